@@ -21,8 +21,8 @@ const MOST_NAMED: usize = 3;
 const MOST_STUCK: usize = 4;
 
 /// Which orbit of a continuum is shown.
-const SHOWN: &str = "Shown is the motion in which a spring that never slips carries no mean force, as in joints that creep, or no more than balance needs \
-    on bodies that contacts alone hold; what is rigid sticks where the search found it, and method `transient` shows what its run led to.";
+const SHOWN: &str = "Reported: the solution that begins at static equilibrium under the constant loads, applied as one ramp. A rigid joint sticks where the \
+    search found it, and method `transient` reports what its run led to.";
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

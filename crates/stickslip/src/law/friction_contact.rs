@@ -11,7 +11,7 @@
 //! with an arctangent slider has no limit for its rate as the load goes to zero.
 
 use super::plane;
-use super::{Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Step, StepLaw, StepSlopes, TANGENTS};
+use super::{Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Reach, Step, StepLaw, StepSlopes, TANGENTS};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -223,11 +223,16 @@ impl StepLaw for FrictionContact {
         out[t] = after;
         Some(out)
     }
-    fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
+    fn holds(&self, (from, z): (&[f64; MOST_DIRECTIONS], &[f64]), Reach { mean, reach }: Reach<'_>) -> bool {
         let t = self.tangents;
+        let closed = self.preload + self.normal * from[t];
         let least = self.preload + self.normal * (mean[t] - reach[t]);
-        let pull = self.tangential * reach[..t].iter().map(|u| u * u).sum::<f64>().sqrt();
-        self.preload > 0.0 && least > 0.0 && pull < self.friction * least
+        let at_mean = (0..t).map(|a| z[a] + self.tangential * (mean[a] - from[a]));
+        let length = |squares: f64| squares.sqrt();
+        let pull =
+            length(at_mean.map(|f| f * f).sum()) + self.tangential * length(reach[..t].iter().map(|u| u * u).sum());
+        // the straight way to the mean lies between two states within the friction cone
+        closed > 0.0 && least > 0.0 && pull < self.friction * least
     }
 }
 

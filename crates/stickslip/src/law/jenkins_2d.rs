@@ -5,7 +5,9 @@
 //! step by Krieg and Key (1977), exact for straight steps.
 
 use super::plane;
-use super::{Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw, Step, StepLaw, StepSlopes};
+use super::{
+    Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, Reach, SharedLaw, Step, StepLaw, StepSlopes,
+};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -109,7 +111,8 @@ impl StepLaw for Jenkins2d {
         forces.copy_from_slice(states);
         Some([force[0], force[1], 0.0])
     }
-    fn holds(&self, _mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
-        self.stiffness * reach[0].hypot(reach[1]) < self.limit
+    fn holds(&self, (from, z): (&[f64; MOST_DIRECTIONS], &[f64]), Reach { mean, reach }: Reach<'_>) -> bool {
+        let at_mean = |a: usize| z[a] + self.stiffness * (mean[a] - from[a]);
+        at_mean(0).hypot(at_mean(1)) + self.stiffness * reach[0].hypot(reach[1]) < self.limit
     }
 }

@@ -76,7 +76,7 @@ pub use pieces::{Piece, Slider};
 pub use prox::{Mean, Prox};
 pub use rate::{Rate, RateLaw, RatePoint};
 pub use relative::{MOST_DIRECTIONS, Relative};
-pub use step::{Step, StepLaw, StepPoint, StepSlopes};
+pub use step::{Reach, Step, StepLaw, StepPoint, StepSlopes};
 pub use stribeck::Stribeck;
 pub use stribeck_arctan::StribeckArctan;
 pub use traits::{Law, LawInfo, SharedLaw};

@@ -32,11 +32,21 @@ pub trait StepLaw {
     ) -> Option<[f64; MOST_DIRECTIONS]> {
         None
     }
-    /// Whether motion that stays within `reach` of the position `mean` (m), where its states were zero, is followed as at rest all the time: force
-    /// and states are linear in it. `false` is always right.
-    fn holds(&self, _mean: &[f64; MOST_DIRECTIONS], _reach: &[f64; MOST_DIRECTIONS]) -> bool {
+    /// Whether the joint sticks throughout a motion that leads straight from `from` (m), where the states are `z`, to
+    /// `mean` (m) and then stays within `reach` (m) of it: force and states are then linear in the motion. `false` is
+    /// always right.
+    fn holds(&self, _from: (&[f64; MOST_DIRECTIONS], &[f64]), _to: Reach<'_>) -> bool {
         false
     }
+}
+
+/// Displacements within `reach` of `mean` along each direction, m.
+#[derive(Debug, Clone, Copy)]
+pub struct Reach<'a> {
+    /// Centre of the motion, m.
+    pub mean: &'a [f64; MOST_DIRECTIONS],
+    /// Largest distance from it, m.
+    pub reach: &'a [f64; MOST_DIRECTIONS],
 }
 
 /// Where the derivatives of a step go: rows of the forces, and rows of the states.
@@ -85,7 +95,7 @@ pub trait Step: Debug + Send + Sync {
         rows: Option<&mut [f64]>,
     );
     /// See [`StepLaw::holds`].
-    fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool;
+    fn holds(&self, from: (&[f64; MOST_DIRECTIONS], &[f64]), to: Reach<'_>) -> bool;
 }
 
 /// Force and states at the end of a step, with derivatives by its arguments: the displacement before along all directions, the one after along
@@ -215,8 +225,8 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
             from = to;
         }
     }
-    fn holds(&self, mean: &[f64; MOST_DIRECTIONS], reach: &[f64; MOST_DIRECTIONS]) -> bool {
-        StepLaw::holds(self, mean, reach)
+    fn holds(&self, from: (&[f64; MOST_DIRECTIONS], &[f64]), to: Reach<'_>) -> bool {
+        StepLaw::holds(self, from, to)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a motion does that is followed in time from rest, where no orbit was found: whether it settles, repeats after several periods, moves on, or
+//! What a motion does that is followed in time from static equilibrium, where no orbit was found: whether it settles, repeats after several periods, moves on, or
 //! does none of these. An orbit to which it settles can be searched for anew from it.
 
 use super::flow::Flow;
@@ -7,6 +7,7 @@ use super::incremental::flow::IncrementalFlow;
 use crate::law::Contact;
 use crate::model::{Axis, System};
 use crate::orbit::{Course, Path, Sample, Symmetry};
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -15,8 +16,11 @@ const LARGEST: usize = 100;
 const JOINTS: usize = 60;
 /// Steps per period: enough for what a motion does, not for its digits.
 const STEPS: usize = 256;
-/// Periods, and how many at the end are looked at.
+/// Periods after which it is looked at for the first time; where it has not settled by then it is followed twice as long,
+/// and again, up to [`MOST_PERIODS`]: that is ten times the decay of a mode with 0.1 % of critical damping.
 const PERIODS: usize = 80;
+const MOST_PERIODS: usize = 1280;
+/// Periods at the end that are looked at.
 const WINDOW: usize = 33;
 /// Periods after which a motion may repeat.
 const REPEATS: usize = 8;
@@ -30,8 +34,8 @@ const MOVED: f64 = 2.0;
 /// Instants of the last period at which contacts are asked.
 const INSTANTS: usize = 128;
 
-/// The course of the motion from rest, and its last period; `None` where no flow in steps follows the system, or where it breaks down.
-pub(crate) fn course(system: &System, omega: f64) -> Option<(Course, Arc<dyn Path>)> {
+/// The course of the motion from a state, and its last period; `None` where no flow in steps follows the system, or where it breaks down.
+pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option<(Course, Arc<dyn Path>)> {
     if system.dofs() > LARGEST || system.joints().len() > JOINTS || Kind::of(system, None) != Kind::Incremental {
         return None;
     }
@@ -39,21 +43,33 @@ pub(crate) fn course(system: &System, omega: f64) -> Option<(Course, Arc<dyn Pat
     flow.count = STEPS;
     let (n, period) = (system.dofs(), TAU / omega);
     flow.set_drive(system, omega);
-    let mut state = vec![0.0; flow.states()];
-    let mut returns = Vec::with_capacity(WINDOW);
-    for count in 1..=PERIODS {
-        flow.keep(count == PERIODS);
+    start.resize(flow.states(), 0.0);
+    let mut state = start;
+    let mut returns = VecDeque::with_capacity(WINDOW);
+    let (mut count, mut next) = (0, PERIODS);
+    loop {
+        count += 1;
+        flow.keep(count == next);
         flow.run(&mut state, period, None).ok()?;
-        if count > PERIODS - WINDOW {
-            returns.push(state[..2 * n].to_vec());
+        if returns.len() == WINDOW {
+            returns.pop_front();
         }
+        returns.push_back(state[..2 * n].to_vec());
+        if count < next {
+            continue;
+        }
+        let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
+        let samples: Vec<_> = (0..INSTANTS).map(|i| path.sample(period * i as f64 / INSTANTS as f64)).collect();
+        let course = classified(system, omega, (count, returns.make_contiguous()), &samples);
+        let may_settle = matches!(course, Course::Settling { .. } | Course::Wanders { .. });
+        if !may_settle || 2 * next > MOST_PERIODS {
+            return Some((course, path));
+        }
+        next *= 2;
     }
-    let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
-    let samples: Vec<_> = (0..INSTANTS).map(|i| path.sample(period * i as f64 / INSTANTS as f64)).collect();
-    Some((classified(system, omega, &returns, &samples), path))
 }
 
-fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[Sample]) -> Course {
+fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64>]), samples: &[Sample]) -> Course {
     let n = system.dofs();
     // displacements, and velocities over Ω
     let unit = |i: usize| if i < n { 1.0 } else { omega };
@@ -70,7 +86,7 @@ fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[Samp
         return if periods == 1 { Course::Settles } else { Course::Repeats { periods } };
     }
     if apart(1) <= CALMS * apart_at(last / 2, 1) && apart_at(last / 2, 1) <= CALMS * apart_at(REPEATS + 1, 1) {
-        return Course::Settling { periods: PERIODS };
+        return Course::Settling { periods };
     }
     let open = |j: usize| {
         samples.iter().filter(|now| now.joints[j].contact == Contact::Open).count() as f64 / samples.len() as f64
@@ -91,7 +107,7 @@ fn classified(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[Samp
         let (way, place) = (farthest.0, farthest.1.to_owned());
         return Course::MovesOn { place, way, periods: last, joint, share };
     }
-    Course::Wanders { periods: PERIODS, joint, share }
+    Course::Wanders { periods, joint, share }
 }
 
 #[cfg(test)]
@@ -122,9 +138,9 @@ mod tests {
     /// alone then balances what is left of the load.
     #[test]
     fn a_block_stays_slides_or_leaves() {
-        assert_eq!(course(&block([2.0, 10.0]), OMEGA).unwrap().0, Course::Settles);
+        assert_eq!(course(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, Course::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
-            let (course, _) = course(&block(load), OMEGA).unwrap();
+            let (course, _) = course(&block(load), OMEGA, Vec::new()).unwrap();
             let Course::MovesOn { ref place, way, periods, share, .. } = course else { panic!("{course}") };
             assert_eq!(place, along);
             let expected = speed * periods as f64 * TAU / OMEGA;
@@ -139,13 +155,13 @@ mod tests {
     fn what_repeats_is_told_from_what_does_not() {
         let system = block([0.0, 10.0]);
         let returns = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
-        let path = course(&system, OMEGA).unwrap().1;
+        let path = course(&system, OMEGA, Vec::new()).unwrap().1;
         let samples = [path.sample(0.0)];
-        let third = classified(&system, OMEGA, &returns(&|k| (k % 3) as f64), &samples);
+        let third = classified(&system, OMEGA, (PERIODS, &returns(&|k| (k % 3) as f64)), &samples);
         assert_eq!(third, Course::Repeats { periods: 3 });
-        let slow = classified(&system, OMEGA, &returns(&|k| (-0.02 * k as f64).exp()), &samples);
+        let slow = classified(&system, OMEGA, (PERIODS, &returns(&|k| (-0.02 * k as f64).exp())), &samples);
         assert_eq!(slow, Course::Settling { periods: PERIODS });
-        let none = classified(&system, OMEGA, &returns(&|k| ((k * k) as f64).sin()), &samples);
+        let none = classified(&system, OMEGA, (PERIODS, &returns(&|k| ((k * k) as f64).sin())), &samples);
         assert!(matches!(none, Course::Wanders { periods: PERIODS, .. }), "{none}");
     }
 }

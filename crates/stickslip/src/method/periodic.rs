@@ -185,7 +185,8 @@ fn settle(
             };
             // the first of them is one return ago
             let repeats = last_states.iter().position(|earlier| distance(earlier) <= REPEATS * residual);
-            hopeless = if settles(&changes, tolerance, returns - count) { 0 } else { hopeless + 1 };
+            let needed = returns_needed(&changes, tolerance);
+            hopeless = if needed <= (returns - count) as f64 { 0 } else { hopeless + 1 };
             if residual > tolerance && (repeats.is_some() || hopeless == HOPELESS) {
                 let (method, omega) = (aim.method, aim.omega);
                 let repeats = repeats.map(|back| back + 1);
@@ -195,6 +196,7 @@ fn settle(
                     returns: count,
                     change: residual,
                     repeats,
+                    needed: Some(count as f64 + needed).filter(|needed| needed.is_finite()),
                     instead: String::new(),
                 });
             }
@@ -241,20 +243,21 @@ const HOPELESS: usize = 3;
 const MOST_REPEATS: usize = 8;
 const REPEATS: f64 = 1e-3;
 
-/// Whether a motion reaches the tolerance within so many more returns if its changes go on to fall as they fell over the last half of all returns.
-fn settles(changes: &[f64], tolerance: f64, more: usize) -> bool {
+/// Returns after which a motion reaches the tolerance if its changes go on to fall as they fell over the last half of all
+/// returns; infinite where they did not fall.
+fn returns_needed(changes: &[f64], tolerance: f64) -> f64 {
     let window = changes.len() / 4;
     let of = |last: usize| changes[changes.len() - last - window..changes.len() - last].iter().sum::<f64>();
     let (earlier, last) = (of(window), of(0));
     if last == 0.0 {
-        return true;
+        return 0.0;
     }
     let decay = last / earlier;
     if decay.is_nan() || decay >= 1.0 {
-        return false;
+        return f64::INFINITY;
     }
     let missing = last * decay / (1.0 - decay);
-    missing <= tolerance || window as f64 * (missing / tolerance).ln() <= more as f64 * -decay.ln()
+    (window as f64 * (missing / tolerance).ln() / -decay.ln()).max(0.0)
 }
 
 /// A change per return below this is rounding.

@@ -12,9 +12,10 @@ use super::guess::Guess;
 use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
 use super::option::{PERIOD, periods, width};
 use super::periodic::{Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
-use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
+use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
 use super::smooth::flow::{Lengths, SmoothFlow};
+use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::stepped::SteppedPath;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
@@ -177,6 +178,8 @@ pub(super) struct Shooter<'a> {
     /// Energy norm below which a state counts as rest, √J.
     rest: f64,
     contracts: bool,
+    /// Where a motion begins; none where no constant load acts.
+    equilibrium: Option<StaticEquilibrium>,
 }
 
 impl ReturnMap for Shooter<'_> {
@@ -242,13 +245,16 @@ impl<'a> Shooter<'a> {
             rest: 0.0,
             // smooth neighbours are passive where the exact laws are
             contracts: system.contracts(),
+            equilibrium: StaticEquilibrium::under_load(system),
         })
     }
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let assembly = self.stepping.assembly();
         let mut state = Guess::new(self.system, omega).state(assembly.n);
-        state.resize(assembly.states(), 0.0);
+        let count = assembly.states() - state.len();
+        let states = states_at(self.equilibrium.as_ref(), self.system, &state[..assembly.n], count);
+        state.extend(states);
         state
     }
 
@@ -581,7 +587,9 @@ impl Solver for Shooter<'_> {
         }
         if self.search == Search::Newton {
             let system = self.system;
-            orbit = relaxed(self, system, orbit, Aim { residual: CLOSED_STEPS, ..aim });
+            let equilibrium = self.equilibrium.clone();
+            let aim = Aim { residual: CLOSED_STEPS, ..aim };
+            orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
         }
         let share = self.share_in(&orbit, rest);
         vibration::relate(&mut orbit.evidence, share);

@@ -182,7 +182,7 @@ pub enum OrbitError {
     /// The motion does not settle.
     #[error(
         "{method} at Ω = {omega:.4} rad/s: after {returns} returns the motion still changes by {change:.1e} from one to the next{}",
-        unsettled(*.repeats, .instead)
+        unsettled(*.repeats, *.needed, .instead)
     )]
     Unsettled {
         /// The method.
@@ -195,6 +195,8 @@ pub enum OrbitError {
         change: f64,
         /// Returns after which it repeats, if it does after a few.
         repeats: Option<usize>,
+        /// Returns after which it would have settled, by its decay so far; `None` where it does not decay.
+        needed: Option<f64>,
         /// What finds orbits without waiting, as words behind a comma; empty where nobody has asked or nothing does.
         instead: String,
     },
@@ -253,8 +255,10 @@ pub enum OrbitError {
         /// What follows such a motion, as words behind a comma; empty where nobody has asked or nothing does.
         instead: String,
     },
-    /// No orbit was found, and a motion that was followed from rest shows what there is instead.
-    #[error("{method} finds no orbit at Ω = {omega:.4} rad/s; followed in time from rest, the motion {course}")]
+    /// No orbit was found, and a motion that was followed from static equilibrium shows what there is instead.
+    #[error(
+        "{method} finds no orbit at Ω = {omega:.4} rad/s; followed in time from static equilibrium, the motion {course}"
+    )]
     NoOrbit {
         /// The method.
         method: &'static str,
@@ -368,8 +372,8 @@ impl std::fmt::Display for Course {
             ),
             Course::Wanders { periods, joint, share } => write!(
                 f,
-                "neither repeats nor settles in {periods} periods{}: no orbit attracts it; press the contacts harder or damp the motion, and look at \
-                 it with kind = \"transient\"",
+                "neither repeats nor settles in {periods} periods{}, which does not prove that there is no orbit; press the contacts harder, \
+                 damp the motion, or look at it with kind = \"transient\"",
                 apart(joint, *share)
             ),
         }
@@ -377,7 +381,8 @@ impl std::fmt::Display for Course {
 }
 
 /// What a motion that does not settle does instead, and what to do about it.
-fn unsettled(repeats: Option<usize>, instead: &str) -> String {
+fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> String {
+    let by_newton = if instead.is_empty() { String::new() } else { format!("{instead}, which does not wait") };
     match repeats {
         // what does not change is settled: the first that can be is the second
         Some(repeats) => {
@@ -385,11 +390,16 @@ fn unsettled(repeats: Option<usize>, instead: &str) -> String {
                 "; it repeats after {repeats} of them: ask for it with {repeats} times the `period` (1 when absent)"
             )
         }
-        None => format!(
-            "; by its decay it does not settle within `periods`: no orbit attracts it, or next to nothing damps it; look at it with \
-             kind = \"transient\"{instead}{}",
-            if instead.is_empty() { "" } else { ", which does not wait" }
-        ),
+        None => match needed {
+            Some(needed) => {
+                format!(
+                    "; by its decay so far it would settle after about {needed:.0} returns: raise `periods`{by_newton}"
+                )
+            }
+            None => {
+                format!("; it does not decay; add damping, or look at it with kind = \"transient\"{by_newton}")
+            }
+        },
     }
 }
 

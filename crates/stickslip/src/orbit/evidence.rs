@@ -48,8 +48,8 @@ pub struct Evidence {
     pub stuck: Vec<String>,
     /// Names of joints of which a part, a slider behind a spring or all, sticks for the whole period of a motion that is not its own mirror image:
     /// where it is relaxed depends on how the motion began, and with it the means, and the amplitudes too where a law knows positions. The orbit
-    /// is then the one in which what sticks behind a spring carries no mean force, as it is where joints creep; with method `transient`
-    /// the one that its motion led to.
+    /// is then the one that begins at static equilibrium under the constant loads
+    /// ([`StaticEquilibrium`](crate::method::StaticEquilibrium)); with method `transient` the one that its motion led to.
     pub history: Vec<String>,
     /// The method that was to find it and did not, where another one did: see [`Auto`](crate::method::auto::Auto).
     pub instead_of: Option<&'static str>,

@@ -32,8 +32,9 @@ use super::drive::Drive;
 use super::guess::Guess;
 use super::option::{PERIOD, periods};
 use super::periodic::{Aim, Closed, ReturnMap, Search, approached};
-use super::relaxed::{Closing, ElasticSlider, relaxed};
 use super::repeated::Afresh;
+use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
+use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver, vibration};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
@@ -111,6 +112,8 @@ pub(crate) struct Exact<'a> {
     /// Periods of the drive after which the motion repeats.
     periods: usize,
     contracts: bool,
+    /// Where a motion begins; none where no constant load acts.
+    equilibrium: Option<StaticEquilibrium>,
 }
 
 impl ReturnMap for Exact<'_> {
@@ -174,6 +177,7 @@ impl<'a> Exact<'a> {
             duration: 0.0,
             periods,
             contracts: system.contracts(),
+            equilibrium: StaticEquilibrium::under_load(system),
         })
     }
 
@@ -207,7 +211,9 @@ impl<'a> Exact<'a> {
         let mechanics = &self.flow.mechanics;
         let guess = Guess::new(self.system, omega);
         let mut state = guess.state(mechanics.n);
-        state.resize(mechanics.states(), 0.0);
+        let count = mechanics.states() - state.len();
+        let states = states_at(self.equilibrium.as_ref(), self.system, &state[..mechanics.n], count);
+        state.extend(states);
         state
     }
 }
@@ -238,7 +244,8 @@ impl Solver for Exact<'_> {
         let mut orbit = self.found(start, search, aim)?;
         if search == Search::Newton {
             let system = self.system;
-            orbit = relaxed(self, system, orbit, aim);
+            let equilibrium = self.equilibrium.clone();
+            orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
         } else {
             // closed forms have all digits of a vibration, and only whoever waits must know how large it is
             let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };

@@ -9,6 +9,7 @@ use super::recent::{RECENT, Recent};
 use super::rest::Rest;
 use super::solve::Lost;
 use super::sparse::{self, Sparse};
+use super::static_equilibrium::{StaticEquilibrium, static_equilibrium};
 use super::storage::{MEMORY, check_memory, level_memory};
 use super::{coupled, path, work};
 use crate::method::evidence::Judge;
@@ -51,6 +52,8 @@ pub(super) struct Balance {
     /// Whether a law was met whose force samples see as a jump.
     pub(super) steep: bool,
     pub(super) judge: Judge,
+    /// The state of static equilibrium: displacements, velocities (zero), states of the joints.
+    pub(super) static_start: Option<Vec<f64>>,
     pub(super) levels: BTreeMap<usize, Level>,
     /// Points in a row, the last ones, whose searches took long and found nothing, see [`budget::ENOUGH`].
     pub(super) in_vain: usize,
@@ -77,8 +80,9 @@ impl Balance {
         if let Some(error) = MethodError::empty(NAME, &system) {
             return Err(error);
         }
-        let (ports, around) = Ports::of_sector(&system)?;
+        let (mut ports, mut around) = Ports::of_sector(&system)?;
         let rest = Rest::new(&system, &ports);
+        let system = Arc::new(system);
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         let banded = Sparse::new(&system, &ports, &[1]);
@@ -86,6 +90,15 @@ impl Balance {
         let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports, steep);
         let bytes = level_memory(banded.as_ref(), &ports, &rest, (harmonics.len(), samples));
         check_memory(bytes, &ports, (harmonics.len(), periods))?;
+        let mut static_start = None;
+        if kept.has(0)
+            && let Some(StaticEquilibrium { orbit, states }) =
+                static_equilibrium(&system, (&ports, around.as_ref()), &rest)
+        {
+            ports.begin_at(&states);
+            around.iter_mut().for_each(|around| around.begin_at(&states));
+            static_start = Some(orbit.start);
+        }
         Ok(Balance {
             method,
             periods,
@@ -98,7 +111,8 @@ impl Balance {
             first,
             steep,
             judge: Judge::new(&system),
-            system: Arc::new(system),
+            system,
+            static_start,
             levels: BTreeMap::new(),
             in_vain: 0,
             recent: VecDeque::new(),
@@ -363,9 +377,7 @@ impl Solver for Balance {
         let warm = self.near(start, omega);
         let found = match self.from(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
-                let drifts = matches!(error, OrbitError::Drift { .. });
-                let by_time = |balance: &mut Self| balance.by_time(omega, drifts).ok_or(error);
-                self.by_its_course(omega).unwrap_or_else(|| by_time(self))
+                self.by_its_course(omega).unwrap_or_else(|| self.by_time(omega).ok_or(error))
             }
             found => found,
         };

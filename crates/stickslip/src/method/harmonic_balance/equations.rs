@@ -64,6 +64,8 @@ pub(super) struct Level {
     pub linear: Vec<Complex64>,
     /// Mean of the imposed motion along the axes, m.
     imposed: Vec<f64>,
+    /// Displacements along the axes in static equilibrium, m; empty where none is known.
+    pub equilibrium: Vec<f64>,
     /// Compliances in series with the axes, m/N.
     series: Vec<f64>,
     /// Stiffness of closed contacts along the axes (N/m) that the structure has for the mean; empty if it is held without them.
@@ -123,8 +125,6 @@ pub(super) struct Solution {
     pub c: Vec<Complex64>,
     /// Harmonics of the forces along them, N.
     pub force: Vec<Complex64>,
-    /// Of laws whose springs are relaxed at displacement zero, see [`Alternation::relaxed_at_zero`].
-    pub relaxed_at_zero: bool,
     pub residual: f64,
     pub iterations: usize,
 }
@@ -139,7 +139,6 @@ impl Solution {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
         (self.residual, self.iterations) = (other.residual, other.iterations);
-        self.relaxed_at_zero = other.relaxed_at_zero;
     }
 }
 
@@ -187,6 +186,7 @@ impl Level {
             holding: 0.0,
             linear: vec![ZERO; nh * axes],
             imposed: vec![0.0; axes],
+            equilibrium: ports.equilibrium().to_vec(),
             series: ports.iter().flat_map(|port| vec![port.series; port.axes]).collect(),
             springs: Vec::new(),
             acting: Vec::new(),
@@ -279,7 +279,7 @@ impl Level {
     /// The forces of motion ports, and their derivatives.
     pub(super) fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, ease: Ease, slopes: Slopes) {
         let nh = self.harmonics().len();
-        self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
+        self.alternation.static_share = self.load(ease) / ease.limits;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
             let wanted = slopes == Slopes::All || (slopes == Slopes::Cheap && !port.marches());
@@ -417,11 +417,13 @@ impl Level {
         !self.springs.is_empty()
     }
 
-    /// Rest on closed contacts under so many times the constant loads.
+    /// Static equilibrium under so many times the constant loads; where none is known, that of closed contacts.
     pub fn at_rest(&self, share: f64) -> Solution {
         let nh = self.harmonics().len();
         let mut motion = Solution::rest(self.linear.len());
-        motion.c.iter_mut().zip(&self.linear).step_by(nh).for_each(|(c, linear)| *c = linear * share);
+        let known = &self.equilibrium;
+        let still = |i: usize| known.get(i / nh).map_or(self.linear[i], |u| Complex64::new(*u, 0.0));
+        motion.c.iter_mut().enumerate().step_by(nh).for_each(|(i, c)| *c = still(i) * share);
         motion
     }
 
@@ -473,7 +475,7 @@ impl Level {
         if self.linearised && port.marches() {
             self.alternation.begin = self.states[p].forgotten();
         }
-        self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
+        self.alternation.static_share = 1.0;
         let range = port.first * nh..(port.first + port.axes) * nh;
         self.alternation.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
     }

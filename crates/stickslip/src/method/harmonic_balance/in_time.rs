@@ -15,6 +15,8 @@ use std::f64::consts::TAU;
 const MOST_FOLLOWED: usize = 8;
 /// Degrees of freedom up to which it is followed to find an orbit: steps of integrations multiply full matrices.
 const MOST_DOFS_IN_TIME: usize = 60;
+/// Series that are tried from a motion that has settled, each with twice the harmonics of the one before.
+const LONGER: usize = 3;
 /// Returns of a motion from the state of a neighbouring orbit before it is read: what it brings along from there, Newton's method does away with.
 const LED: usize = 1;
 
@@ -43,7 +45,7 @@ impl Balance {
 
     /// Where the search has found no orbit: from the motion that rest comes to in time, `None` where it is not followed. Of frequencies at which there is
     /// more than one orbit it leads to one that attracts. Where springs that carry no mean let it drift, friction carries what it can.
-    pub(super) fn by_time(&mut self, omega: f64, drifts: bool) -> Option<Orbit> {
+    pub(super) fn by_time(&mut self, omega: f64) -> Option<Orbit> {
         // twice the harmonics, since with few of them there may be a motion that leads nowhere
         let top = self.method.harmonics.unwrap_or(self.kept.double(self.first));
         if self.periods > 1 || self.system.dofs() > MOST_DOFS_IN_TIME || self.tried_in_time >= MOST_FOLLOWED {
@@ -51,9 +53,14 @@ impl Balance {
         }
         self.tried_in_time += 1;
         self.level(top, omega).ok()?;
-        let path = self.judge.approach(&self.system, omega, vec![0.0; 2 * self.system.dofs()], APPROACH)?;
-        let motion = Solution { relaxed_at_zero: drifts, ..self.series_of(&*path, top, omega)? };
+        let path = self.judge.approach(&self.system, omega, self.standing(), APPROACH)?;
+        let motion = self.series_of(&*path, top, omega)?;
         self.from(top, omega, Some((top, motion))).ok()
+    }
+
+    /// The state of static equilibrium, or that of all things unloaded where there is none.
+    fn standing(&self) -> Vec<f64> {
+        self.static_start.clone().unwrap_or_else(|| vec![0.0; 2 * self.system.dofs()])
     }
 
     /// The harmonics of a motion that was followed over a period.
@@ -95,12 +102,22 @@ impl Balance {
         if self.followed.len() >= MOST_FOLLOWED {
             return None;
         }
-        let (course, path) = course(&self.system, omega)?;
-        if matches!(course, Course::Settles | Course::Settling { .. })
-            && let Some(motion) = self.series_of(&*path, top, omega)
-            && let Ok(orbit) = self.from(top, omega, Some((top, motion)))
-        {
-            return Some(Ok(orbit));
+        let (course, path) = course(&self.system, omega, self.standing())?;
+        if matches!(course, Course::Settles | Course::Settling { .. }) {
+            // contacts that part and close again may have no solution with few harmonics
+            let mut top = top;
+            for _ in 0..LONGER {
+                let found = self.level(top, omega).is_ok().then(|| self.series_of(&*path, top, omega)).flatten();
+                if let Some(motion) = found
+                    && let Ok(orbit) = self.from(top, omega, Some((top, motion)))
+                {
+                    return Some(Ok(orbit));
+                }
+                if self.method.harmonics.is_some() {
+                    break;
+                }
+                top = self.kept.double(top);
+            }
         }
         self.followed.push((omega, course.clone()));
         no_orbit(course)

@@ -2,6 +2,7 @@
 //!
 //! - `ports`: from the harmonics of relative motions to those of the laws' forces, with the exact derivative;
 //! - `rest`: the receptance of the linear rest, in closed form from its modes;
+//! - `static_equilibrium`: where every vibration begins: the equilibrium under the constant loads;
 //! - `closed`: the mean of bodies that nothing but contacts holds;
 //! - `equations`: those along the joints, and their derivative;
 //! - `linear`: their derivative as a matrix; `coupled`: steps by its products;
@@ -44,6 +45,7 @@ mod rest;
 mod sampling;
 mod solve;
 mod sparse;
+mod static_equilibrium;
 mod storage;
 mod subharmonic;
 mod uncoupled;
@@ -60,6 +62,7 @@ use balance::Balance;
 pub(crate) use branch::BranchEquations;
 pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
 pub use options::{HarmonicBalance, NAME};
+pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
 pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 

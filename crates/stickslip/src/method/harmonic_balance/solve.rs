@@ -42,16 +42,10 @@ pub(super) const HALVINGS: usize = 7;
 pub(super) const GROWS: f64 = 100.0;
 /// Share of its length by which a step has to shorten the residual.
 pub(super) const SHORTENS: f64 = 1e-3;
-/// Mean motion of one step where contacts alone hold, relative to the motion.
-const REACH: f64 = 2.0;
 /// Mean beyond which such a motion has left its contacts, relative to the motion: what stands on them goes about as far as it swings.
 const AWAY: f64 = 10.0;
 /// Shares of the stiffness of closed contacts that hold the mean back in a step which goes farther.
 const HELD: [f64; 5] = [1e-3, 1e-2, 0.1, 1.0, 10.0];
-/// What is left of that reach after a step that led away.
-const SHRINK: f64 = 0.25;
-/// Steps that have to be held back, at most, where springs carry no mean.
-const MOST_FLAT: usize = 8;
 /// Multiplications of an evaluation, per sample and axis: transforms to and fro, and the law. Measured: 15 µs for 2048 samples.
 const EVALUATED: f64 = 40.0;
 /// The same of friction that falls with velocity, which is sought at six instants of a sample. Measured: 0.4 µs.
@@ -171,7 +165,6 @@ impl Level {
         let (mut mark, mut waited) = (residual, 0);
         // forces that wander are found by proximal points
         let hope = if ports.has_forces() { PATIENCE } else { most };
-        let (mut reach, mut flat) = (REACH * self.extent(motion), 0);
         for _ in 0..most {
             let found = residual <= solved || (waited > PATIENCE && least <= ROUNDED);
             if found || self.is_exhausted(ports) || (waited > hope && least < f64::INFINITY) {
@@ -181,7 +174,9 @@ impl Level {
                 rough_slopes = self.follow_slopes(ports, omega, motion, (ease, sketched));
             }
             let near = Near { length, residual, sketched: rough_slopes || rough, kept };
-            let Some(held) = self.bounded_step(ports, omega, ease, near, reach) else { break };
+            if !self.newton_step(ports, omega, ease, near) {
+                break;
+            }
             motion.iterations += 1;
             self.before.copy(motion);
             let beaten = if rough { recent.iter().fold(residual, |most, r| most.max(*r)) } else { residual };
@@ -206,14 +201,11 @@ impl Level {
                 }
                 fraction *= 0.5;
             }
+            if after >= beaten && self.stands() {
+                after = self.held_step(ports, (omega, ease), motion, near);
+            }
             if !after.is_finite() || after > GROWS * residual {
                 break;
-            }
-            // beyond the reach forces do not follow the mean, and the way back from too long a step is none either
-            reach *= if after > residual { SHRINK } else { 1.0 };
-            flat += usize::from(held);
-            if flat > MOST_FLAT && !motion.relaxed_at_zero {
-                break; // no friction carries a mean here
             }
             sketched &= after < SKETCH * residual || residual > NEAR;
             kept = rough_slopes && after < KEPT * residual && self.linearised;
@@ -250,44 +242,38 @@ impl Level {
         }
     }
 
-    /// The Newton step into `self.step`. Where contacts alone hold, the mean goes no farther at once than `reach`, m: a step that opens all of them, or
-    /// slips in all, knows of nothing that brings it back. Such a step is made again as if springs held the mean where it is. Says whether it was,
-    /// `None` if there is no step.
-    fn bounded_step(&mut self, ports: &Ports, omega: f64, ease: Ease, at: Near, reach: f64) -> Option<bool> {
-        if !self.newton_step(ports, omega, ease, at) {
-            return None;
-        }
-        let mut held = 0.0;
-        if self.stands() {
-            for share in HELD {
-                if self.mean_step(ports, at.length) <= reach {
-                    break;
-                }
-                for (p, port) in ports.iter().enumerate() {
-                    self.add_springs(p, port, share - held);
-                }
-                self.linearised = false;
-                held = share;
-                if !self.newton_step(ports, omega, ease, Near { kept: false, ..at }) {
-                    return None;
-                }
+    /// A step from `self.before` as if springs held the mean where it is, into `motion`: where contacts alone hold a body, a
+    /// step that opens all of them, or slips in all, knows of nothing that brings it back. The first of these steps, from soft
+    /// springs to stiff ones, that comes closer. Returns the residual that it leaves.
+    fn held_step(&mut self, ports: &Ports, (omega, ease): (f64, Ease), motion: &mut Solution, at: Near) -> f64 {
+        let mut after = f64::INFINITY;
+        for share in HELD {
+            // the residual and the derivatives of where the step begins
+            motion.copy(&self.before);
+            self.evaluate(ports, omega, motion, ease, at.length, Slopes::Cheap);
+            self.follow_slopes(ports, omega, motion, (ease, false));
+            for (p, port) in ports.iter().enumerate() {
+                self.add_springs(p, port, share);
+            }
+            self.linearised = false;
+            if !self.newton_step(ports, omega, ease, Near { kept: false, ..at }) {
+                return f64::INFINITY;
+            }
+            self.advance(ports, motion, 1.0, at.length);
+            after = self.evaluate(ports, omega, motion, ease, at.length, Slopes::Cheap);
+            if after < at.residual {
+                break;
             }
         }
-        Some(held > 0.0)
+        after
     }
 
-    /// How far the step leads the mean along any axis, m.
-    fn mean_step(&self, ports: &Ports, length: f64) -> f64 {
-        let nh = self.harmonics().len();
-        let motions = ports.iter().filter(|port| !port.is_force());
-        motions.flat_map(|port| port.range()).map(|q| self.step[2 * q * nh].abs() * length).fold(0.0, f64::max)
-    }
-
-    /// How far motion on these contacts goes, m: that at rest, that without friction, and the harmonics of this one.
+    /// How far motion on these contacts goes, m: static equilibrium, the motion without friction, the harmonics of this one.
     fn extent(&self, motion: &Solution) -> f64 {
         let nh = self.harmonics().len();
         let swing = motion.c.iter().enumerate().filter(|(i, _)| i % nh > 0).map(|(_, c)| c.norm());
-        self.linear.iter().map(|c| c.norm()).chain(swing).fold(0.0, f64::max)
+        let still = self.at_rest(1.0).c.into_iter().step_by(nh).map(|c| c.norm());
+        self.linear.iter().map(|c| c.norm()).chain(swing).chain(still).fold(0.0, f64::max)
     }
 
     /// Whether the mean of a motion that contacts alone hold has left them.
@@ -426,28 +412,16 @@ impl Level {
                 Err(lost) => nearest = lost.residual,
             }
         }
-        if self.stands() {
-            // friction that stuck contacts carry in the mean
-            motion = Solution { iterations: motion.iterations, relaxed_at_zero: true, ..self.at_rest(1.0) };
-            let found = self.newton(ports, omega, &mut motion, GIVEN, (ITERATIONS, Goal::Solved));
-            let away = self.is_away(&motion);
-            if found.is_ok() && !away {
-                return Ok(motion);
-            }
-            return match self.lower_limits(ports, omega, &mut motion) {
-                Ok(()) if !self.is_away(&motion) => Ok(motion),
-                Ok(()) => Err(Lost { away: true, ..Lost::after(motion.iterations, motion.residual) }),
-                Err(lost) => Err(Lost { away: away || lost.away, ..lost }),
-            };
+        let away = self.is_away(&motion);
+        match self.lower_limits(ports, omega, &mut motion) {
+            Ok(()) if !self.is_away(&motion) => Ok(motion),
+            Ok(()) => Err(Lost { away: true, ..Lost::after(motion.iterations, motion.residual) }),
+            Err(lost) => Err(Lost { away: away || lost.away, residual: lost.residual.min(nearest), ..lost }),
         }
-        let found = self.lower_limits(ports, omega, &mut motion);
-        found.map_err(|lost| Lost { residual: lost.residual.min(nearest), ..lost })?;
-        Ok(motion)
     }
 
     /// From slip limits that hold to those that are given.
     fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
-        let relaxed_at_zero = motion.relaxed_at_zero;
         let mut good = Solution { iterations: motion.iterations, ..self.unhindered() };
         let mut limits: f64 = 1.0;
         // where everything sticks the equations are linear
@@ -460,7 +434,7 @@ impl Level {
             }
             let iterations = good.iterations;
             good = match self.stands() {
-                true => Solution { iterations, relaxed_at_zero, ..self.at_rest(limits) },
+                true => Solution { iterations, ..self.at_rest(limits) },
                 false => Solution { iterations, ..self.unhindered() },
             };
             let most = if self.stands() { STICKS } else { ITERATIONS };

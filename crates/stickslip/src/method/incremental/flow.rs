@@ -8,7 +8,7 @@ use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
 use crate::method::periodic::norm;
-use crate::method::relaxed::ElasticSlider;
+use crate::method::residual_traction::ElasticSlider;
 use crate::method::stepped::SteppedPath;
 use crate::method::steps::{Steps, extrapolate};
 use crate::method::{Breakdown, MethodError};

@@ -52,8 +52,46 @@ pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
     pieces(law).into_iter().filter_map(slider).collect()
 }
 
+/// The states of a law that is moved slowly along a straight way, within a second: a step of a law whose way alone counts, as
+/// many small ones of one that knows rates. They stay as they were where a step has no solution.
+pub(crate) fn moved(
+    law: &SharedLaw,
+    (directions, state_scale): (usize, f64),
+    (from, states): ([f64; MOST_DIRECTIONS], &[f64]),
+    to: [f64; MOST_DIRECTIONS],
+) -> Vec<f64> {
+    let placed = PlacedLaw {
+        joint: String::new(),
+        law: law.clone(),
+        first_axis: 0,
+        directions,
+        first_state: 0,
+        states: states.len(),
+        state_scale,
+    };
+    let mut follower = Follower::new(&placed);
+    let steps = if follower.view == View::Rate { SLOW_STEPS } else { 1 };
+    let at = |step: usize| Relative {
+        displacement: std::array::from_fn(|a| from[a] + (to[a] - from[a]) * step as f64 / steps as f64),
+        velocity: std::array::from_fn(|a| to[a] - from[a]),
+    };
+    let mut z = states.to_vec();
+    for step in 1..=steps {
+        let begin = At { motion: at(step - 1), z: &z };
+        follower.begin(law, begin);
+        if !follower.advance(law, begin, &at(step), 1.0 / steps as f64) {
+            return states.to_vec();
+        }
+        z.clone_from(&follower.state);
+    }
+    z
+}
+
+/// Steps of a slow way of a law that knows rates: the trapezoidal rule then errs by less than 1e-6 of its reach.
+const SLOW_STEPS: usize = 2000;
+
 /// States that a law has here, and their size.
-pub(super) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
+pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     match view(law)? {
         View::Pieces => {
             let sliders = pieces(law).iter().filter(|piece| matches!(piece, Piece::Slider(_))).count();

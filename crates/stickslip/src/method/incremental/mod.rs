@@ -10,5 +10,5 @@
 
 mod carried;
 pub(crate) mod flow;
-mod law;
+pub(super) mod law;
 mod step;

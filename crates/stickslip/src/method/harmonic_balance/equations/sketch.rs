@@ -34,7 +34,7 @@ impl Level {
         (ease, sketched): (Ease, bool),
     ) -> bool {
         let nh = self.harmonics().len();
-        self.alternation.relaxed_at_zero = motion.relaxed_at_zero;
+        self.alternation.static_share = self.load(ease) / ease.limits;
         let mut any = false;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.marches()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
@@ -44,7 +44,7 @@ impl Level {
             let mut rough = false;
             if let Some(sketch) = self.sketch.as_mut().filter(|_| sketched && port.steps()) {
                 let image = &mut self.image[..range.len()];
-                sketch.relaxed_at_zero = alternation.relaxed_at_zero;
+                sketch.static_share = alternation.static_share;
                 sketch.begin.clone_from(&self.states[p]);
                 sketch.repeats = ALMOST;
                 sketch.respond(port, (omega, ease.limits), c, image, Some(&mut *slot));

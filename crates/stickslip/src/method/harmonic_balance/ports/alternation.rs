@@ -1,6 +1,7 @@
 //! The alternation between frequency and time: the signals of a port over a period, and what its kernels have in common.
 
 use super::memory::REPEATS;
+use super::{Port, StaticState};
 use crate::law::MOST_DIRECTIONS;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -11,9 +12,9 @@ pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// The transform's memory for one number of harmonics and samples.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Alternation {
-    /// Springs behind sliders are relaxed at displacement zero, and not where the mean of the motion is: they then carry mean forces from the first
-    /// movement on, as far as their limits allow.
-    pub relaxed_at_zero: bool,
+    /// Factor of the joints' [`StaticState`](super::StaticState): the share of the constant loads in the units in which
+    /// laws are evaluated.
+    pub static_share: f64,
     /// Steps that laws with a memory were marched, in the present search.
     pub marched: usize,
     /// Distance of the states of these from those a period later, relative to their size, at which they repeat.
@@ -83,7 +84,7 @@ impl Alternation {
         let three = || std::array::from_fn(|_| vec![0.0; samples]);
         let top = harmonics.last().copied().unwrap_or(0);
         Alternation {
-            relaxed_at_zero: false,
+            static_share: 1.0,
             marched: 0,
             repeats: REPEATS,
             fourier: Fourier::new(samples),
@@ -126,9 +127,10 @@ impl Alternation {
         self.fourier.synthesise(&self.pairs, &mut self.signal);
     }
 
-    /// Where springs behind sliders are relaxed in a motion of these harmonics along an axis, m.
-    pub(super) fn relaxed(&self, harmonics: &[usize], c: &[Complex64]) -> f64 {
-        if harmonics[0] == 0 && !self.relaxed_at_zero { c[0].re } else { 0.0 }
+    /// Where the joint of a port is before it vibrates: displacements (m) along its axes, and states.
+    pub(super) fn at_rest(&self, port: &Port) -> ([f64; MOST_DIRECTIONS], Vec<f64>) {
+        let StaticState { displacement, states } = &port.static_state;
+        (displacement.map(|u| u * self.static_share), states.iter().map(|z| z * self.static_share).collect())
     }
 
     /// Any harmonics below half of the samples of the forces that were sampled last along an axis.

@@ -18,9 +18,8 @@ pub(in super::super) struct Interval {
 /// What the offset moves with.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum Anchor {
+    /// Nothing: the slider has not slipped since static equilibrium.
     Nothing,
-    /// The mean of the motion: the slider was never moved.
-    Mean,
     /// The motion at a phase, rad.
     At(f64),
 }

@@ -5,7 +5,7 @@
 //! side by side by their limits.
 
 use super::sliders::Part;
-use super::{Kernel, Member, Port, Ports, Rigid, Times};
+use super::{Kernel, Member, Port, Ports, Rigid, StaticState, Times};
 use crate::law::{Piece, Slider};
 use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
@@ -58,7 +58,10 @@ impl Gathered {
         let (first, axes) = (self.ports.axes.len(), joint.axes().len());
         self.ports.axes.extend((0..axes).map(|a| (j, a)));
         let members = vec![Member { joint: j, factor: 1.0, share: 1.0 }];
-        self.ports.list.push(Port { members, first, axes, series, scale, least_penalty, kernel });
+        let mut port =
+            Port { members, first, axes, series, scale, least_penalty, static_state: StaticState::default(), kernel };
+        port.static_state.states = vec![0.0; port.states()];
+        self.ports.list.push(port);
     }
 
     /// One port for elastic sliders and stops, and one for rigid sliders: both move alike.

@@ -3,8 +3,8 @@
 //! A step makes states and forces of the states before it and of its inputs, which are linear in the harmonics of the motion. The states
 //! `z` at t = 0 repeat if `z = F(z)` over the period: Newton's method with the product `Π` of the steps' derivatives, or more periods where
 //! it does not help. By a harmonic of the motion, `δz = Π δz + δq`. In directions in which nothing is forgotten, as in a contact that
-//! sticks all the time, `1 - Π` is singular: there states and derivatives stay what they were when the joint was first moved
-//! from its mean position.
+//! sticks all the time, `1 - Π` is singular: there states and derivatives are those of a joint that was moved straight from
+//! static equilibrium to where the period begins.
 
 use super::alternation::{Alternation, share};
 use super::memory::{Memory, REPEATS, at_once};
@@ -52,14 +52,8 @@ pub(super) trait March {
     /// if it is known.
     /// False if some step has no solution.
     fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
-    /// The first movement, from the mean position of a joint that has not been moved to sample 0.
-    fn first(
-        &mut self,
-        before: &[f64],
-        after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
-        rows: Option<&mut [f64]>,
-    ) -> bool;
+    /// The first movement, straight from static equilibrium to sample 0.
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
 }
 
 impl Alternation {
@@ -94,7 +88,7 @@ impl Alternation {
             z.copy_from_slice(&known.state);
         } else {
             let mut force = [0.0; MOST_DIRECTIONS];
-            if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, None) {
+            if !march.first(z.as_mut_slice(), &mut force, None) {
                 return None;
             }
         }
@@ -436,7 +430,7 @@ impl Alternation {
         first.resize((m + d) * width(march), 0.0);
         let mut z = DVector::zeros(m);
         let mut force = [0.0; MOST_DIRECTIONS];
-        if !march.first(&vec![0.0; m], z.as_mut_slice(), &mut force, Some(first)) {
+        if !march.first(z.as_mut_slice(), &mut force, Some(first)) {
             return None;
         }
         let forces = self.force.clone();

@@ -63,6 +63,15 @@ pub(super) struct Member {
     pub share: f64,
 }
 
+/// Displacements and states of a joint in static equilibrium under the constant loads, where every vibration begins.
+#[derive(Debug, Clone, Default)]
+pub(super) struct StaticState {
+    /// Along the axes of the port, m.
+    pub displacement: [f64; MOST_DIRECTIONS],
+    /// Internal states of its law, or the forces of its sliders (N); none where the law has none.
+    pub states: Vec<f64>,
+}
+
 /// A relative motion along one to three axes with what acts along it: that of a joint, of several that move alike, or of their inner sliders behind
 /// springs.
 #[derive(Debug, Clone)]
@@ -79,6 +88,8 @@ pub(super) struct Port {
     pub scale: f64,
     /// The penalty above which its resolvent is single-valued, N s/m.
     pub least_penalty: f64,
+    /// Where its joint is before it vibrates.
+    pub static_state: StaticState,
     kernel: Kernel,
 }
 
@@ -192,6 +203,16 @@ impl Port {
         self.stateful().map(|_| self.scale / self.stiffness()).filter(|layer| layer.is_finite())
     }
 
+    /// Internal states of a motion port.
+    fn states(&self) -> usize {
+        match &self.kernel {
+            Kernel::Sliders(parts) => parts.iter().filter(|part| matches!(part, Part::Slider { .. })).count(),
+            Kernel::Step(law) => law.step().map_or(0, |step| step.states()),
+            Kernel::Rate(law) => law.rate().map_or(0, |rate| rate.states()),
+            Kernel::Rigid(_) | Kernel::Prox(_) => 0,
+        }
+    }
+
     /// The law, if its states are followed.
     fn stateful(&self) -> Option<&SharedLaw> {
         match &self.kernel {
@@ -227,6 +248,8 @@ pub(super) struct Ports {
     /// Joint and number within it of every axis: of several joints the first.
     axes: Vec<(usize, usize)>,
     wave: Option<Cyclic>,
+    /// Displacements along all axes in static equilibrium, m; empty where none is known.
+    equilibrium: Vec<f64>,
 }
 
 impl std::ops::Deref for Ports {
@@ -269,6 +292,23 @@ impl Ports {
             }));
         }
         Ok((first, Some(all)))
+    }
+
+    /// Displacements along all axes in static equilibrium, m; empty where none is known.
+    pub fn equilibrium(&self) -> &[f64] {
+        &self.equilibrium
+    }
+
+    /// Begins every vibration at these states, one for each port; of a ring they are those of its first sector.
+    pub fn begin_at(&mut self, states: &[StaticState]) {
+        let of_ports = self.list.iter().zip(states.iter().cycle());
+        self.equilibrium = of_ports.flat_map(|(port, state)| state.displacement[..port.axes].to_vec()).collect();
+        for (port, state) in self.list.iter_mut().zip(states.iter().cycle()).filter(|(port, _)| !port.is_force()) {
+            port.static_state.displacement = state.displacement;
+            if state.states.len() == port.states() {
+                port.static_state.states.clone_from(&state.states);
+            }
+        }
     }
 
     /// The wave in which the other sectors follow, if these are the ports of the first one alone.
@@ -337,15 +377,15 @@ impl Alternation {
             }
         }
         match &port.kernel {
-            Kernel::Sliders(parts) => self.slide(parts, &motion, force, tangent),
+            Kernel::Sliders(parts) => self.slide(parts, &port.static_state, &motion, force, tangent),
             Kernel::Rate(law) => {
                 if let Some(rate) = law.rate() {
-                    self.rate(rate, port.axes, omega, &motion, force, tangent);
+                    self.rate(rate, port, omega, &motion, force, tangent);
                 }
             }
             Kernel::Step(law) => {
                 if let Some(step) = law.step() {
-                    self.step(step, port.axes, &motion, force, tangent);
+                    self.step(step, port, &motion, force, tangent);
                 }
             }
             Kernel::Rigid(_) | Kernel::Prox(_) => {}
@@ -391,13 +431,13 @@ impl Alternation {
     /// Samples of the forces of a port in a motion that has been found, see [`Alternation::force`].
     pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
         if let Kernel::Sliders(parts) = &port.kernel {
-            return self.sample_slides(parts, c);
+            return self.sample_slides(parts, &port.static_state, c);
         }
         let mut out = vec![ZERO; c.len()];
         if let Kernel::Step(law) = &port.kernel
             && let Some(step) = law.step()
         {
-            self.step_by_step(step, port.axes, c, &mut out, None);
+            self.step_by_step(step, port, c, &mut out, None);
         } else if port.is_force() {
             self.image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
         } else {

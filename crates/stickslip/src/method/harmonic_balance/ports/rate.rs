@@ -6,6 +6,7 @@
 //! of the state's reach per sample), and no stiffness makes it ring. Where a rate has a kink, the step over it has order 2.
 //! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5.
 
+use super::Port;
 use super::alternation::Alternation;
 use super::march::March;
 use crate::law::{MOST_DIRECTIONS, Rate, RatePoint, Relative};
@@ -23,7 +24,7 @@ const SOLVED: f64 = 1e-9;
 const RADAU: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 /// Share of the step that is left at the first stage.
 const LEFT: f64 = 2.0 / 3.0;
-/// Before the first period the joint is moved from its mean position to where the period begins, in this share of a period.
+/// Before the first period the joint is moved from static equilibrium to where the period begins, in this share of a period.
 const LEAD: f64 = 0.25;
 
 impl Alternation {
@@ -31,13 +32,13 @@ impl Alternation {
     pub(super) fn rate(
         &mut self,
         rate: &dyn Rate,
-        axes: usize,
+        port: &Port,
         omega: f64,
         c: &[Complex64],
         force: &mut [Complex64],
         tangent: Option<&mut [f64]>,
     ) {
-        let nh = self.harmonics.len();
+        let (axes, nh) = (port.axes, self.harmonics.len());
         let turn = |h: usize| Complex64::new(0.0, h as f64 * omega);
         for a in 0..axes {
             let c = &c[a * nh..(a + 1) * nh];
@@ -47,7 +48,7 @@ impl Alternation {
             self.velocity[a].copy_from_slice(&self.signal);
         }
         if rate.states() > 0 {
-            return self.integrate(rate, axes, omega, c, force, tangent);
+            return self.integrate(rate, port, omega, c, force, tangent);
         }
         self.state.clear();
         self.reserve_slopes(2 * axes * axes);
@@ -101,13 +102,14 @@ impl Alternation {
     fn integrate(
         &mut self,
         rate: &dyn Rate,
-        axes: usize,
+        port: &Port,
         omega: f64,
         c: &[Complex64],
         force: &mut [Complex64],
         tangent: Option<&mut [f64]>,
     ) {
-        let (n, nh) = (self.samples(), self.harmonics.len());
+        let (n, nh, axes) = (self.samples(), self.harmonics.len(), port.axes);
+        let (rest, at_rest) = self.at_rest(port);
         let angle = TAU / n as f64;
         let mut stages: [[Vec<f64>; MOST_DIRECTIONS]; 2] = Default::default();
         for a in 0..axes {
@@ -121,7 +123,6 @@ impl Alternation {
         }
         let displacement = std::mem::take(&mut self.displacement);
         let velocity = std::mem::take(&mut self.velocity);
-        let relaxed = |a: usize| self.relaxed(&self.harmonics, &c[a * nh..(a + 1) * nh]);
         let states = rate.states();
         let mut march = RateMarch {
             rate,
@@ -130,8 +131,8 @@ impl Alternation {
             length: angle / omega,
             at: [&displacement, &velocity],
             stages: &stages,
-            relaxed: std::array::from_fn(|a| if a < axes { relaxed(a) } else { 0.0 }),
-            follows_mean: !self.relaxed_at_zero,
+            rest,
+            at_rest,
             points: [RatePoint::new(axes, states), RatePoint::new(axes, states)],
             stage: DVector::zeros(2 * states),
             frequency: self.by_frequency.is_some(),
@@ -155,9 +156,9 @@ struct RateMarch<'a> {
     at: [&'a Signals; 2],
     /// The same at the first stage of the step that ends at the sample.
     stages: &'a [Signals; 2],
-    /// Where the first movement begins, and whether that is the mean.
-    relaxed: [f64; MOST_DIRECTIONS],
-    follows_mean: bool,
+    /// Displacements and states in static equilibrium, where the first movement begins.
+    rest: [f64; MOST_DIRECTIONS],
+    at_rest: Vec<f64>,
     points: [RatePoint; 2],
     stage: DVector<f64>,
     /// The derivative by ω is wanted.
@@ -277,10 +278,9 @@ impl March for RateMarch<'_> {
         let stage = at * Complex64::cis(-LEFT * angle * h as f64);
         [stage, stage * turn, at, at * turn]
     }
-    fn first_waves(&self, h: usize) -> [Complex64; 4] {
-        let mean = if h == 0 && self.follows_mean { 1.0 } else { 0.0 };
-        let rate = (1.0 - mean) * self.omega / (TAU * LEAD);
-        [LEFT * mean + (1.0 - LEFT), rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
+    fn first_waves(&self, _h: usize) -> [Complex64; 4] {
+        let rate = self.omega / (TAU * LEAD);
+        [1.0 - LEFT, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
     fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
         let (n, m, d) = (self.at[0][0].len(), z.len(), self.axes);
@@ -302,18 +302,15 @@ impl March for RateMarch<'_> {
         }
         true
     }
-    fn first(
-        &mut self,
-        before: &[f64],
-        after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
-        rows: Option<&mut [f64]>,
-    ) -> bool {
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         let duration = TAU * LEAD / self.omega;
         let to: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
-        let velocity = std::array::from_fn(|a| (to[a] - self.relaxed[a]) / duration);
-        let third = std::array::from_fn(|a| LEFT * self.relaxed[a] + (1.0 - LEFT) * to[a]);
+        let velocity = std::array::from_fn(|a| (to[a] - self.rest[a]) / duration);
+        let third = std::array::from_fn(|a| LEFT * self.rest[a] + (1.0 - LEFT) * to[a]);
         let motions = [third, to].map(|displacement| Relative { displacement, velocity });
-        self.advance((duration, motions), before, after, force, rows)
+        let before = std::mem::take(&mut self.at_rest);
+        let found = self.advance((duration, motions), &before, after, force, rows);
+        self.at_rest = before;
+        found
     }
 }

@@ -7,6 +7,7 @@
 //! harmonics: in stick `δf = kt (δu - δu*)`, in slip `δf = 0`, and where they meet the force is continuous. Every stick interval
 //! adds one product of a column and a row to the derivative.
 
+use super::StaticState;
 use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
 use super::events::{Anchor, Extreme, Grid, Interval};
 use super::series::{Series, turns};
@@ -53,6 +54,15 @@ impl Part {
     }
 }
 
+/// The force of each part's slider in static equilibrium, N; zero of a stop.
+fn held<'a>(parts: &'a [Part], rest: &'a StaticState) -> impl Iterator<Item = f64> + 'a {
+    let mut states = rest.states.iter();
+    parts.iter().map(move |part| match part {
+        Part::Slider { .. } => states.next().copied().unwrap_or(0.0),
+        Part::Stop { .. } => 0.0,
+    })
+}
+
 /// Distance of an event from its last iterate, in samples, that is rounding.
 const PLACED: f64 = 1e-11;
 
@@ -61,6 +71,7 @@ impl Alternation {
     pub(super) fn slide(
         &mut self,
         parts: &[Part],
+        rest: &StaticState,
         c: &[Complex64],
         force: &mut [Complex64],
         mut tangent: Option<&mut [f64]>,
@@ -68,15 +79,15 @@ impl Alternation {
         self.find(c);
         self.state.clear();
         let harmonics = std::mem::take(&mut self.harmonics);
-        for part in parts {
-            self.history(part, Series { harmonics: &harmonics, c });
+        for (part, hold) in parts.iter().zip(held(parts, rest)) {
+            self.history(part, [rest.displacement[0], hold], Series { harmonics: &harmonics, c });
             self.add_intervals(&harmonics, c, force, tangent.as_deref_mut());
         }
         self.harmonics = harmonics;
     }
 
     /// Samples of the force, of slip, and the forces of the sliders at t = 0.
-    pub(super) fn sample_slides(&mut self, parts: &[Part], c: &[Complex64]) {
+    pub(super) fn sample_slides(&mut self, parts: &[Part], rest: &StaticState, c: &[Complex64]) {
         self.find(c);
         self.synthesise(c, |_| Complex64::new(1.0, 0.0));
         self.state.clear();
@@ -84,8 +95,8 @@ impl Alternation {
         self.slips.fill(false);
         let n = self.samples();
         let harmonics = std::mem::take(&mut self.harmonics);
-        for part in parts {
-            self.history(part, Series { harmonics: &harmonics, c });
+        for (part, hold) in parts.iter().zip(held(parts, rest)) {
+            self.history(part, [rest.displacement[0], hold], Series { harmonics: &harmonics, c });
             let before = self.force[0][0];
             for interval in &self.intervals {
                 let sample = |phase: f64| (phase * n as f64 / TAU).ceil() as isize;
@@ -161,18 +172,19 @@ impl Alternation {
         }
     }
 
-    /// The intervals of one part; motion and turning points have been found.
-    fn history(&mut self, part: &Part, series: Series) {
+    /// The intervals of one part; motion and turning points have been found. `rest`: its displacement and force in static
+    /// equilibrium.
+    fn history(&mut self, part: &Part, rest: [f64; 2], series: Series) {
         self.intervals.clear();
         match *part {
-            Part::Slider { stiffness, limit } => self.slider(stiffness, limit, series),
+            Part::Slider { stiffness, limit } => {
+                self.slider(stiffness, limit, rest.map(|x| x * self.static_share), series);
+            }
             Part::Stop { gap, stiffness } => self.stop(gap, stiffness, series),
         }
     }
 
-    fn slider(&mut self, kt: f64, limit: f64, series: Series) {
-        let relaxed = self.relaxed(series.harmonics, series.c);
-        let first = if self.relaxed_at_zero { Anchor::Nothing } else { Anchor::Mean };
+    fn slider(&mut self, kt: f64, limit: f64, [rest, held]: [f64; 2], series: Series) {
         let count = self.extremes.len();
         let hold_at = |hold: f64, from: f64, anchor: Anchor, begin: f64, end: f64| Interval {
             begin,
@@ -187,11 +199,11 @@ impl Alternation {
             Interval { begin, end, stiffness: 0.0, offset, anchor, slips: true }
         };
         // force and displacement at the anchor
-        let (mut hold, mut from, mut anchor) = (0.0, relaxed, first);
-        let rest = kt * (self.grid.value[0] - relaxed);
-        if count == 0 && rest.abs() > limit {
+        let (mut hold, mut from, mut anchor) = (held, rest, Anchor::Nothing);
+        let still = held + kt * (self.grid.value[0] - rest);
+        if count == 0 && still.abs() > limit {
             // dragged to where nothing moves any more
-            self.intervals.push(Interval { slips: false, ..drag(0.0, TAU, limit.copysign(rest)) });
+            self.intervals.push(Interval { slips: false, ..drag(0.0, TAU, limit.copysign(still)) });
             return;
         }
         let mut slipped = None;
@@ -319,12 +331,6 @@ impl Alternation {
             let by = Complex64::new(-interval.stiffness, 0.0);
             match interval.anchor {
                 Anchor::Nothing => continue,
-                Anchor::Mean => {
-                    self.row.fill(ZERO);
-                    if harmonics[0] == 0 {
-                        self.row[0] = by;
-                    }
-                }
                 Anchor::At(phase) => {
                     let (mut turn, step) = turns(harmonics, phase);
                     for value in &mut self.row {

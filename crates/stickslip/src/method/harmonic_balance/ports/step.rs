@@ -3,9 +3,10 @@
 //! A straight step is exact for elastic-plastic laws along one direction; between samples the motion is curved, and what that
 //! leaves out is `(2π h/N)²/8` of the motion at harmonic h, some 5e-6 at 1024 samples.
 
+use super::Port;
 use super::alternation::{Alternation, Beginning, add_entries};
 use super::march::March;
-use crate::law::{MOST_DIRECTIONS, Step, StepPoint};
+use crate::law::{MOST_DIRECTIONS, Reach, Step, StepPoint};
 use num_complex::Complex64;
 
 impl Alternation {
@@ -14,12 +15,13 @@ impl Alternation {
     pub(super) fn step(
         &mut self,
         step: &dyn Step,
-        axes: usize,
+        port: &Port,
         c: &[Complex64],
         force: &mut [Complex64],
         tangent: Option<&mut [f64]>,
     ) {
-        let nh = self.harmonics.len();
+        let (axes, nh) = (port.axes, self.harmonics.len());
+        let (rest, states) = self.at_rest(port);
         let (mut mean, mut reach) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS]);
         for (a, c) in c.chunks_exact(nh).enumerate() {
             for (c, h) in c.iter().zip(&self.harmonics) {
@@ -30,25 +32,24 @@ impl Alternation {
                 }
             }
         }
-        if self.relaxed_at_zero || !step.holds(&mean, &reach) {
-            return self.step_by_step(step, axes, c, force, tangent);
+        if !step.holds((&rest, &states), Reach { mean: &mean, reach: &reach }) {
+            return self.step_by_step(step, port, c, force, tangent);
         }
         self.state.clear();
         self.forgets.clear();
         self.begin = Beginning::default();
         let mut point = StepPoint::new(axes, step.states());
-        step.linearise(axes, &mean, &mean, &vec![0.0; step.states()], &mut point);
+        step.linearise(axes, &rest, &mean, &states, &mut point);
         let mut tangent = tangent;
         for a in 0..axes {
-            let (from, to) = point.force_slope(a)[..2 * axes].split_at(axes);
+            let to = &point.force_slope(a)[axes..2 * axes];
             for (k, &h) in self.harmonics.iter().enumerate() {
                 let at = a * nh + k;
                 if h == 0 {
                     force[at] += point.force[a];
                 }
                 for b in 0..axes {
-                    // the position of rest moves both ends of a step
-                    let slope = if h == 0 { from[b] + to[b] } else { to[b] };
+                    let slope = to[b];
                     if h > 0 {
                         force[at] += c[b * nh + k] * slope;
                     }
@@ -64,26 +65,24 @@ impl Alternation {
     pub(super) fn step_by_step(
         &mut self,
         step: &dyn Step,
-        axes: usize,
+        port: &Port,
         c: &[Complex64],
         force: &mut [Complex64],
         tangent: Option<&mut [f64]>,
     ) {
-        let nh = self.harmonics.len();
-        let mut relaxed = [0.0; MOST_DIRECTIONS];
+        let (axes, nh) = (port.axes, self.harmonics.len());
+        let (rest, states) = self.at_rest(port);
         for a in 0..axes {
             let c = &c[a * nh..(a + 1) * nh];
             self.synthesise(c, |_| Complex64::new(1.0, 0.0));
             self.displacement[a].copy_from_slice(&self.signal);
-            relaxed[a] = self.relaxed(&self.harmonics, c);
         }
         let displacement = std::mem::take(&mut self.displacement);
-        let follows_mean = !self.relaxed_at_zero;
         let point = StepPoint::new(axes, step.states());
         let mut trail = std::mem::take(&mut self.trail);
         trail.clear();
         trail.resize(self.samples() * step.states(), f64::NAN);
-        let mut march = StepMarch { step, axes, at: &displacement, relaxed, follows_mean, point, trail };
+        let mut march = StepMarch { step, axes, at: &displacement, rest, states, point, trail };
         self.march(&mut march, force, tangent);
         self.trail = march.trail;
         self.displacement = displacement;
@@ -95,9 +94,9 @@ struct StepMarch<'a> {
     step: &'a dyn Step,
     axes: usize,
     at: &'a [Vec<f64>; MOST_DIRECTIONS],
-    /// Where the first movement begins, and whether that is the mean.
-    relaxed: [f64; MOST_DIRECTIONS],
-    follows_mean: bool,
+    /// Displacements and states in static equilibrium, where the first movement begins.
+    rest: [f64; MOST_DIRECTIONS],
+    states: Vec<f64>,
     point: StepPoint,
     /// States at the samples of the last period, see [`Step::around`].
     trail: Vec<f64>,
@@ -152,29 +151,42 @@ impl March for StepMarch<'_> {
         let zero = Complex64::new(0.0, 0.0);
         [at * Complex64::cis(-angle * h as f64), at, zero, zero]
     }
-    fn first_waves(&self, h: usize) -> [Complex64; 4] {
-        [if h == 0 && self.follows_mean { 1.0 } else { 0.0 }, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
+    fn first_waves(&self, _h: usize) -> [Complex64; 4] {
+        [0.0, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
     fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         self.step.around(self.axes, self.at, (&mut *z, &mut self.trail), force, rows);
         z.iter().all(|z| z.is_finite())
     }
-    fn first(
-        &mut self,
-        before: &[f64],
-        after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
-        rows: Option<&mut [f64]>,
-    ) -> bool {
-        let (from, to) = (self.relaxed, self.read(0));
-        self.advance((&from, &to), before, after, force, rows)
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+        let (from, to) = (self.rest, self.read(0));
+        let before = std::mem::take(&mut self.states);
+        let found = self.advance((&from, &to), &before, after, force, rows);
+        self.states = before;
+        found
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Kernel, StaticState};
     use super::*;
-    use crate::law::{FrictionContact, Jenkins2d};
+    use crate::law::{FrictionContact, Jenkins2d, Law};
+    use std::sync::Arc;
+
+    fn port(law: impl Law + 'static, axes: usize) -> Port {
+        let states = law.step().map_or(0, |step| step.states());
+        Port {
+            members: Vec::new(),
+            first: 0,
+            axes,
+            series: 0.0,
+            scale: law.scale(),
+            least_penalty: 0.0,
+            static_state: StaticState { states: vec![0.0; states], ..StaticState::default() },
+            kernel: Kernel::Step(Arc::new(law)),
+        }
+    }
 
     /// What is known of a motion that holds is what its samples give; a larger motion is not taken for one.
     #[test]
@@ -182,8 +194,10 @@ mod tests {
         let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 2 };
         let line = FrictionContact { tangents: 1, ..contact };
         let plane = Jenkins2d { stiffness: 3.0, limit: 1.8 };
-        let laws: [(&dyn Step, usize); 3] = [(&contact, 3), (&line, 2), (&plane, 2)];
-        for (law, axes) in laws {
+        let ports = [port(contact, 3), port(line, 2), port(plane, 2)];
+        let laws: [&dyn Step; 3] = [&contact, &line, &plane];
+        for (law, port) in laws.into_iter().zip(&ports) {
+            let axes = port.axes;
             for harmonics in [vec![0, 1, 2, 3], vec![1, 3]] {
                 let nh = harmonics.len();
                 let imaginary = |k: usize| if harmonics[k] == 0 { 0.0 } else { 0.1 };
@@ -195,15 +209,15 @@ mod tests {
                 let mut found = [(); 2].map(|()| (vec![Complex64::new(0.0, 0.0); axes * nh], vec![0.0; size * size]));
                 let [(force, slopes), (sampled, sampled_slopes)] = &mut found;
                 alternation.marched = 0;
-                alternation.step(law, axes, &c, force, Some(slopes));
+                alternation.step(law, port, &c, force, Some(slopes));
                 assert_eq!(alternation.marched, 0, "{law:?} was sampled");
-                alternation.step_by_step(law, axes, &c, sampled, Some(sampled_slopes));
+                alternation.step_by_step(law, port, &c, sampled, Some(sampled_slopes));
                 assert!(force.iter().zip(&*sampled).all(|(a, b)| (a - b).norm() < 1e-12), "{force:?} {sampled:?}");
                 for (i, (a, b)) in slopes.iter().zip(&*sampled_slopes).enumerate() {
                     assert!((a - b).abs() < 1e-11, "{law:?}, row {}, column {}: {a} {b}", i / size, i % size);
                 }
                 let far: Vec<Complex64> = c.iter().map(|c| c * 9.0).collect();
-                alternation.step(law, axes, &far, force, None);
+                alternation.step(law, port, &far, force, None);
                 assert!(alternation.marched > 0, "{law:?} slips");
             }
         }
@@ -222,14 +236,15 @@ mod tests {
         let none = vec![Complex64::new(0.0, 0.0); 3 * nh];
         let mut alternation = Alternation::new(harmonics, 512);
         let mut slopes = vec![0.0; (6 * nh).pow(2)];
-        alternation.step(&contact, 3, &at(0.0), &mut none.clone(), Some(&mut slopes));
+        let port = port(contact, 3);
+        alternation.step(&contact, &port, &at(0.0), &mut none.clone(), Some(&mut slopes));
         let known = Beginning { state: alternation.state.clone(), forgets: alternation.forgets.clone() };
         assert!(known.forgets.len() == 4, "a contact that slips forgets");
         for change in [1e-6, 1e-2, 0.3] {
             let mut run = |begin: Beginning| {
                 let mut force = none.clone();
                 (alternation.begin, alternation.marched) = (begin, 0);
-                alternation.step(&contact, 3, &at(change), &mut force, None);
+                alternation.step(&contact, &port, &at(change), &mut force, None);
                 (force, alternation.marched)
             };
             let (from_rest, many) = run(Beginning::default());

@@ -1,15 +1,16 @@
-//! Which orbit of a continuum: friction that holds all the time carries no mean force.
+//! Which orbit of a continuum: sliders that never slip stay where static equilibrium has left them.
 //!
 //! A slider behind a spring that does not slip over the whole period, `kt (u_max - u_min) <= 2 limit`, remembers for ever where its spring is
 //! relaxed: the return map has a multiplier of one, and every such place `o` within reach has its orbit. Where the motion is its own mirror image
-//! `o` is zero; elsewhere the mean depends on it, and where a gap or another law knows positions so does everything else. Real joints creep: with
-//! any creep, however slow, the mean force dies out, and what is left is `o = ū`, the mean of the motion, or the nearest place at which the
-//! limit is not passed. This orbit is the one that harmonic balance finds by itself; Newton's method on a return map comes to any of them, and is
-//! led to this one here, with the rows of such sliders replaced by `z = kt (u - o)`, and `o` iterated.
+//! `o` is zero; elsewhere the mean depends on it, and where a gap or another law knows positions so does everything else. All methods choose
+//! `o = u_s - f_s/kt` of static equilibrium ([`super::static_equilibrium`]), or the nearest place at which the limit is not passed. Harmonic
+//! balance finds this orbit by itself; Newton's method on a return map comes to any of them, and is led to this one here, with the rows of
+//! such sliders replaced by `z = kt (u - o)`, and `o` iterated.
 
 use super::OrbitError;
 use super::periodic::{Aim, Closed, ReturnMap, close};
-use crate::model::{Axis, System};
+use super::static_equilibrium::StaticEquilibrium;
+use crate::model::System;
 use crate::orbit::{Breakdown, Orbit, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::eigen;
@@ -96,14 +97,20 @@ pub(super) trait Closing: ReturnMap {
     fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError>;
 }
 
-/// The orbit of the continuum that `first` is of in which held sliders carry no mean force, closed with the same aim; `first` itself if it is alone, or
-/// if that orbit is not found.
-pub(super) fn relaxed(map: &mut dyn Closing, system: &System, first: Orbit, aim: Aim) -> Orbit {
+/// The orbit of the continuum that `first` is of in which held sliders stand as in static equilibrium, or unloaded without
+/// one; closed with the same aim. `first` itself if it is alone, or if that orbit is not found.
+pub(super) fn as_in_equilibrium(
+    map: &mut dyn Closing,
+    (system, equilibrium): (&System, Option<&StaticEquilibrium>),
+    first: Orbit,
+    aim: Aim,
+) -> Orbit {
     if first.symmetry == Symmetry::HalfPeriod || first.evidence.history.is_empty() {
         return first;
     }
     let springs = map.springs();
-    let found = iterate(map, system, &first, &springs, aim);
+    let places: Vec<f64> = springs.iter().map(|spring| place(system, equilibrium, spring)).collect();
+    let found = iterate(map, system, &first, (&springs, &places), aim);
     map.limit(&springs);
     found.unwrap_or(first)
 }
@@ -112,12 +119,12 @@ fn iterate(
     map: &mut dyn Closing,
     system: &System,
     first: &Orbit,
-    springs: &[ElasticSlider],
+    (springs, equilibrium): (&[ElasticSlider], &[f64]),
     aim: Aim,
 ) -> Option<Orbit> {
     let (mut orbit, mut rounds) = (first.clone(), Rounds::default());
     for _ in 0..ROUNDS {
-        let held = held(system, &orbit, springs);
+        let held = held(&orbit, springs, equilibrium);
         if held.iter().all(|slider| slider.gap().abs() <= RELAXED * slider.spring.limit / slider.spring.stiffness) {
             return Some(orbit);
         }
@@ -167,41 +174,33 @@ impl Held {
     }
 }
 
-fn held(system: &System, orbit: &Orbit, springs: &[ElasticSlider]) -> Vec<Held> {
+/// Where the spring of a slider is relaxed in static equilibrium, m.
+fn place(system: &System, equilibrium: Option<&StaticEquilibrium>, spring: &ElasticSlider) -> f64 {
+    let Some(known) = equilibrium else { return 0.0 };
+    let axis = &system.joints()[spring.joint].axes()[0];
+    let displacement = axis.along(known.displacement()) + axis.imposed_at(0).re;
+    let force = known.joint_states().get(spring.state - 2 * system.dofs()).copied().unwrap_or(0.0);
+    displacement - force / spring.stiffness
+}
+
+fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<Held> {
     let begin = orbit.sample(0.0);
-    let means = means(system, orbit);
     springs
         .iter()
-        .filter_map(|&spring| {
+        .zip(equilibrium)
+        .filter_map(|(&spring, place)| {
             let (low, high) = orbit.joints[spring.joint].displacement[0];
             let reach = spring.limit / spring.stiffness;
             if high - low > 2.0 * reach {
                 return None;
             }
-            let axis = &system.joints()[spring.joint].axes()[0];
-            let mean = axis.along(&means) + axis.imposed_at(0).re;
+            // a slider that stands exactly at its limit slips by rounding
+            let reach = (reach * (1.0 - 2.0 * RELAXED)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
             let is = begin - orbit.start[spring.state] / spring.stiffness;
-            Some(Held { spring, begin, is, ought: mean.max(high - reach).min(low + reach) })
+            Some(Held { spring, begin, is, ought: place.max(high - reach).min(low + reach) })
         })
         .collect()
-}
-
-/// Instants of a period for the means of degrees of freedom that are no places: a motion with corners has them to 1e-5.
-const INSTANTS: usize = 256;
-
-/// Mean of every degree of freedom, m.
-fn means(system: &System, orbit: &Orbit) -> Vec<f64> {
-    let is_place = |(row, axis): (usize, &Axis)| axis.rows() == [(row, 1.0)];
-    if system.seen().len() == system.dofs() && system.seen().iter().enumerate().all(is_place) {
-        return orbit.places.iter().map(|place| place.mean).collect();
-    }
-    let mut sum = vec![0.0; system.dofs()];
-    for instant in 0..INSTANTS {
-        let sample = orbit.sample(orbit.period() * instant as f64 / INSTANTS as f64);
-        sum.iter_mut().zip(sample.displacement).for_each(|(sum, x)| *sum += x / INSTANTS as f64);
-    }
-    sum
 }
 
 /// The rounds so far, for as long as the same sliders are held: places and gaps.

@@ -1,0 +1,142 @@
+//! Static equilibrium under the constant loads: where every vibration begins.
+//!
+//! Constant forces, preloads and constant imposed motions grow together from zero, as one ramp. Every joint moves straight
+//! from where it is unloaded to its place in equilibrium, and slips on the way where its limit asks for it:
+//!
+//! `K x + W f(0 → Wᵀx) = F₀`
+//!
+//! That is harmonic balance with harmonic 0 alone, so that the same equations and the same Newton iteration solve it. Contacts
+//! without a fixed slip limit are homogeneous of degree one, and for these the straight path is the exact result of the ramp.
+//! The place of each slider is kept: a contact that sticks for the whole period goes on carrying the static friction force,
+//! and the mean friction force of one that slips follows from there.
+//!
+//! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
+
+use super::equations::Level;
+use super::path;
+use super::ports::{Ports, StaticState};
+use super::rest::Rest;
+use super::sparse::Sparse;
+use crate::model::System;
+use crate::orbit::Orbit;
+use std::sync::Arc;
+
+/// Newton iterations: each may change which joints slip, and a handful of changes are usual.
+const ITERATIONS: usize = 200;
+/// Samples of a motion that stands still.
+const SAMPLES: usize = 8;
+
+/// The static equilibrium of a system, as an orbit on which nothing moves; `None` as of [`static_equilibrium`], and for laws
+/// that harmonic balance does not take.
+pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
+    let (ports, around) = Ports::of_sector(system).ok()?;
+    let rest = Rest::new(system, &ports);
+    let system = Arc::new(system.clone());
+    static_equilibrium(&system, (&ports, around.as_ref()), &rest).map(|found| found.orbit)
+}
+
+/// The static equilibrium of a system.
+pub(super) struct StaticEquilibrium {
+    /// As an orbit on which nothing moves.
+    pub orbit: Orbit,
+    /// Of each port.
+    pub states: Vec<StaticState>,
+}
+
+/// The static equilibrium; `None` where the iteration finds none, as where no joint and no spring carries a constant load.
+pub(super) fn static_equilibrium(
+    system: &Arc<System>,
+    (ports, around): (&Ports, Option<&Ports>),
+    rest: &Rest,
+) -> Option<StaticEquilibrium> {
+    let harmonics = vec![0];
+    let omega = scale_of_rates(system);
+    let sparse = Sparse::new(system, ports, &harmonics);
+    let mut level = Level::new(harmonics, SAMPLES, ports, sparse);
+    level.drive(system, ports, rest, omega).ok()?;
+    let start = if level.stands() { level.at_rest(1.0) } else { level.unhindered() };
+    let mut solution = start;
+    level.polish(ports, omega, &mut solution, ITERATIONS).ok()?;
+    let mut states = vec![StaticState::default(); ports.len()];
+    for (p, port) in ports.iter().enumerate() {
+        level.sample(ports, p, omega, &solution);
+        states[p].states.clone_from(&level.alternation.state);
+        for (to, c) in states[p].displacement.iter_mut().zip(&solution.c[port.range()]) {
+            *to = c.re;
+        }
+    }
+    let x = path::places(&mut level, rest, omega, &solution).ok()?;
+    let setting = path::Setting {
+        system,
+        ports,
+        around,
+        omega,
+        first: 1,
+        odd: false,
+        truncation: None,
+        tolerance: 0.0,
+        judge: None,
+    };
+    let orbit = path::orbit(setting, &mut level, &solution, x)?;
+    Some(StaticEquilibrium { orbit, states })
+}
+
+/// A rate of the system itself, 1/s, for equations that need one where nothing moves: that of its largest stiffness and mass.
+fn scale_of_rates(system: &System) -> f64 {
+    let [mass, _, stiffness] = system.structure().largest();
+    let rate = (stiffness / mass).sqrt();
+    if rate.is_finite() && rate > 0.0 { rate } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::FrictionContact;
+    use crate::model::Axis;
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
+    use num_complex::Complex64;
+
+    const TANGENTIAL: f64 = 15e6;
+    const NORMAL: f64 = 20e6;
+    const ANGLE: f64 = 40.0;
+
+    /// Half a wedge of 6 g that a load along z presses against one rigid face at [`ANGLE`] to z: symmetry keeps its x at rest.
+    fn wedge(load: f64, friction: f64) -> Arc<System> {
+        let one = DMatrix::identity(1, 1);
+        let structure =
+            Structure::new(vec!["z".into()], &one * 0.006, DMatrix::zeros(1, 1), DMatrix::zeros(1, 1)).unwrap();
+        let law = FrictionContact { tangential: TANGENTIAL, normal: NORMAL, friction, preload: 0.0, tangents: 1 };
+        let (sine, cosine) = ANGLE.to_radians().sin_cos();
+        let axes = vec![Axis::new(vec![(0, cosine)]), Axis::new(vec![(0, sine)])];
+        let builder = System::builder(structure).joint("face", Arc::new(law), axes);
+        let builder = builder.force(0, 0, Complex64::new(load, 0.0)).force(0, 1, Complex64::new(1.0, 0.0));
+        Arc::new(builder.build().unwrap())
+    }
+
+    fn equilibrium(system: &Arc<System>) -> Option<StaticEquilibrium> {
+        let ports = Ports::new(system).unwrap();
+        static_equilibrium(system, (&ports, None), &Rest::new(system, &ports))
+    }
+
+    /// Stuck: `z (kn sin² + kt cos²) = Q`; slipping: `z kn (sin² + µ sin cos) = Q`, whichever friction allows.
+    #[test]
+    fn a_wedge_sinks_until_its_faces_carry_the_load() {
+        let (sine, cosine) = ANGLE.to_radians().sin_cos();
+        for (friction, sticks) in [(0.9, true), (0.25, false)] {
+            let StaticEquilibrium { orbit, states } = equilibrium(&wedge(500.0, friction)).unwrap();
+            let by_friction = if sticks { TANGENTIAL * cosine * cosine } else { friction * NORMAL * sine * cosine };
+            let z = 500.0 / (NORMAL * sine * sine + by_friction);
+            assert!((orbit.places[0].mean / z - 1.0).abs() < 1e-9, "{} {z}", orbit.places[0].mean);
+            let tangential = if sticks { TANGENTIAL * cosine * z } else { friction * NORMAL * sine * z };
+            assert!((states[0].states[0] / tangential - 1.0).abs() < 1e-9, "{states:?} {tangential}");
+            assert!((states[0].displacement[1] / (sine * z) - 1.0).abs() < 1e-9);
+        }
+    }
+
+    /// A load that pulls the wedge out has no equilibrium.
+    #[test]
+    fn a_load_that_nothing_carries_has_none() {
+        assert!(equilibrium(&wedge(-500.0, 0.25)).is_none());
+    }
+}
