@@ -24,6 +24,9 @@ const MOST_STUCK: usize = 4;
 const SHOWN: &str = "Reported: the solution that begins at static equilibrium under the constant loads, applied as one ramp. A rigid joint sticks where the \
     search found it, and method `transient` reports what its run led to.";
 
+/// Change of amplitudes with the history above which it is told: the tolerance of harmonic balance.
+const SPREAD: f64 = 1e-3;
+
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Note {
@@ -40,6 +43,8 @@ pub enum Note {
     },
     /// Points whose series is too short, and the largest estimated error.
     Truncated(usize, f64),
+    /// Points whose amplitudes depend on the history of a joint that sticks, and the largest change.
+    HistorySpread(usize, f64),
     /// The same on a branch, whose harmonics are given, and which has no other method.
     TruncatedOnBranch(usize, f64),
     /// Points whose series was not compared with a longer one.
@@ -120,7 +125,9 @@ impl Note {
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
         let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::Unjudged(1));
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
-        said.chain(Note::history(model, orbit)).chain(Note::slipping(model, orbit)).collect()
+        let spread = orbit.evidence.history_spread.filter(|spread| *spread > SPREAD);
+        let range = spread.map(|spread| Note::HistorySpread(1, spread));
+        said.chain(Note::history(model, orbit)).chain(range).chain(Note::slipping(model, orbit)).collect()
     }
 
     /// That friction makes harmonics above those that the coordinates were chosen for.
@@ -210,6 +217,7 @@ impl Note {
                     return;
                 }
                 (Note::Truncated(points, largest), Note::Truncated(more, other))
+                | (Note::HistorySpread(points, largest), Note::HistorySpread(more, other))
                 | (Note::TruncatedOnBranch(points, largest), Note::TruncatedOnBranch(more, other)) => {
                     *points += more;
                     *largest = largest.max(*other);
@@ -266,6 +274,12 @@ impl Note {
                     more => format!("{warning}{cases} cases ({first} and {more} more): {said}"),
                 })
             }
+            Note::HistorySpread(count, largest) => Some(format!(
+                "At {} the amplitudes depend on the history of a joint that sticks: they change by up to {} % where it begins without the \
+                 friction force of static equilibrium, or with the opposite one.",
+                points(*count),
+                significant(100.0 * largest, 2)
+            )),
             Note::Truncated(count, largest) => Some(format!(
                 "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {largest:.1e}. \
                  Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \

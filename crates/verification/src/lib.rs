@@ -4,6 +4,7 @@
 //! written apart from the library's own.
 
 pub mod held;
+pub mod loose_dampers;
 pub mod reference;
 pub mod replay;
 

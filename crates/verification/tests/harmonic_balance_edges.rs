@@ -192,7 +192,8 @@ fn a_constant_force_beyond_the_limit_is_not_held() {
     }
 }
 
-/// Multipliers beside one are those of the flow's own orbit: a series that is 4e-4 off put a pair outside the circle, 1.0047, inside it.
+/// Multipliers beside one are those of the flow's own orbit where the series may be on the wrong side: one that is 4e-4 off put a
+/// pair outside the circle, 1.0047, inside it. Those of the series itself err by a few times its return defect.
 #[test]
 fn a_series_beside_the_limit_of_stability_knows_its_side() {
     let stop = |name: &str, a: &str, b: &str, gap, stiffness| Joint {
@@ -216,7 +217,8 @@ fn a_series_beside_the_limit_of_stability_knows_its_side() {
     let system = model.assemble().unwrap();
     let (found, exact) = (orbit(&HarmonicBalance::default(), &system, 50.52), orbit(&EventDriven, &system, 50.52));
     let (largest, its) = (exact.multipliers().unwrap()[0].norm(), found.multipliers().unwrap()[0].norm());
-    assert!(largest > 1.004 && (its - largest).abs() < 1e-6, "{its} {largest}");
+    let defect = found.evidence.return_defect.unwrap();
+    assert!(largest > 1.004 && its > 1.004 && (its - largest).abs() < 10.0 * defect, "{its} {largest} {defect}");
 }
 
 /// Rigid friction in a plane beside an elastic contact there, pushed along one direction, is friction along that: the series is as long as rigid friction

@@ -530,6 +530,7 @@ impl<'a> Shooter<'a> {
                 return_defect: Some(closed.residual),
                 history: history(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
+                history_spread: None,
                 instead_of: None,
             },
             places: measured.places,

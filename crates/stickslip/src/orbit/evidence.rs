@@ -51,6 +51,10 @@ pub struct Evidence {
     /// is then the one that begins at static equilibrium under the constant loads
     /// ([`StaticEquilibrium`](crate::method::StaticEquilibrium)); with method `transient` the one that its motion led to.
     pub history: Vec<String>,
+    /// The largest change of an amplitude with two other histories of the joints named there, without friction forces in static
+    /// equilibrium and with the opposite ones, relative to the largest amplitude; `None` where amplitudes do not depend on them, or
+    /// where it was not measured (methods other than harmonic balance).
+    pub history_spread: Option<f64>,
     /// The method that was to find it and did not, where another one did: see [`Auto`](crate::method::auto::Auto).
     pub instead_of: Option<&'static str>,
 }

@@ -216,6 +216,7 @@ impl Orbit {
                 return_defect: None,
                 history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
+                history_spread: None,
                 instead_of: None,
             },
             places: measured.places,

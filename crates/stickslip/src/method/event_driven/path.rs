@@ -75,6 +75,7 @@ pub(super) fn orbit(
             accuracy: Accuracy::Converged,
             history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
+            history_spread: None,
             instead_of: None,
         },
         places: measured.places,

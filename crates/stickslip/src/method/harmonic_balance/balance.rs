@@ -381,6 +381,10 @@ impl Solver for Balance {
             }
             found => found,
         };
+        let mut found = found;
+        if let Ok(orbit) = &mut found {
+            orbit.evidence.history_spread = self.history_spread(orbit, omega);
+        }
         self.end_point(found)
     }
 

@@ -66,6 +66,8 @@ pub(super) struct Level {
     imposed: Vec<f64>,
     /// Displacements along the axes in static equilibrium, m; empty where none is known.
     pub equilibrium: Vec<f64>,
+    /// Springs that tie the mean to where it was, where static equilibrium is sought from afar.
+    pub tether: Option<Tether>,
     /// Compliances in series with the axes, m/N.
     series: Vec<f64>,
     /// Stiffness of closed contacts along the axes (N/m) that the structure has for the mean; empty if it is held without them.
@@ -116,6 +118,15 @@ pub(super) struct Level {
     /// Motions along the axes under their forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
+}
+
+/// Springs along the axes that tie the mean to a place.
+#[derive(Debug, Clone)]
+pub(super) struct Tether {
+    /// Their stiffness, relative to the springs of closed contacts.
+    pub share: f64,
+    /// Where they are relaxed, m.
+    pub anchor: Vec<f64>,
 }
 
 /// A solution or a start.
@@ -187,6 +198,7 @@ impl Level {
             linear: vec![ZERO; nh * axes],
             imposed: vec![0.0; axes],
             equilibrium: ports.equilibrium().to_vec(),
+            tether: None,
             series: ports.iter().flat_map(|port| vec![port.series; port.axes]).collect(),
             springs: Vec::new(),
             acting: Vec::new(),
@@ -290,7 +302,7 @@ impl Level {
             }
             self.alternation.respond(port, (omega, ease.limits), c, force, slot);
             if wanted {
-                self.add_springs(p, port, OPEN);
+                self.add_springs(p, port, OPEN + self.tether_share());
             }
             if port.marches() {
                 self.states[p].state.clone_from(&self.alternation.state);
@@ -443,12 +455,22 @@ impl Level {
         for (q, (k, imposed)) in self.springs.iter().zip(&self.imposed).enumerate() {
             self.acting[q * nh] -= (motion.c[q * nh] - imposed * share) * *k;
         }
+        if let Some(tether) = &self.tether {
+            for (q, (k, anchor)) in self.springs.iter().zip(&tether.anchor).enumerate() {
+                self.acting[q * nh] += (motion.c[q * nh] - anchor) * (tether.share * k);
+            }
+        }
     }
 
     /// What acts on the structure in a motion, [axis][harmonic], N, see [`Level::springs`].
     pub fn acting<'a>(&'a mut self, motion: &'a Solution) -> &'a [Complex64] {
         self.act(motion, 1.0);
         if self.stands() { &self.acting } else { &motion.force }
+    }
+
+    /// Stiffness of the tether, relative to the springs of closed contacts.
+    pub(super) fn tether_share(&self) -> f64 {
+        self.tether.as_ref().map_or(0.0, |tether| tether.share)
     }
 
     /// Adds so many times these springs to the derivative of the mean at a port: [`OPEN`] where the structure has them, a share of them where a step

@@ -103,13 +103,31 @@ impl Balance {
         doubled.skip(1).find(|top| *top as f64 >= least || *top > MOST * self.kept.scale).expect("they grow")
     }
 
+    /// Whether a series with twice the harmonics can be solved and compared.
+    fn can_go_on(&self, top: usize) -> bool {
+        let double = self.kept.double(top);
+        double <= MOST * self.kept.scale && self.can_compare(double, self.taken(None))
+    }
+
     /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error
     /// is known from it.
     pub(super) fn chosen(
         &mut self,
+        top: usize,
+        omega: f64,
+        warm: Option<(usize, Solution)>,
+    ) -> Result<Orbit, OrbitError> {
+        let mut returned = None;
+        // an orbit whose return is farther away than allowed is better than none, and says so
+        self.doubled(top, omega, warm, &mut returned).or_else(|error| returned.ok_or(error))
+    }
+
+    fn doubled(
+        &mut self,
         mut top: usize,
         omega: f64,
         warm: Option<(usize, Solution)>,
+        returned: &mut Option<Orbit>,
     ) -> Result<Orbit, OrbitError> {
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
         let first = top;
@@ -135,7 +153,15 @@ impl Balance {
             // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
             let shown = top > first || !(self.steep && self.ports.has_falling());
             if error <= tolerance && shown {
-                return self.finish(top, omega, motion, x, Some(error));
+                let orbit = self.finish(top, omega, motion, x, Some(error))?;
+                let judged = orbit.evidence.truncation.unwrap_or(error);
+                let before = returned.as_ref().and_then(|orbit| orbit.evidence.truncation);
+                let closer = before.is_none_or(|before| judged <= 0.5 * before);
+                if judged <= tolerance || !closer || !self.can_go_on(top) {
+                    return Ok(orbit);
+                }
+                *returned = Some(orbit);
+                error = judged;
             }
             (checked, estimate) = (top, error);
             if self.ports.has_forces() && top > first {

@@ -35,6 +35,7 @@ mod modal;
 mod mode;
 mod open;
 mod options;
+mod other_histories;
 mod path;
 mod penalty;
 mod ports;

@@ -160,6 +160,9 @@ pub(super) fn orbit(
     let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
     let Judged { derivative, defect } = judge
         .map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start, &path.stuck()));
+    // where contacts part and close again a series with twice the harmonics may be as wrong as the shorter one: the return tells
+    let opens = measured.joints.iter().any(|joint| joint.open_fraction > 0.0 && joint.open_fraction < 1.0);
+    let truncation = truncation.map(|error| if opens { error.max(defect.unwrap_or(0.0)) } else { error });
     Some(Orbit {
         method: super::NAME,
         omega,
@@ -181,6 +184,7 @@ pub(super) fn orbit(
             },
             history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
+            history_spread: None,
             instead_of: None,
         },
         places: measured.places,

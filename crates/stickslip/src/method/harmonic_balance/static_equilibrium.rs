@@ -12,7 +12,7 @@
 //!
 //! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
 
-use super::equations::Level;
+use super::equations::{Level, Solution, Tether};
 use super::path;
 use super::ports::{Ports, StaticState};
 use super::rest::Rest;
@@ -22,7 +22,10 @@ use crate::orbit::Orbit;
 use std::sync::Arc;
 
 /// Newton iterations: each may change which joints slip, and a handful of changes are usual.
-const ITERATIONS: usize = 200;
+const ITERATIONS: usize = 60;
+/// Proximal points, and the stiffness of the springs of the first one, relative to closed contacts: nothing slides far there.
+const POINTS: usize = 60;
+const STIFFEST: f64 = 1.0;
 /// Samples of a motion that stands still.
 const SAMPLES: usize = 8;
 
@@ -56,7 +59,7 @@ pub(super) fn static_equilibrium(
     level.drive(system, ports, rest, omega).ok()?;
     let start = if level.stands() { level.at_rest(1.0) } else { level.unhindered() };
     let mut solution = start;
-    level.polish(ports, omega, &mut solution, ITERATIONS).ok()?;
+    found(&mut level, ports, omega, &mut solution)?;
     let mut states = vec![StaticState::default(); ports.len()];
     for (p, port) in ports.iter().enumerate() {
         level.sample(ports, p, omega, &solution);
@@ -79,6 +82,44 @@ pub(super) fn static_equilibrium(
     };
     let orbit = path::orbit(setting, &mut level, &solution, x)?;
     Some(StaticEquilibrium { orbit, states })
+}
+
+/// Newton's method from closed contacts, and where that fails proximal points: equilibria of a structure that springs tie to
+/// the one before, from which the springs become softer as long as they are found. That is how an overdamped structure sinks
+/// under its load: a body may slide far on soft springs while it turns by little between its contacts.
+/// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
+fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) -> Option<()> {
+    let begin = solution.clone();
+    if level.polish(ports, omega, solution, ITERATIONS).is_ok() {
+        return Some(());
+    }
+    if !level.stands() {
+        return None;
+    }
+    *solution = begin;
+    let (mut share, mut softer) = (STIFFEST, 0.1f64);
+    for _ in 0..POINTS {
+        let anchor = solution.c.iter().map(|c| c.re).collect();
+        level.tether = Some(Tether { share, anchor });
+        let mut next = solution.clone();
+        let tied = level.polish(ports, omega, &mut next, ITERATIONS).is_ok();
+        level.tether = None;
+        if !tied {
+            if share >= STIFFEST {
+                return None;
+            }
+            share /= softer;
+            softer = softer.sqrt();
+            continue;
+        }
+        *solution = next.clone();
+        if level.polish(ports, omega, &mut next, ITERATIONS).is_ok() {
+            *solution = next;
+            return Some(());
+        }
+        share *= softer;
+    }
+    None
 }
 
 /// A rate of the system itself, 1/s, for equations that need one where nothing moves: that of its largest stiffness and mass.

@@ -61,7 +61,7 @@ impl Level {
             // what holds was not sampled
             any |= rough && !alternation.state.is_empty();
             self.states[p].forgets.clone_from(&alternation.forgets);
-            self.add_springs(p, port, OPEN);
+            self.add_springs(p, port, OPEN + self.tether_share());
         }
         self.linearised = true;
         any

@@ -311,6 +311,19 @@ impl Ports {
         }
     }
 
+    /// Of all ports.
+    pub fn static_states(&self) -> Vec<StaticState> {
+        self.list.iter().map(|port| port.static_state.clone()).collect()
+    }
+
+    /// Begins every vibration at these displacements, with states that are so many times these.
+    pub fn scale_static_forces(&mut self, states: &[StaticState], factor: f64) {
+        for (port, state) in self.list.iter_mut().zip(states) {
+            let own = &mut port.static_state.states;
+            own.iter_mut().zip(&state.states).for_each(|(z, known)| *z = factor * known);
+        }
+    }
+
     /// The wave in which the other sectors follow, if these are the ports of the first one alone.
     pub fn wave(&self) -> Option<Cyclic> {
         self.wave

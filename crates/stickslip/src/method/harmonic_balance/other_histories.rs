@@ -1,0 +1,62 @@
+//! How far amplitudes depend on the history of joints that never slip.
+//!
+//! Their residual traction is that of the static equilibrium, by rule. What other histories could give is measured: the same
+//! equations are solved again with the friction forces of static equilibrium taken away, and with the opposite ones.
+
+use super::balance::Balance;
+use super::equations::Solution;
+use crate::orbit::Orbit;
+use nalgebra::DVector;
+use num_complex::Complex64;
+
+/// Factors of the friction forces in static equilibrium.
+const HISTORIES: [f64; 2] = [0.0, -1.0];
+/// Newton iterations from the orbit that was found.
+const ITERATIONS: usize = 20;
+
+impl Balance {
+    /// The largest change of a place's vibration with another history, relative to the largest vibration; `None` where no
+    /// history is kept, or where no other orbit was found. Where all joints stick the equations are linear, and nothing changes.
+    pub(super) fn history_spread(&mut self, orbit: &Orbit, omega: f64) -> Option<f64> {
+        let sticks = orbit.joints.iter().all(|joint| joint.slip_fraction == 0.0 && joint.open_fraction == 0.0);
+        if orbit.evidence.history.is_empty() || sticks {
+            return None;
+        }
+        let found = self.recent.front().filter(|recent| recent.start == orbit.start)?;
+        let (top, motion) = (found.top, found.motion.clone());
+        let own = self.places(top, omega, &motion).ok()?;
+        let states = self.ports.static_states();
+        let mut spread: Option<f64> = None;
+        for factor in HISTORIES {
+            self.ports.scale_static_forces(&states, factor);
+            let other = self.with_history(top, omega, &motion);
+            self.ports.scale_static_forces(&states, 1.0);
+            if let Some(other) = other {
+                let apart = self.apart(top, &own, &other);
+                spread = Some(spread.map_or(apart, |spread| spread.max(apart)));
+            }
+        }
+        spread
+    }
+
+    /// Harmonics of all places in the orbit with the present static states near a motion.
+    fn with_history(&mut self, top: usize, omega: f64, motion: &Solution) -> Option<Vec<DVector<Complex64>>> {
+        let mut other = Solution { iterations: 0, ..motion.clone() };
+        let level = self.levels.get_mut(&top)?;
+        level.polish(&self.ports, omega, &mut other, ITERATIONS).ok()?;
+        self.places(top, omega, &other).ok()
+    }
+
+    /// The largest change of a place's vibration, relative to the largest vibration of all.
+    fn apart(&self, top: usize, one: &[DVector<Complex64>], other: &[DVector<Complex64>]) -> f64 {
+        let moving: Vec<usize> = (0..one.len()).filter(|k| self.kept.up_to(top)[*k] > 0).collect();
+        let vibration = |of: &dyn Fn(usize) -> Complex64| moving.iter().map(|k| of(*k).norm_sqr()).sum::<f64>().sqrt();
+        let (mut apart, mut size) = (0.0f64, 0.0f64);
+        for axis in self.system.seen() {
+            let (a, b) = (|k: usize| axis.along_complex(&one[k]), |k: usize| axis.along_complex(&other[k]));
+            size = size.max(vibration(&a));
+            apart = apart.max((vibration(&a) - vibration(&b)).abs());
+        }
+        if size > 0.0 { apart / size } else { 0.0 }
+    }
+}

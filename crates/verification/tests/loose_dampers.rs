@@ -1,0 +1,138 @@
+//! Dampers that nothing but contacts and a constant load holds, against an integration in time that shares no code with the
+//! library and begins at the same static equilibrium.
+//!
+//! `STICKSLIP_LOOSE_DAMPERS=200` takes as many random ones, `STICKSLIP_LOOSE_FIRST=SEED` those from a seed on; it prints every point that differs, fails or
+//! cannot be judged, and the counts.
+
+#![allow(clippy::print_stdout)] // tests say what they measured
+
+use std::f64::consts::TAU;
+use std::time::Instant;
+use stickslip::method::Method;
+use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip_verification::loose_dampers::{Course, LooseDamper, loose_damper, roof_damper};
+
+/// Random dampers by default.
+const DAMPERS: u64 = 6;
+/// How the reference is followed, first as it is usual and then, where it differs, longer: what rings undamped on its contacts
+/// takes an excitation that grows slowly, and a resonance many steps.
+const COURSES: [Course; 2] = [
+    Course { steps: 1000, growth: 40, periods: 3000, settled: 1e-5 },
+    Course { steps: 2000, growth: 1000, periods: 6000, settled: 2e-6 },
+];
+/// Difference that is allowed in any case.
+const NEAR: f64 = 1e-3;
+
+fn variable(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
+/// What became of the points.
+#[derive(Debug, Default)]
+struct Counts {
+    agree: usize,
+    /// Within the range that other histories of a stuck contact give.
+    within_histories: usize,
+    differ: usize,
+    /// No orbit, where the reference settles.
+    missed: usize,
+    /// No orbit, and the reference does not settle either.
+    unsettled: usize,
+    /// An orbit, to which the reference does not settle.
+    unjudged: usize,
+    /// Reported error above 1 %.
+    inaccurate: usize,
+}
+
+/// The largest difference of the blades' amplitudes from those of the reference, relative to the largest.
+fn apart(damper: &LooseDamper, amplitudes: &[f64], omega: f64, course: Course) -> Option<f64> {
+    let reference = damper.settled(omega, course)?;
+    let size = reference[..damper.blades].iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = amplitudes.iter().zip(&reference).take(damper.blades);
+    Some(pairs.map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max))
+}
+
+fn judge(damper: &LooseDamper, name: &str, counts: &mut Counts) {
+    let system = damper.system();
+    let mut solver = HarmonicBalance::default().solver(&system).unwrap();
+    for &omega in &damper.frequencies {
+        let clock = Instant::now();
+        let orbit = match solver.orbit(omega, None) {
+            Ok(orbit) => orbit,
+            Err(error) => {
+                let settles = damper.settled(omega, COURSES[0]).is_some();
+                let count = if settles { &mut counts.missed } else { &mut counts.unsettled };
+                *count += 1;
+                println!("{name} at {:.3} Hz: {} (reference settles: {settles})", omega / TAU, error.status());
+                continue;
+            }
+        };
+        let seconds = clock.elapsed().as_secs_f64();
+        let amplitudes: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
+        let error = orbit.evidence.truncation.unwrap_or(f64::INFINITY);
+        counts.inaccurate += usize::from(error > 0.01);
+        let allowed = NEAR.max(error);
+        let mut distance = apart(damper, &amplitudes, omega, COURSES[0]);
+        if distance.is_none_or(|distance| distance > allowed) {
+            distance = apart(damper, &amplitudes, omega, COURSES[1]).or(distance);
+        }
+        let spread = orbit.evidence.history_spread.unwrap_or(0.0);
+        match distance {
+            None => counts.unjudged += 1,
+            Some(distance) if distance <= allowed => {
+                counts.agree += 1;
+                continue;
+            }
+            Some(distance) if distance <= allowed + spread => counts.within_histories += 1,
+            Some(_) => counts.differ += 1,
+        }
+        println!(
+            "{name} at {:.3} Hz: apart {distance:?}, error {error:.1e}, histories {spread:.1e}, {seconds:.2} s",
+            omega / TAU
+        );
+    }
+}
+
+/// Wedges, roofs and cylinders at 20 to 70 degrees, with friction of 0.1 to 0.6, pressed by 3 N to 3 kN, through full slip and lift-off.
+#[test]
+fn random_loose_dampers_vibrate_as_they_do_in_time() {
+    let first = variable("STICKSLIP_LOOSE_FIRST", 0);
+    let dampers = variable("STICKSLIP_LOOSE_DAMPERS", DAMPERS);
+    let mut counts = Counts::default();
+    for seed in first..first + dampers {
+        let damper = loose_damper(seed);
+        judge(&damper, &format!("{} {seed}", damper.kind), &mut counts);
+    }
+    println!("{counts:?}");
+    let found = counts.agree + counts.within_histories + counts.differ + counts.unjudged;
+    assert_eq!(counts.differ, 0, "{counts:?}");
+    assert!(counts.missed as f64 <= 0.01 * (found + counts.missed) as f64, "{counts:?}");
+    assert!(counts.inaccurate as f64 <= 0.05 * found as f64, "{counts:?}");
+}
+
+/// Half of peak to peak of the first blade, contacts stuck, by an own integration in C.
+#[test]
+fn a_roof_damper_has_its_orbits_at_all_speeds() {
+    let damper = roof_damper(1000.0);
+    let system = damper.system();
+    let mut solver = HarmonicBalance::default().solver(&system).unwrap();
+    for (hertz, micrometres) in [(120.0, 53.652), (150.0, 11.520), (165.0, 6.7442), (175.5, 5.1345)] {
+        let orbit = solver.orbit(TAU * hertz, None).unwrap();
+        let amplitude = 1e6 * orbit.places[0].amplitude();
+        assert!((amplitude / micrometres - 1.0).abs() < 1e-4, "{hertz} Hz: {amplitude} {micrometres}");
+    }
+    let mut missed = Vec::new();
+    for speed in [500.0, 1000.0, 2000.0, 4000.0] {
+        let damper = roof_damper(speed);
+        let system = damper.system();
+        let mut solver = HarmonicBalance::default().solver(&system).unwrap();
+        let mut start: Option<Vec<f64>> = None;
+        for &omega in damper.frequencies.iter().step_by(5) {
+            match solver.orbit(omega, start.as_deref()) {
+                Ok(orbit) => start = Some(orbit.start),
+                Err(error) => missed.push(format!("{speed} rpm, {} Hz: {error}", omega / TAU)),
+            }
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
+}
