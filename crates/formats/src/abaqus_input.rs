@@ -78,6 +78,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
     must_end_its_lines(bytes)?;
+    must_be_one(bytes)?;
     let mut rows: Vec<Row> = places.keys().copied().collect();
     rows.sort_unstable();
     for (at, row) in rows.iter().enumerate() {
@@ -85,6 +86,18 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     let size = rows.len();
     Ok(vec![Item::new("", size, size, move || read(bytes, &rows, &places, count))])
+}
+
+/// Refuses a second `*MATRIX INPUT`, whose entries would be added to those of the first.
+fn must_be_one(bytes: &[u8]) -> Result<(), Error> {
+    let begins = |line: &Line| {
+        let keyword: Vec<u8> = line.text.iter().filter(|byte| !byte.is_ascii_whitespace()).take(12).copied().collect();
+        keyword.eq_ignore_ascii_case(b"*MATRIXINPUT")
+    };
+    Lines::new(bytes).filter(begins).nth(1).map_or(Ok(()), |line| {
+        let problem = "a second matrix begins here".into();
+        Err(Error::new(Kind::Unsupported, line.location(), problem, "write every matrix to a file of its own"))
+    })
 }
 
 fn read(bytes: &[u8], rows: &[Row], places: &HashMap<Row, usize>, count: usize) -> Result<Matrix, Error> {
@@ -137,6 +150,8 @@ mod tests {
         check("1,1,1,1,1\n1,1,1,1\n", Kind::Malformed, Location::Line(2));
         check("1,1,1,1,1\n1,1,1,1,1,1\n", Kind::Malformed, Location::Line(2));
         check("1,x,1,1,1\n", Kind::Malformed, Location::Line(1));
+        let two = "*MATRIX INPUT, NAME=K\n1,1,1,1,5\n*Matrix Input, NAME=M\n1,1,1,1,3\n";
+        check(two, Kind::Unsupported, Location::Line(3));
         check("1,1,1,1,1e999\n", Kind::NotFinite, Location::Line(1));
     }
 }

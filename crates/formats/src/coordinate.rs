@@ -1,12 +1,13 @@
 //! Lines of `row column value`, counted from one, without a header: CalculiX (`.sti`, `.mas`) and Abaqus (`FORMAT=COORDINATE`).
 //!
 //! CalculiX writes the upper triangle, Abaqus both. One triangle alone stands for a symmetric matrix, and so does a diagonal.
-//! The size is the largest row or column there is.
+//! The size is the largest row or column there is. A first line of sizes belongs to Matrix Market, see [`FirstLine`].
 //! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus Analysis User's Guide, Generating matrices.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::sizes::{FirstLine, unclear, whole};
 use crate::text::{Line, Lines, integer, must_end_its_lines, real};
 
 pub(crate) const FORMAT: Format = Format {
@@ -32,6 +33,20 @@ fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(usize, usize, f64, Line
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    match FirstLine::of(bytes) {
+        FirstLine::Entry => {}
+        FirstLine::Unclear(line) => return Err(unclear(&line)),
+        FirstLine::Sizes => {
+            let problem = "the first line states sizes and is no entry".into();
+            let remedy = "leave the format out, or state matrix-market";
+            return Err(Error::new(Kind::Malformed, Location::File, problem, remedy));
+        }
+    }
+    if is_full_of_three(bytes) {
+        let problem = "three lines of three whole numbers are either entries or the rows of a full symmetric matrix";
+        let remedy = "give the values a decimal point, as in `1 1 2.`, or in rows all numbers, as in `2. 1. 0.`";
+        return Err(Error::new(Kind::Malformed, Location::File, problem.into(), remedy));
+    }
     let (mut size, mut count) = (0, 0);
     for entry in entries(bytes) {
         let (row, column, ..) = entry?;
@@ -44,6 +59,13 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     must_end_its_lines(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
+}
+
+/// Whether the file is three lines that are also the rows of a full symmetric matrix of whole numbers.
+fn is_full_of_three(bytes: &[u8]) -> bool {
+    let lines = Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty()).take(4);
+    let rows: Option<Vec<[i64; 3]>> = lines.map(|line| whole(&line)).collect();
+    matches!(rows.as_deref(), Some(&[[_, a, b], [c, _, d], [e, f, _]]) if (a, b, d) == (c, e, f))
 }
 
 fn read(bytes: &[u8], size: usize, count: usize) -> Result<Matrix, Error> {
@@ -84,6 +106,8 @@ mod tests {
         check("1 1 1\n2 2 1.2", Kind::Truncated, Location::Line(2));
         check("1 1 inf\n", Kind::NotFinite, Location::Line(1));
         check("1 4000000000 1\n", Kind::TooLarge, Location::File);
+        // a full symmetric matrix is three such lines, too
+        check("2 1 1\n1 2 1\n1 1 2\n", Kind::Malformed, Location::File);
         check("1 1 1\n\n0 1 1\n", Kind::Malformed, Location::Line(3));
     }
 }

@@ -10,10 +10,11 @@
 //! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection, TR/PA/92/86 (1992); ANSYS Mechanical APDL
 //! Command Reference, HBMAT.
 
-use crate::error::{Error, Location};
+use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
+use crate::fortran::Fixed;
 use crate::matrix::{Matrix, Symmetry, Triplets, compressed};
-use crate::text::{Line, Lines, shown};
+use crate::text::{Lines, shown};
 
 pub(crate) const FORMAT: Format = Format {
     name: "harwell-boeing",
@@ -38,56 +39,6 @@ fn type_of(word: &[u8]) -> Option<[u8; 3]> {
     let [values, symmetry, assembly] = *word.to_ascii_uppercase().first_chunk()?;
     let known = b"RCPI".contains(&values) && b"SUHZR".contains(&symmetry) && b"AE".contains(&assembly);
     (known && word.len() == 3).then_some([values, symmetry, assembly])
-}
-
-/// Fields of a line: so many, so wide each.
-#[derive(Clone, Copy)]
-struct Fixed {
-    count: usize,
-    width: usize,
-}
-
-/// Wider lines than any Fortran writes.
-const WIDEST: usize = 10_000;
-
-impl Fixed {
-    /// Of `(8I10)`, `(1P,4E20.12)`, `(1P,4(E20.12))`, `(4D25.16E3)`.
-    fn new(text: &str) -> Option<Self> {
-        let inner = text.strip_prefix('(')?.strip_suffix(')')?.to_uppercase();
-        // a field alone in a group is that field
-        let inner: String = inner.split_whitespace().collect::<String>().replace(['(', ')'], "");
-        // A scale factor changes how many digits stand before the point, not the value, as there is an exponent.
-        let inner = inner.split_once('P').map_or(inner.as_str(), |(_, rest)| rest.trim_start_matches(','));
-        let letter = inner.find(['I', 'E', 'D', 'F', 'G'])?;
-        let count = if letter == 0 { 1 } else { inner[..letter].parse().ok()? };
-        let width = inner[letter + 1..].trim_start_matches(['S', 'N', 'X']);
-        let width = width.split('.').next()?.parse().ok()?;
-        (count > 0 && width > 0 && count <= WIDEST && width <= WIDEST).then_some(Self { count, width })
-    }
-
-    /// Reads `count` fields from as many lines as they take.
-    fn read<'a, T>(
-        self,
-        lines: &mut Lines<'a>,
-        count: usize,
-        what: &str,
-        mut read: impl FnMut(&Line<'a>, &'a [u8]) -> Result<T, Error>,
-    ) -> Result<Vec<T>, Error> {
-        // A field has a digit and something that parts it from the next one, or a line its end.
-        let mut found = Vec::with_capacity(count.min(lines.left() / 2 + 1));
-        while found.len() < count {
-            let line = lines.expect(what)?;
-            let here = self.count.min(count - found.len());
-            for at in 0..here {
-                let field = line.columns(at * self.width, (at + 1) * self.width);
-                if field.is_empty() {
-                    return Err(line.malformed(&format!("{what}, {here} of them in this line"), &at.to_string()));
-                }
-                found.push(read(&line, field)?);
-            }
-        }
-        Ok(found)
-    }
 }
 
 /// The header, with the lines behind it.
@@ -125,10 +76,15 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     let mut formats = text.split_inclusive(closes).map(str::trim);
     let mut format = |what: &str| {
         let found = formats.next().unwrap_or_default();
-        Fixed::new(found).ok_or_else(|| line.malformed(&format!("the format of {what}"), &shown(found.as_bytes())))
+        Fixed::new(found).ok_or_else(|| {
+            let problem = format!("{} is not read as the Fortran format of {what}", shown(found.as_bytes()));
+            let remedy =
+                "formats of whole and real numbers are, such as (8I10), (1X,8I9), (1P,4E20.12): write one of these";
+            Error::new(Kind::Malformed, line.location(), problem, remedy)
+        })
     };
     let (pointers, indices) = (format("pointers")?, format("rows")?);
-    let values = if kind[0] == b'P' { indices } else { format("values")? };
+    let values = if kind[0] == b'P' { indices.clone() } else { format("values")? };
     if right_sides > 0 {
         lines.expect("the line of right-hand sides")?;
     }
@@ -147,11 +103,12 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     let Header { rows, columns, entries, kind, pointers, indices, values, mut lines } = header(bytes)?;
     let count = columns.saturating_add(1);
-    let pointers = pointers.read(&mut lines, count, "a pointer of every column", |line, field| line.index(field))?;
-    let indices = indices.read(&mut lines, entries, "a row of every entry", |line, field| line.index(field))?;
+    let pointers =
+        pointers.read(&mut lines, count, "a pointer of every column", |field| field.line.index(field.text))?;
+    let indices = indices.read(&mut lines, entries, "a row of every entry", |field| field.line.index(field.text))?;
     let values = match kind[0] {
         b'P' => vec![1.0; indices.len()],
-        _ => values.read(&mut lines, entries, "a value of every entry", |line, field| line.real(field))?,
+        _ => values.read(&mut lines, entries, "a value of every entry", |field| field.real())?,
     };
     let symmetry = match kind[1] {
         // What is real and Hermitian is symmetric.
@@ -169,7 +126,6 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Kind;
     use crate::read_bytes;
 
     fn file(kind: &str, formats: &str, body: &str) -> String {
@@ -204,19 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn formats_of_fortran() {
-        let check = |text, expected: Option<(usize, usize)>| {
-            assert_eq!(Fixed::new(text).map(|fixed| (fixed.count, fixed.width)), expected, "{text}");
-        };
-        check("(8I10)", Some((8, 10)));
-        check("(1P,4E20.12)", Some((4, 20)));
-        check("(1P,4(E20.12))", Some((4, 20)));
-        check("(1p4d25.16e3)", Some((4, 25)));
-        check("(I14)", Some((1, 14)));
-        check("( 3 F 12.4 )", Some((3, 12)));
-        for wrong in ["(8A10)", "8I10", "(8I)", "(0I4)", "(4I0)", "(99999999999I4)", "()", "(é)"] {
-            check(wrong, None);
-        }
+    fn skipped_columns_and_repeated_groups() -> Result<(), Error> {
+        let body = "F\n   1  3  4  5\n   1  3  2  3\n -1.0000000000000000E+03 -5.0000000000000000E+02\n\
+            \x20 2.0000000000000000E+00  3.0000000000000000E+00\n";
+        let formats = "(1X,8I3)        (1X,8I3)        (2(1P,E24.16))      (4E20.12)";
+        let matrix = read_bytes(file("RSA", formats, body).as_bytes(), None, None)?;
+        assert_eq!((matrix.get(0, 0), matrix.get(0, 2), matrix.get(1, 1), matrix.get(2, 2)), (-1e3, -5e2, 2.0, 3.0));
+        Ok(())
     }
 
     #[test]

@@ -24,9 +24,11 @@ mod ansys_full;
 mod bytes;
 mod constrained;
 mod coordinate;
+mod dense;
 mod error;
 mod file;
 mod format;
+mod fortran;
 mod harwell_boeing;
 mod hdf5;
 mod inflate;
@@ -39,6 +41,7 @@ mod nastran_op4;
 mod npy;
 mod npz;
 mod report;
+mod sizes;
 mod text;
 
 use std::path::Path;
@@ -66,6 +69,8 @@ pub const TABLE: &[Format] = &[
     ansys_full::FORMAT,
     harwell_boeing::FORMAT,
     coordinate::FORMAT,
+    // Rows of numbers begin as many other files do.
+    dense::FORMAT,
     // Its cards may stand anywhere in a file, so that it looks through all of it.
     nastran_dmig::FORMAT,
 ];
@@ -203,6 +208,10 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
         (None, []) if items.len() == 1 => Ok(&items[0]),
         (None, []) if items.is_empty() => fault("the file holds nothing".into(), "export the matrix again"),
         (None, []) => fault(format!("the file holds no real matrix, but {}", there()), "export the matrix again"),
+        (None, several) if several.iter().any(|item| item.variable.name.is_empty()) => fault(
+            format!("the file holds {}", there()),
+            "say which one by its name; export one without a name in a file of its own",
+        ),
         (None, _) => fault(format!("the file holds {}", there()), "say which one by its name"),
     }
 }

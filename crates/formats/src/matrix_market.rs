@@ -6,32 +6,49 @@
 //! 1 1 2.5
 //! 3 1 -1.0
 //! ```
+//! Symmetric and skew-symmetric matrices store their lower triangle. Coordinates without a banner are read too, see [`FirstLine`]; one triangle
+//! alone then stands for a symmetric matrix.
 //! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats: Initial Design, NISTIR 5935 (1996).
-//! Symmetric and skew-symmetric matrices store their lower triangle.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::sizes::{FirstLine, is_comment, unclear};
 use crate::text::{Line, Lines, shown, truncated};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matrix-market",
     summary: "Matrix Market (.mtx): coordinate or array; SciPy `mmwrite`, MATLAB, Julia, most sparse libraries",
-    sniff: |bytes| bytes.get(..BANNER.len()).is_some_and(|start| start.eq_ignore_ascii_case(BANNER)),
+    sniff: |bytes| banner(bytes).is_some() || !matches!(FirstLine::of(bytes), FirstLine::Entry),
     open,
 };
 
-const BANNER: &[u8] = b"%%MatrixMarket";
-
 /// What the banner says.
-struct Header {
+struct Layout {
     coordinate: bool,
     pattern: bool,
     symmetry: Symmetry,
+}
+
+/// The banner and the line of sizes.
+struct Header {
+    layout: Layout,
     rows: usize,
     columns: usize,
     /// Entries in the file.
     entries: usize,
+}
+
+/// The banner, among the comments that a file begins with.
+fn banner(bytes: &[u8]) -> Option<Line<'_>> {
+    let filled = Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty());
+    filled.take_while(is_comment).find(|line| words(line).first().is_some_and(|word| word == "matrixmarket"))
+}
+
+/// The words of a comment in small letters, without its `%`.
+fn words(line: &Line) -> Vec<String> {
+    let text = String::from_utf8_lossy(line.text).to_lowercase();
+    text.trim_start_matches(|c: char| c == '%' || c.is_whitespace()).split_whitespace().map(str::to_string).collect()
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
@@ -42,8 +59,42 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 }
 
 fn header(lines: &mut Lines) -> Result<Header, Error> {
-    let banner = lines.expect("the banner `%%MatrixMarket matrix …`")?;
-    let words: Vec<String> = banner.words().map(|word| String::from_utf8_lossy(word).to_lowercase()).collect();
+    let mut layout = match banner(lines.rest()) {
+        Some(line) => layout(&line)?,
+        None => match FirstLine::of(lines.rest()) {
+            FirstLine::Sizes => Layout { coordinate: true, pattern: false, symmetry: Symmetry::Unsaid },
+            FirstLine::Unclear(line) => return Err(unclear(&line)),
+            FirstLine::Entry => {
+                let line = lines.expect_filled("the banner `%%MatrixMarket matrix …`")?;
+                return Err(line.malformed("the banner `%%MatrixMarket matrix …`", &shown(line.text)));
+            }
+        },
+    };
+    let sizes = loop {
+        let line = lines.expect_filled("the line of sizes")?;
+        if !is_comment(&line) {
+            break line;
+        }
+    };
+    let (rows, columns, entries) = if layout.coordinate {
+        let [rows, columns, entries] = sizes.exactly("rows, columns and number of entries")?;
+        (sizes.count(rows)?, sizes.count(columns)?, Some(sizes.count(entries)?))
+    } else {
+        let [rows, columns] = sizes.exactly("rows and columns")?;
+        (sizes.count(rows)?, sizes.count(columns)?, None)
+    };
+    if rows != columns && layout.symmetry == Symmetry::Unsaid {
+        layout.symmetry = Symmetry::General;
+    }
+    if layout.symmetry != Symmetry::General && rows != columns {
+        return Err(sizes.malformed("a square symmetric matrix", &format!("{rows} x {columns}")));
+    }
+    let entries = entries.map_or_else(|| stored(rows, columns, layout.symmetry, &sizes), Ok)?;
+    Ok(Header { layout, rows, columns, entries })
+}
+
+fn layout(banner: &Line) -> Result<Layout, Error> {
+    let words = words(banner);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let [_, "matrix", layout, field, symmetry] = words[..] else {
         return Err(banner.malformed("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &shown(banner.text)));
@@ -73,24 +124,7 @@ fn header(lines: &mut Lines) -> Result<Header, Error> {
         "skew-symmetric" => Symmetry::Skew,
         other => return Err(banner.malformed("general, symmetric or skew-symmetric", &format!("`{other}`"))),
     };
-    let sizes = loop {
-        let line = lines.expect_filled("the line of sizes")?;
-        if !line.text.starts_with(b"%") {
-            break line;
-        }
-    };
-    let (rows, columns, entries) = if coordinate {
-        let [rows, columns, entries] = sizes.exactly("rows, columns and number of entries")?;
-        (sizes.count(rows)?, sizes.count(columns)?, Some(sizes.count(entries)?))
-    } else {
-        let [rows, columns] = sizes.exactly("rows and columns")?;
-        (sizes.count(rows)?, sizes.count(columns)?, None)
-    };
-    if symmetry != Symmetry::General && rows != columns {
-        return Err(sizes.malformed("a square symmetric matrix", &format!("{rows} x {columns}")));
-    }
-    let entries = entries.map_or_else(|| stored(rows, columns, symmetry, &sizes), Ok)?;
-    Ok(Header { coordinate, pattern, symmetry, rows, columns, entries })
+    Ok(Layout { coordinate, pattern, symmetry })
 }
 
 /// Numbers that an array of this size stores.
@@ -107,28 +141,28 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     let mut lines = Lines::new(bytes);
     let header = header(&mut lines)?;
     // The shortest line of an entry is `1 1` and its end, of a number `0` and its end.
-    let shortest = if header.coordinate { 4 } else { 2 };
+    let shortest = if header.layout.coordinate { 4 } else { 2 };
     let room = header.entries.min(lines.left() / shortest + 1);
     let mut triplets = Triplets::new(header.rows, header.columns, room, lines.location())?;
-    if header.coordinate {
+    if header.layout.coordinate {
         coordinates(&mut lines, &header, &mut triplets)?;
     } else {
         array(&mut lines, &header, &mut triplets)?;
     }
-    triplets.finish(header.symmetry)
+    triplets.finish(header.layout.symmetry)
 }
 
 fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
     let mut count = 0;
     for line in lines.by_ref() {
-        if line.text.trim_ascii().is_empty() || line.text.starts_with(b"%") {
+        if line.text.trim_ascii().is_empty() || is_comment(&line) {
             continue;
         }
         count += 1;
         if count > header.entries {
             return Err(too_many(line.location(), header.entries));
         }
-        let (row, column, value) = if header.pattern {
+        let (row, column, value) = if header.layout.pattern {
             let [row, column] = line.exactly("row and column")?;
             (row, column, 1.0)
         } else {
@@ -141,13 +175,13 @@ fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> R
 }
 
 fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
-    let first = |column: usize| match header.symmetry {
+    let first = |column: usize| match header.layout.symmetry {
         Symmetry::General | Symmetry::Unsaid => 0,
         Symmetry::Symmetric => column,
         Symmetry::Skew => column + 1,
     };
     let (mut row, mut column, mut count) = (first(0), 0, 0);
-    for line in lines.by_ref().filter(|line| !line.text.starts_with(b"%")) {
+    for line in lines.by_ref().filter(|line| !is_comment(line)) {
         for word in line.words() {
             count += 1;
             if count > header.entries {
@@ -240,6 +274,54 @@ mod tests {
         check(skew, &expected)?;
         check("%%MatrixMarket matrix array real general\n0 0\n", &[])?;
         Ok(())
+    }
+
+    /// The chain of three, `[2 -1 0; -1 2 -1; 0 -1 1]` kN/m.
+    const CHAIN: &str = "1 1 2000\n2 1 -1000\n2 2 2000\n3 2 -1000\n3 3 1000\n";
+
+    #[test]
+    fn blanks_before_banner_and_comments_do_no_harm() -> Result<(), Error> {
+        let entries = [(0, 0, 2e3), (1, 0, -1e3), (0, 1, -1e3), (1, 1, 2e3), (2, 1, -1e3), (1, 2, -1e3), (2, 2, 1e3)];
+        let banner = "%%MatrixMarket matrix coordinate real symmetric\n";
+        check(&format!("  {banner}3 3 5\n{CHAIN}"), &entries)?;
+        check(&format!("\n% by a program\n{banner}   % a chain\n3 3 5\n\t% of three\n{CHAIN}"), &entries)?;
+        check(&format!("{}3 3 5\n{CHAIN}", banner.replace("%%", "% %")), &entries)?;
+        check(
+            "%%MatrixMarket matrix array real symmetric\n  % a comment\n 2 2\n1\n % another\n2\n3\n",
+            &[(0, 0, 1.0), (1, 0, 2.0), (0, 1, 2.0), (1, 1, 3.0)],
+        )?;
+        Ok(())
+    }
+
+    #[test]
+    fn sizes_without_a_banner_are_no_entry() -> Result<(), Error> {
+        let entries = [(0, 0, 2e3), (1, 0, -1e3), (0, 1, -1e3), (1, 1, 2e3), (2, 1, -1e3), (1, 2, -1e3), (2, 2, 1e3)];
+        for text in [format!("3 3 5\n{CHAIN}"), format!("% a chain\n\n 3 3 5\r\n{CHAIN}\n")] {
+            let matrix = check(&text, &entries)?;
+            assert_eq!((matrix.rows(), matrix.origin().format), (3, "matrix-market"));
+        }
+        check("3 3 3\n1 1 1\n2 2 1\n3 3 1\n", &[(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0)])?;
+        check("1 1 1\n1 1 5\n", &[(0, 0, 5.0)])?;
+        let wide = check("2 3 2\n1 1 4\n2 1 5\n", &[(0, 0, 4.0), (1, 0, 5.0)])?;
+        assert_eq!((wide.rows(), wide.columns(), wide.get(0, 1)), (2, 3, 0.0));
+        // an entry alone, and one that is no count
+        for (text, value) in [("3 3 50\n", 50.0), ("3 3 50.\n1 1 1\n", 50.0), ("3 3 -5\n1 1 1\n", -5.0)] {
+            let matrix = read(text)?;
+            assert_eq!((matrix.origin().format, matrix.get(2, 2)), ("coordinate", value), "{text}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_first_line_that_may_be_sizes_or_an_entry_is_refused() {
+        for text in [format!("3 3 6\n{CHAIN}"), format!("3 3 4\n{CHAIN}"), "2 2 1000\n2 1 -1000\n1 1 2000\n".into()] {
+            for format in [None, Some("coordinate"), Some("matrix-market")] {
+                let error = read_bytes(text.as_bytes(), format, None).map(|_| ()).map_err(|e| (e.kind, e.location));
+                assert_eq!(error, Err((Kind::Malformed, Location::Line(1))), "{text}");
+            }
+        }
+        let stated = read_bytes(format!("3 3 5\n{CHAIN}").as_bytes(), Some("coordinate"), None).map(|_| ());
+        assert!(stated.is_err_and(|error| error.to_string().contains("sizes")));
     }
 
     #[test]

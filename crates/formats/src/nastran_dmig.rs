@@ -88,7 +88,7 @@ impl Found {
 /// One thing that the cards say.
 enum Said<'a> {
     Header { name: String, form: i64, complex: bool, columns: usize },
-    Entry { name: &'a str, column: Row, row: Row, value: f64 },
+    Entry { name: &'a str, column: Row, row: Row, value: f64, imaginary: bool },
 }
 
 /// Goes through all cards of DMIG.
@@ -135,12 +135,10 @@ fn entries(
         if grid.is_empty() {
             continue;
         }
-        if rest.first().is_some_and(|imaginary| !imaginary.is_empty() && line.real(imaginary).is_ok_and(|x| x != 0.0)) {
-            return Err(complex(name, line.location()));
-        }
+        let imaginary = rest.first().is_some_and(|field| !field.is_empty() && line.real(field).is_ok_and(|x| x != 0.0));
         let component = if component.is_empty() { 0 } else { line.integer(component)? };
         let row = (line.integer(grid)?, component);
-        tell(Said::Entry { name, column, row, value: line.real(value)? }, line)?;
+        tell(Said::Entry { name, column, row, value: line.real(value)?, imaginary }, line)?;
     }
     Ok(())
 }
@@ -202,9 +200,12 @@ fn read(bytes: &[u8], wanted: &str, matrix: &Found) -> Result<Matrix, Error> {
     let (rows, columns) = matrix.size();
     let mut triplets = Triplets::new(rows, columns, matrix.entries, Location::File)?;
     scan(bytes, |said, line| {
-        let Said::Entry { name, column, row, value } = said else { return Ok(()) };
+        let Said::Entry { name, column, row, value, imaginary } = said else { return Ok(()) };
         if name != wanted {
             return Ok(());
+        }
+        if imaginary {
+            return Err(complex(name, line.location()));
         }
         // Columns of a rectangular matrix are numbered, and what is not a number from one is refused by the size.
         let column = match matrix.rectangular() {
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn several_are_listed_and_wrong_ones_refused() -> Result<(), Error> {
+    fn real_matrices_beside_complex_ones_are_read_and_wrong_ones_refused() -> Result<(), Error> {
         let two = format!("{PUNCH}DMIG    C       0       6       4\n");
         let listed: Vec<_> = list_bytes(two.as_bytes(), None)?.iter().map(ToString::to_string).collect();
         assert_eq!(listed, ["KAAX (2 x 2)", "C (complex)"]);
@@ -278,6 +279,15 @@ mod tests {
             let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(found, Err((kind, location)), "{text}");
         };
+        let mixed = format!(
+            "{two}DMIG*   C                              7               1\n\
+            *                      7               1 2.000000000D+03 1.000000000D+01\n"
+        );
+        let listed: Vec<_> = list_bytes(mixed.as_bytes(), None)?.iter().map(ToString::to_string).collect();
+        assert_eq!(listed, ["KAAX (2 x 2)", "C (complex)"]);
+        assert_eq!(read_bytes(mixed.as_bytes(), None, Some("KAAX"))?.get(0, 0), 1e3);
+        let named = read_bytes(mixed.as_bytes(), None, Some("C")).map(|_| ()).map_err(|e| (e.kind, e.location));
+        assert_eq!(named, Err((Kind::Complex, Location::Variable("C".into()))));
         check("DMIG,C,0,6,4\n", Kind::Complex, Location::Variable("C".into()));
         check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", Kind::Complex, Location::Line(2));
         check("DMIG,M,1,1,,1,1,2.0\n", Kind::Malformed, Location::Line(1));

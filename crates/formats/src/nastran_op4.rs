@@ -34,7 +34,7 @@ impl Header {
         let [columns, rows, form, kind] = numbers;
         let name = String::from_utf8_lossy(name).trim().to_uppercase();
         let known = (0..=100).contains(&form) && (1..=4).contains(&kind);
-        let named = name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.bytes().all(|b| b.is_ascii_graphic());
+        let named = name.bytes().all(|b| b.is_ascii_graphic());
         let size = |size: i64| u32::try_from(size).ok().map(|size| size as usize);
         if !known || !named {
             return None;
@@ -77,6 +77,10 @@ impl Text {
         }
         let header = Header::new(numbers, field(4)).ok_or_else(wrong)?;
         let format = String::from_utf8_lossy(line.columns(widths[5], text.len())).to_uppercase().replace("|I16", "");
+        // a row of whole numbers has neither a name nor a format
+        if format.is_empty() && !header.name.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            return Err(wrong());
+        }
         // `1P,3E23.16` or `5E16.9`, which is what holds where none is given.
         let width = match format.rsplit_once(['E', 'D']) {
             None if format.is_empty() => 16,
@@ -351,6 +355,27 @@ mod tests {
         assert_eq!((null.rows(), null.entries().len()), (3, 0));
         let strings = read_bytes(text.as_bytes(), None, Some("STRINGS"))?;
         assert_eq!((strings.get(2, 0), strings.get(8, 0), strings.entries().len()), (1.0, 6.0, 6));
+        Ok(())
+    }
+
+    #[test]
+    fn names_may_begin_with_a_digit_or_be_blank() -> Result<(), Error> {
+        let digit = DENSE.replace("2K       1P", "21MAT    1P");
+        assert_eq!(read_bytes(digit.as_bytes(), None, Some("1MAT"))?.get(1, 0), 1.5);
+        let blank = DENSE.replace("2K       1P", "2        1P");
+        let read = read_bytes(blank.as_bytes(), None, None)?;
+        assert_eq!((read.get(1, 0), read.origin().variable.as_str()), (1.5, ""));
+        let two = format!("{blank}{DENSE}");
+        let listed: Vec<_> = list_bytes(two.as_bytes(), None)?.iter().map(ToString::to_string).collect();
+        assert_eq!(listed, ["3 x 2", "K (3 x 2)"]);
+        assert_eq!(read_bytes(two.as_bytes(), None, Some("K"))?.get(1, 0), 1.5);
+        let error = read_bytes(two.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.remedy));
+        assert!(error.is_err_and(|(kind, remedy)| kind == Kind::Choice && remedy.contains("export")));
+        // a row of a full matrix
+        let rows: String = ["2 1 1 2", "1 2 1 1", "1 1 2 1", "2 1 1 2"]
+            .map(|row| row.split(' ').map(|word| format!("{word:>8}")).collect::<String>() + "\n")
+            .concat();
+        assert_eq!(read_bytes(rows.as_bytes(), None, None)?.origin().format, "dense-text");
         Ok(())
     }
 

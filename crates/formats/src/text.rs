@@ -33,6 +33,11 @@ impl<'a> Lines<'a> {
         }
     }
 
+    /// What is not yet read.
+    pub fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
     /// Bytes not yet read.
     pub fn left(&self) -> usize {
         self.rest.len()

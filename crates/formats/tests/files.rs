@@ -54,6 +54,30 @@ fn numpy_arrays() {
 }
 
 #[test]
+fn rows_of_numbers_as_text() {
+    for file in ["savetxt.txt", "rows.csv"] {
+        check(file, None, "dense-text", "stiffness");
+    }
+}
+
+/// `1000 [2 -1 0; -1 2 -1; 0 -1 1]`, by files that vary within their format.
+#[test]
+fn a_chain_of_three_in_every_variant() {
+    for file in ["chain_no_banner.mtx", "chain_indented_banner.mtx", "chain_indented_comment.mtx"] {
+        check(file, None, "matrix-market", "chain");
+    }
+    for file in ["chain_skipped_column.rsa", "chain_repeated_group.rsa"] {
+        check(file, None, "harwell-boeing", "chain");
+    }
+    check("chain_digit.op4", Some("1MAT"), "nastran-op4", "chain");
+    check("chain_blank.op4", None, "nastran-op4", "chain");
+    check("chain_complex_beside.pch", Some("KAAX"), "nastran-dmig", "chain");
+    let listed: Vec<_> =
+        list(data("chain_complex_beside.pch"), None).expect("a list").iter().map(ToString::to_string).collect();
+    assert_eq!(listed.join(", "), "KAAX (3 x 3), MAAX (3 x 3), VAX (2 x 1), K4CX (complex)");
+}
+
+#[test]
 fn scipy_sparse_matrices() {
     for file in ["stiffness_csc.npz", "stiffness_csr.npz", "stiffness_int64.npz"] {
         check(file, None, "npz", "stiffness");

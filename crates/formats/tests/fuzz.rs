@@ -240,6 +240,11 @@ fn large(format: &str) -> Vec<u8> {
         }
         "coordinate" => lines(&|row, column, value| format!("{row} {column} {value}\n")),
         "abaqus-matrix-input" => lines(&|row, column, value| format!("{row},1, {column},1, {value:.15e}\n")),
+        "dense-text" => {
+            let number = |row, column| format!("{:.6e}", 1.5 + (row + column) as f64);
+            let row = |row| (0..FULL).map(|column| number(row, column)).collect::<Vec<_>>().join(" ") + "\n";
+            (0..FULL).map(row).collect::<String>().into_bytes()
+        }
         "abaqus-element" => {
             let nodes: Vec<String> = (1..=FULL).map(|node| node.to_string()).collect();
             let mut text = format!("*USER ELEMENT,NODES={FULL},LINEAR\n** ELEMENT NODES\n");

@@ -4,7 +4,8 @@
     apt-get install calculix-ccx octave   # 2.20, 7.3.0
     venv/bin/python make.py
 
-Nothing but these programs writes a file here, except `punch.pch` and those of Abaqus and ANSYS, which follow their documentation.
+Nothing but these programs writes a file here, except `punch.pch` and those of Abaqus and ANSYS, which follow their documentation, and
+`chain_*`, a chain of three masses written by hand with what other programs add or leave out.
 Expected values stand in `NAME.bits`: rows and columns, then `row column bits` of every entry, the bits as 16 hexadecimal digits.
 """
 
@@ -47,6 +48,8 @@ def expect(name, matrix):
 
 def numpy_and_scipy():
     np.save(HERE / "stiffness.npy", STIFFNESS)
+    np.savetxt(HERE / "savetxt.txt", STIFFNESS, header="stiffness")
+    np.savetxt(HERE / "rows.csv", STIFFNESS, delimiter=",", fmt="%.17g")
     np.save(HERE / "general_fortran.npy", np.asfortranarray(GENERAL))
     np.save(HERE / "stiffness_big_endian.npy", STIFFNESS.astype(">f8"))
     np.savez(HERE / "dense.npz", K=STIFFNESS, M=MASS, note=np.array("text"), z=np.array([[1j]]))

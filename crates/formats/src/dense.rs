@@ -1,0 +1,132 @@
+//! Full matrices as text, a line for every row: `numpy.savetxt`, CSV, MATLAB's `writematrix`.
+//!
+//! ```text
+//! # stiffness
+//! 2000.0, -1000.0
+//! -1000.0, 1000.0
+//! ```
+//! Numbers stand between blanks, commas or semicolons; comments begin with `#` or `%`. The matrix is square: a line of sizes or of column
+//! numbers, or a column of row numbers, makes it rectangular, and is refused.
+
+use crate::error::{Error, Kind, Location};
+use crate::format::{Format, Item};
+use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::text::{Line, Lines, integer, must_end_its_lines, real};
+
+pub(crate) const FORMAT: Format = Format {
+    name: "dense-text",
+    summary: "a line of numbers for every row: `numpy.savetxt`, CSV, MATLAB `writematrix`",
+    sniff: |bytes| rows(bytes).next().is_some_and(|line| fields(&line).all(|field| real(field).is_some())),
+    open,
+};
+
+/// The lines that are no comments.
+fn rows(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    let is_comment = |line: &Line| matches!(line.text.trim_ascii_start().first(), None | Some(b'#' | b'%'));
+    Lines::new(bytes).filter(move |line| !is_comment(line))
+}
+
+/// The fields of a line: between semicolons if there are any, else between commas, else between blanks.
+fn fields<'a>(line: &Line<'a>) -> Box<dyn Iterator<Item = &'a [u8]> + 'a> {
+    match [b';', b','].into_iter().find(|mark| line.text.contains(mark)) {
+        Some(mark) => Box::new(line.text.split(move |byte| *byte == mark).map(<[u8]>::trim_ascii)),
+        None => Box::new(line.words()),
+    }
+}
+
+fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
+    let (mut size, mut columns) = (0, 0);
+    for line in rows(bytes) {
+        let here = fields(&line).count();
+        if size > 0 && here != columns {
+            let remedy = "every row of a full matrix has all its numbers; sizes and titles stand in comments only";
+            let problem = format!("{here} numbers in a row, {columns} in the rows before");
+            return Err(Error::new(Kind::Malformed, line.location(), problem, remedy));
+        }
+        (size, columns) = (size + 1, here);
+    }
+    let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, Location::File, problem, remedy));
+    if size == 0 {
+        return fault(Kind::Truncated, "the file has no row of numbers".into(), "export it again");
+    }
+    if size != columns {
+        let problem = format!("{size} rows of {columns} numbers, as many as rows were expected");
+        let remedy = "export a square matrix, without a line of sizes or column numbers and without row numbers";
+        return fault(Kind::NotSquare, problem, remedy);
+    }
+    if columns == 3 && rows(bytes).all(|line| has_indices(&line)) {
+        let problem = "three lines that are either full rows or entries `row column value`".into();
+        let remedy = "give all numbers of full rows a decimal point; write entries without comments and commas";
+        return fault(Kind::Malformed, problem, remedy);
+    }
+    must_end_its_lines(bytes)?;
+    Ok(vec![Item::new("", size, size, move || read(bytes, size))])
+}
+
+/// Whether a line begins with two numbers that may be a row and a column.
+fn has_indices(line: &Line) -> bool {
+    fields(line).take(2).all(|field| integer(field).is_some_and(|index| index > 0))
+}
+
+fn read(bytes: &[u8], size: usize) -> Result<Matrix, Error> {
+    let mut triplets = Triplets::new(size, size, 0, Location::File)?;
+    for (row, line) in rows(bytes).enumerate() {
+        for (column, field) in fields(&line).enumerate() {
+            triplets.push(row, column, line.real(field)?, line.location())?;
+        }
+    }
+    triplets.finish(Symmetry::General)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_bytes;
+
+    /// The chain of three in the ways in which programs write it.
+    #[test]
+    fn rows_of_numbers_in_every_dialect() -> Result<(), Error> {
+        let files = [
+            // numpy.savetxt with its default format, and with a header
+            "# stiffness\n2.000000000000000000e+03 -1.000000000000000000e+03 0.000000000000000000e+00\n\
+             -1.000000000000000000e+03 2.000000000000000000e+03 -1.000000000000000000e+03\n\
+             0.000000000000000000e+00 -1.000000000000000000e+03 1.000000000000000000e+03\n",
+            "2000,-1000,0\r\n-1000,2000,-1000\r\n0,-1000,1000\r\n",
+            "% MATLAB\n 2000\t-1000\t0\n\n-1000\t2000\t-1000\n0\t-1000\t1000\n",
+            "2000; -1000; 0\n-1000; 2000; -1000\n0; -1000; 1000\n",
+        ];
+        for file in files {
+            let matrix = read_bytes(file.as_bytes(), None, None)?;
+            assert!(matrix.is_symmetric(), "{file}");
+            let values: Vec<f64> = matrix.entries().iter().map(|e| e.value).collect();
+            assert_eq!((matrix.rows(), &values[..]), (3, &[2e3, -1e3, 2e3, -1e3, 1e3][..]), "{file}");
+        }
+        let skew = read_bytes(b"0.0 300.0\n-300.0 0.0\n", None, None)?;
+        assert_eq!((skew.get(0, 1), skew.get(1, 0)), (300.0, -300.0));
+        assert_eq!(read_bytes(b"5\n", None, None)?.get(0, 0), 5.0);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_no_square_of_numbers_is_refused_with_its_line() {
+        let check = |text: &str, kind, location| {
+            let found = read_bytes(text.as_bytes(), Some("dense-text"), None).map(|_| ());
+            assert_eq!(found.map_err(|e| (e.kind, e.location)), Err((kind, location)), "{text}");
+        };
+        check("# nothing\n", Kind::Truncated, Location::File);
+        check("2 1\n1 2\n3 4\n", Kind::NotSquare, Location::File);
+        // sizes, column numbers, row numbers
+        check("2 2\n2.5 1\n1 2\n", Kind::NotSquare, Location::File);
+        check("3\n1 2 3\n2 4 5\n3 5 6\n", Kind::Malformed, Location::Line(2));
+        check("0,1\n2,1\n1,2\n", Kind::NotSquare, Location::File);
+        check("0,2,1\n1,1,2\n", Kind::NotSquare, Location::File);
+        check(",0,1\n0,2,1\n1,1,2\n", Kind::Malformed, Location::Line(1));
+        check("1 2\n3 x\n", Kind::Malformed, Location::Line(2));
+        check("1,5;2,5\n2,5;1,5\n", Kind::Malformed, Location::Line(1));
+        check("1 2\n3 nan\n", Kind::NotFinite, Location::Line(2));
+        check("1 2\n3 4.2", Kind::Truncated, Location::Line(2));
+        // entries of Octave's sparse text, or rows
+        check("# type: sparse matrix\n1 1 2\n2 2 3\n3 3 4\n", Kind::Malformed, Location::File);
+        check("1,1,2\n2,2,3\n3,3,4\n", Kind::Malformed, Location::File);
+    }
+}

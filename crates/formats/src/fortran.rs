@@ -1,0 +1,303 @@
+//! Formats of Fortran for lines of fixed fields, such as `(8I10)`, `(1X,8I9)` and `(3(1P,E24.16))`.
+//!
+//! Where a format ends before the numbers do, the next line begins at its last group. A scale factor `kP` holds for all later fields: a number
+//! without an exponent is then `10^k` times what it stands for.
+//! Source: ISO/IEC 1539-1 (Fortran 2018), 13.3 to 13.8.
+
+use std::str::from_utf8;
+
+use crate::error::Error;
+use crate::text::{Line, Lines, shown};
+
+/// What a format says, one thing after the other, its repetitions written out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Edit {
+    /// The next so many characters are a number; digits behind its point, where a real number shows none.
+    Field { width: usize, decimals: usize },
+    /// So many characters are skipped, backwards if negative.
+    Skip(isize),
+    /// The next character is this one, from zero.
+    Column(usize),
+    /// Numbers without an exponent are `10^k` times as large as they are.
+    Scale(i32),
+    /// The rest is on the next line.
+    Line,
+}
+
+/// A format.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fixed {
+    edits: Vec<Edit>,
+    /// Where it begins anew.
+    again: usize,
+}
+
+/// A field of a line.
+pub(crate) struct Field<'a> {
+    pub line: Line<'a>,
+    pub text: &'a [u8],
+    decimals: usize,
+    scale: i32,
+}
+
+/// Columns, repetitions and fields beyond these are no format of Fortran.
+const MOST: usize = 10_000;
+
+impl Fixed {
+    /// `None` if the text is not a format of numbers.
+    pub fn new(text: &str) -> Option<Self> {
+        let text: Vec<u8> = text.to_uppercase().bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
+        let mut parser = Parser { rest: text.strip_prefix(b"(")?, again: 0 };
+        let mut edits = Vec::new();
+        parser.list(&mut edits, 0)?;
+        let again = parser.again;
+        let has_field = edits[again..].iter().any(|edit| matches!(edit, Edit::Field { .. }));
+        (parser.rest.is_empty() && has_field).then_some(Self { edits, again })
+    }
+
+    /// Reads `count` fields from as many lines as they take.
+    pub fn read<'a, T>(
+        &self,
+        lines: &mut Lines<'a>,
+        count: usize,
+        what: &str,
+        mut read: impl FnMut(Field<'a>) -> Result<T, Error>,
+    ) -> Result<Vec<T>, Error> {
+        // A field has a digit and something that parts it from the next one, or a line its end.
+        let mut found = Vec::with_capacity(count.min(lines.left() / 2 + 1));
+        let (mut line, mut column, mut scale, mut next) = (None, 0_usize, 0, 0);
+        while found.len() < count {
+            let Some(edit) = self.edits.get(next) else {
+                (line, next) = (None, self.again);
+                continue;
+            };
+            let current = match line {
+                Some(line) => line,
+                None => {
+                    column = 0;
+                    *line.insert(lines.expect(what)?)
+                }
+            };
+            match *edit {
+                Edit::Field { width, decimals } => {
+                    let text = current.columns(column, column + width);
+                    if text.is_empty() {
+                        let columns = format!("nothing in columns {} to {}", column + 1, column + width);
+                        return Err(current.malformed(what, &columns));
+                    }
+                    found.push(read(Field { line: current, text, decimals, scale })?);
+                    column += width;
+                }
+                Edit::Skip(by) => column = column.saturating_add_signed(by),
+                Edit::Column(at) => column = at,
+                Edit::Scale(power) => scale = power,
+                Edit::Line => line = None,
+            }
+            next += 1;
+        }
+        Ok(found)
+    }
+}
+
+impl Field<'_> {
+    /// A real number.
+    pub fn real(&self) -> Result<f64, Error> {
+        let value = self.line.real(self.text)?;
+        if self.decimals > 0 && value != 0.0 && value.is_finite() && !self.text.contains(&b'.') {
+            // Fortran puts the point before the last digits, all other programs behind them.
+            return Err(self.line.malformed("a number with a decimal point", &shown(self.text)));
+        }
+        let is_exponent = |(at, byte): (usize, &u8)| byte.is_ascii_alphabetic() || (at > 0 && b"+-".contains(byte));
+        match self.text.iter().enumerate().any(is_exponent) {
+            true => Ok(value),
+            false => Ok(value / 10_f64.powi(self.scale)),
+        }
+    }
+}
+
+/// A format on its way.
+struct Parser<'t> {
+    rest: &'t [u8],
+    /// Where the last group outside of all others begins.
+    again: usize,
+}
+
+impl Parser<'_> {
+    /// Everything up to the closing parenthesis.
+    fn list(&mut self, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
+        loop {
+            match self.letter()? {
+                b')' => return Some(()),
+                b',' => {}
+                b'/' => edits.push(Edit::Line),
+                first => self.item(first, edits, depth)?,
+            }
+            if edits.len() > MOST {
+                return None;
+            }
+        }
+    }
+
+    /// One item, which begins with this character.
+    fn item(&mut self, first: u8, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
+        let negative = first == b'-';
+        let (count, letter) = match first {
+            b'+' | b'-' => (Some(self.number()?), self.letter()?),
+            b'0'..=b'9' => {
+                let count = self.number_after(first)?;
+                (Some(count), self.letter()?)
+            }
+            letter => (None, letter),
+        };
+        match letter {
+            b'P' => {
+                let power = i32::try_from(count?).ok()?;
+                edits.push(Edit::Scale(if negative { -power } else { power }));
+                return Some(());
+            }
+            _ if negative || count == Some(0) => return None,
+            _ => {}
+        }
+        let count = count.unwrap_or(1);
+        match letter {
+            b'(' if depth < 8 => self.group(count, edits, depth)?,
+            b'X' => edits.push(Edit::Skip(count as isize)),
+            b'T' => edits.push(match self.rest.first()? {
+                b'L' => Edit::Skip(-(self.number_behind()? as isize)),
+                b'R' => Edit::Skip(self.number_behind()? as isize),
+                _ => Edit::Column(self.number()?.checked_sub(1)?),
+            }),
+            // signs and blanks, which numbers show by themselves
+            b'S' | b'B' => self.skip(b"PSNZ"),
+            b'I' | b'E' | b'D' | b'F' | b'G' => {
+                let field = self.field(letter)?;
+                edits.extend(std::iter::repeat_n(field, count));
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+
+    fn group(&mut self, count: usize, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
+        let start = edits.len();
+        if depth == 0 {
+            self.again = start;
+        }
+        self.list(edits, depth + 1)?;
+        let group = edits[start..].to_vec();
+        if group.len().saturating_mul(count) > MOST {
+            return None;
+        }
+        (1..count).for_each(|_| edits.extend(&group));
+        Some(())
+    }
+
+    /// `w`, `w.d` or `w.dEe` behind the letter of a field.
+    fn field(&mut self, letter: u8) -> Option<Edit> {
+        if letter == b'E' {
+            self.skip(b"SNX");
+        }
+        let width = self.number().filter(|width| *width > 0)?;
+        let mut decimals = 0;
+        if self.rest.first() == Some(&b'.') {
+            decimals = self.number_behind()?;
+            if self.rest.first() == Some(&b'E') {
+                self.number_behind()?;
+            }
+        }
+        Some(Edit::Field { width, decimals: if letter == b'I' { 0 } else { decimals } })
+    }
+
+    fn letter(&mut self) -> Option<u8> {
+        let (first, rest) = self.rest.split_first()?;
+        self.rest = rest;
+        Some(*first)
+    }
+
+    fn skip(&mut self, letters: &[u8]) {
+        if self.rest.first().is_some_and(|letter| letters.contains(letter)) {
+            self.rest = &self.rest[1..];
+        }
+    }
+
+    fn number(&mut self) -> Option<usize> {
+        let digits = self.rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+        let (number, rest) = self.rest.split_at(digits);
+        self.rest = rest;
+        from_utf8(number).ok()?.parse().ok().filter(|number| *number <= MOST)
+    }
+
+    /// The number behind one more character.
+    fn number_behind(&mut self) -> Option<usize> {
+        self.letter()?;
+        self.number()
+    }
+
+    /// The number of which this is the first digit.
+    fn number_after(&mut self, first: u8) -> Option<usize> {
+        let digits = self.rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+        let (others, rest) = self.rest.split_at(digits);
+        self.rest = rest;
+        let number = format!("{}{}", first as char, from_utf8(others).ok()?);
+        number.parse().ok().filter(|number| *number <= MOST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reals(format: &str, text: &str, count: usize) -> Result<Vec<f64>, Error> {
+        let fixed = Fixed::new(format).unwrap_or_else(|| panic!("{format}"));
+        fixed.read(&mut Lines::new(text.as_bytes()), count, "a number", |field| field.real())
+    }
+
+    #[test]
+    fn formats_of_one_kind_of_field() {
+        let check = |text: &str, expected: Option<(usize, usize)>| {
+            let fields = Fixed::new(text).map(|fixed| {
+                let widths: Vec<usize> = (fixed.edits.iter())
+                    .filter_map(|edit| match edit {
+                        Edit::Field { width, .. } => Some(*width),
+                        _ => None,
+                    })
+                    .collect();
+                (widths.len(), widths[0])
+            });
+            assert_eq!(fields, expected, "{text}");
+        };
+        check("(8I10)", Some((8, 10)));
+        check("(1X,8I9)", Some((8, 9)));
+        check("(8I10.10)", Some((8, 10)));
+        check("(1P,4E20.12)", Some((4, 20)));
+        check("(1P,4(E20.12))", Some((4, 20)));
+        check("(3(1P,E24.16))", Some((3, 24)));
+        check("(2(2(1P,ES24.16E3)))", Some((4, 24)));
+        check("(1p4d25.16e3)", Some((4, 25)));
+        check("(SP,BN,4F20.12)", Some((4, 20)));
+        check("(I14)", Some((1, 14)));
+        check("( 3 F 12.4 )", Some((3, 12)));
+        let wrong =
+            ["(8A10)", "8I10", "(8I)", "(0I4)", "(4I0)", "(99999999999I4)", "()", "(é)", "(*)", "(1X)", "(I5))"];
+        for text in wrong.into_iter().chain(["(9999(9999(I1)))", "((((((((((I1))))))))))", "(I5,2(1X))", "(I5"]) {
+            check(text, None);
+        }
+    }
+
+    /// What gfortran 13 writes with these formats reads back.
+    #[test]
+    fn lines_of_every_kind_of_format() -> Result<(), Error> {
+        assert_eq!(reals("(1X,3I4)", "    1   2   3\n    4\n", 4)?, [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(reals("(2(1X,I3))", "   1   2\n   3\n", 3)?, [1.0, 2.0, 3.0]);
+        assert_eq!(reals("(I3,2(1X,I3))", "  1   2   3\n   4   5\n", 5)?, [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(reals("(I3/I4)", "  1\n   2\n  3\n", 3)?, [1.0, 2.0, 3.0]);
+        assert_eq!(reals("(T5,I2,TR1,I2,T1,I4)", "1234 5  6\n", 3)?, [5.0, 6.0, 1234.0]);
+        // a scale factor counts where no exponent stands, from there on
+        assert_eq!(reals("(F7.3,1P,2F7.3)", "  1.500 15.000  1.5E1\n", 3)?, [1.5, 1.5, 15.0]);
+        assert_eq!(reals("(1P,E13.5)", "  1.50000E+01\n", 1)?, [15.0]);
+        assert!(reals("(F7.3)", "   1500\n", 1).is_err(), "Fortran reads 1.5, others 1500");
+        assert_eq!(reals("(F7.3)", "      0\n", 1)?, [0.0]);
+        assert!(reals("(2I4)", "   1\n   2\n", 2).is_err(), "a line that is too short");
+        Ok(())
+    }
+}
