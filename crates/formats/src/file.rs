@@ -1,13 +1,76 @@
 //! Files into memory, and what the system says if that fails.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Kind, Location};
 
+/// Bytes of a file at most, 16 GiB: a sparse matrix of some 400 million entries as text.
+pub const LARGEST_FILE: u64 = 16 << 30;
+
+/// A whole file. Devices and pipes, of which nothing tells where they end or whether they begin, are refused.
 pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|error| io(path, &error))
+    let failed = |error: std::io::Error| io(path, &error);
+    let found = std::fs::metadata(path).map_err(failed)?;
+    if found.is_dir() {
+        let problem = "this is a folder, a file was expected".into();
+        return Err(Error::new(Kind::Io, Location::File, problem, "give the name of a file in it").of(path));
+    }
+    if !found.is_file() {
+        let problem = "this is a device or a pipe, which has no size".into();
+        return Err(Error::new(Kind::TooLarge, Location::File, problem, "write its content to a file first").of(path));
+    }
+    let mut bytes = Vec::new();
+    if found.len() <= LARGEST_FILE {
+        bytes.try_reserve_exact(found.len() as usize).map_err(|error| failed(error.into()))?;
+        // a file may grow while it is read
+        File::open(path).and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    }
+    let size = found.len().max(bytes.len() as u64);
+    if size <= LARGEST_FILE {
+        return Ok(bytes);
+    }
+    let problem = format!("the file has {size} bytes, at most {LARGEST_FILE} are read");
+    let remedy = "save the matrix in binary (.npz, .mat), or export a smaller structure";
+    Err(Error::new(Kind::TooLarge, Location::File, problem, remedy).of(path))
 }
 
 pub(crate) fn io(path: &Path, error: &std::io::Error) -> Error {
     Error::new(Kind::Io, Location::File, error.to_string(), "check the path and its permissions").of(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(path: &Path) -> Kind {
+        load(path).map(|bytes| bytes.len()).expect_err("no file of a known size").kind
+    }
+
+    #[test]
+    fn only_files_of_a_known_size_are_read() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("huge.mtx");
+        // takes no room on the disk
+        File::create(&path)?.set_len(LARGEST_FILE + 1)?;
+        assert_eq!(refused(&path), Kind::TooLarge);
+        assert_eq!(refused(folder.path()), Kind::Io);
+        assert_eq!(refused(&folder.path().join("none.mtx")), Kind::Io);
+        std::fs::write(&path, b"1 1 2.0\n")?;
+        assert_eq!(load(&path).expect("a file"), b"1 1 2.0\n");
+        Ok(())
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_and_pipes_are_refused_at_once() -> std::io::Result<()> {
+        assert_eq!(refused(Path::new("/dev/zero")), Kind::TooLarge);
+        let pipe = tempfile::tempdir()?;
+        let pipe = pipe.path().join("pipe");
+        // nobody writes to it: to open it would take for ever
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status()?.success());
+        assert_eq!(refused(&pipe), Kind::TooLarge);
+        Ok(())
+    }
 }

@@ -51,6 +51,7 @@ use format::Item;
 
 pub use constrained::{aligned, constrained};
 pub use error::{Error, Kind, Location};
+pub use file::LARGEST_FILE;
 pub use format::{Format, Variable};
 pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
