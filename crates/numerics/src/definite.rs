@@ -1,8 +1,13 @@
 //! Whether a symmetric matrix is positive semidefinite, and of which rank: Cholesky's factorisation with pivots from the diagonal; of large ones in
 //! blocks first, which suffices for all that are definite.
 //!
+//! Rounding is told in two ways, and one of them suffices. Rows are scaled to ones on the diagonal, so that a small negative entry counts
+//! beside large ones. A matrix that was summed up from others, `Tᵀ M T` of a rigid link or a superelement, has rounding of its largest entries everywhere:
+//! eigenvalues that far below zero are zero.
+//!
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
+use crate::eigen::symmetric_in_blocks;
 use crate::sparse::{Analysis, Matrix};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
@@ -13,16 +18,35 @@ use nalgebra::DMatrix;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The rank of a symmetric positive semidefinite matrix; `None` if the matrix is not symmetric, has an entry that is not finite, or has a
-/// negative eigenvalue beyond rounding. The rows are scaled to ones on the diagonal, so that a small negative entry counts beside large ones.
+/// negative eigenvalue beyond rounding.
 ///
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
 /// use stickslip_numerics::definite::semidefinite;
 /// assert_eq!(semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0]), Some(1));
-/// assert_eq!(semidefinite(&dmatrix![1e9, 0.0; 0.0, -1e-9]), None);
+/// assert_eq!(semidefinite(&dmatrix![1e9, 0.0; 0.0, -1e-3]), None);
 /// ```
 pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
+    by_rows(matrix).or_else(|| {
+        let size = largest(matrix)?;
+        let (values, _) = symmetric_in_blocks(&(matrix / size))?;
+        let zero = ROUNDING * matrix.nrows() as f64;
+        values.iter().all(|value| *value >= -zero).then(|| values.iter().filter(|value| **value > zero).count())
+    })
+}
+
+/// The largest magnitude of a matrix that is symmetric to the rounding of that; `None` of others and of zeros.
+fn largest(matrix: &DMatrix<f64>) -> Option<f64> {
+    let n = matrix.nrows();
+    let size = matrix.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+    let zero = ROUNDING * n as f64 * size;
+    let symmetric = || (0..n).all(|i| (0..i).all(|k| (matrix[(i, k)] - matrix[(k, i)]).abs() <= zero));
+    (size > 0.0 && matrix.iter().all(|value| value.is_finite()) && symmetric()).then_some(size)
+}
+
+/// The rank with rows scaled to ones on the diagonal.
+fn by_rows(matrix: &DMatrix<f64>) -> Option<usize> {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
     let (mut rest, scale) = scaled(matrix)?;
@@ -64,11 +88,12 @@ pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
 /// ```
 pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
     let n = matrix.nrows();
-    match scaled(matrix) {
-        Some((rows, _)) if n >= LARGE => positive(&rows, ROUNDING * n as f64),
-        Some(_) => semidefinite(matrix).is_some(),
-        None => false,
+    let zero = ROUNDING * n as f64;
+    if n < LARGE {
+        return semidefinite(matrix).is_some();
     }
+    scaled(matrix).is_some_and(|(rows, _)| positive(&rows, zero))
+        || largest(matrix).is_some_and(|size| positive(&(matrix / size), zero))
 }
 
 /// Size from which factors in blocks are the faster ones, as in [`dense`](crate::dense).
@@ -136,27 +161,38 @@ fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> Analysis) -> Optio
     let n = matrix.n();
     // above what a factor takes for rounding of a pivot
     let rounding = ROUNDING * n.max(16) as f64;
+    let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
+    let analysis = analysis(&[matrix, &one]);
+    let positive = |rows: &Matrix, shift: f64| {
+        analysis.factor(&[(1.0, rows), (shift, &one)]).is_ok_and(|factor| factor.negative() == 0)
+    };
+    if let Some(rows) = sparse_scaled(matrix).filter(|rows| rows.asymmetry(rounding).is_none()) {
+        if (0..n).all(|i| matrix.get(i, i) > 0.0) && positive(&rows, -rounding) {
+            return Some(true);
+        }
+        if positive(&rows, rounding) {
+            return Some(false);
+        }
+    }
+    let size = matrix.largest();
+    let whole = Matrix::from_triplets(n, matrix.entries().map(|(i, k, value)| (i, k, value / size))).ok()?;
+    (whole.asymmetry(rounding).is_none() && positive(&whole, rounding)).then_some(false)
+}
+
+/// Rows and columns scaled to ones on the diagonal; rows of zeros, which have no part in the signs, get a one. `None` if an entry of the diagonal is
+/// negative, or one beside a zero there.
+fn sparse_scaled(matrix: &Matrix) -> Option<Matrix> {
+    let n = matrix.n();
     let diagonal: Vec<f64> = (0..n).map(|i| matrix.get(i, i)).collect();
     let beside_zero = |(i, k, _): (usize, usize, f64)| i != k && (diagonal[i] == 0.0 || diagonal[k] == 0.0);
     if diagonal.iter().any(|d| *d < 0.0) || matrix.entries().any(beside_zero) {
         return None;
     }
-    // rows of ones on the diagonal, so that a small negative entry counts beside large ones; rows of zeros have no part in the signs
+    // rows of ones on the diagonal, so that a small negative entry counts beside large ones
     let scale: Vec<f64> = diagonal.iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
     let scaled = matrix.entries().map(|(i, k, value)| (i, k, value / scale[i] / scale[k]));
     let empty = (0..n).filter(|i| diagonal[*i] == 0.0).map(|i| (i, i, 1.0));
-    let scaled = Matrix::from_triplets(n, scaled.chain(empty)).ok()?;
-    if scaled.asymmetry(rounding).is_some() {
-        return None;
-    }
-    let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
-    let analysis = analysis(&[&scaled, &one]);
-    let positive =
-        |shift: f64| analysis.factor(&[(1.0, &scaled), (shift, &one)]).is_ok_and(|factor| factor.negative() == 0);
-    if diagonal.iter().all(|d| *d > 0.0) && positive(-rounding) {
-        return Some(true);
-    }
-    positive(rounding).then_some(false)
+    Matrix::from_triplets(n, scaled.chain(empty)).ok()
 }
 
 #[cfg(test)]
@@ -218,6 +254,29 @@ mod tests {
         for (last, expected) in [(1.0, Some(false)), (-1.0, Some(false)), (-2.0, None)] {
             let mass = masses(last);
             assert_eq!([sparse_definite_in_order(&mass, &order), sparse_definite(&mass)], [expected; 2], "{last}");
+        }
+    }
+
+    /// `v vᵀ` of a rigid link whose far end hardly moves, with the rounding of its largest entry where it is small; and what is no rounding.
+    #[test]
+    fn rounding_of_the_largest_entry_is_no_negative_mass() {
+        let link = 1e-6;
+        let cases = [([link, link * link - 2e-16], Some(1)), ([0.0, -1e-16], Some(1)), ([link, 0.0], None)];
+        for ([beside, own], expected) in cases.into_iter().chain([([0.0, -1e-12], None)]) {
+            for size in [2, 2 * LARGE] {
+                // the same link again and again
+                let mut mass = DMatrix::zeros(size, size);
+                for i in (0..size).step_by(2) {
+                    (mass[(i, i)], mass[(i + 1, i + 1)]) = (3.0, 3.0 * own);
+                    (mass[(i, i + 1)], mass[(i + 1, i)]) = (3.0 * beside, 3.0 * beside);
+                }
+                assert_eq!(by_rows(&mass), None, "the rows by themselves say it is negative");
+                assert_eq!(semidefinite(&mass), expected.map(|rank: usize| rank * size / 2), "{beside} {own}");
+                assert_eq!(is_semidefinite(&mass), expected.is_some(), "{beside} {own}");
+                let all = (0..size * size).map(|at| (at / size, at % size, mass[at]));
+                let sparse = Matrix::from_triplets(size, all).unwrap();
+                assert_eq!(sparse_definite(&sparse), expected.map(|_| false), "{beside} {own}");
+            }
         }
     }
 

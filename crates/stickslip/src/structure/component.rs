@@ -182,11 +182,10 @@ impl Component {
             }
         }
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
-        let negative = mass.entries().any(|(row, column, value)| row == column && value < 0.0);
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry were looked at
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
-        let definite = sparse_definite_in_order(&whole.mass, &whole.analysis).filter(|_| !negative);
+        let definite = sparse_definite_in_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());

@@ -292,7 +292,7 @@ impl Structure {
             Form::Sparse { mass, damping, stiffness, .. } => {
                 let is_diagonal = mass.entries().all(|(row, column, _)| row == column);
                 let negative = mass.entries().any(|(row, column, value)| row == column && value < 0.0);
-                if negative || (!is_diagonal && sparse_definite(mass).is_none()) {
+                if (negative || !is_diagonal) && sparse_definite(mass).is_none() {
                     return Err(StructureError::NegativeMass);
                 }
                 [mass, damping, stiffness].map(Matrix::largest)
@@ -476,7 +476,7 @@ impl Matrices {
         // a diagonal needs no factor
         let off_diagonal = (0..n).any(|i| (0..i).any(|k| self.mass[(i, k)] != 0.0));
         let negative = (0..n).any(|i| self.mass[(i, i)] < 0.0);
-        if negative || (off_diagonal && semidefinite(&self.mass).is_none()) {
+        if (negative || off_diagonal) && !is_semidefinite(&self.mass) {
             return Err(StructureError::NegativeMass);
         }
         Ok(())

@@ -13,7 +13,7 @@ const DEPENDENT: f64 = 1e-14;
 const CANCELLED: f64 = 1e-6;
 /// Below this share `M v` is computed anew instead of being followed through the projection: its digits cancel with those of v.
 const FOLLOWED: f64 = 0.1;
-/// A negative `vᵀ M v` is rounding up to this share of `|v| |M v|`.
+/// A negative `vᵀ M v` is rounding of a file of ten digits up to this share of `Σ |vᵢ Mᵢₖ vₖ|`.
 const MASSLESS: f64 = 1e-10;
 
 /// An eigenvalue of the projected operator.
@@ -29,6 +29,8 @@ pub(super) struct Pair {
 pub(super) struct Lanczos<'a> {
     factor: &'a Factor,
     mass: &'a Matrix,
+    /// Largest entry of the mass.
+    heaviest: f64,
     found: &'a [f64],
     n: usize,
     basis: Vec<f64>,
@@ -51,6 +53,7 @@ impl<'a> Lanczos<'a> {
         Lanczos {
             factor,
             mass,
+            heaviest: mass.largest(),
             found,
             n,
             basis: vec![],
@@ -102,7 +105,27 @@ impl<'a> Lanczos<'a> {
 
     /// In the norm of M, with M times the block.
     fn norms(&self, block: &[f64], forces: &[f64]) -> Result<Vec<f64>, ModesError> {
-        block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, force)| norm(v, force)).collect()
+        block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, force)| self.norm(v, force)).collect()
+    }
+
+    /// The norm of a vector by M times it; zero if all digits of `vᵀ M v` cancel, as they do where a motion has no mass.
+    fn norm(&self, v: &[f64], force: &[f64]) -> Result<f64, ModesError> {
+        let (square, longest) = (dot(v, force), self.heaviest * dot(v, v));
+        if !square.is_finite() {
+            return Err(ModesError::OutOfRange);
+        }
+        if square > MASSLESS * longest {
+            return Ok(square.sqrt());
+        }
+        let sum: f64 = self.mass.entries().map(|(row, column, value)| (v[row] * value * v[column]).abs()).sum();
+        let rounding = f64::EPSILON * self.n.max(16) as f64;
+        if square > rounding * sum {
+            Ok(square.sqrt())
+        } else if square >= -MASSLESS * sum - 8.0 * rounding * longest {
+            Ok(0.0)
+        } else {
+            Err(ModesError::NegativeMass)
+        }
     }
 
     /// Projects the modes found and the basis out of a block and of M times the block, and returns its components along the basis. Twice is enough.
@@ -132,7 +155,7 @@ impl<'a> Lanczos<'a> {
         for (k, ((column, force), size)) in block.chunks(n).zip(forces.chunks(n)).zip(sizes).enumerate() {
             let (mut column, mut force) = (column.to_vec(), force.to_vec());
             let mut along = DMatrix::zeros(self.size() - first, 1);
-            let mut left = norm(&column, &force)?;
+            let mut left = self.norm(&column, &force)?;
             for _ in 0..2 {
                 let part = columns::products(n, &self.basis[first * n..], &force);
                 columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
@@ -142,7 +165,7 @@ impl<'a> Lanczos<'a> {
                 if dot(&column, &force) < (FOLLOWED * left).powi(2) {
                     force = self.mass.times_columns(&column);
                 }
-                left = norm(&column, &force)?;
+                left = self.norm(&column, &force)?;
             }
             (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
             if left <= DEPENDENT * size {
@@ -152,7 +175,7 @@ impl<'a> Lanczos<'a> {
             scale(&mut force, 1.0 / left);
             if left < CANCELLED * size {
                 self.clear(&mut column, &mut force);
-                let again = norm(&column, &force)?;
+                let again = self.norm(&column, &force)?;
                 if again < 0.5 {
                     continue;
                 }
@@ -264,23 +287,8 @@ impl<'a> Lanczos<'a> {
     }
 }
 
-/// The norm of a vector by M times it.
-fn norm(v: &[f64], force: &[f64]) -> Result<f64, ModesError> {
-    match dot(v, force) {
-        square if !square.is_finite() => Err(ModesError::OutOfRange),
-        square if square >= 0.0 => Ok(square.sqrt()),
-        // of a vector without mass rounding may be negative
-        square if square >= -MASSLESS * length(v) * length(force) => Ok(0.0),
-        _ => Err(ModesError::NegativeMass),
-    }
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-pub(super) fn length(v: &[f64]) -> f64 {
-    dot(v, v).sqrt()
 }
 
 fn scale(v: &mut [f64], factor: f64) {

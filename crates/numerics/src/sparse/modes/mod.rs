@@ -5,7 +5,8 @@
 //! modes that are already found are projected out, so that a next run finds the rest of larger groups.
 //!
 //! How many eigenvalues lie below μ is known without computing them: as many as the factor of `K - μM` has negative pivots. Modes are handed
-//! out when that number agrees with those found below; otherwise the same factor becomes the next shift, and the search goes on around it.
+//! out when that number agrees with those found below; otherwise the same factor becomes the next shift, and the search goes on around it. A
+//! run in which nothing converges, as all eigenvalues are about equally far from the shift, tells where they are: the next one begins there.
 //!
 //! M may be singular: vectors that come out of the operator have no component without mass, up to rounding that another multiplication
 //! removes. K may be singular too: the first shift is negative.
@@ -129,6 +130,8 @@ struct Run {
 enum End {
     /// Enough modes, or no more room.
     Full,
+    /// No more room and no mode yet: the eigenvalues are closer to each other than to the shift, and about here.
+    Clustered(f64),
     /// The space has no further vectors: all modes are known.
     Exhausted,
     /// A first shift that is much larger than this eigenvalue.
@@ -152,6 +155,11 @@ impl Search<'_> {
             if let End::Slender(value) = run.end {
                 depth = value.max(least);
                 (shift, factor) = self.first(depth, Some(factor))?;
+                continue;
+            }
+            if let End::Clustered(value) = run.end {
+                (shift, factor) = self.beside(value, depth, factor)?;
+                counted = factor.negative();
                 continue;
             }
             let (exhausted, more) = (matches!(run.end, End::Exhausted), run.modes.count());
@@ -232,9 +240,11 @@ impl Search<'_> {
             },
         };
         let last = values.last().copied().unwrap_or(0.0).max(above);
-        let mut gaps =
-            (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
-        let gap = gaps.find(|(low, high)| high - low > GAP * (high + depth));
+        let gaps = (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
+        let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + depth);
+        // in a cluster no gap is wide: the widest of all will do
+        let widest = || gaps.clone().filter(wide(ROUNDING)).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
+        let gap = gaps.clone().find(wide(GAP)).or_else(widest);
         gap.map_or(last + (BEYOND * (last + depth)).max(depth), |(low, high)| 0.5 * (low + high))
     }
 
@@ -257,6 +267,7 @@ impl Search<'_> {
             }
             next += CHECKED.max(blocks / CHECKED_SHARE);
             let mut pairs = lanczos.pairs()?;
+            let nearest_value = pairs.first().map(value);
             let converged = |pair: &Pair| pair.residual <= CONVERGED * pair.theta.abs();
             let nearest = pairs.iter().take_while(|pair| converged(pair)).count();
             pairs.retain(converged);
@@ -270,7 +281,11 @@ impl Search<'_> {
             };
             if (enough && low >= missing) || full || exhausted {
                 let modes = lanczos.modes(self.stiffness, shift, &pairs)?;
-                let end = if exhausted { End::Exhausted } else { End::Full };
+                let end = match nearest_value {
+                    _ if exhausted => End::Exhausted,
+                    Some(value) if pairs.is_empty() => End::Clustered(value),
+                    _ => End::Full,
+                };
                 return Ok(Run { modes, vectors: lanczos.expanded, end });
             }
             if blocks >= JUDGED && self.found.count() == 0 && depth > LEAST_SHIFT * self.scale {
@@ -287,7 +302,6 @@ impl Search<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::lanczos::length;
     use super::*;
     use crate::sparse::columns;
     use nalgebra::DMatrix;
@@ -326,7 +340,8 @@ mod tests {
         assert!((gram - DMatrix::identity(modes.count(), modes.count())).amax() < 1e-10);
         let (kx, mx) = (k.times_columns(&modes.shapes), m.times_columns(&modes.shapes));
         for mode in 0..modes.count() {
-            let size = k.largest() * length(modes.shape(mode));
+            let length = modes.shape(mode).iter().map(|x| x * x).sum::<f64>().sqrt();
+            let size = k.largest() * length;
             let off =
                 (0..n).map(|i| (kx[mode * n + i] - modes.values[mode] * mx[mode * n + i]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-9 * size, "mode {mode}: {off:e} of {size:e}");
@@ -396,6 +411,21 @@ mod tests {
         check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected[..30], 0.0);
         check(&k, &m, &modes(&k, &m, Wanted::UpTo { value: 3.0, most: 99 }).unwrap(), &expected[..33], 0.0);
         check(&k, &m, &modes(&k, &m, Wanted::Lowest(n + 5)).unwrap(), &expected, 0.0);
+    }
+
+    /// Equal oscillators on weak springs: all eigenvalues are within 0.4 % of each other, `λ = k (1 + 2 ε - 2 ε cos(π i / (n + 1)))`.
+    #[test]
+    fn clusters_larger_than_a_run() {
+        let (n, stiffness, weak) = (500, 1e6, 1e-3);
+        let links = (1..n).flat_map(|i| [(i, i - 1, -weak * stiffness), (i - 1, i, -weak * stiffness)]);
+        let k = matrix(n, links.chain((0..n).map(|i| (i, i, (1.0 + 2.0 * weak) * stiffness))));
+        let cosine = |i: usize| (PI * i as f64 / (n + 1) as f64).cos();
+        let expected: Vec<f64> = (1..=n).map(|i| stiffness * (1.0 + 2.0 * weak * (1.0 - cosine(i)))).collect();
+        check(&k, &identity(n), &modes(&k, &identity(n), Wanted::Lowest(6)).unwrap(), &expected[..6], 1e-8);
+        let bound = Wanted::UpTo { value: 1.1 * stiffness, most: n };
+        check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected, 1e-8);
+        let bound = Wanted::UpTo { value: 0.5 * (expected[29] + expected[30]), most: n };
+        check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected[..30], 1e-8);
     }
 
     /// More modes than one run has room for.
@@ -512,6 +542,45 @@ mod tests {
         let here = solve();
         let there: Vec<_> = (0..3).map(|_| std::thread::spawn(solve)).collect();
         assert!(there.into_iter().all(|thread| thread.join().unwrap() == here));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+
+        /// Masses seen by fewer motions than there are coordinates, `M = Tᵀ T`: without the massless part, `λ` is one over an eigenvalue of
+        /// the flexibility `T K⁻¹ Tᵀ` of these motions. Coordinates have units that differ by up to a thousand.
+        #[test]
+        fn massless_combinations(
+            size in 2usize..24,
+            share in 0.05f64..0.95,
+            entries in proptest::collection::vec(-1.0f64..1.0, 600),
+            springs in proptest::collection::vec(0.1f64..10.0, 24),
+            units in proptest::collection::vec(-3.0f64..3.0, 24),
+        ) {
+            let rank = ((size as f64 * share) as usize).max(1);
+            let unit = |i: usize| 10f64.powf(units[i]);
+            let t = DMatrix::from_fn(rank, size, |i, k| entries[i * size + k] * unit(k));
+            let coupled = DMatrix::from_fn(size, size, |i, k| 0.2 * entries[599 - (i.min(k) * size + i.max(k)) % 600]);
+            let own = DMatrix::from_fn(size, size, |i, k| if i == k { springs[i] + size as f64 * 0.2 } else { 0.0 });
+            let k = DMatrix::from_fn(size, size, |i, k| (own[(i, k)] + coupled[(i, k)]) * unit(i) * unit(k));
+            let mut m = t.transpose() * &t;
+            m.fill_lower_triangle_with_upper_triangle();
+            let flexibility = &t * k.clone().cholesky().unwrap().solve(&t.transpose());
+            let mut thetas: Vec<f64> = flexibility.symmetric_eigenvalues().iter().copied().collect();
+            thetas.sort_by(|a, b| b.total_cmp(a));
+            prop_assume!(thetas[rank - 1] > 1e-6 * thetas[0]);
+            let all = |a: &DMatrix<f64>| matrix(size, (0..size * size).map(|at| (at / size, at % size, a[at])));
+            let (k, m) = (all(&k), all(&m));
+            for count in [1, rank, rank + 1, size + 3] {
+                let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
+                prop_assert_eq!(found.count(), count.min(rank), "{:?} of {:?}", found.values, thetas);
+                for (value, theta) in found.values.iter().zip(&thetas) {
+                    // a mode far above the lowest has as many digits as it is above fewer
+                    let error = (value * theta - 1.0).abs();
+                    prop_assert!(error < 1e-11 * thetas[0] / theta, "{} instead of {}", value, 1.0 / theta);
+                }
+            }
+        }
     }
 
     proptest! {
