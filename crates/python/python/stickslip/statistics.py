@@ -2,63 +2,88 @@
 
 from __future__ import annotations
 
+import importlib
+import warnings
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    #: The range of an input: lowest and highest value, or a function from (0, 1) to values.
+    Bound = Sequence[float] | NDArray[Any] | Callable[[NDArray[np.float64]], ArrayLike]
 
 #: Most values of an input that are looked at together in `first_order`: fewer make the mean of each group better, more follow the curve better.
 MOST_GROUPS = 48
 
 
-def exceedance(values, levels):
-    """The share of the values that are above each of the levels; NaN counts for nothing.
+def exceedance(values: ArrayLike, levels: ArrayLike) -> NDArray[np.float64]:
+    """The share of the values that are above each of the levels. NaN counts for nothing; the share is NaN where there is no value at all.
 
     >>> from stickslip.statistics import exceedance
     >>> exceedance([1.0, 2.0, 3.0, 4.0], [0.0, 2.0, 3.5]).tolist()
     [1.0, 0.5, 0.25]
     """
-    values = np.sort(np.asarray(values, float))
-    values = values[~np.isnan(values)]
-    above = len(values) - np.searchsorted(values, np.asarray(levels, float), side="right")
-    return above / max(len(values), 1)
+    there = np.sort(np.asarray(values, float), axis=None)
+    there = there[~np.isnan(there)]
+    at = np.asarray(levels, float)
+    above = len(there) - np.searchsorted(there, at, side="right")
+    return np.asarray(above / len(there) if len(there) else np.full(at.shape, np.nan))
 
 
-def first_order(values, output, *, groups=None) -> float:
+def first_order(values: ArrayLike, output: ArrayLike, *, groups: int | None = None) -> float:
     """First-order Sobol index of an input, from any sample of independent inputs: the variance of ``E[output | input]`` over that of ``output``.
 
     The sample is cut into groups of neighbouring values of the input, and the scatter of the means that the rest of the inputs leaves in finite
-    groups is subtracted. Good to about ``1/sqrt(n)``. Source: Plischke, Borgonovo, Smith (2013).
+    groups is subtracted. Good to about ``1/sqrt(n)``. Pairs in which one is NaN count for nothing; without any pair the index is NaN.
+    Source: Plischke, Borgonovo, Smith (2013).
     """
-    values, output = np.asarray(values, float), np.asarray(output, float)
-    there = ~(np.isnan(values) | np.isnan(output))
-    values, output = values[there], output[there]
-    n = len(values)
+    x, y = np.ravel(np.asarray(values, float)), np.ravel(np.asarray(output, float))
+    there = ~(np.isnan(x) | np.isnan(y))
+    x, y = x[there], y[there]
+    n = len(x)
+    if n == 0:
+        return float("nan")
     groups = groups or int(min(MOST_GROUPS, max(2, np.cbrt(n))))
-    if n < 2 * groups or np.ptp(output) == 0.0 or np.ptp(values) == 0.0:
+    if n < 2 * groups or np.ptp(y) == 0.0 or np.ptp(x) == 0.0:
         return 0.0
-    order = np.argsort(values, kind="stable")
-    parts = np.array_split(output[order], groups)
-    mean = output.mean()
+    order = np.argsort(x, kind="stable")
+    parts = np.array_split(y[order], groups)
+    mean = y.mean()
     between = sum(len(part) * (part.mean() - mean) ** 2 for part in parts) / n
     within = sum(part.var(ddof=1) for part in parts) / n
-    return float(max(0.0, between - within) / output.var())
+    return float(max(0.0, between - within) / y.var())
 
 
-def sobol(function, bounds, *, count=1024, seed=0):
+def sobol(
+    function: Callable[[NDArray[np.float64]], ArrayLike], bounds: Sequence[Bound], *, count: int = 1024, seed: int = 0
+) -> dict[str, NDArray[np.float64]]:
     """First-order and total Sobol indices of ``function`` over independent uniform inputs.
 
     ``function`` takes an array (n, inputs) and returns n values: one vectorised call for all points. ``bounds``: pairs of lowest and highest, or
     functions from (0, 1) to values such as ``scipy.stats.norm(2, 0.2).ppf``. Takes ``count (inputs + 2)`` points; ``count`` is a power of two.
-    Returns a dictionary with arrays ``first`` and ``total`` (inputs). Needs SciPy. Source: Saltelli et al. (2010), with Jansen's total index.
-    """
-    from scipy.stats import qmc
+    Returns a dictionary with arrays ``first`` and ``total`` (inputs). Where a value is not finite, the index is that of the other points,
+    and a warning says how many were left out. Needs SciPy.
+    Source: Saltelli et al. (2010), of values about their mean, with Jansen's total index.
 
+    >>> from stickslip.statistics import sobol
+    >>> indices = sobol(lambda p: 121.0 + p[:, 0] + 2 * p[:, 1], [(0, 1), (0, 1)])
+    >>> indices["first"].round(2).tolist()
+    [0.2, 0.8]
+    """
+    qmc = importlib.import_module("scipy.stats").qmc
     d = len(bounds)
+    if d == 0:
+        raise ValueError("`bounds` must name one input or more")
     if count < 2 or count & (count - 1):
         raise ValueError(f"count must be a power of two, found {count}")
     both = qmc.Sobol(2 * d, seed=seed).random(count)
     # the quantile of 0 or 1 may be infinite
     both = np.clip(both, 1e-9, 1 - 1e-9)
 
-    def scaled(points):
+    def scaled(points: NDArray[np.float64]) -> NDArray[np.float64]:
         columns = []
         for i, bound in enumerate(bounds):
             columns.append(bound(points[:, i]) if callable(bound) else bound[0] + (bound[1] - bound[0]) * points[:, i])
@@ -66,10 +91,28 @@ def sobol(function, bounds, *, count=1024, seed=0):
 
     a, b = both[:, :d], both[:, d:]
     mixed = [np.column_stack([b[:, k] if k == i else a[:, k] for k in range(d)]) for i in range(d)]
-    values = np.asarray(function(scaled(np.concatenate([a, b, *mixed]))), float).reshape(d + 2, count)
-    fa, fb, fm = values[0], values[1], values[2:]
+    answer = np.asarray(function(scaled(np.concatenate([a, b, *mixed]))), float)
+    if answer.size != (d + 2) * count:
+        raise ValueError(f"`function` must return {(d + 2) * count} values, one for each row of its argument, and returned {answer.size}")
+    values = answer.reshape(d + 2, count)
+    whole = np.isfinite(values)
+    if not whole.all():
+        lost = values.size - np.count_nonzero(whole)
+        message = f"{lost} of {values.size} values of the function are not finite: the indices are those of the points without them"
+        warnings.warn(message, stacklevel=2)
+    pairs = [_indices(values[0][keep], values[1][keep], values[2 + i][keep]) for i in range(d) for keep in [whole[[0, 1, 2 + i]].all(axis=0)]]
+    first, total = np.array(pairs).T
+    return {"first": first, "total": total}
+
+
+def _indices(fa: NDArray[np.float64], fb: NDArray[np.float64], mixed: NDArray[np.float64]) -> tuple[float, float]:
+    """First-order and total index of an input, which ``mixed`` has from the second sample and the rest from the first."""
+    if not len(fa):
+        return float("nan"), float("nan")
+    # of values about their mean: a large mean would multiply the error of the sample
+    mean = np.concatenate([fa, fb]).mean()
+    fa, fb, mixed = fa - mean, fb - mean, mixed - mean
     variance = np.concatenate([fa, fb]).var()
-    return {
-        "first": (fb * (fm - fa)).mean(axis=1) / variance,
-        "total": 0.5 * ((fa - fm) ** 2).mean(axis=1) / variance,
-    }
+    if variance == 0.0:
+        return 0.0, 0.0
+    return float((fb * (mixed - fa)).mean() / variance), float(0.5 * ((fa - mixed) ** 2).mean() / variance)
