@@ -24,26 +24,40 @@ pub struct Cycle {
     pub damping_ratio: f64,
 }
 
+/// Displacement (m) and velocity (m/s) of a place at a time (s) between two samples.
+pub type Motion<'a> = dyn Fn(f64) -> [f64; 2] + 'a;
+
 /// The turning points of one place, found as the samples come.
 #[derive(Debug, Clone, Default)]
 pub struct Decay {
     last: Option<[f64; 3]>,
     turns: Vec<(f64, f64)>,
+    /// Least and largest displacement of a sample, m.
+    extent: Option<(f64, f64)>,
 }
 
 impl Decay {
-    /// Takes in a sample: time (s), displacement (m), velocity (m/s).
-    pub fn add(&mut self, time: f64, displacement: f64, velocity: f64) {
+    /// Takes in a sample: time (s), displacement (m), velocity (m/s). A turning point since the last sample is located by the motion between
+    /// both, or by the cubic through them where that is not given. The cubic errs where the acceleration jumps, as at the turning points of
+    /// dry friction.
+    pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&Motion<'_>>) {
         match self.last {
             // a motion that begins at rest begins with a turning point
             None if velocity == 0.0 => self.turns.push((time, displacement)),
             Some([t, x, v]) if v != 0.0 && v * velocity <= 0.0 => {
-                let turn = turning_point([t, x, v], [time, displacement, velocity]);
-                self.turns.push(turn);
+                let cubic = cubic([t, x, v], [time, displacement, velocity]);
+                self.turns.push(turning_point(motion.unwrap_or(&cubic), [t, time], v));
             }
             _ => {}
         }
+        let (low, high) = self.extent.unwrap_or((displacement, displacement));
+        self.extent = Some((low.min(displacement), high.max(displacement)));
         self.last = Some([time, displacement, velocity]);
+    }
+
+    /// How far the samples so far lie apart, m.
+    pub fn extent(&self) -> f64 {
+        self.extent.map_or(0.0, |(low, high)| high - low)
     }
 
     /// Largest swing, m.
@@ -88,20 +102,27 @@ fn swing(a: (f64, f64), b: (f64, f64)) -> f64 {
     0.5 * (a.1 - b.1).abs()
 }
 
-/// Time and displacement where the cubic through two samples and their velocities turns.
-fn turning_point([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> (f64, f64) {
+/// The cubic through two samples and their velocities.
+fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64; 2] {
     let step = t1 - t0;
     // x = x0 + step (v0 s + b s² + c s³) with 0 <= s <= 1
     let mean = (x1 - x0) / step;
     let (b, c) = (3.0 * mean - 2.0 * v0 - v1, v0 + v1 - 2.0 * mean);
-    let velocity = |s: f64| v0 + s * (2.0 * b + s * 3.0 * c);
-    let (mut low, mut high) = (0.0, 1.0);
+    move |time| {
+        let s = (time - t0) / step;
+        [x0 + step * s * (v0 + s * (b + s * c)), v0 + s * (2.0 * b + s * 3.0 * c)]
+    }
+}
+
+/// Time and displacement where a motion between two times first has no velocity in the direction of `v0`, which it has at the first of them: where it
+/// turns, or begins to stick.
+fn turning_point(motion: &Motion<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if velocity(middle) * v0 > 0.0 { low = middle } else { high = middle }
+        if motion(middle)[1] * v0 > 0.0 { low = middle } else { high = middle }
     }
-    let s = 0.5 * (low + high);
-    (t0 + s * step, x0 + step * s * (v0 + s * (b + s * c)))
+    let time = 0.5 * (low + high);
+    (time, motion(time)[0])
 }
 
 /// Halvings of the time between two samples: all bits of a double.
@@ -116,7 +137,7 @@ mod tests {
         for i in 0..=(duration / step) as usize {
             let time = i as f64 * step;
             let (x, v) = motion(time);
-            decay.add(time, x, v);
+            decay.add([time, x, v], None);
         }
         decay.cycles()
     }

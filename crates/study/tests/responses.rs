@@ -793,6 +793,53 @@ fn contact_is_said_of_what_has_faces() {
     assert!(words.iter().any(|w| w == "stick") && words.iter().any(|w| w == "slip+"));
 }
 
+/// Coulomb friction shifts the centre of each swing and not the time between two turning points: every cycle of a free decay has the frequency
+/// `ω √(1 - ζ²)/2π` of the oscillator without it, whatever the samples. About the centre `F/k` a swing shrinks by `e^(-π ζ/√(1 - ζ²))`.
+#[test]
+fn every_cycle_of_a_decay_has_its_frequency() {
+    let (m, k, c, friction, start) = (2.0, 800.0, 4.0, 3.0, 0.1);
+    let omega: f64 = f64::sqrt(k / m);
+    let zeta: f64 = c / (2.0 * m * omega);
+    let root = (1.0 - zeta * zeta).sqrt();
+    let (expected, shrinks) = (omega * root / TAU, (-0.5 * TAU * zeta / root).exp());
+    for step in ["10 ms", "7.3 ms", "1 ms"] {
+        let found = dataset(&format!(
+            r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "2 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "800 N/m"
+damping = "4 N s/m"
+[[joint]]
+name = "rub"
+between = ["m", "ground"]
+law = {{ kind = "coulomb", limit = "3 N" }}
+[study]
+kind = "transient"
+start = {{ m = "0.1 m" }}
+duration = "5 s"
+time_step = "{step}"
+"#
+        ));
+        let (frequencies, amplitudes) =
+            (numbers(&found, "decay", "frequency_Hz"), numbers(&found, "decay", "amplitude_m"));
+        assert_eq!(frequencies.len(), 3);
+        let mut turn = start;
+        for (frequency, amplitude) in frequencies.iter().zip(amplitudes) {
+            assert!((frequency / expected - 1.0).abs() < 1e-9, "{step}: {frequency} instead of {expected}");
+            // turning points on either side: each centre is F/k towards the side that the swing comes from
+            let next = |turn: f64| shrinks * (turn - friction / k) - friction / k;
+            let (second, third) = (next(turn), next(next(turn)));
+            let mean = 0.5 * (0.5 * (turn + second) + 0.5 * (second + third));
+            assert!((amplitude / mean - 1.0).abs() < 1e-9, "{step}: {amplitude} instead of {mean}");
+            turn = third;
+        }
+    }
+}
+
 /// A stiff element of Dahl creeps while it is worked back and forth; the motion loses energy in every cycle all the same.
 #[test]
 fn a_decay_with_creep_has_no_negative_damping() {

@@ -85,6 +85,25 @@ struct Stretch {
     path: Arc<dyn Path>,
 }
 
+/// A sample of the motion, and the motion since the sample before it.
+pub struct Instant<'a> {
+    /// Time, s.
+    pub time: f64,
+    /// Drive frequency, rad/s; zero if free.
+    pub omega: f64,
+    /// The state.
+    pub state: &'a Sample,
+    /// The state at any time (s) between the sample before this one and this one, by the motion itself.
+    pub since: &'a dyn Fn(f64) -> Sample,
+}
+
+impl Stretch {
+    /// The state at a time, s, of this stretch.
+    fn at(&self, time: f64) -> Sample {
+        self.path.sample((time - self.begin).clamp(0.0, self.length))
+    }
+}
+
 impl TimeHistory {
     /// Computes the motion; `sample` receives time (s), drive frequency (rad/s, zero if free) and state, and stops the motion by
     /// returning false.
@@ -116,6 +135,14 @@ impl TimeHistory {
         system: &System,
         sample: &mut dyn FnMut(f64, f64, &Sample) -> bool,
     ) -> Result<(), TimeHistoryError> {
+        self.visit(system, &mut |instant| sample(instant.time, instant.omega, instant.state))
+    }
+
+    /// The same for a visitor that also looks at the motion between two samples.
+    ///
+    /// # Errors
+    /// [`TimeHistoryError`].
+    pub fn visit(&self, system: &System, visitor: &mut dyn FnMut(Instant<'_>) -> bool) -> Result<(), TimeHistoryError> {
         let shared = Arc::new(system.clone());
         let mut flow = TimeHistory::flow(system, self.width)?;
         flow.keep(true);
@@ -123,6 +150,7 @@ impl TimeHistory {
         state.resize(flow.states(), 0.0);
         let mut begin = 0.0;
         let mut next = 0usize; // index of the next sample
+        let mut before: Option<Stretch> = None;
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             let omega = self.frequency(begin);
@@ -145,12 +173,16 @@ impl TimeHistory {
             if let Some(stretch) = stretch {
                 while stretch.last.is_some_and(|last| next <= last) {
                     let time = next as f64 * self.step;
-                    let since = (time - stretch.begin).clamp(0.0, stretch.length);
-                    if !sample(time, omega, &stretch.path.sample(since)) {
+                    let since = |time: f64| match &before {
+                        Some(before) if time < stretch.begin => before.at(time),
+                        _ => stretch.at(time),
+                    };
+                    if !visitor(Instant { time, omega, state: &stretch.at(time), since: &since }) {
                         return Ok(());
                     }
                     next += 1;
                 }
+                before = Some(stretch);
             }
             followed.map_err(|cause| TimeHistoryError::Breakdown {
                 last: next.checked_sub(1).map(|last| last as f64 * self.step),

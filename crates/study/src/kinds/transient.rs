@@ -4,7 +4,7 @@ use super::keys::MOST_SAMPLES;
 use super::orbit::write_sample;
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Figure, Panel, Series};
-use crate::decay::Decay;
+use crate::decay::{Decay, Motion};
 use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, numbers};
 use crate::draws;
 use crate::info::Complaint;
@@ -24,8 +24,9 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::method::WIDTH;
-use stickslip::method::time_history::{Excitation, TimeHistory, TimeHistoryError};
+use stickslip::method::time_history::{Excitation, Instant, TimeHistory, TimeHistoryError};
 use stickslip::model::Model;
+use stickslip::orbit::Sample;
 
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
 const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
@@ -245,7 +246,8 @@ fn compute(work: &Work<'_>) -> Computed {
         // of every mass the largest displacement, and when
         let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
-        let end = transient.run(&prepared.system, &mut |time, omega, sample| {
+        let end = transient.visit(&prepared.system, &mut |instant| {
+            let Instant { time, omega, state: sample, since } = instant;
             rows.varied(case);
             if work.several_frequencies() {
                 rows.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
@@ -255,9 +257,13 @@ fn compute(work: &Work<'_>) -> Computed {
             write_sample(prepared, sample, &mut rows);
             rows.end();
             sampled = true;
+            // the turning points of the place that moves most are those that are read off
+            let most = leader(&decays).filter(|_| excitation == Excitation::Free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
-                let x = along.along(&sample.displacement);
-                decay.add(time, x, along.along(&sample.velocity));
+                let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
+                let [x, v] = of_place(sample);
+                let motion = |time: f64| of_place(&since(time));
+                decay.add([time, x, v], (Some(i) == most).then_some(&motion as &Motion<'_>));
                 if x.abs() > largest[i].0 {
                     largest[i] = (x.abs(), time);
                 }
@@ -295,6 +301,11 @@ fn compute(work: &Work<'_>) -> Computed {
     }
     part.tables = vec![rows, extremes, decay, summary];
     Ok(part)
+}
+
+/// The place whose samples lie farthest apart.
+fn leader(decays: &[Decay]) -> Option<usize> {
+    (0..decays.len()).max_by(|&a, &b| decays[a].extent().total_cmp(&decays[b].extent()))
 }
 
 /// Samples per cycle that turning points need: with 20 the damping ratio is off by 1e-3 of a cycle's decrement, with 3 it is anything.
