@@ -37,13 +37,21 @@ pub(crate) struct StatedEntry {
 /// Rows with their weights.
 pub(crate) type Weights = Vec<(String, Location, Quantity)>;
 
+/// Which order the ends of a range may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    Rising,
+    /// The second end may lie below the first, but is not the same.
+    Any,
+}
+
 #[derive(Debug, Clone)]
 pub(crate) enum Stated {
     Fixed(Given),
     Names(Vec<(String, Location)>),
     Quantity { quantity: Quantity, dimension: Dimension, within: Within, example: &'static str },
     List(Vec<Quantity>, Within),
-    Range { from: Quantity, to: Quantity, points: usize, within: Within },
+    Range { from: Quantity, to: Quantity, points: usize, within: Within, order: Order },
     Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
     ByName(Vec<(String, Location, Quantity)>, Dimension),
     Vector(Vec<Quantity>),
@@ -235,11 +243,13 @@ impl Stated {
                 let numbers = list.iter().map(|q| q.number(key, frequency, "\"121 Hz\"", environment));
                 Given::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
             }
-            Stated::Range { from, to, points, within } => {
+            Stated::Range { from, to, points, within, order } => {
                 let frequency = (Dimension::FREQUENCY, *within);
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
-                not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
+                if *order == Order::Rising || start == end {
+                    not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
+                }
                 Given::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
             }
             Stated::Adaptive { from, to, tolerance } => {

@@ -223,6 +223,80 @@ vary = { Ft = ["2 N", "4 N"] }
     }
 }
 
+/// The amplitudes of a branch where it passes a frequency (rad/s), in its order, on the line between its points.
+fn passed(branch: &Dataset, omega: f64) -> Vec<f64> {
+    let rows = table(branch, "branch");
+    let at: Vec<f64> = rows.numbers("frequency_Hz").unwrap().iter().map(|f| f * std::f64::consts::TAU).collect();
+    let amplitudes = rows.numbers("m_amplitude_m").unwrap();
+    let close = |row: usize| (at[row] - omega).abs() < 1e-9;
+    let between = |row: usize| (at[row] - omega) * (at[row + 1] - omega) < 0.0 && !close(row) && !close(row + 1);
+    let line = |row: usize| {
+        let share = (omega - at[row]) / (at[row + 1] - at[row]);
+        amplitudes[row] + share * (amplitudes[row + 1] - amplitudes[row])
+    };
+    let on = (0..at.len()).filter(|row| close(*row)).map(|row| (row, amplitudes[row]));
+    let beside = (0..at.len() - 1).filter(|row| between(*row)).map(|row| (row, line(row)));
+    let mut found: Vec<(usize, f64)> = on.chain(beside).collect();
+    found.sort_by_key(|(row, _)| *row);
+    found.into_iter().map(|(_, amplitude)| amplitude).collect()
+}
+
+fn near(found: &[f64], expected: &[f64]) {
+    let all = found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
+    assert!(all, "{found:?} instead of {expected:?}");
+}
+
+/// `x'' + 0.02 x' + x - 0.05 x³ = 0.05 cos ωt`, in twentieths of x, which softens: three orbits between 0.805663 and 0.957875 rad/s. A range that begins
+/// there has them all, whatever its direction. The values are those of a harmonic balance of its own with arc length, 15 harmonics, in NumPy.
+#[test]
+fn a_branch_that_begins_between_folds_covers_its_range() {
+    let soft = |frequency: &str| {
+        let study = format!("kind = \"branch\"\nfrequency = {frequency}");
+        oscillator("0.02 kg/s", r#"{ kind = "cubic", stiffness = "-1.25e-4 N/m^3" }"#, &study)
+    };
+    let times = |values: &[f64]| values.iter().map(|x| 20.0 * x).collect::<Vec<_>>();
+    for (frequency, up) in [
+        (r#"{ from = "0.85 rad/s", to = "1.2 rad/s" }"#, true),
+        (r#"{ from = "1.2 rad/s", to = "0.85 rad/s" }"#, false),
+    ] {
+        let branch = soft(frequency);
+        assert!(branch.failures.is_empty(), "{:?}", branch.failures);
+        let from_below = |values: &[f64]| -> Vec<f64> {
+            let mut values = times(values);
+            if !up {
+                values.reverse();
+            }
+            values
+        };
+        near(&passed(&branch, 0.85), &from_below(&[0.180_623_1, 2.664_511, 2.727_506_4]));
+        near(&passed(&branch, 0.9), &from_below(&[0.265_614, 2.154_925_5, 2.307_118_1]));
+        near(&passed(&branch, 1.0), &times(&[1.063_259]));
+        near(&passed(&branch, 1.1), &times(&[0.234_504_7]));
+        // the curve is interrupted where it runs outside of the range
+        assert!(branch.figure.panels[0].series.len() >= 3);
+        let turns = table(&branch, "turns").numbers("frequency_Hz").unwrap();
+        assert!(turns.len() == 1 && (turns[0] - 0.152_448_6).abs() < 1e-4, "{turns:?}");
+    }
+    for frequency in [r#"{ from = "0.7 rad/s", to = "1.2 rad/s" }"#, r#"{ from = "1.2 rad/s", to = "0.7 rad/s" }"#] {
+        let branch = soft(frequency);
+        near(table(&branch, "peaks").numbers("amplitude_m").unwrap(), &times(&[3.024_735_4]));
+        near(table(&branch, "peaks").numbers("frequency_Hz").unwrap(), &[0.805_724 / std::f64::consts::TAU]);
+    }
+}
+
+/// The same oscillator with a spring that hardens: three orbits between 1.040154 and 1.094317 rad/s, and the peak above where the range begins.
+#[test]
+fn a_branch_that_begins_between_folds_has_the_peak_of_its_range() {
+    let study = "kind = \"branch\"\nfrequency = { from = \"1.06 rad/s\", to = \"1.3 rad/s\" }";
+    let branch = oscillator("0.02 kg/s", r#"{ kind = "cubic", stiffness = "1.25e-4 N/m^3" }"#, study);
+    assert!(branch.failures.is_empty(), "{:?}", branch.failures);
+    let mut begin = passed(&branch, 1.06);
+    begin.sort_by(f64::total_cmp);
+    near(&begin, &[0.420_732_4, 1.650_830_2, 1.928_548_5].map(|x| 20.0 * x));
+    near(table(&branch, "peaks").numbers("amplitude_m").unwrap(), &[20.0 * 2.300_106_1]);
+    near(table(&branch, "peaks").numbers("frequency_Hz").unwrap(), &[1.093_993_2 / std::f64::consts::TAU]);
+}
+
 /// A branch without a range says what it needs.
 #[test]
 fn a_branch_without_a_range_fails_with_words() {

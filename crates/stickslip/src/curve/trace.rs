@@ -2,6 +2,10 @@
 //!
 //! A branch is followed around turning points; its maxima are refined. A kink (the onset of slip) is stepped over: the corrector
 //! converges on either side of it, with steps that are halved until it does, or with a search of its own a little further on.
+//!
+//! Where several orbits exist at an end of the range, the curve leaves the range there and may come back on another orbit. It is followed outside as
+//! well, up to half of the range beyond either end; its points outside are not reported. What part of the range it still does not have is sought from
+//! an orbit at the other end.
 
 use crate::method::harmonic_balance::{BranchEquations, HarmonicBalance};
 use crate::method::{MethodError, OrbitError};
@@ -40,7 +44,7 @@ pub struct TracePoint {
 /// A branch.
 #[derive(Debug, Clone)]
 pub struct Branch {
-    /// Its points in the order of the arc.
+    /// Its points in the order of the arc. Two in a row at the same end of the range are joined by the curve outside of it, or belong to two curves.
     pub points: Vec<TracePoint>,
     /// Refined maxima of the quantity: (parameter, value).
     pub peaks: Vec<(f64, f64)>,
@@ -48,6 +52,19 @@ pub struct Branch {
     pub turns: Vec<usize>,
     /// Why it ends.
     pub end: End,
+}
+
+impl Branch {
+    /// Whether it has a point at this value.
+    pub fn reaches(&self, value: f64) -> bool {
+        self.points.iter().any(|point| point.value == value)
+    }
+
+    fn append(&mut self, mut other: Branch) {
+        self.turns.extend(other.turns.iter().map(|turn| turn + self.points.len()));
+        self.points.append(&mut other.points);
+        self.peaks.append(&mut other.peaks);
+    }
 }
 
 /// No branch at all.
@@ -65,9 +82,77 @@ pub enum TraceError {
 const ROUNDING: f64 = 1e-9;
 /// Relative width at which the search for a peak ends: the height of a smooth one is then right to rounding, of a kink to about this share.
 const LOCATED: f64 = 1e-9;
+/// Points at one value of the parameter are one whose unknowns differ by less than this share.
+const SAME: f64 = 1e-6;
+
+/// A point with the unknowns that tell it, and its parameter.
+type Passed = (TracePoint, (Vec<f64>, f64));
+
+/// What was followed of a curve, in the order of the arc.
+#[derive(Default)]
+struct Way {
+    points: Vec<Passed>,
+    /// Whether there is one orbit at every value, so that the curve does not come back.
+    single: bool,
+}
+
+impl Way {
+    /// Follows the curve from a point, also outside of the range where it comes back from there.
+    fn follow(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) -> End {
+        let mut from = (from, steps);
+        loop {
+            let ((x, value), steps) = from;
+            let left = Steps { points: steps.points.saturating_sub(self.points.len()), ..steps };
+            let end = continuation::trace(equations, &x, value, left, &mut |equations, x, value| {
+                let Some(orbit) = equations.orbit(x, value) else { return false };
+                self.points.push((TracePoint { value, orbit }, (x.to_vec(), value)));
+                true
+            });
+            let leaves = end == End::Border && !self.single;
+            let Some((_, last)) = self.points.last().filter(|_| leaves) else { return end };
+            match Way::excursion(equations, last.clone(), steps) {
+                Some(back) if !self.has(&back.0) => from = back,
+                _ => return end,
+            }
+        }
+    }
+
+    /// Leaves the range from a point at its border, and follows the curve if it comes back.
+    fn outside(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) {
+        if let Some((back, steps)) = Way::excursion(equations, from, steps) {
+            self.follow(equations, back, steps);
+        }
+    }
+
+    /// From a point at a border of the range out of it: where the curve comes back, and the steps from there.
+    fn excursion(
+        equations: &mut BranchEquations<'_>,
+        (x, border): (Vec<f64>, f64),
+        steps: Steps,
+    ) -> Option<((Vec<f64>, f64), Steps)> {
+        let (low, high) = steps.range;
+        let reach = 0.5 * (high - low);
+        let (range, direction) = if border == low { ((low - reach, low), -1.0) } else { ((high, high + reach), 1.0) };
+        let mut last = None;
+        let outside = Steps { range, direction, ..steps };
+        let end = continuation::trace(equations, &x, border, outside, &mut |_, x, value| {
+            last = Some((x.to_vec(), value));
+            true
+        });
+        let back = last.filter(|(_, value)| end == End::Border && *value == border)?;
+        Some((back, Steps { direction: -direction, ..steps }))
+    }
+
+    /// Whether it passed a point at a border of the range.
+    fn has(&self, (x, value): &(Vec<f64>, f64)) -> bool {
+        let distance = |other: &[f64]| x.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+        let size = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        self.points.iter().any(|(_, (other, at))| at == value && distance(other) <= SAME * size)
+    }
+}
 
 impl Trace<'_> {
-    /// Follows the branch from the start of the range until it leaves it.
+    /// Follows the branch from the start of the range until it leaves it for good.
     ///
     /// # Errors
     /// The method cannot take the system, or there is no orbit at the start. A branch that is lost later is returned as far as it got.
@@ -92,14 +177,32 @@ impl Trace<'_> {
         let mut equations = BranchEquations::new(self.at, self.method, self.range)?;
         let start = equations.start(self.range.0)?;
         let steps = Steps::between(self.range.0, self.range.1, self.step);
-        let mut points: Vec<TracePoint> = Vec::new();
-        let mut arc: Vec<(Vec<f64>, f64)> = Vec::new();
-        let end = continuation::trace(&mut equations, &start, self.range.0, steps, &mut |equations, x, value| {
-            let Some(orbit) = equations.orbit(x, value) else { return false };
-            points.push(TracePoint { value, orbit });
-            arc.push((x.to_vec(), value));
-            true
-        });
+        let single = (self.at)(self.range.0).0.contracts();
+        let mut way = Way { single, ..Way::default() };
+        let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
+        if !single && end == End::Border {
+            // the same curve the other way, which may come back into the range
+            let mut before = Way::default();
+            let out = Steps { direction: -steps.direction, ..steps };
+            before.outside(&mut equations, (start, self.range.0), out);
+            before.points.reverse();
+            way.points.splice(..0, before.points);
+        }
+        let mut branch = self.told(&mut equations, way, end);
+        if end == End::Border && !branch.reaches(self.range.1) {
+            let mut way = Way { single, ..Way::default() };
+            if let Ok(start) = equations.start(self.range.1) {
+                way.follow(&mut equations, (start, self.range.1), Steps { direction: -steps.direction, ..steps });
+            }
+            way.points.reverse();
+            branch.append(self.told(&mut equations, way, end));
+        }
+        Ok(branch)
+    }
+
+    /// Peaks and turns of what was followed.
+    fn told(&self, equations: &mut BranchEquations<'_>, way: Way, end: End) -> Branch {
+        let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = way.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
         let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
         let mut peaks = Vec::new();
@@ -109,11 +212,13 @@ impl Trace<'_> {
             if (b - a) * (c - b) < 0.0 {
                 turns.push(i);
             }
-            if heights[i] > rounding && heights[i] >= heights[i - 1] && heights[i] > heights[i + 1] {
-                peaks.push(self.refine(&mut equations, &arc[i - 1..=i + 1], (b, heights[i])));
+            // at an end of the range the curve goes on outside
+            let inside = a != b && b != c;
+            if inside && heights[i] > rounding && heights[i] >= heights[i - 1] && heights[i] > heights[i + 1] {
+                peaks.push(self.refine(equations, &arc[i - 1..=i + 1], (b, heights[i])));
             }
         }
-        Ok(Branch { points, peaks, turns, end })
+        Branch { points, peaks, turns, end }
     }
 
     /// The highest place between three neighbours where the parameter is monotonic.

@@ -38,7 +38,7 @@ pub(super) const KIND: Kind = Kind {
             required(
                 "frequency",
                 Takes::Frequencies(ENDS),
-                "drive frequency: a range whose ends count, `steps` says how close the points lie; one, for a branch along a parameter",
+                "drive frequency: a range whose ends count, in either order, `steps` says how close the points lie; one, for a branch along a parameter",
                 "{ from = \"119 Hz\", to = \"123 Hz\" }",
             ),
             default(
@@ -153,7 +153,8 @@ fn compute(work: &Work<'_>) -> Computed {
     let (outer, along) = split(work.study, &prepared.case.varied);
     let label = || varied_text(outer);
     let mut part = Part::default();
-    let found = follow(work, along);
+    let range = range(work, along);
+    let found = follow(work, along, range);
     (0..work.cases.len() * work.points.len()).for_each(|_| (work.context.finished)());
     let branch = match found {
         Ok(branch) => branch,
@@ -198,7 +199,7 @@ fn compute(work: &Work<'_>) -> Computed {
         turns.end();
     }
     let reason = match branch.end {
-        End::Border => None,
+        End::Border => missing(&branch, range, (name.as_str(), factor)),
         End::Stalled { at } => Some(format!("no shorter step converges beyond {name} = {:.9}", at * factor)),
         End::Points => Some("the branch does not reach the end of its range".to_owned()),
         End::Stopped => Some("what follows is no orbit: its mean forces or its energies do not balance".to_owned()),
@@ -244,12 +245,34 @@ fn method(values: &Values) -> HarmonicBalance {
     }
 }
 
-fn follow(work: &Work<'_>, along: Option<&VariedValue>) -> Result<Branch, Missing> {
-    let (prepared, last) = (work.case(), &work.cases[work.cases.len() - 1]);
-    let range = match (along, split(work.study, &last.case.varied).1) {
+/// What part of the range a branch does not have that left it, and how it is found.
+fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64)) -> Option<String> {
+    let reached = branch
+        .points
+        .iter()
+        .map(|point| point.value)
+        .fold(from, |far, value| if (value - from).abs() > (far - from).abs() { value } else { far });
+    (!branch.reaches(to)).then(|| {
+        format!(
+            "the branch turns at {name} = {:.9} and leaves the range where it began; nothing was found from there to {:.9}: begin it where there \
+             is one orbit, or at the other end",
+            reached * factor,
+            to * factor
+        )
+    })
+}
+
+/// From which value to which a branch runs.
+fn range(work: &Work<'_>, along: Option<&VariedValue>) -> (f64, f64) {
+    let last = &work.cases[work.cases.len() - 1];
+    match (along, split(work.study, &last.case.varied).1) {
         (Some(first), Some(last)) => (first.si, last.si),
         _ => (work.omega(work.points.start), work.omega(work.points.end - 1)),
-    };
+    }
+}
+
+fn follow(work: &Work<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Result<Branch, Missing> {
+    let prepared = work.case();
     if range.0 == range.1 {
         return Err(Missing::NoRange);
     }
@@ -300,10 +323,17 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let unstable = unstable(table);
     let line_of = |stretch: &Stretch, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
         let mut from = stretch.rows.start;
+        // between two points at one end of the range the curve runs outside of it
+        let at = numbers(table, &name_of_axis(table, outer.len()), stretch.rows.clone());
+        let leaves = |row: usize| row > 0 && at[row - 1] == at[row];
+        let rows: Vec<usize> = (0..stretch.rows.len()).collect();
+        let unstable = &unstable[stretch.rows.clone()];
         // unstable stretches are dashed; each begins at the last point of the one before
-        let runs = unstable[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|run| {
-            let shown = from.max(stretch.rows.start + 1) - 1..from + run.len();
-            from += run.len();
+        let runs = rows.chunk_by(|a, b| unstable[*a] == unstable[*b] && !leaves(*b)).map(|rows| {
+            let run = &unstable[rows[0]..];
+            let joined = usize::from(rows[0] > 0 && !leaves(rows[0]));
+            let shown = from - joined..from + rows.len();
+            from += rows.len();
             let all: Vec<Vec<f64>> = places.iter().map(|p| numbers(table, &column(*p), shown.clone())).collect();
             let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
             let y = (0..shown.len()).map(|i| largest(i) * factor).collect();

@@ -7,7 +7,7 @@ use crate::error::{Location, Problem};
 use crate::expression::Expression;
 use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, Key, MOST_POINTS, Presence, Takes, Within};
-use crate::statement::{Quantity, Stated, StatedEntry, StatedTable, Weights};
+use crate::statement::{Order, Quantity, Stated, StatedEntry, StatedTable, Weights};
 use crate::values::Given;
 use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
@@ -129,7 +129,10 @@ impl Reader {
             }
             (Takes::Frequencies(keys), Content::Table(table)) => {
                 let (from, to, points) = self.range(table, keys, key.name)?;
-                Some(Stated::Range { from, to, points, within: within(keys) })
+                // where the ends alone count they say which way it goes
+                let ends = |key: &Key| key.name == "points" && matches!(key.presence, Presence::Default(_));
+                let order = if keys.iter().any(ends) { Order::Any } else { Order::Rising };
+                Some(Stated::Range { from, to, points, within: within(keys), order })
             }
             (Takes::ByName(dimension), Content::Table(table)) => {
                 let mut names = Vec::new();
