@@ -3,7 +3,8 @@
 //! At small amplitude joints stick and the mode is the linear one with their springs, or with rigid contacts closed; at large amplitude
 //! it is the linear one without joints. A mode is *followed* from an amplitude at which friction hardly matters, by arc length, in steps
 //! that its own curve decides: neither the range that is asked for nor its points change them. Where all joints stick, every smaller motion
-//! is a multiple of the last one. The points above are solved for, each from the followed states beside it.
+//! is a multiple of the last one. The points above are solved for, each from the followed states beside it. Where a mode ends above the smallest
+//! amplitude, what lies below is followed from there upwards, from the mode of the same number with all joints as they hold in small motion.
 //!
 //! Where friction pulls two frequencies together, two modes nearly become one: [`Mode::merges`]. Below there are two again, in other motions,
 //! and little decides which mode goes on to which, the number of harmonics for example. There the curve may also turn: its amplitude grows
@@ -124,27 +125,78 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
-    let path = ModeCurve::follow(&mut equations, request.mode, request.range);
     let last = request.points.max(2) - 1;
-    let largest = path.largest(&mut equations, (low, high));
+    let followed = Followed::new(&mut equations, request);
+    let larger = |a: &(f64, ModeState), b: &(f64, ModeState)| a.1.damping.total_cmp(&b.1.damping);
+    let largest = followed.curves().filter_map(|curve| curve.largest(&mut equations, (low, high))).max_by(larger);
+    let merges = followed.curves().flat_map(|curve| curve.merges(&equations)).filter(|a| (low..high).contains(a));
+    let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.at < high);
     let mut mode = Mode {
         points: Vec::new(),
         largest: largest.map(|(a, state)| point(&equations, a, &state)),
-        merges: path.merges(&equations).into_iter().filter(|a| (low..high).contains(a)).collect(),
-        turns: path.turns().into_iter().filter(|turn| turn.at < high).collect(),
+        merges: merges.collect(),
+        turns: turns.collect(),
         missing: Vec::new(),
-        lost: path.lost,
-        travels: path.travels(),
+        lost: followed.lost(high),
+        travels: followed.curves().any(ModeCurve::travels),
     };
     for i in 0..=last {
         let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
-        match path.at(&mut equations, amplitude) {
+        match followed.curves().find_map(|curve| curve.at(&mut equations, amplitude)) {
             Some(state) => mode.points.push(point(&equations, amplitude, &state)),
-            None if amplitude > path.end() => mode.missing.push(amplitude),
+            None if followed.passes(amplitude) => mode.missing.push(amplitude),
             None => {}
         }
     }
     Ok(mode)
+}
+
+/// The curve of a mode: what is followed from its large end, and from its small end where the other one does not come there.
+struct Followed {
+    falling: Option<ModeCurve>,
+    rising: Option<ModeCurve>,
+}
+
+impl Followed {
+    fn new(equations: &mut ModeEquations<'_>, request: ModeRequest) -> Self {
+        let (low, high) = request.range;
+        // the only mode is that of its number at both ends: of a law with memory, which is dear to follow through large motions, its small end comes first
+        let rising = match equations.is_alone_with_memory() {
+            true => ModeCurve::from_rest(equations, request.mode, request.range),
+            false => None,
+        };
+        if rising.as_ref().is_some_and(|rising| rising.top() >= high) {
+            return Followed { falling: None, rising };
+        }
+        let falling = ModeCurve::follow(equations, request.mode, request.range);
+        let end = falling.end().min(high);
+        let is_sought = rising.is_none() && falling.lost.is_some() && end > low;
+        let below = if is_sought { ModeCurve::from_rest(equations, request.mode, (low, end)) } else { None };
+        Followed { falling: Some(falling), rising: rising.or(below) }
+    }
+
+    fn curves(&self) -> impl Iterator<Item = &ModeCurve> {
+        self.falling.iter().chain(&self.rising)
+    }
+
+    /// Whether one of them has passed an amplitude.
+    fn passes(&self, amplitude: f64) -> bool {
+        self.falling.as_ref().is_some_and(|curve| amplitude > curve.end())
+            || self.rising.as_ref().is_some_and(|curve| amplitude < curve.top())
+    }
+
+    /// Where and why the mode ends above the smallest amplitude, of those up to `high`.
+    fn lost(&self, high: f64) -> Option<Lost> {
+        let falling = self.falling.as_ref()?;
+        let lost = falling.lost?;
+        match &self.rising {
+            Some(rising) if rising.top() >= falling.end().min(high) => None,
+            Some(rising) if lost.reason == Reason::NoBeginning => {
+                Some(Lost { at: rising.top(), reason: Reason::FromRest })
+            }
+            _ => Some(lost),
+        }
+    }
 }
 
 /// Modal amplitude (m √kg) of mode `index` of the structure without its joints where the place that moves most in it has an amplitude of one

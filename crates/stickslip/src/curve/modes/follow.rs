@@ -44,6 +44,17 @@ pub enum Reason {
         "its damping ratio is above ten there: nothing vibrates, and it is not followed further; ask for larger amplitudes"
     )]
     Overdamped,
+    /// It is followed from its small end to there, and from its large end not at all.
+    #[error(
+        "it is followed from small amplitudes to there, where nothing vibrates or no neighbouring motion was found, and at large amplitudes no motion \
+         was found either"
+    )]
+    FromRest,
+    /// The states of a law took too many steps.
+    #[error(
+        "it is not followed further: the states of a law change so fast there that every motion takes long; ask for other amplitudes"
+    )]
+    Dear,
     /// All steps are used up.
     #[error("it was not followed to the end within 4000 steps; try fewer harmonics")]
     Steps,
@@ -64,6 +75,8 @@ const OVERDAMPED: f64 = 10.0;
 /// Harmonics times samples of all steps that are spent on such motions: two seconds or so. Rigid friction that is followed to a nanometre takes
 /// thousands of steps, of which nobody has anything where each is dear.
 const CREEPING: usize = 8_000_000;
+/// Steps of laws with memory that a curve may take: ten seconds or so. A curve of one joint takes a few millions.
+const MARCHED: usize = 4_000_000;
 /// Arc lengths, see [`ModeEquations::step`]: the longest step changes the amplitude by up to a half, or a fifth of the shape.
 const LONGEST: f64 = 0.2;
 /// The first step, and that after a leap.
@@ -109,6 +122,7 @@ impl ModeCurve {
     /// Follows mode `index` until it is below the modal amplitude `low`; where forces grow with amplitude, up to `high` as well.
     pub(super) fn follow(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Self {
         let modes = equations.linear_modes();
+        let begun = equations.marched();
         let none = |linear| {
             let lost = Lost { at: f64::INFINITY, reason: Reason::NoBeginning };
             ModeCurve { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
@@ -122,6 +136,9 @@ impl ModeCurve {
         let start = shapes.into_iter().flatten().find_map(|linear| {
             equations.mixes = linear.stands.is_some();
             let start = OTHERS.iter().find_map(|factor| {
+                if equations.marched() - begun > MARCHED {
+                    return None;
+                }
                 let amplitude = factor * faint;
                 let guess = equations.linear(&linear, amplitude)?;
                 let state = equations.solve(&guess, amplitude, amplitude)?;
@@ -157,6 +174,10 @@ impl ModeCurve {
                     path.lost = Some(Lost { at: path.end(), reason: Reason::Overdamped });
                     return path;
                 }
+                _ if equations.marched() - begun > MARCHED => {
+                    path.lost = Some(Lost { at: path.end(), reason: Reason::Dear });
+                    return path;
+                }
                 _ if at > top => Reason::Merged,
                 _ if since > PATIENCE => Reason::Turned,
                 Some(step) => {
@@ -187,6 +208,23 @@ impl ModeCurve {
         path
     }
 
+    /// Follows mode `index` from where all joints hold as in small motion, at the modal amplitude `low`, until it is above `high` or no step goes on. `None`
+    /// where no motion is found there.
+    pub(super) fn from_rest(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Option<Self> {
+        equations.mixes = false;
+        let guess = equations.at_rest(index, low)?;
+        let state = equations.solve(&guess, low, low).filter(|state| equations.assurance(&guess, state) >= SHAPE)?;
+        let start = equations.begin(&state, low)?;
+        let mut arcs = risen(equations, &start, high);
+        arcs.push(start);
+        Some(ModeCurve { linear: None, arcs, sticks: false, lost: None })
+    }
+
+    /// The largest amplitude that was reached.
+    pub(super) fn top(&self) -> f64 {
+        self.arcs.iter().fold(0.0, |most, arc| most.max(arc.amplitude))
+    }
+
     /// Whether it is one of the two waves of a pair.
     pub(super) fn travels(&self) -> bool {
         self.linear.as_ref().is_some_and(|linear| linear.stands.is_some())
@@ -207,6 +245,10 @@ impl ModeCurve {
             let guess = equations.linear(self.linear.as_ref()?, a)?;
             let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
             return (equations.assurance(&guess, &found) >= SHAPE).then_some(found);
+        }
+        // a curve from its small end begins at an amplitude that is asked for
+        if let Some(last) = self.arcs.last().filter(|last| last.amplitude == a) {
+            return Some(last.state.clone());
         }
         let Some(pair) = self.arcs.windows(2).find(|pair| pair[0].amplitude >= a && pair[1].amplitude < a) else {
             let last = self.arcs.last().filter(|_| self.sticks)?;
@@ -334,9 +376,15 @@ fn taken(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Optio
 /// forces grow with amplitude.
 fn risen(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
     let mut arcs = Vec::new();
-    let (mut now, mut length) = (start.reversed(), FIRST);
+    let (mut now, mut length, mut creeping, begun) = (start.reversed(), FIRST, 0, equations.marched());
     for _ in 0..MOST_STEPS {
         if now.amplitude > high || length <= SHORTEST {
+            break;
+        }
+        if now.state.damping > OVERDAMPED {
+            creeping += equations.resolution();
+        }
+        if creeping > CREEPING || equations.marched() - begun > MARCHED {
             break;
         }
         match taken(equations, &now, length) {

@@ -113,6 +113,16 @@ impl<'a> ModeEquations<'a> {
         self.alternation.resolution()
     }
 
+    /// Steps that laws with memory have been followed for.
+    pub fn marched(&self) -> usize {
+        self.alternation.marched
+    }
+
+    /// Whether there is one mode, on a law with memory.
+    pub fn is_alone_with_memory(&self) -> bool {
+        self.system.dofs() == 1 && self.elastic.iter().any(|placed| placed.port.marches())
+    }
+
     /// Axes of the force ports.
     pub(super) fn forces(&self) -> usize {
         self.contacts.last().map_or(0, |last| last.port.first + last.port.axes)

@@ -13,6 +13,8 @@ const EQUAL: f64 = 1e-7;
 const SQUARE: f64 = 64.0 * f64::EPSILON;
 /// Share of the size of a mode below which nothing is read off it.
 const FAINT_PLACE: f64 = 1e-6;
+/// Rounds in which the stiffness of joints in small motion, which may depend on the frequency, and the frequency find each other.
+const ROUNDS: usize = 5;
 
 /// A linear mode of the structure without its joints.
 #[derive(Debug, Clone)]
@@ -54,6 +56,9 @@ impl ModeEquations<'_> {
     /// The linear modes of the structure without its joints, by rising frequency.
     pub fn linear_modes(&self) -> Vec<LinearMode> {
         let n = self.system.dofs();
+        if n == 0 {
+            return Vec::new(); // the motion of every place is given
+        }
         let mut stiffness = self.system.structure().stiffness().clone();
         // a trace of the joints stays, so that equal blades move with or against each other as the joints make them
         for Placed { port, w } in self.elastic.iter().chain(&self.contacts) {
@@ -106,6 +111,47 @@ impl ModeEquations<'_> {
         let lost = mode.shape.dotc(&(damping * &mode.shape)).re;
         let force = vec![ZERO; nh * self.forces()];
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
+    }
+
+    /// The linear mode of this number with all joints as they hold in small motion, by rising frequency, as a motion of amplitude `a`: the start of a mode
+    /// from its small end. `None` where friction is rigid, which holds without a stiffness.
+    pub fn at_rest(&self, index: usize, a: f64) -> Option<ModeState> {
+        if !self.contacts.is_empty() {
+            return None;
+        }
+        let (n, structure) = (self.system.dofs(), self.system.structure());
+        let mut square = structure.stiffness().amax() / structure.mass().amax();
+        let mut found = None;
+        for _ in 0..ROUNDS {
+            let omega = square.sqrt();
+            let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
+            stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
+            for Placed { port, w } in &self.elastic {
+                let holds = port.at_rest(omega);
+                for (i, v) in w.iter().enumerate() {
+                    for (k, w) in w.iter().enumerate() {
+                        stiffness += (v * w.transpose()).map(|product| holds[(i, k)] * product);
+                    }
+                }
+            }
+            let inverse = structure.mass().clone().cholesky()?.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+            let eigen = eigen::symmetric(&inverse * stiffness.map(|k| k.re) * inverse.transpose())?;
+            let mut order: Vec<usize> = (0..n).collect();
+            order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+            let shape = real(&(inverse.transpose() * eigen.eigenvectors.column(*order.get(index)?)));
+            // φᴴ M φ is one: (ω² + 2 j ζ ω²) = φᴴ (K + j ω C) φ
+            let whole = shape.dotc(&(stiffness * &shape));
+            square = whole.re;
+            if square.is_nan() || square <= 0.0 {
+                return None;
+            }
+            found = Some((shape, whole.im / (2.0 * square)));
+        }
+        let (shape, damping) = found?;
+        let nh = self.alternation.harmonics.len();
+        let mut x = vec![ZERO; nh * n];
+        x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
+        Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
     }
 
     /// Modal amplitude, m √kg, from which on the first harmonic of friction is at most a share of the forces of inertia of the linear mode

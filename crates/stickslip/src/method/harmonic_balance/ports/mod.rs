@@ -32,6 +32,7 @@ use sliders::Part;
 use crate::law::{MOST_DIRECTIONS, Prox, SharedLaw};
 use crate::method::MethodError;
 use crate::model::{Axis, Cyclic, System, SystemJoint};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 /// Directions of joints from which what the structure couples among them is multiplied with and not eliminated: few with many harmonics have steps that are
@@ -157,6 +158,14 @@ impl Port {
         kind(self) == kind(other)
             && self.members.len() == other.members.len()
             && self.members.iter().zip(&other.members).all(alike)
+    }
+
+    /// Complex stiffness of small motions about rest at a frequency (rad/s), axes × axes, N/m, of a motion port.
+    pub fn at_rest(&self, omega: f64) -> DMatrix<Complex64> {
+        match &self.kernel {
+            Kernel::Step(law) | Kernel::Rate(law) => crate::method::guess::at_rest(&**law, omega),
+            _ => DMatrix::from_diagonal_element(self.axes, self.axes, Complex64::new(self.stiffness(), 0.0)),
+        }
     }
 
     /// Stiffness at rest along its axes, N/m, roughly; zero if it is rigid.
