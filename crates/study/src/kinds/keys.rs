@@ -5,14 +5,21 @@ use crate::info::Complaint;
 use crate::key::RANGE;
 use crate::key::{Key, Takes, default, optional, required};
 use crate::values::Values;
+use std::collections::BTreeSet;
 use stickslip::method::{MethodError, Options};
-use stickslip::model::{Model, System};
+use stickslip::model::{Mass, Model, System};
 
 /// Whether there is a mass whose peak could count.
 pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
     if model.masses.is_empty() && model.places.is_empty() {
         let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
         return Err(Complaint::new("kind", "the model has no mass, so no amplitude has a peak", help));
+    }
+    let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
+    let mut places = model.masses.iter().flat_map(Mass::places);
+    if model.places.is_empty() && places.all(|place| moved.contains(place.as_str())) {
+        let help = "leave a mass without a [[motion]], or ask for kind = \"hysteresis\"";
+        return Err(Complaint::new("kind", "the motion of every mass is given, so no amplitude has a peak", help));
     }
     Ok(())
 }

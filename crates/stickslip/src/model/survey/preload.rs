@@ -40,7 +40,9 @@ pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
         }
     }
     (0..n).for_each(|i| stiffness[(i, i)] += SOFT * stiffest);
-    let Some(x) = stiffness.lu().solve(&load) else { return unknown() };
+    // where every place is moved nothing gives way
+    let solved = if n == 0 { Some(load) } else { stiffness.lu().solve(&load) };
+    let Some(x) = solved else { return unknown() };
     let carried = |joint: &Stuck| {
         let preload = joint.pressed.filter(|force| *force > 0.0)?;
         let force = preload + springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>();
