@@ -33,7 +33,11 @@ pub fn is_followed(system: &System) -> bool {
 /// The method cannot take the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = advised(method, system)?;
-    Ok(if is_followed(system) { Box::new(Onward { solver, last: None, told: None, spent: false }) } else { solver })
+    Ok(if is_followed(system) {
+        Box::new(Onward { solver, last: None, told: None, end: None, spent: false })
+    } else {
+        solver
+    })
 }
 
 struct Onward<'a> {
@@ -41,8 +45,24 @@ struct Onward<'a> {
     last: Option<Last>,
     /// What it was told of.
     told: Option<Last>,
+    /// Where smaller steps did not go on.
+    end: Option<End>,
     /// Whether the searches on a way took too long: no way is gone after that.
     spent: bool,
+}
+
+/// The end of a branch: its last orbit that was found, and a frequency (rad/s) close to that at which it has none.
+struct End {
+    last: Last,
+    beyond: f64,
+}
+
+impl End {
+    /// Whether the way from an orbit to a frequency leads over this end.
+    fn lies_between(&self, from: &Last, omega: f64) -> bool {
+        let ahead = (self.beyond - self.last.omega).signum();
+        (self.beyond - from.omega) * ahead > 0.0 && (omega - self.beyond) * ahead >= 0.0 && from.is_near(&self.last)
+    }
 }
 
 /// Where a curve has arrived.
@@ -62,8 +82,12 @@ impl Last {
 
     /// Whether an orbit may be the next one of the branch.
     fn leads_to(&self, orbit: &Orbit) -> bool {
-        let next = Last::new(orbit);
-        let pairs = || self.places.iter().zip(&next.places);
+        self.is_near(&Last::new(orbit))
+    }
+
+    /// Whether no amplitude or phase differs much.
+    fn is_near(&self, other: &Last) -> bool {
+        let pairs = || self.places.iter().zip(&other.places);
         let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
         pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= STRIDE * largest)
     }
@@ -80,6 +104,7 @@ impl Onward<'_> {
         if let (Some(last), Ok(orbit)) = (known, &found)
             && !self.spent
             && !last.leads_to(orbit)
+            && self.end.as_ref().is_none_or(|end| !end.lies_between(last, omega))
             && let Some(orbit) = self.followed(last.clone(), omega, between)
         {
             found = Ok(orbit);
@@ -92,6 +117,7 @@ impl Onward<'_> {
     fn followed(&mut self, mut last: Last, omega: f64, between: bool) -> Option<Orbit> {
         let from = last.omega;
         let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
+        let mut beyond;
         for _ in 0..MOST {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
@@ -102,11 +128,12 @@ impl Onward<'_> {
             match found.ok().filter(|orbit| last.leads_to(orbit)) {
                 Some(orbit) if arrives => return Some(orbit),
                 _ if self.spent => return None,
-                Some(orbit) => (last, at, step) = (Last::new(&orbit), share, 2.0 * step),
-                None => step *= 0.5,
+                Some(orbit) => (last, at, step, beyond) = (Last::new(&orbit), share, 2.0 * step, omega),
+                None => (step, beyond) = (0.5 * step, target),
             }
             step = step.min(1.0 - at);
             if step < FINEST {
+                self.end = Some(End { last, beyond });
                 return None;
             }
         }
@@ -172,7 +199,7 @@ mod tests {
         let asked = std::sync::Arc::default();
         let solver = EventDriven.solver(&system).unwrap();
         let solver = Slow { solver, effort, asked: std::sync::Arc::clone(&asked) };
-        let mut onward = Onward { solver: Box::new(solver), last: None, told: None, spent: false };
+        let mut onward = Onward { solver: Box::new(solver), last: None, told: None, end: None, spent: false };
         let mut start: Option<Vec<f64>> = None;
         let mut amplitudes = Vec::new();
         for hertz in [119.5, 120.5, 121.5] {
@@ -182,6 +209,43 @@ mod tests {
         }
         assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > STRIDE), "{amplitudes:?}");
         asked.load(std::sync::atomic::Ordering::Relaxed)
+    }
+
+    /// The orbits of a branch that ends at a frequency, and those of another one beyond it.
+    struct Ends<'a> {
+        solver: Box<dyn Solver + Send + 'a>,
+        end: f64,
+        asked: std::sync::Arc<std::sync::atomic::AtomicUsize>,
+    }
+
+    impl Solver for Ends<'_> {
+        fn orbit(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+            self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            let other = if omega < self.end { 0.0 } else { 50.0 };
+            self.solver.orbit(omega + other, None).map(|orbit| Orbit { omega, ..orbit })
+        }
+    }
+
+    #[test]
+    fn the_end_of_a_branch_is_sought_once() {
+        let system = crate::model::example::blade_couple().assemble().unwrap();
+        let asked: std::sync::Arc<std::sync::atomic::AtomicUsize> = std::sync::Arc::default();
+        let from = TAU * 119.5;
+        let solver = EventDriven.solver(&system).unwrap();
+        let solver = Ends { solver, end: from + 0.2, asked: std::sync::Arc::clone(&asked) };
+        let mut onward = Onward { solver: Box::new(solver), last: None, told: None, end: None, spent: false };
+        let start = onward.orbit(from, None).unwrap().start;
+        let count = || asked.load(std::sync::atomic::Ordering::Relaxed);
+        let mut searches = |beyond: f64| {
+            onward.begin_at(from, &start);
+            let before = count();
+            onward.between(from + beyond, Some(&start)).unwrap();
+            count() - before
+        };
+        // from the orbit itself, and again beyond the end that is known; nearer to it the way is gone anew
+        let found = [1.0, 0.9, 0.5].map(&mut searches);
+        assert!(found[0] > 6 && found[1..] == [1, 1], "{found:?}");
+        assert!(searches(0.2001) > 1);
     }
 
     #[test]
