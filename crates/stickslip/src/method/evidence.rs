@@ -3,6 +3,8 @@
 //! A series that solves its own equations proves nothing by that. The motion that starts at the orbit's state is therefore followed over one
 //! return, exactly for laws that are exact and by implicit integration for others. How far it comes back from the start is the return
 //! defect; its derivative is the return map that stability asks for, where no theorem answers it ([`System::contracts`]).
+//!
+//! A ring in a travelling wave returns to itself, turned by some sectors, after a fraction of the period already.
 
 use super::assembly::NEAR_REST;
 use super::flow::Flow;
@@ -10,7 +12,7 @@ use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
 use super::periodic::{newton_step, norm};
 use super::vibration;
-use crate::model::System;
+use crate::model::{Cyclic, System};
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -109,6 +111,7 @@ impl Judge {
         let flow = self.flow.as_mut()?;
         let period = TAU / omega;
         flow.set_drive(system, omega);
+        flow.set_share(1.0);
         start.resize(flow.states(), 0.0);
         for _ in 0..returns {
             flow.run(&mut start, period, None).ok()?;
@@ -155,7 +158,7 @@ impl Judge {
         sensitive: Option<&[usize]>,
     ) -> Judged {
         let Some(flow) = &mut self.flow else { return Judged::default() };
-        let (part, sign) = if symmetry == Symmetry::HalfPeriod { (0.5, -1.0) } else { (1.0, 1.0) };
+        let back = Return::of(system, symmetry);
         flow.set_drive(system, omega);
         let (weights, rest) = (flow.weights(), NEAR_REST * flow.energy_scale());
         let share = vibration::share(path, (symmetry, TAU / omega), start, (&weights, rest));
@@ -163,7 +166,8 @@ impl Judge {
         let states = flow.states();
         let mut state = start.to_vec();
         state.resize(states, 0.0);
-        let duration = part * TAU / omega;
+        let duration = back.part * TAU / omega;
+        flow.set_share(back.share);
         let mut derivative = sensitive.map(|_| DMatrix::identity(states, states));
         let stuck = sensitive.unwrap_or_default();
         let alone = derivative.as_mut().filter(|_| stuck.is_empty());
@@ -181,16 +185,90 @@ impl Judge {
         }
         // states that the method does not know begin wrong, and their return says nothing of the orbit
         let known = start.len() == states;
-        let gap = DVector::from_iterator(start.len(), start.iter().zip(&state).map(|(start, end)| start - sign * end));
+        let end = back.returned(&state, system.dofs());
+        let gap = DVector::from_iterator(start.len(), start.iter().zip(&end).map(|(start, end)| start - end));
         let size = share * norm(&weights, start).max(rest).max(f64::MIN_POSITIVE);
         let defect = known.then(|| norm(&weights, gap.as_slice()) / size);
-        if let (Some(defect), Some(of_series), true) = (defect, &derivative, stuck.is_empty())
-            && eigen::largest_modulus(of_series).is_some_and(|modulus| (modulus - 1.0).abs() <= MARGIN * defect)
+        let mut of_return = derivative.map(|derivative| back.derivative(&derivative, system.dofs()));
+        if let (Some(defect), Some(of_series), true) = (defect, &of_return, stuck.is_empty())
+            && eigen::largest_modulus(of_series)
+                .is_some_and(|modulus| (modulus.powi(back.times as i32) - 1.0).abs() <= MARGIN * defect)
         {
-            let near = of_the_orbit_beside(&mut **flow, (start, gap, of_series), (sign, duration, &weights));
-            derivative = near.or(derivative);
+            let near =
+                of_the_orbit_beside(&mut **flow, (start, gap, of_series), (&back, system.dofs()), (duration, &weights));
+            of_return = near.or(of_return);
         }
-        Judged { derivative, defect }
+        Judged { derivative: of_return.map(|derivative| back.whole(&derivative, system.dofs())), defect }
+    }
+}
+
+/// After which share of the period a motion comes back to its start, and as what: its opposite, or a ring turned by some sectors.
+struct Return {
+    /// Share of the period.
+    part: f64,
+    /// Share of the steps of a period that it is followed in.
+    share: f64,
+    sign: f64,
+    /// Sectors of a ring, or one, and by how many of them what comes back is turned.
+    sectors: usize,
+    turned: usize,
+    /// Returns after which everything is where it was, up to a turn.
+    times: usize,
+}
+
+impl Return {
+    fn of(system: &System, symmetry: Symmetry) -> Self {
+        let whole = Return { part: 1.0, share: 1.0, sign: 1.0, sectors: 1, turned: 0, times: 1 };
+        match (symmetry, system.cyclic()) {
+            (Symmetry::HalfPeriod, _) => Return { part: 0.5, sign: -1.0, ..whole },
+            (Symmetry::FullPeriod, Some(Cyclic { sectors, order })) if order > 0 => {
+                // a sector does what the first one does, earlier by `order/sectors` of a period for every sector between them
+                let (mut a, mut b) = (sectors, order);
+                while b > 0 {
+                    (a, b) = (b, a % b);
+                }
+                let turned = (1..=sectors).find(|turned| order * turned % sectors == a % sectors).unwrap_or(0);
+                let times = sectors / a;
+                Return { part: 1.0 / times as f64, share: 1.0 / times as f64, sign: 1.0, sectors, turned, times }
+            }
+            (Symmetry::FullPeriod, _) => whole,
+        }
+    }
+
+    /// Where a coordinate of a state stands after a turn by so many sectors: displacements, velocities and states of joints stand sector by sector.
+    fn place(&self, at: usize, (dofs, states): (usize, usize), turned: usize) -> usize {
+        let (first, length) = match at / dofs.max(1) {
+            0 => (0, dofs),
+            1 => (dofs, dofs),
+            _ => (2 * dofs, states - 2 * dofs),
+        };
+        first + (at - first + turned * (length / self.sectors)) % length
+    }
+
+    /// What the end of a return is compared with the start as.
+    fn returned(&self, end: &[f64], dofs: usize) -> Vec<f64> {
+        let mut out = vec![0.0; end.len()];
+        end.iter().enumerate().for_each(|(i, z)| out[self.place(i, (dofs, end.len()), self.turned)] = self.sign * z);
+        out
+    }
+
+    /// The derivative of a return that is turned like this, without its sign.
+    fn derivative(&self, derivative: &DMatrix<f64>, dofs: usize) -> DMatrix<f64> {
+        self.rows_turned(derivative, dofs, self.turned)
+    }
+
+    fn rows_turned(&self, matrix: &DMatrix<f64>, dofs: usize, turned: usize) -> DMatrix<f64> {
+        let mut out = matrix.clone();
+        let states = matrix.nrows();
+        (0..states).for_each(|i| out.set_row(self.place(i, (dofs, states), turned), &matrix.row(i)));
+        out
+    }
+
+    /// The derivative over as many returns as bring everything back to where it was.
+    fn whole(&self, of_return: &DMatrix<f64>, dofs: usize) -> DMatrix<f64> {
+        let power = (1..self.times).fold(of_return.clone(), |power, _| &power * of_return);
+        let back = self.sectors - self.turned * self.times % self.sectors;
+        self.rows_turned(&power, dofs, back % self.sectors)
     }
 }
 
@@ -199,20 +277,22 @@ impl Judge {
 fn of_the_orbit_beside(
     flow: &mut dyn Flow,
     (start, mut gap, of_series): (&[f64], DVector<f64>, &DMatrix<f64>),
-    (sign, duration, weights): (f64, f64, &[f64]),
+    (back, dofs): (&Return, usize),
+    (duration, weights): (f64, &[f64]),
 ) -> Option<DMatrix<f64>> {
     let (mut state, mut nearer) = (start.to_vec(), None);
     for _ in 0..STEPS_NEARER {
-        let step = newton_step(nearer.as_ref().unwrap_or(of_series), &gap, sign, weights);
+        let step = newton_step(nearer.as_ref().unwrap_or(of_series), &gap, back.sign, weights);
         let from: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
         let (mut end, mut derivative) = (from.clone(), DMatrix::identity(from.len(), from.len()));
         flow.run(&mut end, duration, Some(&mut derivative)).ok()?;
-        let left = DVector::from_iterator(from.len(), from.iter().zip(&end).map(|(z, end)| z - sign * end));
+        let end = back.returned(&end, dofs);
+        let left = DVector::from_iterator(from.len(), from.iter().zip(&end).map(|(z, end)| z - end));
         let share = norm(weights, left.as_slice()) / norm(weights, gap.as_slice());
         if share.is_nan() || share > LEFT {
             break;
         }
-        (state, gap, nearer) = (from, left, Some(derivative));
+        (state, gap, nearer) = (from, left, Some(back.derivative(&derivative, dofs)));
     }
     nearer
 }
@@ -220,10 +300,12 @@ fn of_the_orbit_beside(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
+    use crate::law::{Coulomb, CoulombArctan, FrictionContact, Jenkins, SharedLaw};
     use crate::method::Method;
     use crate::method::harmonic_balance::HarmonicBalance;
-    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
+    use crate::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, example};
+    use crate::structure::Structure;
+    use num_complex::Complex64;
     use std::sync::Arc;
 
     fn couple(law: SharedLaw) -> System {
@@ -283,6 +365,48 @@ mod tests {
         assert!(few < 0.1 && many < 0.3 * few, "{few} {many}");
         let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
         assert_eq!(orbit.return_defect(), Some(orbit.evidence.residual));
+    }
+
+    /// A ring of six nodes in a plane with contacts between them, whose wave goes round twice: known to be one, it is followed for a third of the period, and is
+    /// told the same as for the whole of it.
+    #[test]
+    fn a_travelling_wave_returns_after_a_part_of_the_period() {
+        let (nodes, waves) = (6, 2);
+        let at = |node: usize, direction: usize| (node % nodes) * 2 + direction;
+        let n = 2 * nodes;
+        let each = |value: f64| DMatrix::identity(n, n) * value;
+        let places = (0..n).map(|i| format!("x{i}")).collect();
+        let stiffness = DMatrix::from_fn(n, n, |i, k| if i == k { 1e5 * (1.0 + (i % 2) as f64) } else { 0.0 });
+        let law: SharedLaw =
+            Arc::new(FrictionContact { tangential: 2e4, normal: 3e4, friction: 0.3, preload: 5.0, tangents: 1 });
+        let mut builder = System::builder(Structure::new(places, each(1.0), each(5.0), stiffness).unwrap());
+        for node in 0..nodes {
+            let axes = (0..2).map(|d| Axis::new(vec![(at(node, d), 1.0), (at(node + 1, d), -1.0)]));
+            builder = builder.joint(format!("j{node}"), law.clone(), axes.collect());
+            let phase = TAU * (waves * node) as f64 / nodes as f64;
+            builder = builder.force(at(node, 0), 1, Complex64::from_polar(20.0, phase));
+        }
+        let whole = builder.build().unwrap();
+        let wave = whole.clone().travelling(Cyclic { sectors: nodes, order: waves }).unwrap();
+        let omega = TAU * 55.0;
+        let method = HarmonicBalance { harmonics: Some(15), samples: Some(1024), tolerance: Some(0.9) };
+        let orbit = method.solver(&wave).unwrap().orbit(omega, None).unwrap();
+        let judged = |system: &System| {
+            let path = (orbit.path.as_ref(), Symmetry::FullPeriod);
+            Judge::new(system).judge(system, omega, path, &orbit.start, &[])
+        };
+        let (part, all) = (judged(&wave), judged(&whole));
+        let largest = |judged: &Judged| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
+        let (of_part, of_all) = (largest(&part), largest(&all));
+        // the motion that is followed is beside the orbit by the defect, in which the parts of the period differ
+        let defect = all.defect.unwrap();
+        assert!(defect > 1e-9 && defect < 1e-2, "{defect}");
+        assert!((of_part - of_all).abs() < 10.0 * defect * of_all, "{of_part} {of_all} {defect}");
+        let apart = (part.derivative.unwrap() - all.derivative.unwrap()).amax();
+        assert!(apart < 0.05, "{apart}");
+        // three parts of the period may leave three times as much as one, or a third
+        let left = part.defect.unwrap();
+        assert!(left < 3.0 * defect && 3.0 * left > defect, "{left} {defect}");
     }
 
     /// A state that is none of an orbit does not return, by as much as it is off; one that has not all states says nothing.

@@ -36,8 +36,9 @@ const DROPS: &str = "its friction drops at once when slip begins; that of a law 
 pub(crate) struct IncrementalFlow {
     pub assembly: Assembly,
     pub drive: Drive,
-    /// Steps of a run.
+    /// Steps of a run, of which it takes this share.
     pub count: usize,
+    share: f64,
     keep: bool,
     steps: Steps,
     step: Step,
@@ -70,6 +71,7 @@ impl IncrementalFlow {
         Ok(IncrementalFlow {
             drive: Drive::default(),
             count: FIRST,
+            share: 1.0,
             keep: false,
             steps: Steps::new(vec![(1.0, 1.0)], &assembly),
             step: Step::new(&assembly),
@@ -152,13 +154,18 @@ impl Flow for IncrementalFlow {
         self.assembly.energy_scale(&self.drive)
     }
 
+    fn set_share(&mut self, share: f64) {
+        self.share = share;
+    }
+
     fn run(
         &mut self,
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), Breakdown> {
-        let h = duration / self.count as f64;
+        let count = (self.count as f64 * self.share).ceil();
+        let h = duration / count;
         if self.eliminated.as_ref().is_none_or(|eliminated| eliminated.length != h) {
             self.eliminated = Eliminated::new(&self.assembly, h);
         }
@@ -173,7 +180,7 @@ impl Flow for IncrementalFlow {
         if self.keep {
             self.keep_instant(state, 0.0);
         }
-        for i in 0..self.count {
+        for i in 0..count as usize {
             let time = i as f64 * h;
             if !self.step.advance(&self.assembly, &eliminated, &self.drive, (time, state), scale) {
                 return Err(match self.step.without_number(&self.assembly) {
