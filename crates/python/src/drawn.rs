@@ -15,9 +15,9 @@ pub fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
         Some(name) => (Axis::new(name, "SI"), numbers(&name.replace(['.', '-'], "_"))),
         None => (Axis::new("frequency", "Hz"), frequencies),
     };
-    let series = system.places().iter().enumerate();
+    let series = system.places().iter().zip(system.seen()).enumerate().filter(|(_, (_, along))| !along.is_rotation());
     let series =
-        series.map(|(i, place)| Series::line(place, values.clone(), numbers(&format!("{place}_amplitude_m")), i));
+        series.map(|(i, (place, _))| Series::line(place, values.clone(), numbers(&format!("{place}_amplitude_m")), i));
     let y = Axis::new("amplitude", "m").log();
     Figure {
         panels: vec![Panel { title: String::new(), x, y, series: series.collect(), ..Panel::default() }],
@@ -74,9 +74,9 @@ pub fn mode(found: &Mode, system: &System) -> (Table, Figure) {
         numbers("viscous_damping_ratio", &|point| point.viscous),
     ];
     let phases: Vec<Vec<f64>> = found.points.iter().map(ModePoint::phases).collect();
-    for (i, place) in system.places().iter().enumerate() {
-        let name = column_name(place);
-        columns.push(numbers(&format!("{name}_amplitude_m"), &|point| point.places[i].norm()));
+    for (i, (place, along)) in system.places().iter().zip(system.seen()).enumerate() {
+        let (name, unit) = (column_name(place), along.unit());
+        columns.push(numbers(&format!("{name}_amplitude_{unit}"), &|point| point.places[i].norm()));
         let phase = phases.iter().map(|all| all[i].to_degrees()).collect();
         columns.push(Column::numbers(&format!("{name}_phase_deg"), phase));
     }

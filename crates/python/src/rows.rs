@@ -67,8 +67,10 @@ pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Metho
         |name: &str, value: &dyn Fn(&Row) -> f64| Column::numbers(&column_name(name), rows.iter().map(value).collect());
     let mut columns = first;
     columns.push(numbers("frequency_Hz", &|row| hertz(row.omega)));
-    for (i, place) in system.places().iter().enumerate() {
-        for (k, what) in ["amplitude_m", "mean_m", "phase_deg"].into_iter().enumerate() {
+    for (i, (place, along)) in system.places().iter().zip(system.seen()).enumerate() {
+        let unit = along.unit();
+        let names = [format!("amplitude_{unit}"), format!("mean_{unit}"), "phase_deg".to_owned()];
+        for (k, what) in names.iter().enumerate() {
             columns.push(numbers(&format!("{place}_{what}"), &|row| row.places[i][k]));
         }
     }

@@ -157,7 +157,8 @@ fn duration(seconds: f64) -> String {
 }
 
 /// Units at the end of a column's name, with the prefix chosen for the size of its values.
-const UNITS: [(&str, &str); 14] = [
+const UNITS: [(&str, &str); 16] = [
+    ("_N_m_per_rad", "N m/rad"),
     ("_N_per_m", "N/m"),
     ("_kg_per_s", "kg/s"),
     ("_rad_per_s", "rad/s"),
@@ -166,6 +167,7 @@ const UNITS: [(&str, &str); 14] = [
     ("_Hz_per_s", "Hz/s"),
     ("_Hz", "Hz"),
     ("_deg", "°"),
+    ("_rad", "rad"),
     ("_kg", "kg"),
     ("_m", "m"),
     ("_s", "s"),

@@ -53,7 +53,10 @@ named! {
     CUBIC_STIFFNESS = [1, -2, -2, 0] "cubic stiffness" "N/m^3";
     INVERSE_LENGTH = [0, -1, 0, 0] "inverse length" "1/m";
     DAMPING = [1, 0, -1, 0] "damping" "kg/s";
-    ENERGY = [1, 2, -2, 0] "energy" "J";
+    ENERGY = [1, 2, -2, 0] "energy or moment" "J";
+    INERTIA = [1, 2, 0, 0] "moment of inertia" "kg m^2";
+    ANGULAR_STIFFNESS = [1, 2, -2, -1] "angular stiffness" "N m/rad";
+    ANGULAR_DAMPING = [1, 2, -1, -1] "angular damping" "N m s/rad";
 }
 
 impl Dimension {

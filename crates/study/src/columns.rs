@@ -15,9 +15,14 @@ pub(crate) const ENERGY_GAP: &str = "energy_gap";
 /// The largest relative error of a structure in few coordinates against the whole, of what its places see.
 pub(crate) const REDUCTION_ERROR: &str = "reduction_error";
 
-/// The amplitude of a place, m.
+/// The amplitude of a place that is a displacement, m.
 pub(crate) fn amplitude_of(place: &str) -> String {
-    format!("{place}_amplitude_m")
+    amplitude_in(place, "m")
+}
+
+/// The amplitude of a place in its unit: m, or rad of a rotation.
+pub(crate) fn amplitude_in(place: &str, unit: &str) -> String {
+    format!("{place}_amplitude_{unit}")
 }
 
 /// The phase of its first harmonic against the drive, degrees; in free vibration against the place that moves most.

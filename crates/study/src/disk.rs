@@ -53,7 +53,7 @@ pub(crate) fn ring_of(
             None => Vec::new(),
             Some(deviations) => mistuned(structure, disk, environment, again, (&first, deviations))?,
         };
-        let most = MOST_MASSES / first.masses.len().max(1);
+        let most = MOST_MASSES / (first.masses.len() + first.bodies.len()).max(1);
         if sectors > most {
             let message = format!("{sectors} sectors of {} masses; the limit is {MOST_MASSES}", first.masses.len());
             return Err(vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]);

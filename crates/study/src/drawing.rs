@@ -61,6 +61,13 @@ impl<'a> Drawing<'a> {
         self.options().names("only").is_none_or(|names| names.iter().any(is))
     }
 
+    /// The places that the figure shows, with their numbers: displacements, as rotations have no place on an axis of lengths.
+    pub(crate) fn displacements(&self, system: &System) -> Vec<(String, usize)> {
+        let places = system.places().iter().zip(system.seen()).enumerate();
+        let shown = places.filter(|(_, (name, along))| !along.is_rotation() && self.shows(name));
+        shown.map(|(place, (name, _))| (name.clone(), place)).collect()
+    }
+
     /// How curves of so many masses and cases are laid out, where each case has so many panels; draws are shown by their percentiles, for every
     /// mass.
     pub(crate) fn layout(&self, masses: usize, cases: usize, panels: usize) -> Layout {

@@ -5,7 +5,7 @@ use crate::study::Case;
 use crate::work::Prepared;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip::model::{System, SystemJoint};
+use stickslip::model::{Axis, System, SystemJoint};
 use stickslip::orbit::{JointMotion, Orbit, Sample};
 
 /// Something that `output` can ask for.
@@ -75,7 +75,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "velocity",
         doc: "half of peak to peak of every mass's velocity",
-        columns: |system| of_places(system, "velocity_amplitude_m_per_s"),
+        columns: |system| of_places(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
             let places = prepared.system.seen().iter();
             places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.velocity)))).collect()
@@ -84,7 +84,7 @@ pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "acceleration",
         doc: "half of peak to peak of every mass's acceleration",
-        columns: |system| of_places(system, "acceleration_amplitude_m_per_s2"),
+        columns: |system| of_places(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
             let places = prepared.system.seen().iter();
             places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.acceleration)))).collect()
@@ -94,17 +94,21 @@ pub(crate) const TABLE: &[Extra] = &[
         name: "harmonics",
         doc: "amplitudes of the harmonics 1 to 5 of every mass's displacement",
         columns: |system| {
-            let places = system.places().iter();
-            places.flat_map(|place| (1..=HARMONICS).map(move |h| format!("{place}_harmonic{h}_m"))).collect()
+            let places = system.places().iter().zip(system.seen());
+            let all = |(place, along): (&String, &Axis)| {
+                (1..=HARMONICS).map(|h| format!("{place}_harmonic{h}_{}", along.unit())).collect::<Vec<_>>()
+            };
+            places.flat_map(all).collect()
         },
         values: |prepared, orbit, _| harmonics(prepared, orbit),
     },
     Extra {
         name: "receptance",
         doc: "amplitude of the first harmonic of every mass per unit of the largest force",
-        columns: |system| of_places(system, "receptance_m_per_N"),
+        columns: |system| of_places(system, |unit| format!("receptance_{unit}_per_N")),
         values: |prepared, orbit, _| {
-            let forces = prepared.case.model.forces.iter().filter(|force| force.harmonic == 1);
+            let model = &prepared.case.model;
+            let forces = model.forces.iter().filter(|force| force.harmonic == 1 && !model.is_rotation(&force.on));
             let largest = forces.map(|force| force.amplitude.abs()).fold(0.0, f64::max);
             let unit = |x: Complex64| if largest > 0.0 { x.norm() / largest } else { f64::NAN };
             orbit.places.iter().map(|place| unit(place.first_harmonic)).collect()
@@ -121,8 +125,9 @@ fn of_joints(system: &System, quantity: &str) -> Vec<String> {
     system.joints().iter().flat_map(|joint| joint.labels()).map(|label| format!("{label}_{quantity}")).collect()
 }
 
-fn of_places(system: &System, quantity: &str) -> Vec<String> {
-    system.places().iter().map(|place| format!("{place}_{quantity}")).collect()
+fn of_places(system: &System, quantity: fn(&str) -> String) -> Vec<String> {
+    let places = system.places().iter().zip(system.seen());
+    places.map(|(place, along)| format!("{place}_{}", quantity(along.unit()))).collect()
 }
 
 fn half_range(values: impl Iterator<Item = f64>) -> f64 {

@@ -11,6 +11,11 @@ use stickslip::model::Model;
 pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), Complaint> {
     let known = Names::of_places(model).and_joints(model);
     for name in figure.names("only").unwrap_or_default() {
+        if model.is_rotation(name) {
+            let message = format!("`{name}` is a rotation, and figures show displacements");
+            let help = "name a [[place]] of the body; the tables have its rotations, in rad";
+            return Err(Complaint { name: Some(name.clone()), ..Complaint::new("only", message, help) });
+        }
         known.all("only", "mass or joint", name)?;
     }
     for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {

@@ -95,8 +95,10 @@ pub enum Takes {
     Rows,
     /// A table from rows to weights, or a list of such.
     Weights,
-    /// Three numbers.
-    Vector,
+    /// Three numbers, or quantities of a dimension.
+    Vector(Dimension),
+    /// A quantity, or a list of such.
+    Quantities(Dimension, Within),
     /// Nothing, and why: what is looked for under this name cannot be stated. The key's line says what to do instead.
     Refused(&'static str),
 }

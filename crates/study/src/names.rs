@@ -24,6 +24,10 @@ fn entries(name: &str, labels: Vec<String>) -> Vec<(String, Vec<String>)> {
     entries
 }
 
+fn of_bodies(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
+    model.bodies.iter().flat_map(|body| entries(&body.name, body.places()))
+}
+
 fn of_masses(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places()))
 }
@@ -32,8 +36,9 @@ impl Names {
     /// The places of the structure and of all masses, and their nodes.
     pub fn of_places(model: &Model) -> Names {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
-        let mut names = Names { known: places.chain(of_masses(model)).collect() };
+        let mut names = Names { known: places.chain(of_masses(model)).chain(of_bodies(model)).collect() };
         names.around(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
+        names.around(model, model.bodies.iter().map(|body| (body.name.as_str(), body.places())).collect());
         names.around(model, model.places.iter().map(|place| (place.name.as_str(), place.places())).collect());
         names
     }
@@ -56,9 +61,22 @@ impl Names {
         }
     }
 
-    /// Those of masses whose motion is not imposed.
+    /// The places with a displacement, without rotations: those whose amplitudes are compared.
+    pub fn of_displacements(model: &Model) -> Names {
+        let mut names = Names::of_places(model);
+        names.known.iter_mut().for_each(|(_, places)| places.retain(|place| !model.is_rotation(place)));
+        names.known.retain(|(_, places)| !places.is_empty());
+        names
+    }
+
+    /// Those of masses and bodies whose motion is not imposed.
     pub fn of_free_masses(model: &Model) -> Names {
-        let mut names = Names { known: of_masses(model).collect() };
+        let displacements = of_bodies(model).map(|(name, mut places)| {
+            places.retain(|place| !model.is_rotation(place));
+            (name, places)
+        });
+        let of_bodies = displacements.filter(|(_, places)| !places.is_empty());
+        let mut names = Names { known: of_masses(model).chain(of_bodies).collect() };
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
@@ -74,10 +92,11 @@ impl Names {
         self
     }
 
-    /// The places with an imposed motion too.
+    /// The places with an imposed motion too, but for rotations.
     #[must_use]
     pub fn and_moved(mut self, model: &Model) -> Names {
-        self.known.extend(model.motions.iter().map(|motion| (motion.on.clone(), vec![motion.on.clone()])));
+        let moved = model.motions.iter().filter(|motion| !model.is_rotation(&motion.on));
+        self.known.extend(moved.map(|motion| (motion.on.clone(), vec![motion.on.clone()])));
         self
     }
 

@@ -86,9 +86,9 @@ impl Summary {
     /// The cells of the row, after the varied parameters and the frequency.
     pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
         let system = &prepared.system;
-        for (place, [amplitude, mean, phase]) in system.places().iter().zip(&self.places) {
-            rows.number(&columns::amplitude_of(place), *amplitude);
-            rows.number(&format!("{place}_mean_m"), *mean);
+        for ((place, along), [amplitude, mean, phase]) in system.places().iter().zip(system.seen()).zip(&self.places) {
+            rows.number(&columns::amplitude_in(place, along.unit()), *amplitude);
+            rows.number(&format!("{place}_mean_{}", along.unit()), *mean);
             rows.number(&columns::phase_of(place), *phase);
         }
         for (joint, [dissipation, slip]) in system.joints().iter().zip(&self.joints) {

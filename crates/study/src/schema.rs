@@ -48,10 +48,11 @@ pub const FILE: &[Key] = &[
     optional(
         "place",
         Takes::List(PLACE),
-        "places of the structure, or faces of masses that are turned, which joints, forces and results speak of",
+        "places of the structure, points of bodies, or faces of masses that are turned, which joints, forces and results speak of",
         "[]",
     ),
     optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
+    optional("body", Takes::List(BODY), "rigid bodies, which turn as well; points of them are [[place]]s", "[]"),
     optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
     optional("joint", Takes::List(JOINT), "places that rub", "[]"),
     optional(
@@ -262,7 +263,8 @@ const PLACE: &[Key] = &[
     optional(
         "of",
         Takes::Text,
-        "the node of a [[mass]] that it is another view of, with `normal`: a face that is turned; needs no [structure]",
+        "the [[body]] that it is a point of, with `offset`, `normal` or both; or the [[mass]] that it is another view of, with `normal`: a face \
+         that is turned; needs no [structure]",
         "\"damper\"",
     ),
     optional(
@@ -297,11 +299,22 @@ const PLACE: &[Key] = &[
     ),
     optional(
         "normal",
-        Takes::Vector,
+        Takes::Vector(Dimension::NONE),
         "the normal of a local frame: the directions then are two tangents and the normal, made of x, y, z",
         "[0, \"-sin(a)\", \"cos(a)\"]",
     ),
-    optional("tangent", Takes::Vector, "a vector whose part across the normal is the first tangent", "[1, 0, 0]"),
+    optional(
+        "tangent",
+        Takes::Vector(Dimension::NONE),
+        "a vector whose part across the normal is the first tangent",
+        "[1, 0, 0]",
+    ),
+    optional(
+        "offset",
+        Takes::Vector(Dimension::LENGTH),
+        "of a place of a [[body]]: the point, along x, y, z from the centre of mass",
+        "[\"3 mm\", 0, \"-2 mm\"]",
+    ),
     REPEAT,
 ];
 
@@ -325,6 +338,31 @@ const MASS: &[Key] = &[
     REPEAT,
 ];
 
+const BODY: &[Key] = &[
+    required(
+        "name",
+        Takes::Name,
+        "name; its places are `name.x` and so on, of the centre of mass, and the rotations `name.rx`, `name.ry`, `name.rz`",
+        "\"damper\"",
+    ),
+    required("mass", Takes::Quantity(Dimension::MASS, Within::Positive), "mass", "\"12 g\""),
+    required(
+        "inertia",
+        Takes::Quantities(Dimension::INERTIA, Within::Finite),
+        "moment of inertia about the centre of mass: one where the body has one rotation, in a plane that about its normal; else a list of one for each \
+         rotation, in space also the six entries xx, yy, zz, xy, yz, zx of the inertia matrix, where xy is minus the integral of x y",
+        "\"300 g mm^2\"",
+    ),
+    required(
+        "directions",
+        Takes::Names,
+        "the displacements: two of x, y, z are a plane, in which the body turns about the third, all three are space, with three rotations; where \
+         rotations rx, ry, rz are named too, the body has those that are named",
+        "[\"x\", \"z\"]",
+    ),
+    REPEAT,
+];
+
 const SPRING: &[Key] = &[
     required(
         "between",
@@ -335,13 +373,13 @@ const SPRING: &[Key] = &[
     optional(
         "stiffness",
         Takes::Quantity(Dimension::STIFFNESS, Within::AtLeastZero),
-        "stiffness; may be absent where damping is given",
+        "stiffness; between rotations of bodies in N m/rad; may be absent where damping is given",
         "\"105103 N/m\"",
     ),
     optional(
         "damping",
         Takes::Quantity(Dimension::DAMPING, Within::Finite),
-        "viscous damping in parallel",
+        "viscous damping in parallel; between rotations in N m s/rad",
         "\"0.2 kg/s\"",
     ),
     REPEAT,
@@ -459,7 +497,12 @@ const MOST_HARMONIC: i64 = 1_000;
 
 const FORCE: &[Key] = &[
     required("on", Takes::Name, "the mass it acts on", "\"blade1\""),
-    required("amplitude", Takes::Quantity(Dimension::FORCE, Within::Finite), "amplitude", "\"10 N\""),
+    required(
+        "amplitude",
+        Takes::Quantity(Dimension::FORCE, Within::Finite),
+        "amplitude; on a rotation of a body that of a moment in N m",
+        "\"10 N\"",
+    ),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
     ENGINE_ORDER,
@@ -470,7 +513,12 @@ const FORCE: &[Key] = &[
 
 const MOTION: &[Key] = &[
     required("on", Takes::Name, "the place: a mass, or one that exists by this motion alone", "\"mover\""),
-    required("amplitude", Takes::Quantity(Dimension::LENGTH, Within::Finite), "amplitude", "\"2 mm\""),
+    required(
+        "amplitude",
+        Takes::Quantity(Dimension::LENGTH, Within::Finite),
+        "amplitude; of a rotation of a body an angle",
+        "\"2 mm\"",
+    ),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
     ENGINE_ORDER,
@@ -585,7 +633,12 @@ pub fn described(takes: &Takes) -> String {
         Takes::Row => "the name of a row, or its number".to_owned(),
         Takes::Rows => "a list of names or numbers".to_owned(),
         Takes::Weights => "a table from names of rows to numbers, or a list of such tables".to_owned(),
-        Takes::Vector => "a list of three numbers".to_owned(),
+        Takes::Vector(Dimension::NONE) => "a list of three numbers".to_owned(),
+        Takes::Vector(dimension) => format!("a list of three quantities: {}", crate::expression::described(*dimension)),
+        Takes::Quantities(dimension, within) => {
+            let one = described(&Takes::Quantity(*dimension, *within));
+            format!("{one}, or a list of such")
+        }
         Takes::Refused(why) => format!("nothing: {why}"),
     }
 }
@@ -661,7 +714,10 @@ fn takes_schema(takes: &Takes) -> Value {
             let one = json!({ "type": "object", "additionalProperties": quantity(), "minProperties": 1 });
             json!({ "anyOf": [one, { "type": "array", "items": one, "minItems": 1 }] })
         }
-        Takes::Vector => json!({ "type": "array", "items": quantity(), "minItems": 3, "maxItems": 3 }),
+        Takes::Quantities(..) => {
+            json!({ "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }] })
+        }
+        Takes::Vector(_) => json!({ "type": "array", "items": quantity(), "minItems": 3, "maxItems": 3 }),
         Takes::Table(keys) => object(keys),
         Takes::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MOST_ELEMENTS }),
         Takes::Repeat => json!({

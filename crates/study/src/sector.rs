@@ -7,7 +7,7 @@ use crate::substructure;
 use crate::values::Values;
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
-use stickslip::model::{Around, Element, Force, Joint, Mass, Model, Motion, Spring};
+use stickslip::model::{Around, Body, Element, Force, Joint, Mass, Model, Motion, ROTATIONS, Spring, with_rotations};
 
 /// The places of the structure by matrices.
 fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
@@ -39,7 +39,7 @@ pub(crate) fn sector_of(
         (None, _) => {
             if let Some(place) = own(lists).next() {
                 let message = "a place is one of a structure, and there is none";
-                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a turned face of one is a place with `of`";
+                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a point or a face of a [[body]] or a mass is a place with `of`";
                 problems.push(Problem::new(&place.location, "place", message).help(help));
             }
         }
@@ -67,9 +67,24 @@ pub(crate) fn sector_of(
             directions: values.names("directions").unwrap_or_default().to_vec(),
         });
     }
+    for (i, table) in lists.body.iter().enumerate() {
+        let values = resolve(Element::Body(i), table);
+        let stated: Vec<&str> = values.names("directions").unwrap_or_default().iter().map(String::as_str).collect();
+        let directions = with_rotations(&stated);
+        // what could not be read has been said
+        let stated = values.quantities("inertia").map(|stated| inertia(table, &directions, stated));
+        let inertia = stated.unwrap_or_else(|| Ok(Default::default())).unwrap_or_else(|problem| {
+            wrong.push(problem);
+            Default::default()
+        });
+        model.bodies.push(Body { name: text(&values, "name"), mass: number(&values, "mass"), inertia, directions });
+    }
     for (i, table) in lists.place.iter().enumerate().filter(|(_, table)| table.entry("of").is_some()) {
         let values = resolve(Element::Place(i), table);
-        match substructure::view(table, &values, &model.masses) {
+        if values.entries.len() < table.entries.len() {
+            continue; // what could not be read has been said
+        }
+        match substructure::view(table, &values, &model) {
             Ok(place) => model.places.push(place),
             Err(problem) => wrong.push(*problem),
         }
@@ -79,8 +94,13 @@ pub(crate) fn sector_of(
         let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
         model.springs.push(Spring { between: between(&values), stiffness, damping });
     }
-    let nodes: BTreeMap<String, usize> =
-        model.nodes().map(|(name, directions)| (name.to_owned(), directions.len())).collect();
+    let displacements = |directions: &[String]| {
+        let turns = |along: &&String| ROTATIONS.contains(&along.as_str());
+        directions.len() - directions.iter().filter(turns).count()
+    };
+    let of_bodies = model.bodies.iter().map(|body| (body.name.clone(), displacements(&body.directions)));
+    let nodes = model.nodes().map(|(name, directions)| (name.to_owned(), directions.len()));
+    let nodes: BTreeMap<String, usize> = nodes.chain(of_bodies).collect();
     for (i, table) in lists.joint.iter().enumerate() {
         let values = resolve(Element::Joint(i), table);
         // without a law there is a problem, and the model is not used
@@ -104,6 +124,37 @@ pub(crate) fn sector_of(
     }
     problems.append(&mut wrong);
     (model, forces, motions)
+}
+
+/// The inertia matrix of a body with these directions.
+fn inertia(table: &StatedTable, directions: &[String], stated: &[f64]) -> Result<[[f64; 3]; 3], Problem> {
+    let turns = |axis: &usize| directions.iter().any(|along| along == ROTATIONS[*axis]);
+    let about: Vec<usize> = (0..ROTATIONS.len()).filter(turns).collect();
+    let mut matrix = [[0.0; 3]; 3];
+    match (stated, &about[..]) {
+        (&[xx, yy, zz, xy, yz, zx], [0, 1, 2]) => return Ok([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]),
+        // that is said of the directions
+        (_, []) => {}
+        _ if stated.len() == about.len() => {
+            about.iter().zip(stated).for_each(|(axis, moment)| matrix[*axis][*axis] = *moment);
+        }
+        _ => {
+            let names: Vec<&str> = about.iter().map(|axis| ROTATIONS[*axis]).collect();
+            let message = format!("{} for the rotations {}", plural(stated.len()), names.join(", "));
+            let help = match about.len() {
+                1 => "state the moment of inertia about that axis, as in inertia = \"300 g mm^2\"",
+                2 => "state a list of the two moments of inertia",
+                _ => "state a list of the moments about x, y, z, or of the six entries xx, yy, zz, xy, yz, zx",
+            };
+            let problem = Problem::new(table.location_of("inertia", None), "inertia", table.with_turn(&message));
+            return Err(problem.help(help));
+        }
+    }
+    Ok(matrix)
+}
+
+fn plural(moments: usize) -> String {
+    if moments == 1 { "one moment of inertia".to_owned() } else { format!("{moments} moments of inertia") }
 }
 
 /// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the

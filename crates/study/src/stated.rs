@@ -6,9 +6,10 @@ use crate::names::Names;
 use crate::near::{nearest, one_of};
 use crate::statement::{Stated, StatedTable};
 use crate::stiffened::Stiffened;
+use crate::values::Given;
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
-use stickslip::model::{Element, Model, ModelError};
+use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};
 use stickslip::structure::{Component, Node, Reduction, ReductionKind};
 use stickslip_numerics::sparse::Matrix;
 
@@ -103,6 +104,7 @@ impl NamedTemplate {
 pub(crate) struct Lists {
     pub place: Vec<StatedTable>,
     pub mass: Vec<StatedTable>,
+    pub body: Vec<StatedTable>,
     pub spring: Vec<StatedTable>,
     pub joint: Vec<StatedTable>,
     pub force: Vec<StatedTable>,
@@ -116,6 +118,7 @@ impl Lists {
         match name {
             "place" => Some(&mut self.place),
             "mass" => Some(&mut self.mass),
+            "body" => Some(&mut self.body),
             "spring" => Some(&mut self.spring),
             "joint" => Some(&mut self.joint),
             "force" => Some(&mut self.force),
@@ -124,10 +127,43 @@ impl Lists {
         }
     }
 
+    /// All of them, one after the other.
+    pub fn all(&self) -> [&Vec<StatedTable>; 7] {
+        [&self.place, &self.mass, &self.body, &self.spring, &self.joint, &self.force, &self.motion]
+    }
+
+    /// Gives what stands at rotations of bodies the dimensions of moments and angles.
+    pub fn turn(&mut self) {
+        let named = self.body.iter().filter_map(|table| match table.entry("name").map(|entry| &entry.value) {
+            Some(Stated::Fixed(Given::Text(name))) => Some(name.clone()),
+            _ => None,
+        });
+        let bodies: BTreeSet<String> = named.collect();
+        let turns = |place: &str| {
+            let split = place.strip_prefix(NEXT).unwrap_or(place).split_once('.');
+            split.is_some_and(|(body, along)| ROTATIONS.contains(&along) && bodies.contains(body))
+        };
+        for table in self.spring.iter_mut().chain(&mut self.force).chain(&mut self.motion) {
+            let turned = table.entries.iter().any(|entry| match &entry.value {
+                Stated::Fixed(Given::Text(name)) => entry.key == "on" && turns(name),
+                Stated::Names(names) => names.iter().any(|(name, _)| turns(name)),
+                _ => false,
+            });
+            for entry in table.entries.iter_mut().filter(|_| turned) {
+                if let Stated::Quantity { dimension, example, .. } = &mut entry.value
+                    && let Some(of_rotation) = OF_ROTATIONS.iter().find(|row| row.displacement == *dimension)
+                {
+                    (*dimension, *example) = (of_rotation.rotation, of_rotation.example);
+                }
+            }
+        }
+    }
+
     pub fn get(&self, name: &str) -> &[StatedTable] {
         match name {
             "place" => &self.place,
             "mass" => &self.mass,
+            "body" => &self.body,
             "spring" => &self.spring,
             "joint" => &self.joint,
             "force" => &self.force,
@@ -136,6 +172,29 @@ impl Lists {
         }
     }
 }
+
+/// What a quantity of displacements is for rotations.
+struct OfRotation {
+    displacement: Dimension,
+    rotation: Dimension,
+    example: &'static str,
+}
+
+/// All of them.
+const OF_ROTATIONS: [OfRotation; 4] = [
+    OfRotation { displacement: Dimension::LENGTH, rotation: Dimension::ANGLE, example: "\"0.1 deg\"" },
+    OfRotation { displacement: Dimension::FORCE, rotation: Dimension::ENERGY, example: "\"2 N m\"" },
+    OfRotation {
+        displacement: Dimension::STIFFNESS,
+        rotation: Dimension::ANGULAR_STIFFNESS,
+        example: "\"500 N m/rad\"",
+    },
+    OfRotation {
+        displacement: Dimension::DAMPING,
+        rotation: Dimension::ANGULAR_DAMPING,
+        example: "\"0.01 N m s/rad\"",
+    },
+];
 
 /// `[disk]` as it is stated.
 #[derive(Debug, Clone)]
@@ -199,7 +258,7 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
         None if error.element == Element::Whole && model.substructure.is_some() => {
             Some("add a [[place]] with a name and a dof".to_owned())
         }
-        None if error.element == Element::Whole => Some("add a [[mass]] or a [[motion]]".to_owned()),
+        None if error.element == Element::Whole => Some("add a [[mass]], a [[body]] or a [[motion]]".to_owned()),
         None if error.key == "reduce" => advice_on_reduction(model),
         None if softened => Some(
             "lower `speed`: what both exports add up to there has lost more stiffness than rotation gives; or check `at` and the sign of the second export"

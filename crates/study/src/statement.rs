@@ -54,7 +54,8 @@ pub(crate) enum Stated {
     Range { from: Quantity, to: Quantity, points: usize, within: Within, order: Order },
     Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
     ByName(Vec<(String, Location, Quantity)>, Dimension),
-    Vector(Vec<Quantity>),
+    Vector(Vec<Quantity>, Dimension, &'static str),
+    Quantities(Vec<Quantity>, Dimension, Within, &'static str),
     Sums(Vec<Weights>),
     Law(&'static LawInfo, StatedTable),
     Table(StatedTable),
@@ -76,7 +77,9 @@ impl StatedTable {
             match &entry.value {
                 Stated::Fixed(_) | Stated::Names(_) => {}
                 Stated::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
-                Stated::Vector(parts) => parts.iter().for_each(|q| each(entry.key, q, Some(Dimension::NONE))),
+                Stated::Vector(parts, dimension, _) | Stated::Quantities(parts, dimension, ..) => {
+                    parts.iter().for_each(|q| each(entry.key, q, Some(*dimension)));
+                }
                 Stated::Sums(sums) => {
                     sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE)));
                 }
@@ -273,12 +276,16 @@ impl Stated {
                 }
                 Given::ByName(table, *dimension)
             }
-            Stated::Vector(parts) => {
+            Stated::Vector(parts, dimension, example) => {
                 let mut vector = [0.0; 3];
                 for (value, part) in vector.iter_mut().zip(parts) {
-                    *value = part.number(key, (Dimension::NONE, Within::Finite), "[0, 0, 1]", environment)?;
+                    *value = part.number(key, (*dimension, Within::Finite), example, environment)?;
                 }
                 Given::Vector(vector)
+            }
+            Stated::Quantities(parts, dimension, within, example) => {
+                let number = |part: &Quantity| part.number(key, (*dimension, *within), example, environment);
+                Given::Quantities(parts.iter().map(number).collect::<Result<_, _>>()?, *dimension)
             }
             Stated::Sums(sums) => {
                 let one = |sum: &Weights| {

@@ -6,7 +6,7 @@ use crate::stated::Matrices;
 use crate::statement::{Environment, StatedTable};
 use crate::values::Values;
 use stickslip::method::WIDTH;
-use stickslip::model::{Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
+use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
@@ -192,27 +192,71 @@ pub(crate) fn place(
 /// Directions of a turned face of a node in a plane.
 const IN_PLANE: [&str; 2] = ["t", "n"];
 
-/// A `[[place]]` that is another view of a node of masses: its directions are a tangent, or two, and the normal.
-pub(crate) fn view(table: &StatedTable, values: &Values, masses: &[Mass]) -> Result<Place, Box<Problem>> {
+/// What a `[[place]]` with `of` is a view of.
+enum Viewed<'a> {
+    Mass(&'a Mass),
+    Body(&'a Body),
+}
+
+impl Viewed<'_> {
+    fn find<'a>(model: &'a Model, of: &str) -> Option<Viewed<'a>> {
+        let body = || model.bodies.iter().find(|body| body.name == of).map(Viewed::Body);
+        model.masses.iter().find(|mass| mass.name == of).map(Viewed::Mass).or_else(body)
+    }
+
+    /// Which of x, y, z it moves along, in the order of its directions; none of a mass that moves otherwise, or along one line.
+    fn axes(&self) -> Option<Vec<usize>> {
+        let axes: Option<Vec<usize>> = match self {
+            Viewed::Mass(mass) => {
+                mass.directions.iter().map(|along| CARTESIAN.iter().position(|axis| axis == along)).collect()
+            }
+            Viewed::Body(body) => Some(body.axes()),
+        };
+        axes.filter(|axes| axes.len() > 1)
+    }
+
+    /// The displacement along a unit vector of the point at an offset.
+    fn row(&self, axes: &[usize], offset: [f64; 3], along: &[f64; 3]) -> Row {
+        match self {
+            Viewed::Mass(_) => axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect(),
+            Viewed::Body(body) => body.row(offset, *along),
+        }
+    }
+}
+
+/// A `[[place]]` that is another view of a node of masses, or a point of a body: its directions are those of the body, or a tangent, or two, and the normal.
+pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
     };
     if let Some(key) = ["dof", "dofs", "nodes", "sum"].into_iter().find(|key| table.entry(key).is_some()) {
-        let message = format!("`of` makes it a place of a mass, and `{key}` of a structure");
+        let message = format!("`of` makes it a place of a mass or a body, and `{key}` of a structure");
         return Err(problem(key, message).map_help("take one of the two out"));
     }
     let of = values.text("of").unwrap_or_default();
-    let Some(mass) = masses.iter().find(|mass| mass.name == of) else {
-        let help = match nearest(of, masses.iter().map(|mass| mass.name.as_str())) {
+    let Some(viewed) = Viewed::find(model, of) else {
+        let names = model.masses.iter().map(|mass| &mass.name).chain(model.bodies.iter().map(|body| &body.name));
+        let help = match nearest(of, names.map(String::as_str)) {
             Some(near) => format!("did you mean `{near}`?"),
-            None => "name a [[mass]] with `directions`".to_owned(),
+            None => "name a [[body]], or a [[mass]] with `directions`".to_owned(),
         };
-        return Err(problem("of", format!("there is no mass `{}`", shown(of))).map_help(&help));
+        return Err(problem("of", format!("there is no mass `{}`, and no body", shown(of))).map_help(&help));
     };
-    // which of x, y, z each of its directions is
-    let axes: Option<Vec<usize>> =
-        mass.directions.iter().map(|along| CARTESIAN.iter().position(|axis| axis == along)).collect();
-    let Some(axes) = axes.filter(|axes| axes.len() > 1) else {
+    let offset = values.vector("offset");
+    if let (Viewed::Mass(mass), Some(_)) = (&viewed, offset) {
+        let message = format!("`{}` is a point mass, which does not turn: no point of it moves otherwise", mass.name);
+        return Err(problem("offset", message).map_help("make it a [[body]] with its inertia, or take `offset` out"));
+    }
+    let name = values.text("name").unwrap_or_default().to_owned();
+    if let (Viewed::Body(body), None) = (&viewed, values.vector("normal")) {
+        if offset.is_none() {
+            let help = "add offset = [\"3 mm\", 0, \"-2 mm\"], the point seen from the centre of mass";
+            return Err(problem("name", "a place of a body needs `offset`, `normal` or both".to_owned()).map_help(help));
+        }
+        return point(table, values, body, &name);
+    }
+    let Some(axes) = viewed.axes() else {
+        let Viewed::Mass(mass) = viewed else { return Err(problem("of", format!("no point of `{of}` moves"))) };
         let message = format!(
             "a face of `{}` is turned among x, y, z, and it moves along {}",
             mass.name,
@@ -230,8 +274,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, masses: &[Mass]) -> Res
     let tangent = match missing {
         None => values.vector("tangent"),
         Some(axis) if normal[axis] != 0.0 => {
-            let message =
-                format!("`{}` does not move along {}, and the normal has a part along it", mass.name, CARTESIAN[axis]);
+            let message = format!("`{of}` does not move along {}, and the normal has a part along it", CARTESIAN[axis]);
             return Err(problem("normal", message).map_help("make that part 0"));
         }
         // in a plane there is but one: the axis across the plane times the normal
@@ -243,7 +286,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, masses: &[Mass]) -> Res
         }
     };
     let frame = Frame::new(normal, tangent).map_err(|error| problem("normal", error.to_string()))?;
-    let row = |along: &[f64; 3]| -> Row { axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect() };
+    let row = |along: &[f64; 3]| viewed.row(&axes, offset.unwrap_or_default(), along);
     let [first, second, normal] = frame.axes();
     let (rows, names) = match missing {
         None => (vec![row(first), row(second), row(normal)], &IN_FRAME[..]),
@@ -256,8 +299,32 @@ pub(crate) fn view(table: &StatedTable, values: &Values, masses: &[Mass]) -> Res
         let message = format!("{} directions for {}", directions.len(), names.join(", "));
         return Err(problem("directions", message).map_help("name each tangent and the normal, or leave it out"));
     }
-    let name = values.text("name").unwrap_or_default().to_owned();
     Ok(Place { name, directions, rows, frame: None, of: Some(of.to_owned()) })
+}
+
+/// A point of a body, along the directions in which its points move, or those of them that are named.
+fn point(table: &StatedTable, values: &Values, body: &Body, name: &str) -> Result<Place, Box<Problem>> {
+    let problem = |key: &str, message: String| {
+        Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
+    };
+    if values.vector("tangent").is_some() {
+        return Err(
+            problem("tangent", "a tangent without a normal is no frame".to_owned()).map_help("add normal = [0, 0, 1]")
+        );
+    }
+    let point = body.point(name, values.vector("offset").unwrap_or_default());
+    let Some(named) = values.names("directions") else { return Ok(point) };
+    let mut rows = Vec::with_capacity(named.len());
+    for along in named {
+        let Some(at) = point.directions.iter().position(|own| own == along) else {
+            let message =
+                format!("points of `{}` move along {}, not along {along}", body.name, point.directions.join(", "));
+            let help = "name some of these; the rotations of the body are its own places, those of every point of it";
+            return Err(problem("directions", message).map_help(help));
+        };
+        rows.push(point.rows[at].clone());
+    }
+    Ok(Place { directions: named.to_vec(), rows, ..point })
 }
 
 /// A mass in the stead of a place, where only names are known.

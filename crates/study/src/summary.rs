@@ -3,6 +3,7 @@
 //!
 //! Everything here comes from the linear structure and from counting; no orbit is computed.
 
+mod bodies;
 mod structure;
 mod text;
 mod warnings;
@@ -30,6 +31,8 @@ pub struct ModelSummary {
     pub dofs: usize,
     /// The structure by its matrices, if there is one.
     pub structure: Option<StructureSummary>,
+    /// The rigid bodies in words, those of the first sector of a disk.
+    pub bodies: Vec<String>,
     /// Whether these are too many for the modes, which are then absent.
     pub too_large: bool,
     /// Modes with all joints free.
@@ -182,6 +185,7 @@ impl ModelSummary {
             cases: study.cases(),
             dofs: first.dofs(),
             structure: StructureSummary::new(study, &cases[0]),
+            bodies: bodies::described(&cases[0].case.model),
             too_large: first.is_too_large(),
             free: first.free().clone(),
             stuck: first.stuck().clone(),
@@ -244,6 +248,7 @@ impl ModelSummary {
         json!({
             "case": self.case,
             "degrees_of_freedom": self.dofs,
+            "bodies": self.bodies,
             "structure": self.structure.as_ref().map(StructureSummary::to_json),
             "joints_free": modes(&self.free),
             "joints_stuck": modes(&self.stuck),

@@ -33,6 +33,8 @@ pub const TABLE: &[Template] = templates![
     "shroud",
     "rim-ring",
     "under-platform-wedge",
+    "under-platform-rocking-wedge",
+    "under-platform-cylinder",
 ];
 
 /// The template with this name.

@@ -223,6 +223,7 @@ pub(crate) enum Given {
     Frequencies(Frequencies),
     ByName(BTreeMap<String, f64>, Dimension),
     Vector([f64; 3]),
+    Quantities(Vec<f64>, Dimension),
     Sums(Vec<Vec<(String, f64)>>),
     Law(SharedLaw),
     Table(Values),
@@ -264,6 +265,8 @@ accessors! {
     by_name -> &BTreeMap<String, f64> { Given::ByName(table, _) => table }
     /// Three numbers.
     vector -> [f64; 3] { Given::Vector(vector) => *vector }
+    /// One quantity or several, in SI.
+    quantities -> &[f64] { Given::Quantities(list, _) => list }
     /// Weighted sums of rows.
     sums -> &[Vec<(String, f64)>] { Given::Sums(sums) => sums }
     /// A friction law.
@@ -303,6 +306,9 @@ impl Given {
                 Json::Object(table.iter().map(entry).collect())
             }
             Given::Vector(vector) => json!(vector),
+            Given::Quantities(list, dimension) => {
+                json!(list.iter().map(|value| quantity_json(*value, Some(*dimension))).collect::<Vec<_>>())
+            }
             Given::Sums(sums) => json!(sums),
             Given::Law(law) => json!(law),
             Given::Table(table) => table.to_json(),

@@ -100,8 +100,10 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
             study.error_at("joint", index, "law", message, help)
         }
         Refusal::NeedsMass { place, .. } | Refusal::Empty { place, .. } | Refusal::Light { place, .. } => {
-            match model.masses.iter().position(|mass| mass.places().contains(place)) {
-                Some(index) => study.error_at("mass", index, "mass", message, help),
+            let mass = model.masses.iter().position(|mass| mass.places().contains(place)).map(|at| ("mass", at));
+            let body = || model.bodies.iter().position(|body| body.places().contains(place)).map(|at| ("body", at));
+            match mass.or_else(body) {
+                Some((list, index)) => study.error_at(list, index, "mass", message, help),
                 None => study.error_at("structure", 0, "mass", message, help),
             }
         }

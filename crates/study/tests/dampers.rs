@@ -120,6 +120,110 @@ fn a_stuck_wedge_is_two_springs_at_angles() {
     }
 }
 
+/// A spring along which a point of a damper is tied to a platform.
+struct Tie {
+    /// What it is stretched by `(x, z, ry)` of the damper.
+    row: [f64; 3],
+    stiffness: f64,
+    /// Whether it is that of the first platform, which moves by one along x; the other stands.
+    first: bool,
+}
+
+/// Points of two faces at these angles, seen from the centre: `(distance, edge)` along the normal and across it, with `1/share` of the stiffnesses at each.
+fn ties(angles: [f64; 2], points: &[(f64, f64)], [kt, kn]: [f64; 2]) -> Vec<Tie> {
+    let share = points.len() as f64;
+    let mut ties = Vec::new();
+    for (first, a) in [(true, -angles[0].to_radians()), (false, angles[1].to_radians())] {
+        let ([nx, nz], [tx, tz]) = ([a.sin(), a.cos()], [a.cos(), -a.sin()]);
+        for (distance, edge) in points {
+            // θ × r with r = distance n + edge t
+            let (rx, rz) = (distance * nx + edge * tx, distance * nz + edge * tz);
+            ties.push(Tie { row: [tx, tz, rz * tx - rx * tz], stiffness: kt / share, first });
+            ties.push(Tie { row: [nx, nz, rz * nx - rx * nz], stiffness: kn / share, first });
+        }
+    }
+    ties
+}
+
+/// The spring that a damper without mass is between the platforms, by condensing its three motions, and how it turns with the first of them, rad/m.
+fn condensed(ties: &[Tie]) -> (f64, f64) {
+    let (mut own, mut pull, mut held) = ([[0.0; 3]; 3], [0.0; 3], 0.0);
+    for Tie { row, stiffness, first } in ties {
+        for i in 0..3 {
+            for n in 0..3 {
+                own[i][n] += stiffness * row[i] * row[n];
+            }
+            pull[i] += if *first { stiffness * row[i] * row[0] } else { 0.0 };
+        }
+        held += if *first { stiffness * row[0] * row[0] } else { 0.0 };
+    }
+    let det = |m: &[[f64; 3]; 3]| {
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+            + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    };
+    let moved: [f64; 3] = std::array::from_fn(|column| {
+        let mut m = own;
+        (0..3).for_each(|row| m[row][column] = pull[row]);
+        det(&m) / det(&own)
+    });
+    (held - (0..3).map(|i| moved[i] * pull[i]).sum::<f64>(), moved[2])
+}
+
+/// Cylinders and wedges that rock, with next to no mass, between blades that move along the circumference: `m ω² = k + 2 kc (1 - cos θ)`.
+#[test]
+fn stuck_dampers_that_turn_are_springs_between_blades() {
+    let (mass, k, kt, kn, rc): (f64, f64, f64, f64, f64) = (0.4, 250e3, 40e3, 50e3, 3.5e-3);
+    for (template, points) in [
+        ("under-platform-cylinder", vec![(rc, 0.0)]),
+        ("under-platform-rocking-wedge", vec![(3e-3, 3e-3), (3e-3, -3e-3)]),
+    ] {
+        for angles in [[30.0f64, 30.0f64], [20.0, 50.0], [65.0, 10.0]] {
+            let (kc, turn) = condensed(&ties(angles, &points, [kt, kn]));
+            if angles[0] == angles[1] {
+                // blades that part do not turn it, and it holds them as a wedge that cannot turn does
+                let (s, c) = angles[0].to_radians().sin_cos();
+                near(template, kc, kt * kn / (2.0 * (kt * s * s + kn * c * c)), 1e-12);
+            } else {
+                assert!(turn.abs() > 1.0, "{template} does not turn: {turn} rad/m");
+            }
+            let mut parameters = vec![
+                ("a1", format!("{} deg", angles[0])),
+                ("a2", format!("{} deg", angles[1])),
+                ("m", "1e-4 g".to_owned()),
+                ("kz", "1e7 N/mm".to_owned()),
+            ];
+            if template == "under-platform-rocking-wedge" {
+                parameters.push(("J", "1e-3 g mm^2".to_owned()));
+            }
+            frequencies((template, 12, 1), &parameters, 2e-6, |stuck, theta| {
+                vec![((k + if stuck { 2.0 * kc * (1.0 - theta.cos()) } else { 0.0 }) / mass).sqrt()]
+            });
+        }
+    }
+}
+
+/// Its loads at rest are those of a wedge: both go through its centre, and no friction is needed.
+#[test]
+fn a_cylinder_is_pressed_by_its_balance() {
+    let (a1, a2) = (15.0f64, 40.0f64);
+    let parameters = [("a1", format!("{a1} deg")), ("a2", format!("{a2} deg")), ("F0", "1e-3 N".to_owned())];
+    let found = study(
+        "under-platform-cylinder",
+        &parameters,
+        "[study]\nkind = \"response\"\nfrequency = [\"60 Hz\"]\noutput = \"joint_mean\"\n\
+         [method]\nkind = \"harmonic-balance\"\nharmonics = 3\n",
+    );
+    let load = 0.003 * 0.25 * (2600.0 * TAU / 60.0f64).powi(2);
+    let sum = (a1 + a2).to_radians().sin();
+    let at = |column: &str| numbers(&found, "curve", column)[0];
+    near("N1", at("face1_0_n_force_mean_N"), load * a2.to_radians().sin() / sum, 1e-6);
+    near("N2", at("face2_3_n_force_mean_N"), load * a1.to_radians().sin() / sum, 1e-6);
+    for joint in ["face1_0_t", "face2_0_t"] {
+        let friction = at(&format!("{joint}_force_mean_N"));
+        assert!(friction.abs() < 1e-6 * load, "{joint} carries {friction} N at rest");
+    }
+}
+
 /// What nothing drives rests, however small the force that does is beside the wedges' load: a billionth of it is answered in proportion.
 #[test]
 fn a_wedge_that_nothing_drives_rests() {

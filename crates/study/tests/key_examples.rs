@@ -37,6 +37,22 @@ force = [{ on = "face.n", amplitude = "1 N" }]
 study = { kind = "response", frequency = "121 Hz" }
 "#;
 
+/// A rigid body in a plane, with a point that a spring holds, beside a block.
+const BODY: &str = r#"
+schema = 1
+mass = [{ name = "block", mass = "1 kg" }]
+body = [{ name = "damper", mass = "10 g", inertia = "200 g mm^2", directions = ["x", "z"] }]
+place = [{ name = "corner", of = "damper", offset = ["2 mm", 0, 0] }]
+spring = [
+    { between = ["block", "ground"], stiffness = "1e5 N/m", damping = "1 kg/s" },
+    { between = ["damper.x", "ground"], stiffness = "1e5 N/m", damping = "1 kg/s" },
+    { between = ["damper.z", "ground"], stiffness = "1e5 N/m", damping = "1 kg/s" },
+    { between = ["corner.z", "ground"], stiffness = "1e5 N/m", damping = "1 kg/s" },
+]
+force = [{ on = "block", amplitude = "1 N" }]
+study = { kind = "response", frequency = "121 Hz" }
+"#;
+
 /// A ring of blades.
 const RING: &str = r#"
 schema = 1
@@ -86,6 +102,9 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
         ("structure.reduce", "modes") => (MATRICES, "", &["up_to"]),
         ("structure.reduce", "orders") => (MATRICES, "modes = 5", &["up_to"]),
         ("place", "of") => (FACE, "", &[]),
+        ("place", "offset") => (BODY, "", &[]),
+        ("body", "repeat") => (BODY, "name = \"damper{i}\"", &["/place", "/spring"]),
+        ("body", _) => (BODY, "", &[]),
         ("place", "dofs" | "nodes" | "sum") => (MATRICES, "", &["dof"]),
         ("place", "directions" | "normal") => (MATRICES, "nodes = [\"188\"]", &["dof"]),
         ("place", "tangent") => (MATRICES, "nodes = [\"188\"]\nnormal = [0, 0, 1]", &["dof"]),

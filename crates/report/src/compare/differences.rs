@@ -220,7 +220,7 @@ fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
 
 /// The name of a column without its unit.
 fn stem(name: &str) -> &str {
-    ["_Hz", "_m", "_N"].iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name)
+    ["_Hz", "_m", "_N", "_rad"].iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name)
 }
 
 impl Largest {

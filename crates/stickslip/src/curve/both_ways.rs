@@ -68,7 +68,7 @@ impl BothWays {
         self.add_point(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
     }
 
-    /// The next point, with the amplitudes of all places, m, or without an orbit.
+    /// The next point, with the sizes of all places, m, or without an orbit.
     pub fn add_point(&mut self, point: Point) {
         self.points.push(point);
     }
@@ -121,7 +121,7 @@ pub fn stretches(there: &[Point], others: &[Point]) -> Vec<Vec<Point>> {
 }
 
 fn amplitudes(orbit: &Orbit) -> Vec<f64> {
-    orbit.places.iter().map(|place| place.amplitude()).collect()
+    orbit.places.iter().map(|place| place.size()).collect()
 }
 
 /// Largest amplitude of an orbit over that of a point at its frequency, if it is another one. What friction holds, or nothing drives, moves by rounding, of

@@ -96,7 +96,8 @@ fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64
     let share = widest.1;
     // both halves of the window lead the same way
     let moved = |axis: &Axis, from: usize, to: usize| axis.along(&returns[to][..n]) - axis.along(&returns[from][..n]);
-    let farthest = system.seen().iter().zip(system.places()).map(|(axis, place)| {
+    let displacements = system.seen().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
+    let farthest = displacements.map(|(axis, place)| {
         let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
         let steady =
             halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();

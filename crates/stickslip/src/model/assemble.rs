@@ -43,7 +43,8 @@ impl Model {
     pub fn joint_labels(&self) -> Vec<Vec<String>> {
         let places = self.place_names();
         let mut nodes: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        for (node, along) in places.iter().filter_map(|place| place.split_once('.')) {
+        let displacements = places.iter().filter(|place| !self.is_rotation(place));
+        for (node, along) in displacements.filter_map(|place| place.split_once('.')) {
             nodes.entry(node).or_default().push(along);
         }
         let labels = |joint: &Joint| {
@@ -131,6 +132,19 @@ impl Assembler<'_> {
         combined(parts.collect())
     }
 
+    /// That a spring joins rotations with each other, or displacements.
+    fn alike(&self, between: &[String; 2], ends: [End; 2], element: Element) -> Result<(), ModelError> {
+        let turns = ends.map(|end| self.places.is_rotation(end));
+        if turns[0] == turns[1] || ends.contains(&End::Ground) {
+            return Ok(());
+        }
+        let (angle, other) = if turns[0] { (&between[0], &between[1]) } else { (&between[1], &between[0]) };
+        let message = format!(
+            "`{angle}` is a rotation and `{other}` a displacement: a spring joins two of a kind; the lever of a body is a [[place]] of it with `offset`"
+        );
+        Err(ModelError::new(element, "between", message))
+    }
+
     fn matrices(&self) -> Result<Matrices, ModelError> {
         let total = self.coordinates.free + self.coordinates.moved;
         for (i, mass) in self.model.masses.iter().enumerate() {
@@ -152,6 +166,7 @@ impl Assembler<'_> {
             let a = self.places.find(&spring.between[0], element, "between")?;
             let b = self.places.find(&spring.between[1], element, "between")?;
             differ(&spring.between, element)?;
+            self.alike(&spring.between, [a, b], element)?;
             let along = self.along(&[(a, 1.0), (b, -1.0)]);
             add_along(&mut stiffness, &along, spring.stiffness);
             add_along(&mut damping, &along, spring.damping);
@@ -186,9 +201,15 @@ impl Assembler<'_> {
 
     /// The places that are free to move, at which results are given.
     fn seen(&self, mut builder: SystemBuilder) -> SystemBuilder {
-        for (place, row) in self.places.stated.iter().zip(&self.coordinates.places) {
-            if !place.moved {
-                builder = builder.place(place.name.clone(), self.axis(row).0);
+        let unseen = &self.coordinates.unseen;
+        for ((place, row), unseen) in self.places.stated.iter().zip(&self.coordinates.places).zip(unseen) {
+            if !place.moved && !unseen {
+                let axis = self.axis(row).0;
+                let axis = match place.radius {
+                    Some(radius) => axis.rotation(radius),
+                    None => axis,
+                };
+                builder = builder.place(place.name.clone(), axis);
             }
         }
         builder

@@ -1,10 +1,11 @@
 //! The coordinates of a model, and its places as weighted sums of them.
 //!
-//! They are those of its substructure (all its rows, or the few of its reduction), then one for each mass along each of its directions; of a ring those
-//! of the first sector, then those of the second, and so on. Places with an imposed motion are coordinates too: each takes the place of the one that it depends on most, so that `x = T (q, u)` with the moved
+//! They are those of its substructure (all its rows, or the few of its reduction), then one for each mass along each of its directions, then those of
+//! rigid bodies; of a ring those of the first sector, then those of the second, and so on. Places with an imposed motion are coordinates too: each takes the place of the one that it depends on most, so that `x = T (q, u)` with the moved
 //! displacements `u` at the end, and `Tᵀ M T` has what they share with the others.
 
 use super::Model;
+use super::body::Body;
 use super::error::{Element, ModelError};
 use super::part::{Entries, Part};
 use super::place::Place;
@@ -26,6 +27,8 @@ pub(super) struct Coordinates {
     pub names: Vec<String>,
     /// The stated places, over free and then moved coordinates.
     pub places: Vec<Row>,
+    /// Which of them have no results, as they follow what moves a body.
+    pub unseen: Vec<bool>,
     /// Mass, damping and stiffness of the substructure.
     pub entries: [Entries; 3],
     /// Damping of its modes beside that, over free and then moved coordinates.
@@ -42,10 +45,15 @@ impl Coordinates {
     pub fn new(model: &Model, places: &Places) -> Result<Self, ModelError> {
         let part = model.substructure.as_ref().map_or_else(|| Ok(Part::default()), |own| Part::new(own, model))?;
         let of_disk = model.substructure.as_ref().is_some_and(|own| own.disk.is_some());
-        let sectors = model.ring.filter(|_| of_disk).map_or(1, |ring| ring.sectors);
         let masses: usize = model.masses.iter().map(|mass| mass.directions.len().max(1)).sum();
-        let order = Order { sectors, part: part.names.len() / sectors, own: masses / sectors };
-        let mut names = vec![String::new(); part.names.len() + masses];
+        let bodies: usize = model.bodies.iter().map(|body| body.directions.len()).sum();
+        // a ring of masses and no bodies stands sector by sector as it is stated
+        let ring = model.ring.filter(|ring| of_disk || whole_sectors(ring.sectors, [part.names.len(), masses, bodies]));
+        let sectors = ring.map_or(1, |ring| ring.sectors);
+        let [part_each, masses_each, bodies_each] = [part.names.len(), masses, bodies].map(|count| count / sectors);
+        let order = Order { sectors, part: part_each, masses: masses_each, bodies: bodies_each };
+        let mut names = vec![String::new(); part.names.len() + masses + bodies];
+        let of_bodies = Bodies::new(model, &order);
         part.names.into_iter().enumerate().for_each(|(at, name)| names[order.of_part(at)] = name);
         let mut own = 0;
         let mut rows: Vec<Row> = Vec::with_capacity(places.stated.len());
@@ -69,6 +77,11 @@ impl Coordinates {
                     own += 1;
                     vec![(at, 1.0)]
                 }
+                Of::Body(index, along) => {
+                    let at = of_bodies.first[index];
+                    names[at + along].clone_from(&place.name);
+                    model.bodies[index].coordinates(&model.bodies[index].directions[along], at)
+                }
             });
         }
         for (place, stated) in places.stated.iter().enumerate() {
@@ -79,7 +92,8 @@ impl Coordinates {
         let of_part = |entries: Entries| -> Entries {
             entries.into_iter().map(|(row, column, v)| (order.of_part(row), order.of_part(column), v)).collect()
         };
-        let entries = part.entries.map(of_part);
+        let mut entries = part.entries.map(of_part);
+        entries[0].extend(of_bodies.mass(model));
         let modes = part.modes.map(|modes| {
             let mut columns = vec![0.0; modes.iter().count() * names.len()];
             for (column, own) in columns.chunks_exact_mut(names.len().max(1)).zip(modes.iter()) {
@@ -95,15 +109,22 @@ impl Coordinates {
             .map(|(place, row)| (place.name.as_str(), row))
             .collect();
         let mut turned = Turned::new(names.len(), &moved)?;
-        let others = places.stated.iter().zip(&rows).filter(|(place, _)| !place.moved);
+        // points of a body are more than it has coordinates, and one that is moved moves others
+        let of_body: Vec<bool> = match model.bodies.is_empty() {
+            true => vec![false; rows.len()],
+            false => places.stated.iter().map(|place| model.is_of_body(&place.name)).collect(),
+        };
+        let others = places.stated.iter().zip(&rows).zip(&of_body);
+        let others = others.filter(|((place, _), of_body)| !place.moved && !**of_body).map(|(other, _)| other);
         turned.unseen(&others.map(|(_, row)| turned.row(row)).collect::<Vec<Row>>());
         let placed: Vec<Row> = rows.iter().map(|row| turned.row(row)).collect();
-        follows(model, places, &placed, turned.free)?;
+        let unseen = follows(model, places, (&placed, &of_body), turned.free)?;
         Ok(Coordinates {
             free: turned.free,
             moved: moved.len(),
             names: names.into_iter().zip(&turned.pivot).filter(|(_, pivot)| !**pivot).map(|(name, _)| name).collect(),
             places: placed,
+            unseen,
             entries: entries.map(|entries| turned.entries(entries)),
             modes: modes.map(|modes| turned.modes(&modes, moved.len())),
             reduced: part.reduced,
@@ -129,32 +150,79 @@ fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
         .collect()
 }
 
-/// Where coordinates of a substructure and of masses stand: sector by sector.
+/// Where coordinates of a substructure, of masses and of bodies stand: sector by sector.
 struct Order {
     sectors: usize,
-    /// Coordinates of the substructure, and of masses, in a sector.
+    /// Coordinates of each in a sector.
     part: usize,
-    own: usize,
+    masses: usize,
+    bodies: usize,
 }
 
 impl Order {
     fn of_part(&self, at: usize) -> usize {
-        at + at / self.part * self.own
+        at + at / self.part * (self.masses + self.bodies)
     }
 
     fn of_mass(&self, at: usize) -> usize {
-        at + (at / self.own.max(1) + 1).min(self.sectors) * self.part
+        let sector = (at / self.masses.max(1)).min(self.sectors - 1);
+        at + (sector + 1) * self.part + sector * self.bodies
+    }
+
+    fn of_body(&self, at: usize) -> usize {
+        let sector = (at / self.bodies.max(1)).min(self.sectors - 1);
+        at + (sector + 1) * (self.part + self.masses)
     }
 }
 
-/// Refuses places that follow moved ones whatever the structure does: results are read off the free coordinates alone.
-fn follows(model: &Model, places: &Places, rows: &[Row], free: usize) -> Result<(), ModelError> {
-    for (place, row) in places.stated.iter().zip(rows).filter(|(place, _)| !place.moved) {
+/// Whether each of these stands for as much in every sector.
+fn whole_sectors(sectors: usize, counts: [usize; 3]) -> bool {
+    counts.iter().all(|count| count.is_multiple_of(sectors))
+}
+
+/// Where the coordinates of every body begin.
+struct Bodies {
+    first: Vec<usize>,
+}
+
+impl Bodies {
+    fn new(model: &Model, order: &Order) -> Self {
+        let mut next = 0;
+        let first = |body: &Body| {
+            let at = order.of_body(next);
+            next += body.directions.len();
+            at
+        };
+        Bodies { first: model.bodies.iter().map(first).collect() }
+    }
+
+    /// Their mass: every coordinate of a body has its mass, as rotations count by the radius of gyration.
+    fn mass(&self, model: &Model) -> Entries {
+        let bodies = model.bodies.iter().zip(&self.first);
+        bodies.flat_map(|(body, first)| (*first..first + body.directions.len()).map(|at| (at, at, body.mass))).collect()
+    }
+}
+
+/// Refuses places that follow moved ones whatever the structure does: results are read off the free coordinates alone. Those of bodies have no
+/// results instead; where what moves them stands still they have.
+fn follows(
+    model: &Model,
+    places: &Places,
+    (rows, of_body): (&[Row], &[bool]),
+    free: usize,
+) -> Result<Vec<bool>, ModelError> {
+    let mut unseen = vec![false; rows.len()];
+    let moved: Vec<&str> = places.stated.iter().filter(|place| place.moved).map(|place| place.name.as_str()).collect();
+    let moves = |name: &str| model.motions.iter().any(|motion| motion.on == name && motion.amplitude != 0.0);
+    for (number, (place, row)) in places.stated.iter().zip(rows).enumerate().filter(|(_, (place, _))| !place.moved) {
         let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
-        let on = row.iter().find(|(at, weight)| *at >= free && weight.abs() > DEPENDENT * size);
-        let Some((at, _)) = on else { continue };
-        let name =
-            places.stated.iter().filter(|place| place.moved).nth(at - free).map_or("", |place| place.name.as_str());
+        let mut on = row.iter().filter(|(at, weight)| *at >= free && weight.abs() > DEPENDENT * size);
+        if of_body[number] {
+            unseen[number] = on.any(|(at, _)| moves(moved[at - free]));
+            continue;
+        }
+        let Some((at, _)) = on.next() else { continue };
+        let name = moved[at - free];
         let motion = model.motions.iter().position(|motion| motion.on == name).unwrap_or(0);
         let message = format!(
             "`{}` follows `{name}`, whose motion is imposed: they are weighted sums of the same rows, or the few coordinates of a reduction do not \
@@ -163,7 +231,7 @@ fn follows(model: &Model, places: &Places, rows: &[Row], free: usize) -> Result<
         );
         return Err(ModelError::new(Element::Motion(motion), "on", message));
     }
-    Ok(())
+    Ok(unseen)
 }
 
 /// `x = T (q, u)`: coordinates of which some have given way to moved displacements.

@@ -113,8 +113,8 @@ impl Disk {
         let first = sector(0);
         self.check(&first)?;
         let count = |model: &Model| {
-            let Model { places, masses, springs, joints, forces, motions, .. } = model;
-            [places.len(), masses.len(), springs.len(), joints.len(), forces.len(), motions.len()]
+            let Model { places, masses, bodies, springs, joints, forces, motions, .. } = model;
+            [places.len(), masses.len(), bodies.len(), springs.len(), joints.len(), forces.len(), motions.len()]
         };
         let mut model = Model { substructure: first.substructure.clone(), ..Model::default() };
         let mut deviations = Vec::new();
@@ -128,6 +128,7 @@ impl Disk {
             one.places.iter_mut().for_each(|place| place.name = name(&place.name));
             one.places.iter_mut().for_each(|place| place.of = place.of.as_ref().map(name));
             one.masses.iter_mut().for_each(|mass| mass.name = name(&mass.name));
+            one.bodies.iter_mut().for_each(|body| body.name = name(&body.name));
             one.springs.iter_mut().for_each(|spring| spring.between = spring.between.each_ref().map(name));
             for joint in &mut one.joints {
                 joint.name = format!("{}_{s}", joint.name);
@@ -145,6 +146,7 @@ impl Disk {
             }
             model.places.append(&mut one.places);
             model.masses.append(&mut one.masses);
+            model.bodies.append(&mut one.bodies);
             model.springs.append(&mut one.springs);
             model.joints.append(&mut one.joints);
             model.forces.append(&mut one.forces);
@@ -214,6 +216,10 @@ impl Disk {
                 let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
                 return refuse(Element::Mass(i), "name", message);
             }
+        }
+        if let Some(i) = sector.bodies.iter().position(|body| next(&body.name)) {
+            let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
+            return refuse(Element::Body(i), "name", message);
         }
         let mut known: BTreeSet<String> = sector.place_names().into_iter().collect();
         known.extend(sector.nodes().map(|(name, _)| name.to_owned()));
@@ -360,6 +366,7 @@ impl Ring {
         let own = |index: usize, all: usize| index % (all / self.sectors.max(1)).max(1);
         match element {
             Element::Mass(i) => Element::Mass(own(i, model.masses.len())),
+            Element::Body(i) => Element::Body(own(i, model.bodies.len())),
             Element::Spring(i) => Element::Spring(own(i, model.springs.len())),
             Element::Joint(i) => Element::Joint(own(i, model.joints.len())),
             Element::Force(i) => Element::Force(own(i, model.forces.len())),

@@ -8,6 +8,7 @@ use std::fmt;
 #[allow(missing_docs)] // index into the list of the model that has the same name
 pub enum Element {
     Mass(usize),
+    Body(usize),
     Spring(usize),
     Joint(usize),
     Force(usize),
@@ -22,6 +23,7 @@ impl Element {
     pub fn entry(self) -> (&'static str, Option<usize>) {
         match self {
             Element::Mass(i) => ("mass", Some(i)),
+            Element::Body(i) => ("body", Some(i)),
             Element::Spring(i) => ("spring", Some(i)),
             Element::Joint(i) => ("joint", Some(i)),
             Element::Force(i) => ("force", Some(i)),
@@ -44,6 +46,7 @@ impl Element {
     pub fn named(self, model: &Model) -> String {
         let name = match self {
             Element::Mass(i) => model.masses.get(i).map(|mass| format!("mass `{}`", mass.name)),
+            Element::Body(i) => model.bodies.get(i).map(|body| format!("body `{}`", body.name)),
             Element::Spring(i) => {
                 model.springs.get(i).map(|Spring { between: [a, b], .. }| format!("spring between `{a}` and `{b}`"))
             }

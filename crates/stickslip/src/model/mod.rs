@@ -1,8 +1,9 @@
-//! What the user states: a structure by its matrices and its places, masses, springs, joints, forces, imposed motions.
+//! What the user states: a structure by its matrices and its places, masses, rigid bodies, springs, joints, forces, imposed motions.
 //!
 //! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and turns it into a [`System`] of matrices.
 
 mod assemble;
+mod body;
 mod contraction;
 mod coordinates;
 mod disk;
@@ -15,6 +16,7 @@ mod places;
 mod survey;
 mod system;
 
+pub use body::{Body, ROTATIONS, TRANSLATIONS, with_rotations};
 pub use disk::{Around, Disk, LEAST_SECTORS, Mistuned, NEXT, Ring, normal_pattern, too_far};
 pub use error::{Element, ModelError};
 pub(crate) use line::{Line, PARALLEL};
@@ -42,6 +44,9 @@ pub struct Model {
     pub places: Vec<Place>,
     /// Point masses; each is one degree of freedom.
     pub masses: Vec<Mass>,
+    /// Rigid bodies, which turn as well.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<Body>,
     /// Springs and dampers.
     pub springs: Vec<Spring>,
     /// Places that rub.
@@ -187,9 +192,9 @@ impl Mass {
 pub struct Spring {
     /// The two places it joins.
     pub between: [String; 2],
-    /// Stiffness, N/m.
+    /// Stiffness, N/m; between rotations N m/rad.
     pub stiffness: f64,
-    /// Viscous damping, kg/s.
+    /// Viscous damping, kg/s; between rotations N m s/rad.
     pub damping: f64,
 }
 
@@ -216,7 +221,7 @@ impl PartialEq for Joint {
 pub struct Force {
     /// The mass it acts on.
     pub on: String,
-    /// Amplitude, N.
+    /// Amplitude, N; of a moment, on a rotation, N m.
     pub amplitude: f64,
     /// Phase lead, rad.
     pub phase: f64,
@@ -230,7 +235,7 @@ pub struct Force {
 pub struct Motion {
     /// The place that is moved.
     pub on: String,
-    /// Amplitude, m.
+    /// Amplitude, m; of a rotation rad.
     pub amplitude: f64,
     /// Phase lead, rad.
     pub phase: f64,

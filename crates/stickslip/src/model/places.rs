@@ -1,5 +1,6 @@
 //! Where the names of a model lead: each a weighted sum of coordinates, the ground, or a place that is moved.
 
+use super::body::{Body, ROTATIONS, TRANSLATIONS};
 use super::error::{Element, ModelError};
 use super::place::{Place, places_of};
 use super::{GROUND, Mass, Model};
@@ -23,6 +24,8 @@ pub(super) enum Of {
     View(usize, usize),
     /// A coordinate of its own with this mass, kg.
     Own(f64),
+    /// A rigid body by its number, and which of its directions.
+    Body(usize, usize),
 }
 
 /// A place as it is stated.
@@ -31,6 +34,8 @@ pub(super) struct Stated {
     pub name: String,
     pub of: Of,
     pub moved: bool,
+    /// Of an angle: the radius of gyration, m.
+    pub radius: Option<f64>,
 }
 
 /// A direction that a joint acts along: its name, if there are several, and where both ends lead.
@@ -68,14 +73,33 @@ impl Model {
     /// first, then the masses.
     pub fn nodes(&self) -> impl Iterator<Item = (&str, &[String])> {
         let places = self.places.iter().map(|place| (place.name.as_str(), place.directions.as_slice()));
-        places.chain(self.masses.iter().map(|mass| (mass.name.as_str(), mass.directions.as_slice())))
+        let masses = self.masses.iter().map(|mass| (mass.name.as_str(), mass.directions.as_slice()));
+        places.chain(masses).chain(self.bodies.iter().map(|body| (body.name.as_str(), body.directions.as_slice())))
+    }
+
+    /// Whether a name is a place of a rigid body: one of its directions, or of a point of it.
+    pub(super) fn is_of_body(&self, place: &str) -> bool {
+        let node = place.split_once('.').map_or(place, |(node, _)| node);
+        let of = self.places.iter().find(|place| place.name == node).and_then(|place| place.of.as_deref());
+        self.bodies.iter().any(|body| body.name == of.unwrap_or(node))
+    }
+
+    /// Whether imposed motions move bodies: their other directions then share mass.
+    pub(super) fn moves_bodies(&self) -> bool {
+        !self.bodies.is_empty() && self.motions.iter().any(|motion| self.is_of_body(&motion.on))
+    }
+
+    /// Whether a place is a rotation of a body, an angle in rad.
+    pub fn is_rotation(&self, place: &str) -> bool {
+        let of_body = |node: &str| self.bodies.iter().any(|body| body.name == node);
+        place.split_once('.').is_some_and(|(node, along)| ROTATIONS.contains(&along) && of_body(node))
     }
 }
 
 impl Places {
     /// Every name once, an identifier, and where it leads.
     pub fn new(model: &Model) -> Result<Self, ModelError> {
-        if model.masses.is_empty() && model.motions.is_empty() && model.places.is_empty() {
+        if model.masses.is_empty() && model.bodies.is_empty() && model.motions.is_empty() && model.places.is_empty() {
             let message = if model.substructure.is_some() {
                 "a structure needs at least one place: what joints, forces and results speak of"
             } else {
@@ -107,6 +131,9 @@ impl Places {
         for (i, mass) in model.masses.iter().enumerate() {
             collected.node(Element::Mass(i), (&mass.name, &mass.directions), |_| Of::Own(mass.mass))?;
         }
+        for (i, body) in model.bodies.iter().enumerate() {
+            collected.body(i, body)?;
+        }
         for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_some()) {
             viewed(model, place, Element::Place(i))?;
             collected.node(Element::Place(i), (&place.name, &place.directions), |along| Of::View(i, along))?;
@@ -130,8 +157,10 @@ impl Places {
         if let Some(end) = self.ends.get(name) {
             return Ok(*end);
         }
-        if let Some(directions) = self.directions.get(name) {
-            let places: Vec<String> = directions.iter().map(|along| format!("`{name}.{along}`")).collect();
+        if self.directions.contains_key(name) {
+            let places = self.stated.iter().map(|place| place.name.as_str());
+            let own = places.filter(|place| place.split_once('.').is_some_and(|(node, _)| node == name));
+            let places: Vec<String> = own.map(|place| format!("`{place}`")).collect();
             let message = format!("`{name}` moves in several directions; name one of them: {}", places.join(", "));
             return Err(ModelError::new(element, key, message));
         }
@@ -141,6 +170,11 @@ impl Places {
             None => format!("there is no place `{name}`"),
         };
         Err(ModelError { wrong_name: Some(name.to_owned()), ..ModelError::new(element, key, message) })
+    }
+
+    /// Whether a name leads to an angle.
+    pub fn is_rotation(&self, end: End) -> bool {
+        matches!(end, End::At(place) if self.stated[place].radius.is_some())
     }
 
     /// Where both ends of a joint lead, along each of `count` directions, one of which may be the normal.
@@ -154,6 +188,10 @@ impl Places {
         let nodes: Vec<&Vec<String>> = between.iter().filter_map(|name| self.directions.get(name)).collect();
         let Some(directions) = nodes.first().copied() else {
             let [a, b] = [self.find(&between[0], element, key)?, self.find(&between[1], element, key)?];
+            if [a, b].into_iter().any(|end| self.is_rotation(end)) {
+                let message = "a joint joins displacements, and this is a rotation: name a [[place]] of the body, whose offset is the lever";
+                return Err(ModelError::new(element, key, message));
+            }
             if count == 1 {
                 return Ok(vec![(None, [a, b])]);
             }
@@ -163,6 +201,10 @@ impl Places {
             );
             return Err(ModelError::new(element, key, message));
         };
+        if directions.is_empty() {
+            let message = "the body only turns: name a [[place]] of it, whose offset is the lever";
+            return Err(ModelError::new(element, key, message));
+        }
         if directions.len() != count {
             let node = if self.directions.contains_key(&between[0]) { &between[0] } else { &between[1] };
             let message = format!(
@@ -202,11 +244,21 @@ impl Places {
 /// Whether the node that a place is a view of has the directions that its rows count.
 fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelError> {
     let Some(of) = &place.of else { return Ok(()) };
-    let Some(node) = model.masses.iter().find(|mass| mass.name == *of) else {
-        let message = format!("there is no mass `{of}` that `{}` could be a place of", place.name);
+    let mass = model.masses.iter().find(|mass| mass.name == *of).map(|mass| mass.places().len());
+    let body = model.bodies.iter().find(|body| body.name == *of).map(|body| body.directions.len());
+    let Some(count) = mass.or(body) else {
+        let message = format!("there is no mass and no body `{of}` that `{}` could be a place of", place.name);
         return Err(ModelError { wrong_name: Some(of.clone()), ..ModelError::new(element, "of", message) });
     };
-    let count = node.places().len();
+    let still = place.rows.iter().position(|row| row.iter().all(|(_, weight)| *weight == 0.0));
+    if let (Some(along), Some(_)) = (still, body) {
+        let message = format!(
+            "`{}` does not move along its direction {}: the body neither moves along it nor turns with a lever to it",
+            place.name,
+            place.directions.get(along).map_or("", String::as_str)
+        );
+        return Err(ModelError::new(element, "directions", message));
+    }
     let weights = || place.rows.iter().flatten();
     let usable = |row: &Row| row.iter().any(|(_, weight)| *weight != 0.0);
     if weights().any(|(at, weight)| *at >= count || !weight.is_finite()) || !place.rows.iter().all(usable) {
@@ -249,11 +301,31 @@ impl Collected<'_> {
         }
         for (along, place) in places_of(name, directions).into_iter().enumerate() {
             let moved = self.motions.contains(place.as_str());
-            self.place(Stated { name: place, of: of(along), moved }, element, "name")?;
+            self.place(Stated { name: place, of: of(along), moved, radius: None }, element, "name")?;
         }
         if !directions.is_empty() {
             self.places.directions.insert(name.clone(), directions.clone());
         }
+        Ok(())
+    }
+
+    /// Adds a rigid body. As a node it has its displacements: those of its centre of mass.
+    fn body(&mut self, index: usize, body: &Body) -> Result<(), ModelError> {
+        let element = Element::Body(index);
+        identifier(&body.name, element, "name", is_identifier)?;
+        body.check().map_err(|(key, message)| ModelError::new(element, key, message))?;
+        if self.places.directions.contains_key(&body.name) || self.places.ends.contains_key(&body.name) {
+            return twice(&body.name, element, "name");
+        }
+        for (along, (name, place)) in body.directions.iter().zip(body.places()).enumerate() {
+            if body.directions[..along].contains(name) {
+                return twice(name, element, "directions");
+            }
+            let (moved, radius) = (self.motions.contains(place.as_str()), body.radius(name));
+            self.place(Stated { name: place, of: Of::Body(index, along), moved, radius }, element, "name")?;
+        }
+        let displacements = body.directions.iter().filter(|name| TRANSLATIONS.contains(&name.as_str()));
+        self.places.directions.insert(body.name.clone(), displacements.cloned().collect());
         Ok(())
     }
 
@@ -278,7 +350,8 @@ impl Collected<'_> {
             if self.places.directions.contains_key(&motion.on) {
                 self.places.find(&motion.on, element, "on")?; // says that a direction is missing
             }
-            self.place(Stated { name: motion.on.clone(), of: Of::Own(0.0), moved: true }, element, "on")?;
+            let place = Stated { name: motion.on.clone(), of: Of::Own(0.0), moved: true, radius: None };
+            self.place(place, element, "on")?;
             if let Some((node, along)) = motion.on.split_once('.') {
                 self.places.directions.entry(node.to_owned()).or_default().push(along.to_owned());
             }

@@ -126,12 +126,35 @@ pub struct Axis {
     name: Option<String>,
     rows: Vec<(usize, f64)>,
     imposed: Vec<(u32, Complex64)>,
+    /// Of an angle: the radius, m, at which it counts beside displacements.
+    radius: Option<f64>,
 }
 
 impl Axis {
     /// Along degrees of freedom with their weights.
     pub fn new(rows: Vec<(usize, f64)>) -> Self {
-        Axis { name: None, rows, imposed: Vec::new() }
+        Axis { name: None, rows, imposed: Vec::new(), radius: None }
+    }
+
+    /// The same as an angle, rad, instead of a displacement; where sizes of both are compared, it counts as the arc at this radius, m.
+    #[must_use]
+    pub fn rotation(self, radius: f64) -> Self {
+        Axis { radius: Some(radius), ..self }
+    }
+
+    /// Whether it is an angle, rad.
+    pub fn is_rotation(&self) -> bool {
+        self.radius.is_some()
+    }
+
+    /// The SI unit of what it measures: m, or rad.
+    pub fn unit(&self) -> &'static str {
+        if self.is_rotation() { "rad" } else { "m" }
+    }
+
+    /// The length, m, that one unit of it counts as beside displacements.
+    pub fn length(&self) -> f64 {
+        self.radius.unwrap_or(1.0)
     }
 
     /// The same with a name, where a joint has several axes.

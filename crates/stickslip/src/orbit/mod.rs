@@ -241,7 +241,7 @@ impl Orbit {
             let velocities = sample.velocity.into_iter().map(|v| v / self.omega);
             sample.displacement.into_iter().chain(velocities).collect::<Vec<f64>>()
         };
-        let size = self.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
+        let size = self.places.iter().map(|place| place.size()).fold(0.0, f64::max);
         let drive = self.period() / self.periods as f64;
         let after = |periods: usize| {
             (0..REPEATED_AT).all(|i| {

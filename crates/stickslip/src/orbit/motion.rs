@@ -32,6 +32,8 @@ pub struct PlaceMotion {
     pub mean: f64,
     /// First harmonic `X` in `x = Re(X e^{jΩt}) + …`, m.
     pub first_harmonic: Complex64,
+    /// Of a rotation, whose values are rad instead of m: the radius (m) at which it counts beside displacements.
+    pub radius: Option<f64>,
 }
 
 /// First harmonic, relative to the amplitude, that is rounding: under a drive that has none, orbits are closed to less.
@@ -41,6 +43,10 @@ impl PlaceMotion {
     /// Half of peak to peak, m.
     pub fn amplitude(&self) -> f64 {
         0.5 * (self.maximum - self.minimum)
+    }
+    /// The same as a length, m, where sizes of places are compared: of a rotation the arc at its radius.
+    pub fn size(&self) -> f64 {
+        self.amplitude() * self.radius.unwrap_or(1.0)
     }
     /// Phase of the first harmonic against `cos Ωt`, degrees in (-180, 180]; not a number where other harmonics are all of the motion.
     pub fn phase_deg(&self) -> f64 {

@@ -5,7 +5,7 @@ mod standing;
 use self::standing::Top;
 use super::keys::{HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
 use super::orbits;
-use super::peak_of::{PEAK_OF, check_peak_of, peak_places, worst};
+use super::peak_of::{PEAK_OF, check_peak_of, displacements, peak_places, worst};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::drawing::{Drawing, Stretch, largest, numbers};
@@ -305,7 +305,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (system, places) = (&prepared.system, peak_places(&prepared));
     let (outer, along) = split(drawing.study, &prepared.case.varied);
     let column = |place: usize| format!("{}_amplitude_m", system.places()[place]);
-    let (y, factor) = drawing.axis(1, "amplitude", largest(table, (0..system.places().len()).map(column)), "m");
+    let all = displacements(system);
+    let (y, factor) = drawing.axis(1, "amplitude", largest(table, all.iter().copied().map(column)), "m");
     let (name, _) = axis(along);
     let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.on_axis().1);
     let stretches = drawing.stretches_of(table, outer.len());
@@ -314,10 +315,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
     // of several branches the masses whose peaks count are shown, the largest amplitude of them
     let shown: Vec<Vec<usize>> = match one {
-        true => (0..system.places().len())
-            .filter(|place| drawing.shows(&system.places()[*place]))
-            .map(|place| vec![place])
-            .collect(),
+        true => drawing.displacements(system).into_iter().map(|(_, place)| vec![place]).collect(),
         false => vec![places],
     };
     let unstable = unstable(table);

@@ -99,7 +99,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         known.all("loop", "joint or moved place", name)?;
     }
     if let Some(name) = values.text("against") {
-        Names::of_places(model).one("against", "mass", name)?;
+        Names::of_displacements(model).one("against", "mass", name)?;
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let wanted = wanted(values, model);
@@ -225,7 +225,8 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
         .collect();
     let mut names = wanted(values, &prepared.case.model);
     if names.is_empty() {
-        names = system.moved().iter().map(|place| place.name.clone()).collect();
+        let moved = system.moved().iter().filter(|place| !prepared.case.model.is_rotation(&place.name));
+        names = moved.map(|place| place.name.clone()).collect();
     }
     let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
     if values.flag("sum") == Some(true) {

@@ -11,7 +11,7 @@ use stickslip::model::{Mass, Model, System};
 
 /// Whether there is a mass whose peak could count.
 pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
-    if model.masses.is_empty() && model.places.is_empty() {
+    if model.masses.is_empty() && model.bodies.is_empty() && model.places.is_empty() {
         let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
         return Err(Complaint::new("kind", "the model has no mass, so no amplitude has a peak", help));
     }

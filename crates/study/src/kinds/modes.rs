@@ -2,7 +2,7 @@
 
 use super::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
 use super::wheel::{self, Around};
-use crate::columns::{amplitude_of, phase_of};
+use crate::columns::{amplitude_in, amplitude_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Table, Values as Cells};
 use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
@@ -96,8 +96,9 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         return Err(Complaint::new("amplitude", "the range is empty", "`from` must be below `to`"));
     }
     check_samples(values)?;
-    let (number, masses): (u64, u64) =
-        (values.count("mode").unwrap_or(1), model.masses.iter().map(|mass| mass.places().len() as u64).sum());
+    let number = values.count("mode").unwrap_or(1);
+    let of_masses = model.masses.iter().map(|mass| mass.places().len());
+    let masses = of_masses.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
         let message = format!("there is no mode {number}: the structure has {masses}");
         return Err(Complaint::new("mode", message, "count modes from 1, by rising frequency"));
@@ -133,8 +134,9 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
         let motions = point.places.iter().zip(point.phases());
-        for (place, (x, phase)) in prepared.system.places().iter().zip(motions) {
-            rows.number(&amplitude_of(place), x.norm());
+        let places = prepared.system.places().iter().zip(prepared.system.seen());
+        for ((place, along), (x, phase)) in places.zip(motions) {
+            rows.number(&amplitude_in(place, along.unit()), x.norm());
             rows.number(&phase_of(place), phase.to_degrees());
         }
         rows.integer("stretch", stretch);
@@ -251,7 +253,14 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
     let column = |place: &String| amplitude_of(place);
-    let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, system.places().iter().map(column)), "m");
+    let displacements: Vec<String> = system
+        .places()
+        .iter()
+        .zip(system.seen())
+        .filter(|(_, a)| !a.is_rotation())
+        .map(|(name, _)| name.clone())
+        .collect();
+    let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, displacements.iter().map(column)), "m");
     let stretches = drawing.stretches(table);
     let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
         Some(Cells::Integer(parts)) => parts.clone(),
@@ -260,7 +269,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let widest_of = |stretch: &Stretch| {
         let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
         let moves = |place: &&String| at_last(place).unwrap_or(0.0);
-        system.places().iter().max_by(|a, b| moves(a).total_cmp(&moves(b)))
+        displacements.iter().max_by(|a, b| moves(a).total_cmp(&moves(b)))
     };
     // draws in one band are of one place: that of the first
     let common = stretches.first().filter(|_| drawing.study.draws().is_some()).and_then(widest_of);
@@ -301,7 +310,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let mut panels = both(&stretches, "");
     if panels.len() + 2 * stretches.len() <= MOST_PANELS {
         panels.extend(
-            stretches.iter().flat_map(|stretch| wheels(drawing, table, system.places(), (stretch, stretches.len()))),
+            stretches.iter().flat_map(|stretch| wheels(drawing, table, &displacements, (stretch, stretches.len()))),
         );
     }
     Figure { panels, ..Figure::default() }

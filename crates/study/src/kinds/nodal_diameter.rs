@@ -178,7 +178,11 @@ fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
                 rows.integer(MODE, mode as u64 + 1);
                 rows.number(FREQUENCY, hertz(found.omega));
                 rows.number("damping_ratio", found.damping);
-                for (i, (_, place)) in places.iter().enumerate() {
+                for (i, (name, place)) in places.iter().enumerate() {
+                    // a mode by its unit modal mass has rotations in rad/(m √kg), beside displacements in 1/√kg
+                    if prepared.case.model.is_rotation(name) {
+                        continue;
+                    }
                     let at = shapes.get(mode).map(|shape| shape[i].to_polar());
                     rows.number(&shape_of(place), at.map_or(f64::NAN, |(size, _)| size));
                     rows.number(&phase_of(place), at.map_or(f64::NAN, |(_, phase)| phase.to_degrees()));
@@ -235,8 +239,10 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel>
             }
     };
     let frequencies = numbers(table, FREQUENCY, 0..table.rows());
-    let places: Vec<(String, String)> =
-        places(&case.model).into_iter().filter(|(name, _)| drawing.shows(name)).collect();
+    let places: Vec<(String, String)> = places(&case.model)
+        .into_iter()
+        .filter(|(name, _)| drawing.shows(name) && !case.model.is_rotation(name))
+        .collect();
     let wheel = |row: usize| {
         let (mode, diameter) = (modes[row], diameters[row]);
         let at = |column: &str| numbers(table, column, row..row + 1)[0];

@@ -139,8 +139,9 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
 pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
     let system = &prepared.system;
     for (place, along) in system.places().iter().zip(system.seen()) {
-        rows.number(&format!("{place}_displacement_m"), along.along(&sample.displacement));
-        rows.number(&format!("{place}_velocity_m_per_s"), along.along(&sample.velocity));
+        let (what, unit) = if along.is_rotation() { ("rotation", "rad") } else { ("displacement", "m") };
+        rows.number(&format!("{place}_{what}_{unit}"), along.along(&sample.displacement));
+        rows.number(&format!("{place}_velocity_{unit}_per_s"), along.along(&sample.velocity));
     }
     for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
         for (a, label) in joint.labels().enumerate() {
@@ -194,7 +195,8 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         };
         let mut panels = Vec::new();
         if !system.places().is_empty() {
-            let names = system.places().iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
+            let shown = drawing.displacements(&system);
+            let names = shown.iter().map(|(name, _)| name.as_str()).collect();
             panels.push(panel("displacement", "m", names, "displacement_m", 0));
         }
         if !system.joints().is_empty() {

@@ -5,7 +5,7 @@ use crate::key::{Key, Takes, optional};
 use crate::names::Names;
 use crate::values::Values;
 use crate::work::Prepared;
-use stickslip::model::Model;
+use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
 
 /// Stands for every mass, unless one has this name.
@@ -21,7 +21,7 @@ pub(super) const PEAK_OF: Key = optional(
 
 /// Whether it names masses of the model.
 pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let masses = Names::of_places(model);
+    let masses = Names::of_displacements(model);
     let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
     named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
 }
@@ -31,9 +31,9 @@ pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     let names = prepared.case.values.names("peak_of").unwrap_or_default();
     let places = &prepared.system.places();
     if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
-        return (0..places.len()).collect();
+        return displacements(&prepared.system);
     }
-    let masses = Names::of_places(&prepared.case.model);
+    let masses = Names::of_displacements(&prepared.case.model);
     let meant = names.iter().filter_map(|name| masses.all(PEAK_OF.name, "mass", name).ok()).flatten();
     let mut found: Vec<usize> = Vec::new();
     for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {
@@ -51,9 +51,16 @@ pub(super) fn peak_places(prepared: &Prepared) -> Vec<usize> {
     if !named.is_empty() {
         return named;
     }
-    let driven = prepared.case.model.forces.first().map(|force| &force.on);
+    let model = &prepared.case.model;
+    let driven = model.forces.iter().map(|force| &force.on).find(|on| !model.is_rotation(on));
     let driven = driven.and_then(|name| prepared.system.places().iter().position(|place| place == name));
-    vec![driven.unwrap_or(0)]
+    vec![driven.or_else(|| displacements(&prepared.system).first().copied()).unwrap_or(0)]
+}
+
+/// The places that are no rotations.
+pub(super) fn displacements(system: &System) -> Vec<usize> {
+    let seen = system.seen().iter().enumerate();
+    seen.filter(|(_, place)| !place.is_rotation()).map(|(place, _)| place).collect()
 }
 
 /// The largest amplitude among some places, m.

@@ -14,7 +14,7 @@ pub use tables::{Curve, MassCurve, curves};
 use super::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::orbits;
 use super::peak_of::{PEAK_OF, check_peak_of};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of, phase_of};
+use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_in, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::drawing::{MOST_CURVES, MOST_PANELS};
 use crate::info::KindInfo;
@@ -192,7 +192,7 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.end();
         }
         part.tables.push(peaks);
-        all.iter().filter(|found| found.leads()).for_each(|found| shape(prepared, found, &mut shapes));
+        all.iter().filter(|found| found.leads(&prepared.system)).for_each(|found| shape(prepared, found, &mut shapes));
         if work.study.wants(amplification::KEY.name)
             && let Err(why) = amplification::row(work, &all, &mut amplified)
         {
@@ -224,8 +224,9 @@ fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows
 fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(found.peak.omega));
-    for (place, of) in prepared.system.places().iter().zip(found.shape.chunks_exact(2)) {
-        rows.number(&amplitude_of(place), of[0]);
+    let places = prepared.system.places().iter().zip(prepared.system.seen());
+    for ((place, along), of) in places.zip(found.shape.chunks_exact(2)) {
+        rows.number(&amplitude_in(place, along.unit()), of[0]);
         rows.number(&phase_of(place), of[1]);
     }
     rows.reduced(prepared.system.reduction_evidence());
@@ -350,7 +351,8 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
     let mut ways = BothWays::of(&prepared.system);
     for (mut point, (kept, shape)) in curve {
         if let Some(ways) = &mut ways {
-            let amplitudes = kept.0.places.iter().map(|[amplitude, ..]| *amplitude);
+            let places = kept.0.places.iter().zip(prepared.system.seen());
+            let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length());
             ways.add_point(Point { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
         }
         stretch.add(point.omega, Some(kept));

@@ -272,7 +272,9 @@ fn compute(work: &Work<'_>) -> Computed {
             !stopped
         });
         // a motion without a sample has no largest displacement
-        for (place, (displacement, time)) in prepared.system.places().iter().zip(largest).filter(|_| sampled) {
+        let displacements = prepared.system.seen().iter().map(|along| !along.is_rotation());
+        let places = prepared.system.places().iter().zip(largest).zip(displacements).filter(|(_, counts)| *counts);
+        for (place, (displacement, time)) in places.map(|(of, _)| of).filter(|_| sampled) {
             extremes.varied(case);
             if work.several_frequencies() {
                 extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
@@ -319,7 +321,8 @@ fn read_off(
     rows: &mut Rows,
     summary: &mut Rows,
 ) -> Option<&'static str> {
-    let most = (0..decays.len()).max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
+    let displacements = (0..decays.len()).filter(|place| !prepared.system.seen()[*place].is_rotation());
+    let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
         return Some(
@@ -362,18 +365,19 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let panel = |title: String, rows: Range<usize>| {
         // draws in one panel have one unit
         let scope = if drawing.study.draws().is_some() { 0..motion.rows() } else { rows.clone() };
-        let all = system.places().iter().flat_map(|place| numbers(motion, &column(place), scope.clone()));
+        let shown = drawing.displacements(&system);
+        let places = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
+        let all = places.flat_map(|(place, _)| numbers(motion, &column(place), scope.clone()));
         let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
         let (y, factor) = drawing.axis(1, "displacement", highest, "m");
         let last = numbers(motion, TIME, scope.clone()).into_iter().fold(0.0, f64::max);
         let (x, x_factor) = drawing.axis(0, "time", last, "s");
         let times: Vec<f64> = numbers(motion, TIME, rows.clone()).iter().map(|time| time * x_factor).collect();
-        let line = |(i, place): (usize, &String)| {
+        let line = |(place, i): &(String, usize)| {
             let displacement = numbers(motion, &column(place), rows.clone());
-            Series::line(place, times.clone(), displacement.iter().map(|y| y * factor).collect(), i)
+            Series::line(place, times.clone(), displacement.iter().map(|y| y * factor).collect(), *i)
         };
-        let shown = system.places().iter().enumerate().filter(|(_, place)| drawing.shows(place));
-        Panel { title, x, y, series: shown.map(line).collect(), ..Panel::default() }
+        Panel { title, x, y, series: shown.iter().map(line).collect(), ..Panel::default() }
     };
     let of_case = |stretch: &Stretch, title: String| -> Vec<Panel> {
         let Some(drives) = drives else { return vec![panel(title, stretch.rows.clone())] };

@@ -36,7 +36,7 @@ impl Reader {
                     self.wrong_type(key, node);
                 }
                 (Takes::List(keys), Content::List(list)) => {
-                    let most = if name == "mass" { MOST_MASSES } else { MOST_ELEMENTS };
+                    let most = if matches!(name, "mass" | "body") { MOST_MASSES } else { MOST_ELEMENTS };
                     let mut elements = 0;
                     for (i, node) in list.iter().enumerate() {
                         match &node.value {
@@ -68,6 +68,7 @@ impl Reader {
                 _ => {}
             }
         }
+        lists.turn();
         for spring in &lists.spring {
             if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
                 let message = "a spring needs a stiffness, a damping, or both";

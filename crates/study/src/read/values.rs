@@ -170,8 +170,16 @@ impl Reader {
                 };
                 Some(Stated::Sums(list.iter().map(sum).collect::<Option<_>>()?))
             }
-            (Takes::Vector, Content::List(list)) if list.len() == 3 => {
-                Some(Stated::Vector(self.quantities(key.name, list, &node.location)?))
+            (Takes::Vector(dimension), Content::List(list)) if list.len() == 3 => {
+                Some(Stated::Vector(self.quantities(key.name, list, &node.location)?, *dimension, key.example))
+            }
+            (Takes::Quantities(dimension, within), Content::List(list)) => {
+                let list = self.quantities(key.name, list, &node.location)?;
+                Some(Stated::Quantities(list, *dimension, *within, key.example))
+            }
+            (Takes::Quantities(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+                let one = self.quantity(key.name, node)?;
+                Some(Stated::Quantities(vec![one], *dimension, *within, key.example))
             }
             (Takes::Table(keys), Content::Table(table)) => {
                 Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))

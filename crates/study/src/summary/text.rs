@@ -159,6 +159,9 @@ impl fmt::Display for ModelSummary {
         for (name, text) in self.structure.iter().flat_map(|structure| structure.lines()) {
             line(name, &text)?;
         }
+        for (number, body) in self.bodies.iter().enumerate() {
+            line(if number == 0 { "bodies" } else { "" }, body)?;
+        }
         if self.dofs > 0 {
             line(if joints > 0 { "joints free" } else { "modes" }, &self.modes(&self.free))?;
             if joints > 0 {

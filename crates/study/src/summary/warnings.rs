@@ -200,7 +200,7 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
     from(&study.method);
     let lists = &study.structure.lists;
     study.structure.matrices.iter().for_each(|matrices| from(&matrices.table));
-    for list in [&lists.place, &lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
+    for list in lists.all() {
         list.iter().for_each(&mut from);
     }
     if let Some(disk) = &lists.disk {
@@ -256,7 +256,7 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let mut turned: BTreeSet<usize> =
         study.parameters.iter().flat_map(|parameter| parameter.quantity.expression.angles()).collect();
     let lists = &study.structure.lists;
-    for list in [&lists.place, &lists.mass, &lists.spring, &lists.joint, &lists.force, &lists.motion] {
+    for list in lists.all() {
         for table in list {
             table.each_quantity(&mut |_, quantity, _| turned.extend(quantity.expression.angles()));
         }

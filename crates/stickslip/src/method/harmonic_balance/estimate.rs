@@ -40,7 +40,7 @@ pub(super) fn estimate(
     let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
     let unhindered = |place: &Axis| {
         let moving = fine.harmonics.iter().zip(&finer.free).filter(|(h, _)| **h > 0);
-        moving.map(|(_, free)| place.along_complex(free).norm_sqr()).sum::<f64>()
+        moving.map(|(_, free)| length(place, free).norm_sqr()).sum::<f64>()
     };
     let largest = seen.iter().map(unhindered).fold(0.0, f64::max);
     let (mut distance, mut size) = (0.0f64, CANCELS * CANCELS * largest);
@@ -54,8 +54,8 @@ pub(super) fn estimate(
         (distance, size) = (distance.max(d), size.max(s));
     };
     for place in seen {
-        let missing = above.iter().map(|x| place.along_complex(x).norm_sqr()).sum();
-        let at = |places: &[DVector<Complex64>], k: usize| place.along_complex(&places[k]);
+        let missing = above.iter().map(|x| length(place, x).norm_sqr()).sum();
+        let at = |places: &[DVector<Complex64>], k: usize| length(place, &places[k]);
         compare(&|k| at(coarse.places, k), &|k| at(fine.places, k), missing);
     }
     let (few, many) = (coarse.harmonics.len(), fine.harmonics.len());
@@ -70,6 +70,11 @@ pub(super) fn estimate(
         1.0
     };
     if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
+}
+
+/// The motion of a place as a length, m.
+fn length(place: &Axis, motion: &DVector<Complex64>) -> Complex64 {
+    place.along_complex(motion) * place.length()
 }
 
 /// What a solution lacks at the resonances above its harmonics: the motions of the places there, under the forces that it has.

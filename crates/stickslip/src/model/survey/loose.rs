@@ -1,6 +1,6 @@
 //! Bodies that no spring holds.
 
-use super::super::{GROUND, Mass, Model, Place, System};
+use super::super::{Body, GROUND, Mass, Model, Place, System};
 use super::Loose;
 use super::hold::{Hold, Stuck};
 use std::collections::{BTreeSet, HashMap};
@@ -16,7 +16,8 @@ impl Model {
         let held = system.reduced().is_none_or(|component| component.free() == 0);
         let own = self.places.iter().filter(|place| place.of.is_none());
         let of_component: Vec<String> = own.flat_map(Place::places).collect();
-        let mut places: Vec<String> = self.masses.iter().flat_map(Mass::places).collect();
+        let of_bodies = self.bodies.iter().flat_map(Body::places);
+        let mut places: Vec<String> = self.masses.iter().flat_map(Mass::places).chain(of_bodies).collect();
         for (i, place) in places.iter().enumerate() {
             index.entry(place.clone()).or_insert(i + 1);
         }
@@ -28,9 +29,14 @@ impl Model {
             places.extend(of_component);
         }
         let mut bodies = Groups::new(component + 1);
+        for body in self.bodies.iter().map(Body::places) {
+            body.windows(2).for_each(|pair| bodies.join((index[&pair[0]], index[&pair[1]])));
+        }
         for place in &self.places {
             // another view of a node takes hold of the node
-            let node = self.masses.iter().find(|mass| place.of.as_ref() == Some(&mass.name)).map(Mass::places);
+            let mass = self.masses.iter().find(|mass| place.of.as_ref() == Some(&mass.name)).map(Mass::places);
+            let body = || self.bodies.iter().find(|body| place.of.as_ref() == Some(&body.name)).map(Body::places);
+            let node = mass.or_else(body);
             let node: Vec<usize> = node.unwrap_or_default().iter().map(|name| index[name]).collect();
             node.windows(2).for_each(|pair| bodies.join((pair[0], pair[1])));
             if let Some(first) = node.first() {

@@ -82,7 +82,7 @@ impl Model {
             .filter(|joint| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty())
             .map(|joint| joint.at.as_slice())
             .collect();
-        if self.substructure.is_some() {
+        if self.substructure.is_some() || self.moves_bodies() {
             let free = Linear::of_matrices(system.structure().full(), &[], &[]);
             let stuck = |held: &[&Link]| Linear::of_matrices(system.structure().full(), held, &rigid);
             let (stuck, closed) = with_faces(&held, &faces, &stuck);

@@ -6,7 +6,7 @@
 use super::hold::{Hold, Stuck};
 use super::linear::{LARGEST, Linear, Link};
 use super::{LinearMode, Model, ModelError, Modes, System};
-use crate::model::{Mass, Place};
+use crate::model::{Body, Mass, Place};
 use crate::structure::{Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -203,7 +203,7 @@ impl Model {
         let Some(ring) = self.ring.filter(|ring| ring.equal) else { return Ok(None) };
         let system = self.assemble()?;
         let (sectors, n) = (ring.sectors, system.dofs() / ring.sectors);
-        if self.substructure.is_some() {
+        if self.substructure.is_some() || self.moves_bodies() {
             return Ok(of_matrices(&system, sectors, lowest, &self.sector_axes(&system)));
         }
         if n == 0 || 2 * n > LARGEST {
@@ -253,7 +253,8 @@ impl Model {
         let Some(ring) = self.ring else { return Vec::new() };
         let own = |all: usize| all / ring.sectors.max(1);
         let places = self.places[..own(self.places.len())].iter().flat_map(Place::places);
-        places.chain(self.masses[..own(self.masses.len())].iter().flat_map(Mass::places)).collect()
+        let masses = self.masses[..own(self.masses.len())].iter().flat_map(Mass::places);
+        places.chain(masses).chain(self.bodies[..own(self.bodies.len())].iter().flat_map(Body::places)).collect()
     }
 
     /// How these follow from the coordinates of the ring.

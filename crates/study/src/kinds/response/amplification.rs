@@ -1,6 +1,6 @@
 //! Amplification: the largest amplitude of a mistuned disk over that of the same disk tuned, each at its own peak.
 
-use super::super::peak_of::{named_places, worst};
+use super::super::peak_of::{displacements, named_places, worst};
 use super::peaks::Found;
 use super::tables;
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
@@ -81,7 +81,7 @@ fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
     let system = case.model.assemble().map_err(|error| error.to_string())?;
     let mut places = named_places(prepared);
     if places.is_empty() {
-        places = (0..system.places().len()).collect();
+        places = displacements(&system);
     }
     let quantities = |orbit: &Orbit| vec![worst(orbit, &places)];
     let method = &*prepared.method;

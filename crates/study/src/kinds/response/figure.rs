@@ -13,8 +13,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
         return Figure::default();
     };
-    let places = system.places().iter().cloned().zip(0..);
-    let shown: Vec<(String, usize)> = places.filter(|(name, _)| drawing.shows(name)).collect();
+    let shown = drawing.displacements(&system);
     // with `output = "joint_force"` only
     let names = system.joints().iter().flat_map(|joint| joint.labels());
     let joints: Vec<String> =

@@ -5,7 +5,8 @@ use crate::work::{Prepared, Work};
 use stickslip::curve::both_ways::stretches;
 use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
-use stickslip::orbit::Orbit;
+use stickslip::model::System;
+use stickslip::orbit::{Orbit, PlaceMotion};
 use stickslip_numerics::leading::leading;
 
 /// Amplitudes below this share of the largest are rounding.
@@ -37,7 +38,9 @@ impl Sought {
     pub(super) fn amplitudes(&self, orbit: &Orbit) -> Vec<f64> {
         let Self { named, .. } = self;
         if named.is_empty() {
-            return orbit.places.iter().map(|place| place.amplitude()).collect();
+            // a rotation has no height among lengths: no peak of it is sought
+            let height = |place: &PlaceMotion| if place.radius.is_some() { 0.0 } else { place.amplitude() };
+            return orbit.places.iter().map(height).collect();
         }
         std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
     }
@@ -85,8 +88,10 @@ pub(super) struct Found {
 
 impl Found {
     /// Whether no place moves more there; of those that move alike the first does.
-    pub(super) fn leads(&self) -> bool {
-        leading(self.shape.iter().copied().step_by(2)) == Some(self.mass)
+    pub(super) fn leads(&self, system: &System) -> bool {
+        let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
+        leading(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
+            == Some(self.mass)
     }
 }
 

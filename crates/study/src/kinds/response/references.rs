@@ -1,6 +1,6 @@
 //! The linear references of a response: the same structure with all joints free, and with all joints stuck.
 
-use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
+use crate::columns::{FREQUENCY as DRIVE, amplitude_in};
 use crate::linear::Reference;
 use crate::note::WARNING;
 use crate::rows::Rows;
@@ -46,10 +46,10 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
     for (i, omega) in omegas.iter().enumerate() {
         rows.number(DRIVE, hertz(*omega));
         for (what, curve) in &curves {
-            for (place, name) in prepared.system.places().iter().enumerate() {
+            for (place, (name, along)) in prepared.system.places().iter().zip(prepared.system.seen()).enumerate() {
                 let point = curve.as_ref().and_then(|curve| curve[i].as_ref());
                 let amplitude = point.map_or(f64::NAN, |amplitudes| amplitudes[place]);
-                rows.number(&amplitude_of(&format!("{name}_{what}")), amplitude);
+                rows.number(&amplitude_in(&format!("{name}_{what}"), along.unit()), amplitude);
             }
         }
         rows.reduced(prepared.system.reduction_evidence());

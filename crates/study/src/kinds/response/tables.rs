@@ -35,7 +35,7 @@ pub struct Curve {
     pub varied: Vec<VariedValue>,
     /// Drive frequencies, Hz, in the order of the table.
     pub frequency: Vec<f64>,
-    /// What every mass does, in the order of the model.
+    /// What every place with a displacement does, in the order of the model; rotations of bodies are in the table.
     pub masses: Vec<MassCurve>,
 }
 
@@ -93,7 +93,9 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsErr
     let keys = study.varied().len();
     let frequency = curve.numbers(FREQUENCY)?;
     let system = study.case(0).ok().and_then(|case| case.model.assemble().ok());
-    let places = system.ok_or_else(|| curve.other_rows())?.places().to_vec();
+    let system = system.ok_or_else(|| curve.other_rows())?;
+    let displacements = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
+    let places: Vec<String> = displacements.map(|(place, _)| place.clone()).collect();
     let amplitudes =
         places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;
     let stretches = results.stretches(&curve, keys)?;
