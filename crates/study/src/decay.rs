@@ -37,8 +37,10 @@ pub struct Decay {
 }
 
 impl Decay {
-    /// Takes in a sample: time (s), displacement (m), velocity (m/s). A turning point since the last sample is located by the motion between
-    /// both, or by the cubic through them where that is not given. The cubic errs where the acceleration jumps, as at the turning points of
+    /// Takes in a sample: time (s), displacement (m), velocity (m/s). A turning point since the
+    /// last sample is located by the motion between
+    /// both, or by the cubic through them where that is not given. The cubic errs where the
+    /// acceleration jumps, as at the turning points of
     /// dry friction.
     pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&Motion<'_>>) {
         match self.last {
@@ -114,7 +116,8 @@ fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64
     }
 }
 
-/// Time and displacement where a motion between two times first has no velocity in the direction of `v0`, which it has at the first of them: where it
+/// Time and displacement where a motion between two times first has no velocity in the direction
+/// of `v0`, which it has at the first of them: where it
 /// turns, or begins to stick.
 fn turning_point(motion: &Motion<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
     for _ in 0..HALVINGS {

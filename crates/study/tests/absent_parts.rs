@@ -1,4 +1,5 @@
-//! Random studies in which parts of a model are absent, every place is moved, a node has one direction, or something is stated twice: `check` and `run`
+//! Random studies in which parts of a model are absent, every place is moved, a node has one
+//! direction, or something is stated twice: `check` and `run`
 //! refuse them with words, or run to the end with whole results.
 //!
 //! `STICKSLIP_ABSENT_PARTS=2000` runs more of them, `STICKSLIP_RANDOM_SEED=…` others.
@@ -285,7 +286,8 @@ fn studies_with_absent_parts_end_whole_or_are_refused() {
     assert!(2 * ran >= count, "{ran} of {count} run to the end");
 }
 
-/// A loop of a contact with a preload whose two directions are imposed, so that nothing is free to move.
+/// A loop of a contact with a preload whose two directions are imposed, so that nothing is free to
+/// move.
 #[test]
 fn a_contact_that_is_moved_alone_has_its_loop() {
     let text = r#"

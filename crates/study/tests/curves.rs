@@ -223,7 +223,8 @@ vary = { Ft = ["2 N", "4 N"] }
     }
 }
 
-/// The amplitudes of a branch where it passes a frequency (rad/s), in its order, on the line between its points.
+/// The amplitudes of a branch where it passes a frequency (rad/s), in its order, on the line
+/// between its points.
 fn passed(branch: &Dataset, omega: f64) -> Vec<f64> {
     let rows = table(branch, "branch");
     let at: Vec<f64> = rows.numbers("frequency_Hz").unwrap().iter().map(|f| f * std::f64::consts::TAU).collect();
@@ -246,8 +247,10 @@ fn near(found: &[f64], expected: &[f64]) {
     assert!(all, "{found:?} instead of {expected:?}");
 }
 
-/// `x'' + 0.02 x' + x - 0.05 x³ = 0.05 cos ωt`, in twentieths of x, which softens: three orbits between 0.805663 and 0.957875 rad/s. A range that begins
-/// there has them all, whatever its direction. The values are those of a harmonic balance of its own with arc length, 15 harmonics, in NumPy.
+/// `x'' + 0.02 x' + x - 0.05 x³ = 0.05 cos ωt`, in twentieths of x, which softens: three orbits
+/// between 0.805663 and 0.957875 rad/s. A range that begins
+/// there has them all, whatever its direction. The values are those of a harmonic balance of its
+/// own with arc length, 15 harmonics, in NumPy.
 #[test]
 fn a_branch_that_begins_between_folds_covers_its_range() {
     let soft = |frequency: &str| {
@@ -284,7 +287,8 @@ fn a_branch_that_begins_between_folds_covers_its_range() {
     }
 }
 
-/// The same oscillator with a spring that hardens: three orbits between 1.040154 and 1.094317 rad/s, and the peak above where the range begins.
+/// The same oscillator with a spring that hardens: three orbits between 1.040154 and 1.094317
+/// rad/s, and the peak above where the range begins.
 #[test]
 fn a_branch_that_begins_between_folds_has_the_peak_of_its_range() {
     let study = "kind = \"branch\"\nfrequency = { from = \"1.06 rad/s\", to = \"1.3 rad/s\" }";
@@ -315,8 +319,10 @@ fn a_branch_without_a_range_fails_with_words() {
     assert!(same.failures[0].reason.contains("a branch needs a range"), "{:?}", same.failures);
 }
 
-/// A mass of 1 kg on 2 N/m and bristles of 1e5 N/m: friction of 1 N holds it until it has no vibration left between 10 µm and half a metre. Its mode is followed
-/// from small amplitudes. Frequencies and damping ratios are those of free modes of 9 and 15 harmonics in SciPy, which agree to 5e-6; at rest `lugre` has
+/// A mass of 1 kg on 2 N/m and bristles of 1e5 N/m: friction of 1 N holds it until it has no
+/// vibration left between 10 µm and half a metre. Its mode is followed
+/// from small amplitudes. Frequencies and damping ratios are those of free modes of 9 and 15
+/// harmonics in SciPy, which agree to 5e-6; at rest `lugre` has
 /// `(s1 + s2)/(2 √((s0 + k) m))` = 0.500628 at 50.3297 Hz.
 #[test]
 fn stiff_bristles_on_a_soft_spring_have_their_mode() {

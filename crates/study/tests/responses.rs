@@ -793,8 +793,10 @@ fn contact_is_said_of_what_has_faces() {
     assert!(words.iter().any(|w| w == "stick") && words.iter().any(|w| w == "slip+"));
 }
 
-/// Coulomb friction shifts the centre of each swing and not the time between two turning points: every cycle of a free decay has the frequency
-/// `ω √(1 - ζ²)/2π` of the oscillator without it, whatever the samples. About the centre `F/k` a swing shrinks by `e^(-π ζ/√(1 - ζ²))`.
+/// Coulomb friction shifts the centre of each swing and not the time between two turning points:
+/// every cycle of a free decay has the frequency
+/// `ω √(1 - ζ²)/2π` of the oscillator without it, whatever the samples. About the centre `F/k` a
+/// swing shrinks by `e^(-π ζ/√(1 - ζ²))`.
 #[test]
 fn every_cycle_of_a_decay_has_its_frequency() {
     let (m, k, c, friction, start) = (2.0, 800.0, 4.0, 3.0, 0.1);
@@ -830,7 +832,8 @@ time_step = "{step}"
         let mut turn = start;
         for (frequency, amplitude) in frequencies.iter().zip(amplitudes) {
             assert!((frequency / expected - 1.0).abs() < 1e-9, "{step}: {frequency} instead of {expected}");
-            // turning points on either side: each centre is F/k towards the side that the swing comes from
+            // turning points on either side: each centre is F/k towards the side that the swing
+            // comes from
             let next = |turn: f64| shrinks * (turn - friction / k) - friction / k;
             let (second, third) = (next(turn), next(next(turn)));
             let mean = 0.5 * (0.5 * (turn + second) + 0.5 * (second + third));

@@ -3,8 +3,10 @@
 //! At small amplitude joints stick and the mode is the linear one with their springs, or with rigid contacts closed; at large amplitude
 //! it is the linear one without joints. A mode is *followed* from an amplitude at which friction hardly matters, by arc length, in steps
 //! that its own curve decides: neither the range that is asked for nor its points change them. Where all joints stick, every smaller motion
-//! is a multiple of the last one. The points above are solved for, each from the followed states beside it. Where a mode ends above the smallest
-//! amplitude, what lies below is followed from there upwards, from the mode of the same number with all joints as they hold in small motion.
+//! is a multiple of the last one. The points above are solved for, each from the followed states
+//! beside it. Where a mode ends above the smallest
+//! amplitude, what lies below is followed from there upwards, from the mode of the same number
+//! with all joints as they hold in small motion.
 //!
 //! Where friction pulls two frequencies together, two modes nearly become one: [`Mode::merges`]. Below there are two again, in other motions,
 //! and little decides which mode goes on to which, the number of harmonics for example. There the curve may also turn: its amplitude grows
@@ -151,7 +153,8 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     Ok(mode)
 }
 
-/// The curve of a mode: what is followed from its large end, and from its small end where the other one does not come there.
+/// The curve of a mode: what is followed from its large end, and from its small end where the
+/// other one does not come there.
 struct Followed {
     falling: Option<ModeCurve>,
     rising: Option<ModeCurve>,
@@ -160,7 +163,8 @@ struct Followed {
 impl Followed {
     fn new(equations: &mut ModeEquations<'_>, request: ModeRequest) -> Self {
         let (low, high) = request.range;
-        // the only mode is that of its number at both ends: of a law with memory, which is dear to follow through large motions, its small end comes first
+        // the only mode is that of its number at both ends: of a law with memory, which is dear to
+        // follow through large motions, its small end comes first
         let rising = match equations.is_alone_with_memory() {
             true => ModeCurve::from_rest(equations, request.mode, request.range),
             false => None,

@@ -51,7 +51,8 @@ struct Onward<'a> {
     spent: bool,
 }
 
-/// The end of a branch: its last orbit that was found, and a frequency (rad/s) close to that at which it has none.
+/// The end of a branch: its last orbit that was found, and a frequency (rad/s) close to that at
+/// which it has none.
 struct End {
     last: Last,
     beyond: f64,
@@ -242,7 +243,8 @@ mod tests {
             onward.between(from + beyond, Some(&start)).unwrap();
             count() - before
         };
-        // from the orbit itself, and again beyond the end that is known; nearer to it the way is gone anew
+        // from the orbit itself, and again beyond the end that is known; nearer to it the way is
+        // gone anew
         let found = [1.0, 0.9, 0.5].map(&mut searches);
         assert!(found[0] > 6 && found[1..] == [1, 1], "{found:?}");
         assert!(searches(0.2001) > 1);

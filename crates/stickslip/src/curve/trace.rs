@@ -3,8 +3,10 @@
 //! A branch is followed around turning points; its maxima are refined. A kink (the onset of slip) is stepped over: the corrector
 //! converges on either side of it, with steps that are halved until it does, or with a search of its own a little further on.
 //!
-//! Where several orbits exist at an end of the range, the curve leaves the range there and may come back on another orbit. It is followed outside as
-//! well, up to half of the range beyond either end; its points outside are not reported. What part of the range it still does not have is sought from
+//! Where several orbits exist at an end of the range, the curve leaves the range there and may
+//! come back on another orbit. It is followed outside as
+//! well, up to half of the range beyond either end; its points outside are not reported. What part
+//! of the range it still does not have is sought from
 //! an orbit at the other end.
 
 use crate::method::harmonic_balance::{BranchEquations, HarmonicBalance};
@@ -44,7 +46,8 @@ pub struct TracePoint {
 /// A branch.
 #[derive(Debug, Clone)]
 pub struct Branch {
-    /// Its points in the order of the arc. Two in a row at the same end of the range are joined by the curve outside of it, or belong to two curves.
+    /// Its points in the order of the arc. Two in a row at the same end of the range are joined by
+    /// the curve outside of it, or belong to two curves.
     pub points: Vec<TracePoint>,
     /// Refined maxima of the quantity: (parameter, value).
     pub peaks: Vec<(f64, f64)>,
@@ -124,7 +127,8 @@ impl Way {
         }
     }
 
-    /// From a point at a border of the range out of it: where the curve comes back, and the steps from there.
+    /// From a point at a border of the range out of it: where the curve comes back, and the steps
+    /// from there.
     fn excursion(
         equations: &mut BranchEquations<'_>,
         (x, border): (Vec<f64>, f64),

@@ -4,7 +4,8 @@
 //! return, exactly for laws that are exact and by implicit integration for others. How far it comes back from the start is the return
 //! defect; its derivative is the return map that stability asks for, where no theorem answers it ([`System::contracts`]).
 //!
-//! A ring in a travelling wave returns to itself, turned by some sectors, after a fraction of the period already.
+//! A ring in a travelling wave returns to itself, turned by some sectors, after a fraction of the
+//! period already.
 
 use super::assembly::NEAR_REST;
 use super::flow::Flow;
@@ -202,7 +203,8 @@ impl Judge {
     }
 }
 
-/// After which share of the period a motion comes back to its start, and as what: its opposite, or a ring turned by some sectors.
+/// After which share of the period a motion comes back to its start, and as what: its opposite, or
+/// a ring turned by some sectors.
 struct Return {
     /// Share of the period.
     part: f64,
@@ -222,7 +224,8 @@ impl Return {
         match (symmetry, system.cyclic()) {
             (Symmetry::HalfPeriod, _) => Return { part: 0.5, sign: -1.0, ..whole },
             (Symmetry::FullPeriod, Some(Cyclic { sectors, order })) if order > 0 => {
-                // a sector does what the first one does, earlier by `order/sectors` of a period for every sector between them
+                // a sector does what the first one does, earlier by `order/sectors` of a period
+                // for every sector between them
                 let (mut a, mut b) = (sectors, order);
                 while b > 0 {
                     (a, b) = (b, a % b);
@@ -235,7 +238,8 @@ impl Return {
         }
     }
 
-    /// Where a coordinate of a state stands after a turn by so many sectors: displacements, velocities and states of joints stand sector by sector.
+    /// Where a coordinate of a state stands after a turn by so many sectors: displacements,
+    /// velocities and states of joints stand sector by sector.
     fn place(&self, at: usize, (dofs, states): (usize, usize), turned: usize) -> usize {
         let (first, length) = match at / dofs.max(1) {
             0 => (0, dofs),
@@ -367,7 +371,8 @@ mod tests {
         assert_eq!(orbit.return_defect(), Some(orbit.evidence.residual));
     }
 
-    /// A ring of six nodes in a plane with contacts between them, whose wave goes round twice: known to be one, it is followed for a third of the period, and is
+    /// A ring of six nodes in a plane with contacts between them, whose wave goes round twice:
+    /// known to be one, it is followed for a third of the period, and is
     /// told the same as for the whole of it.
     #[test]
     fn a_travelling_wave_returns_after_a_part_of_the_period() {
@@ -398,7 +403,8 @@ mod tests {
         let (part, all) = (judged(&wave), judged(&whole));
         let largest = |judged: &Judged| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
         let (of_part, of_all) = (largest(&part), largest(&all));
-        // the motion that is followed is beside the orbit by the defect, in which the parts of the period differ
+        // the motion that is followed is beside the orbit by the defect, in which the parts of the
+        // period differ
         let defect = all.defect.unwrap();
         assert!(defect > 1e-9 && defect < 1e-2, "{defect}");
         assert!((of_part - of_all).abs() < 10.0 * defect * of_all, "{of_part} {of_all} {defect}");

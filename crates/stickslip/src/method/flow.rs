@@ -20,7 +20,8 @@ pub(crate) trait Flow: Send {
     fn energy_scale(&self) -> f64;
     /// Sets the error per step, relative to the state, of a flow that chooses its steps by it.
     fn set_tolerance(&mut self, _tolerance: f64) {}
-    /// Takes only this share of the steps of a run, of a flow in equal steps: a run that is as much shorter then has steps of the same length.
+    /// Takes only this share of the steps of a run, of a flow in equal steps: a run that is as
+    /// much shorter then has steps of the same length.
     fn set_share(&mut self, _share: f64) {}
     /// Runs from `state`, which becomes the end state, over `duration` (s) from the instant at which the drive has phase zero. `sensitivity`,
     /// if given, is multiplied from the left by the derivative of the end state with respect to the initial state.

@@ -93,7 +93,8 @@ pub struct Instant<'a> {
     pub omega: f64,
     /// The state.
     pub state: &'a Sample,
-    /// The state at any time (s) between the sample before this one and this one, by the motion itself.
+    /// The state at any time (s) between the sample before this one and this one, by the motion
+    /// itself.
     pub since: &'a dyn Fn(f64) -> Sample,
 }
 

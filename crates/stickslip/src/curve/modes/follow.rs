@@ -75,7 +75,8 @@ const OVERDAMPED: f64 = 10.0;
 /// Harmonics times samples of all steps that are spent on such motions: two seconds or so. Rigid friction that is followed to a nanometre takes
 /// thousands of steps, of which nobody has anything where each is dear.
 const CREEPING: usize = 8_000_000;
-/// Steps of laws with memory that a curve may take: ten seconds or so. A curve of one joint takes a few millions.
+/// Steps of laws with memory that a curve may take: ten seconds or so. A curve of one joint takes
+/// a few millions.
 const MARCHED: usize = 4_000_000;
 /// Arc lengths, see [`ModeEquations::step`]: the longest step changes the amplitude by up to a half, or a fifth of the shape.
 const LONGEST: f64 = 0.2;
@@ -208,7 +209,8 @@ impl ModeCurve {
         path
     }
 
-    /// Follows mode `index` from where all joints hold as in small motion, at the modal amplitude `low`, until it is above `high` or no step goes on. `None`
+    /// Follows mode `index` from where all joints hold as in small motion, at the modal amplitude
+    /// `low`, until it is above `high` or no step goes on. `None`
     /// where no motion is found there.
     pub(super) fn from_rest(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Option<Self> {
         equations.mixes = false;

@@ -13,7 +13,8 @@ const EQUAL: f64 = 1e-7;
 const SQUARE: f64 = 64.0 * f64::EPSILON;
 /// Share of the size of a mode below which nothing is read off it.
 const FAINT_PLACE: f64 = 1e-6;
-/// Rounds in which the stiffness of joints in small motion, which may depend on the frequency, and the frequency find each other.
+/// Rounds in which the stiffness of joints in small motion, which may depend on the frequency, and
+/// the frequency find each other.
 const ROUNDS: usize = 5;
 
 /// A linear mode of the structure without its joints.
@@ -113,7 +114,8 @@ impl ModeEquations<'_> {
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
     }
 
-    /// The linear mode of this number with all joints as they hold in small motion, by rising frequency, as a motion of amplitude `a`: the start of a mode
+    /// The linear mode of this number with all joints as they hold in small motion, by rising
+    /// frequency, as a motion of amplitude `a`: the start of a mode
     /// from its small end. `None` where friction is rigid, which holds without a stiffness.
     pub fn at_rest(&self, index: usize, a: f64) -> Option<ModeState> {
         if !self.contacts.is_empty() {

@@ -160,7 +160,8 @@ impl Port {
             && self.members.iter().zip(&other.members).all(alike)
     }
 
-    /// Complex stiffness of small motions about rest at a frequency (rad/s), axes × axes, N/m, of a motion port.
+    /// Complex stiffness of small motions about rest at a frequency (rad/s), axes × axes, N/m, of
+    /// a motion port.
     pub fn at_rest(&self, omega: f64) -> DMatrix<Complex64> {
         match &self.kernel {
             Kernel::Step(law) | Kernel::Rate(law) => crate::method::guess::at_rest(&**law, omega),
