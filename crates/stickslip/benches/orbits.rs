@@ -3,9 +3,9 @@
 use divan::Bencher;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, CoulombArctan};
-use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
-use stickslip::model::{System, example};
+use stickslip::law::{Coulomb, CoulombArctan, Iwan, SharedLaw, Stribeck};
+use stickslip::method::{Method, auto::Auto, event_driven::EventDriven, shooting::Shooting};
+use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
 
 fn main() {
     divan::main();
@@ -53,4 +53,38 @@ fn smooth_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let mut solver = Shooting::default().solver(&system).unwrap();
     let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().start;
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
+}
+
+/// A mass of 1 kg on a spring of 10 N/mm and a damper of 3 N s/m under 6 N, with a law to the ground.
+fn mass(law: SharedLaw) -> System {
+    let between = || ["m".to_owned(), GROUND.to_owned()];
+    let model = Model {
+        masses: vec![Mass::new("m", 1.0)],
+        springs: vec![Spring { between: between(), stiffness: 1e4, damping: 3.0 }],
+        joints: vec![Joint { name: "j".to_owned(), between: between(), law }],
+        forces: vec![Force { on: "m".to_owned(), amplitude: 6.0, phase: 0.0, harmonic: 1 }],
+        ..Model::default()
+    };
+    model.assemble().unwrap()
+}
+
+/// One orbit as `auto` finds it, started from the orbit 0.05 Hz below.
+fn warm(bencher: Bencher, system: &System, hertz: f64) {
+    let mut solver = Auto.solver(system).unwrap();
+    let start = solver.orbit(TAU * (hertz - 0.05), None).unwrap().start;
+    bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
+}
+
+/// Falling friction that sticks (4, 8 Hz), turns at once (12 Hz) and slides far (15 Hz).
+#[divan::bench(args = [4, 8, 12, 15], sample_count = 20)]
+fn stribeck_orbit_warm(bencher: Bencher, hertz: u32) {
+    let law = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.02 });
+    warm(bencher, &mass(law), f64::from(hertz));
+}
+
+/// The distribution itself (0) and 32 and 300 sliders in its place, beyond full slip.
+#[divan::bench(args = [0, 32, 300], sample_count = 20)]
+fn iwan_orbit_warm(bencher: Bencher, elements: u32) {
+    let law = Arc::new(Iwan { stiffness: 5e3, limit: 4.0, chi: -0.5, beta: 0.3, elements });
+    warm(bencher, &mass(law), 17.0);
 }

@@ -145,6 +145,8 @@ fn laws() -> String {
         let says = [
             ("sliders", pieces.iter().any(|piece| matches!(piece, law::Piece::Slider(_)))),
             ("stops", pieces.iter().any(|piece| matches!(piece, law::Piece::Stop { .. }))),
+            ("first loading", law.masing().is_some()),
+            ("slip curve", law.sliding().is_some()),
             ("resolvent", law.prox().is_some()),
             ("step", law.step().is_some()),
             ("rates", law.rate().is_some()),

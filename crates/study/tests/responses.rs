@@ -506,18 +506,18 @@ fn the_high_branch_goes_on_whatever_the_points_are() {
     }
 }
 
-/// `auto` goes from event to event where friction has two limits, and by harmonic balance where it falls with velocity: one table has what either tells.
+/// `auto` goes from event to event where Iwan's distribution is a few sliders, and by harmonic balance where it is itself: one table has what either tells.
 #[test]
 fn cases_of_two_methods_stand_in_one_table() {
-    let falling = r#"kind = "stribeck", limit = "1 N", static_limit = "1.2 N", velocity = "vs""#;
+    let law = r#"kind = "iwan", stiffness = "2 N/mm", limit = "1 N", chi = -0.5, beta = 0.3, elements = "n""#;
     let rest = r#"
 [parameters]
-vs = "0 m/s"
+n = 4
 [study]
 kind = "response"
 frequency = { from = "12 Hz", to = "20 Hz", points = 3 }
-vary = { vs = ["0 mm/s", "200 mm/s", "0 mm/s"] }"#;
-    let found = dataset(&one_mass("10 N/mm", "2 N s/m", falling, "3 N", rest));
+vary = { n = [4, 0, 4] }"#;
+    let found = dataset(&one_mass("10 N/mm", "2 N s/m", law, "3 N", rest));
     let curve = &found.tables[0];
     assert_eq!(curve.rows(), 9);
     assert!(curve.columns.iter().all(|column| column.values.len() == 9));

@@ -74,6 +74,7 @@ pub fn any_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
         Range::ZeroOrMore => around(random, value) * f64::from(random.unit() > 0.15),
         Range::Any => around(random, value) * if random.unit() < 0.3 { -1.0 } else { 1.0 },
         Range::Within(least, most) => random.between(least.max(-10.0), most.min(10.0)),
+        Range::UpTo(most) => random.below(most.min(2 * value as u32) as usize + 1) as f64,
         Range::Count(most) => 1.0 + random.below(most.min(2 * value as u32) as usize) as f64,
     })
 }

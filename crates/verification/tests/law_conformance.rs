@@ -77,6 +77,7 @@ fn parameters_out_of_range_are_refused_with_their_key() {
                 Range::ZeroOrMore => wrong.push(-1e-9),
                 Range::Any => {}
                 Range::Within(least, most) => wrong.extend([least - 1e-9, most + 1e-9]),
+                Range::UpTo(most) => wrong.extend([-1.0, 1.5, f64::from(most) + 1.0]),
                 Range::Count(most) => wrong.extend([0.0, -1.0, 1.5, f64::from(most) + 1.0]),
             }
             for value in wrong {

@@ -3,7 +3,7 @@
 //! `f = limit · Sgn(u')`: any force in `[-limit, limit]` while the faces stick, `±limit` while they slip.
 //! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau (1988).
 
-use super::{CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, SharedLaw};
+use super::{CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, SharedLaw, Sliding};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -50,6 +50,9 @@ impl Law for Coulomb {
     fn prox(&self) -> Option<&dyn Prox> {
         Some(self)
     }
+    fn sliding(&self) -> Option<&dyn Sliding> {
+        Some(self)
+    }
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
         Some(Arc::new(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
     }
@@ -61,6 +64,12 @@ impl Law for Coulomb {
             return Complex64::new(0.0, 0.0); // also without motion
         }
         Complex64::new(0.0, 4.0 * self.limit / (PI * amplitude))
+    }
+}
+
+impl Sliding for Coulomb {
+    fn slip_force(&self, _velocity: f64) -> (f64, f64) {
+        (self.limit, 0.0)
     }
 }
 

@@ -8,6 +8,8 @@
 //! | [`Law::pieces`] | ideal sliders, springs and stops side by side | event-driven, harmonic balance |
 //! | [`Law::rate`] | `f = h(u, u', z)`, `z' = g(u, u', z)`, smooth | transient, shooting, harmonic balance |
 //! | [`Law::step`] | the force at the end of a step of `u`, from the state before it | harmonic balance, motion in small steps |
+//! | [`Law::masing`] | the force of first loading of a law that follows Masing's rules | harmonic balance |
+//! | [`Law::sliding`] | set-valued friction that is a smooth curve of the velocity in slip | shooting, transient |
 //! | [`Law::prox`] | the resolvent of a law of velocity, rigid or steep | harmonic balance |
 //!
 //! A law that offers one view works in every method that asks for this view, and a method that finds none says which it misses.
@@ -37,6 +39,7 @@ mod jenkins_2d_arctan;
 mod jenkins_arctan;
 mod kink;
 mod lugre;
+mod masing;
 mod mirror;
 mod parameter;
 mod pieces;
@@ -46,6 +49,7 @@ mod prox;
 mod rate;
 mod references;
 mod relative;
+mod sliding;
 mod slopes;
 mod springs;
 mod step;
@@ -71,11 +75,13 @@ pub use jenkins_2d::Jenkins2d;
 pub use jenkins_2d_arctan::Jenkins2dArctan;
 pub use jenkins_arctan::JenkinsArctan;
 pub use lugre::LuGre;
+pub use masing::Masing;
 pub use parameter::{BuildError, LawError, Parameter, Range, TANGENTS};
 pub use pieces::{Piece, Slider};
 pub use prox::{Mean, Prox};
 pub use rate::{Rate, RateLaw, RatePoint};
 pub use relative::{MOST_DIRECTIONS, Relative};
+pub use sliding::Sliding;
 pub use step::{Reach, Step, StepLaw, StepPoint, StepSlopes};
 pub use stribeck::Stribeck;
 pub use stribeck_arctan::StribeckArctan;

@@ -23,6 +23,8 @@ pub enum Range {
     Within(f64, f64),
     /// A whole number from 1 up to this.
     Count(u32),
+    /// A whole number from 0 up to this.
+    UpTo(u32),
 }
 
 impl Range {
@@ -35,6 +37,7 @@ impl Range {
                 Range::Any => true,
                 Range::Within(least, most) => (least..=most).contains(&value),
                 Range::Count(most) => value >= 1.0 && value <= f64::from(most) && value.fract() == 0.0,
+                Range::UpTo(most) => value >= 0.0 && value <= f64::from(most) && value.fract() == 0.0,
             }
     }
 }
@@ -47,6 +50,7 @@ impl fmt::Display for Range {
             Range::Any => write!(f, "of either sign"),
             Range::Within(least, most) => write!(f, "from {least} to {most}"),
             Range::Count(most) => write!(f, "a whole number from 1 to {most}"),
+            Range::UpTo(most) => write!(f, "a whole number from 0 to {most}"),
         }
     }
 }
@@ -113,7 +117,7 @@ impl Parameter {
     pub fn takes(&self) -> String {
         let power = self.power.map(|power| format!(" to the power `{power}`")).unwrap_or_default();
         let what = match (self.range, self.dimension) {
-            (Range::Count(_), _) => self.range.to_string(),
+            (Range::Count(_) | Range::UpTo(_), _) => self.range.to_string(),
             (range, Dimension::NONE) => format!("pure number{power}, {range}"),
             (range, dimension) => format!("{dimension}{power}, {range}"),
         };

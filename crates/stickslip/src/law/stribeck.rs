@@ -7,7 +7,9 @@
 
 use super::parameter::STATIC_LIMIT;
 use super::stribeck_curve::limits_fit;
-use super::{Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, SharedLaw, Slider, StribeckArctan};
+use super::{
+    Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, SharedLaw, Slider, Sliding, StribeckArctan,
+};
 use crate::dimension::Dimension;
 use std::f64::consts::E;
 use std::sync::Arc;
@@ -65,7 +67,7 @@ impl Stribeck {
     }
 
     /// Friction at a velocity that is not zero, and its derivative there, N and N s/m.
-    fn sliding(&self, velocity: f64) -> (f64, f64) {
+    fn friction(&self, velocity: f64) -> (f64, f64) {
         if self.velocity == 0.0 || self.is_constant() {
             return (self.limit, 0.0);
         }
@@ -97,6 +99,10 @@ impl Law for Stribeck {
     fn prox(&self) -> Option<&dyn Prox> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
+    /// With a velocity, as for the resolvent.
+    fn sliding(&self) -> Option<&dyn Sliding> {
+        if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
+    }
     /// With a velocity: no smooth law of one width has both a static and a dynamic limit.
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
         let Stribeck { limit, static_limit, velocity } = *self;
@@ -113,11 +119,17 @@ impl Law for Stribeck {
         self.is_constant()
     }
     fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
-        let limit = if velocity[0] == 0.0 { self.static_limit } else { self.sliding(velocity[0]).0 };
+        let limit = if velocity[0] == 0.0 { self.static_limit } else { self.friction(velocity[0]).0 };
         Contact::by_limit(limit, velocity, force)
     }
     fn consistent(&self) -> Result<(), String> {
         limits_fit(self.limit, self.static_limit)
+    }
+}
+
+impl Sliding for Stribeck {
+    fn slip_force(&self, velocity: f64) -> (f64, f64) {
+        self.friction(velocity)
     }
 }
 
@@ -137,7 +149,7 @@ impl Prox for Stribeck {
         let rounding = f64::EPSILON * target / penalty;
         let mut v = high;
         for _ in 0..SEARCHED {
-            let (friction, fall) = self.sliding(v);
+            let (friction, fall) = self.friction(v);
             let excess = friction + penalty * v - target;
             if excess > 0.0 {
                 high = v
@@ -152,7 +164,7 @@ impl Prox for Stribeck {
                 break;
             }
         }
-        let (friction, fall) = self.sliding(v);
+        let (friction, fall) = self.friction(v);
         (force[0], slope[0]) = (friction.copysign(y[0]), fall / (fall + penalty));
     }
     /// The steepest fall of friction, at `v = vs / √2`.
@@ -198,7 +210,7 @@ mod tests {
 
     #[test]
     fn the_least_penalty_is_the_steepest_fall() {
-        let steepest = (1..4000).map(|k| -LAW.sliding(f64::from(k) * 1e-5).1).fold(0.0, f64::max);
+        let steepest = (1..4000).map(|k| -LAW.friction(f64::from(k) * 1e-5).1).fold(0.0, f64::max);
         assert!((LAW.least_penalty() / steepest - 1.0).abs() < 1e-5);
     }
 

@@ -1,7 +1,7 @@
 //! What every law answers, and the row by which it is known.
 
 use super::pieces::{Piece, Slider};
-use super::{Contact, Parameter, Prox, Rate, Step, describing};
+use super::{Contact, Masing, Parameter, Prox, Rate, Sliding, Step, describing};
 use num_complex::Complex64;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt::Debug;
@@ -87,8 +87,17 @@ pub trait Law: Debug + Send + Sync {
     fn step(&self) -> Option<&dyn Step> {
         None
     }
+    /// The force of first loading, of a law along one direction that follows Masing's rules with memory.
+    fn masing(&self) -> Option<&dyn Masing> {
+        None
+    }
     /// The resolvent of a law of velocity.
     fn prox(&self) -> Option<&dyn Prox> {
+        None
+    }
+    /// The friction curve of a law that is set-valued at rest, and continuous there: it holds up to the force with which it
+    /// begins to slide.
+    fn sliding(&self) -> Option<&dyn Sliding> {
         None
     }
     /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories. Methods halve the period of systems that are odd,

@@ -20,10 +20,8 @@ use crate::orbit::Orbit;
 /// let system = model.assemble().unwrap();
 /// let error = advised(&EventDriven, &system).err().unwrap();
 /// let ways = error.ways().unwrap();
-/// assert_eq!(ways.methods, ["harmonic-balance"]);
-/// assert_eq!(ways.with_width, ["transient", "shooting"]);
-/// let options = [("width".to_owned(), 1e-4)].into();
-/// assert!((find("shooting").unwrap().build)(&options).unwrap().solver(&system).is_ok());
+/// assert_eq!(ways.methods, ["transient", "shooting", "harmonic-balance"]);
+/// assert!((find("shooting").unwrap().build)(&Default::default()).unwrap().solver(&system).is_ok());
 /// ```
 pub fn advised<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = method.solver(system).map_err(|error| error.with(ways(system)))?;

@@ -1,18 +1,20 @@
 //! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance where it costs less and for waves around a disk.
 
+use super::followed::Kind;
 use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
 use super::{
     Choice, Method, MethodError, MethodInfo, Options, Solver, event_driven, event_driven::EventDriven,
     harmonic_balance, shooting::Shooting, transient, ways,
 };
+use crate::law::Law;
 use crate::model::System;
 use crate::orbit::{Orbit, OrbitError};
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
-    summary: "event-driven where all laws are exact, shooting where all are smooth; harmonic balance where neither holds (friction in a plane or with \
+    summary: "event-driven where all laws are exact, shooting where all are smooth, or friction falls with velocity along a smooth curve; harmonic balance where neither holds (friction in a plane or with \
               a normal force, mixtures), where a place has no mass, where fewer multiplications are counted for it than from event to event, beyond 12 smooth \
               joints or 24 degrees of freedom with them, and for waves around a tuned disk; what it does not take goes to the method that does, \
               and a point that it does not find to the next one that takes it within seconds",
@@ -80,6 +82,13 @@ impl Auto {
             }
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
+        } else if falls(system)
+            && Kind::of(system, None) == Kind::Switched
+            && system.dofs() <= DOFS
+            && joints <= FOLLOWED
+        {
+            let because = "friction falls with velocity, and its switches are located";
+            (Box::new(Shooting::default()), because.to_owned())
         } else if !smooth {
             balance("neither are all laws exact nor all smooth".to_owned())
         } else if system.dofs() > DOFS {
@@ -90,6 +99,12 @@ impl Auto {
             (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }
     }
+}
+
+/// Whether friction falls with velocity somewhere, of which a series needs many harmonics.
+fn falls(system: &System) -> bool {
+    let falls = |law: &dyn Law| law.sliding().is_some() && !law.is_incrementally_passive();
+    system.joints().iter().any(|joint| falls(&**joint.law()))
 }
 
 impl Method for Auto {

@@ -4,6 +4,7 @@
 //! | --- | --- | --- |
 //! | [`ExactFlow`](super::exact_flow::ExactFlow) | sliders and stops | closed forms between switches |
 //! | [`SmoothFlow`](super::smooth::flow::SmoothFlow) | rate | Radau IIA-9 with controlled steps |
+//! | [`SwitchedFlow`](super::switched::flow::SwitchedFlow) | friction that slides along a smooth curve, beside laws with a rate | the same between located switches |
 //! | [`IncrementalFlow`](super::incremental::flow::IncrementalFlow) | step and rate side by side | average acceleration on equal steps |
 
 use super::MethodError;
@@ -13,6 +14,7 @@ use super::exact_flow::ExactFlow;
 use super::flow::Flow;
 use super::incremental::flow::IncrementalFlow;
 use super::smooth::flow::SmoothFlow;
+use super::switched::{self, flow::SwitchedFlow};
 use crate::law::SharedLaw;
 use crate::model::System;
 
@@ -29,6 +31,7 @@ pub(crate) fn of(
     match Kind::of(system, width) {
         Kind::Exact => Ok(Box::new(ExactFlow::new(Mechanics::new(system, method)?))),
         Kind::Smooth => Ok(Box::new(SmoothFlow::new(super::smooth::assembly(system, width, method)?, tolerance))),
+        Kind::Switched => Ok(Box::new(SwitchedFlow::new(system, tolerance, method)?)),
         Kind::Incremental => Ok(Box::new(IncrementalFlow::new(system, width, method)?)),
     }
 }
@@ -38,11 +41,13 @@ pub(crate) fn of(
 pub(crate) enum Kind {
     Exact,
     Smooth,
+    Switched,
     Incremental,
 }
 
 impl Kind {
-    /// Sliders and stops alone are followed exactly, laws with a rate alone by integration, everything else in small steps.
+    /// Sliders and stops alone are followed exactly, laws with a rate alone by integration, and between switches beside friction
+    /// that slides along a smooth curve, everything else in small steps.
     pub fn of(system: &System, width: Option<f64>) -> Kind {
         // a width that smooths no law asks for nothing
         let smooths = |width| system.joints().iter().any(|joint| joint.law().regularised(width).is_some());
@@ -62,6 +67,8 @@ impl Kind {
             Kind::Smooth
         } else if width.is_none() && all(&|law| law.sliders().is_some()) {
             Kind::Exact
+        } else if width.is_none() && switched::takes(system) {
+            Kind::Switched
         } else {
             Kind::Incremental
         }
@@ -453,7 +460,10 @@ mod tests {
     fn what_no_flow_takes_is_refused_by_name() {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
         let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.3 });
-        let system = system(&[(rigid, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
+        let system = system(&[(rigid.clone(), along(0)), (Arc::new(Sample::Sliding), plane())]);
+        // beside a smooth law its switches are located
+        let smooth = self::system(&[(rigid, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
+        assert_eq!((Kind::of(&smooth, None), Kind::of(&system, None)), (Kind::Switched, Kind::Incremental));
         // a joint that carries nothing is in nobody's way
         let idle: SharedLaw = Arc::new(Coulomb { limit: 0.0 });
         let beside = self::system(&[(idle, along(0)), (Arc::new(Sample::Relaxing), along(1))]);

@@ -28,6 +28,7 @@ mod smooth;
 mod static_equilibrium;
 mod stepped;
 mod steps;
+mod switched;
 pub mod time_history;
 mod traits;
 pub mod transient;

@@ -17,6 +17,7 @@ use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
 use super::smooth::flow::{Lengths, SmoothFlow};
 use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::stepped::SteppedPath;
+use super::switched::flow::SwitchedFlow;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
 use crate::model::System;
@@ -39,6 +40,8 @@ const LONG_STEPS: f64 = 1e-8;
 const COARSE_RESIDUAL: f64 = 1e-5;
 /// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
 const CLOSED: f64 = 1e-11;
+/// The same of an orbit between located switches, where every run chooses its steps.
+const CLOSED_SWITCHED: f64 = 1e-10;
 /// Meshes made for one orbit: the first is as good as the first search, the second nearly always enough.
 const MESHES: usize = 6;
 /// A mesh is good when closing the orbit on it moves the state by at most this many times the error per step: that is what the
@@ -131,6 +134,7 @@ impl Method for Shooting {
 /// How the motion is integrated.
 enum Stepping {
     Smooth(Box<SmoothFlow>),
+    Switched(Box<SwitchedFlow>),
     Incremental(Box<IncrementalFlow>),
 }
 
@@ -138,6 +142,7 @@ impl Stepping {
     fn flow(&mut self) -> &mut dyn Flow {
         match self {
             Stepping::Smooth(flow) => flow.as_mut(),
+            Stepping::Switched(flow) => flow.as_mut(),
             Stepping::Incremental(flow) => flow.as_mut(),
         }
     }
@@ -145,6 +150,7 @@ impl Stepping {
     fn assembly(&self) -> &Assembly {
         match self {
             Stepping::Smooth(flow) => &flow.assembly,
+            Stepping::Switched(flow) => &flow.assembly,
             Stepping::Incremental(flow) => &flow.assembly,
         }
     }
@@ -152,6 +158,7 @@ impl Stepping {
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
         match self {
             Stepping::Smooth(flow) => flow.stepped(system, symmetry, period),
+            Stepping::Switched(flow) => flow.stepped(system, symmetry, period),
             Stepping::Incremental(flow) => flow.stepped(system, symmetry, period),
         }
     }
@@ -201,7 +208,7 @@ impl ReturnMap for Shooter<'_> {
 impl Closing for Shooter<'_> {
     fn springs(&self) -> Vec<ElasticSlider> {
         match &self.stepping {
-            Stepping::Smooth(_) => Vec::new(),
+            Stepping::Smooth(_) | Stepping::Switched(_) => Vec::new(),
             Stepping::Incremental(flow) => flow.springs(),
         }
     }
@@ -223,6 +230,7 @@ impl<'a> Shooter<'a> {
     pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
         let stepping = match Kind::integrated(system, options.width) {
             Kind::Incremental => Stepping::Incremental(Box::new(IncrementalFlow::new(system, options.width, name)?)),
+            Kind::Switched => Stepping::Switched(Box::new(SwitchedFlow::new(system, options.tolerance, name)?)),
             // exact laws, if they are meant to be smoothed, are told so by the assembly
             Kind::Smooth | Kind::Exact => {
                 let assembly = super::smooth::assembly(system, options.width, name)?;
@@ -262,6 +270,7 @@ impl<'a> Shooter<'a> {
     fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: Aim) -> Result<Orbit, OrbitError> {
         let closed = match self.stepping {
             Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
+            Stepping::Switched(_) => self.switched_orbit(start, aim)?,
             Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
         };
         Ok(self.orbit_of(aim.omega, symmetry, closed))
@@ -343,6 +352,14 @@ impl<'a> Shooter<'a> {
         }
     }
 
+    /// The orbit between located switches: the return is smooth to the error of its steps.
+    fn switched_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+        let aim = Aim { residual: CLOSED_SWITCHED * self.share, ..aim };
+        let closed = self.search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
+        self.record(&closed)?;
+        Ok(closed)
+    }
+
     /// Relative error per step of the approach.
     fn long_steps(&self) -> f64 {
         self.tolerance.max(LONG_STEPS * self.share)
@@ -412,6 +429,7 @@ impl<'a> Shooter<'a> {
     fn set_tolerance(&mut self, tolerance: f64) -> f64 {
         match &mut self.stepping {
             Stepping::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
+            Stepping::Switched(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
             Stepping::Incremental(_) => self.tolerance,
         }
     }

@@ -47,10 +47,7 @@ impl SteppedPath {
 
     /// Value, slope and curvature at both ends of a step of what `of` reads off the degrees of freedom.
     fn ends(&self, step: usize, of: impl Fn(&[f64]) -> f64) -> [[f64; 3]; 2] {
-        [step, step + 1].map(|at| {
-            let instant = self.steps.instant(at);
-            [instant.displacement, instant.velocity, instant.acceleration].map(&of)
-        })
+        self.steps.ends(step).map(|instant| [instant.displacement, instant.velocity, instant.acceleration].map(&of))
     }
 
     /// The same along an axis.
@@ -62,7 +59,8 @@ impl SteppedPath {
             let acceleration = along.along(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
             [along.along(instant.displacement) + g, along.along(instant.velocity) + speed, acceleration]
         };
-        [end(self.steps.instant(step), start), end(self.steps.instant(step + 1), start + length)]
+        let [from, to] = self.steps.ends(step);
+        [end(from, start), end(to, start + length)]
     }
 
     /// Least and largest value over all steps, each a quintic between its ends.
@@ -79,7 +77,7 @@ impl SteppedPath {
         let count = self.steps.nodes.len();
         let node = |i: usize| if i == 0 { 0.0 } else { self.steps.nodes[i - 1].0 };
         let value = |i: usize| match i {
-            0 => self.steps.instant(step).force[axis],
+            0 => self.steps.ends(step)[0].force[axis],
             _ => self.steps.node(step * count + i - 1).force[axis],
         };
         let sum = (0..=count).map(|i| {
@@ -104,6 +102,9 @@ impl SteppedPath {
 
     /// What a joint does at `s` in [0, 1] of a step.
     fn contact(&self, joint: usize, (step, s): (usize, f64)) -> Contact {
+        if self.steps.jumps {
+            return self.steps.contact_at_end(step)[joint];
+        }
         let (joint, length) = (&self.assembly.joints[joint], self.steps.spans[step].1);
         let mut motion = Relative::along(0.0, 0.0);
         for (d, axis) in joint.axes().enumerate() {
@@ -149,10 +150,10 @@ impl SteppedPath {
             for values in [&mut motion.displacement, &mut motion.velocity, &mut force] {
                 values.iter_mut().for_each(|value| *value *= sign);
             }
-            let contact = if count > 1 {
+            let contact = if count > 1 && !self.steps.jumps {
                 joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
             } else {
-                let contact = self.steps.node(step).contact[q];
+                let contact = self.steps.contact_at_end(step)[q];
                 if sign < 0.0 { contact.mirrored() } else { contact }
             };
             JointSample { displacement: motion.displacement, velocity: motion.velocity, force, contact }

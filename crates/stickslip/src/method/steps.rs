@@ -12,8 +12,11 @@ pub(crate) struct Steps {
     pub spans: Vec<(f64, f64)>,
     /// Degrees of freedom, axes of joints, joints.
     size: [usize; 3],
-    /// What [`Instant`] says, instant after instant, one more than there are steps.
+    /// What [`Instant`] says, instant after instant, one more than there are steps, or two for each.
     instants: Vec<f64>,
+    /// Whether forces may jump from one step to the next, so that each has both of its ends, and joints do the same
+    /// throughout a step.
+    pub jumps: bool,
     /// What [`Node`] says but for the contacts, node after node.
     values: Vec<f64>,
     contacts: Vec<Contact>,
@@ -49,7 +52,13 @@ pub(crate) fn extrapolate(coarse: &mut [f64], fine: &[f64]) {
 impl Steps {
     pub fn new(nodes: Vec<(f64, f64)>, assembly: &Assembly) -> Self {
         let size = [assembly.n, assembly.axes.len(), assembly.joints.len()];
-        Steps { nodes, spans: Vec::new(), size, instants: Vec::new(), values: Vec::new(), contacts: Vec::new() }
+        let (instants, values) = (Vec::new(), Vec::new());
+        Steps { nodes, spans: Vec::new(), size, instants, jumps: false, values, contacts: Vec::new() }
+    }
+
+    /// The same of a run whose forces may jump.
+    pub fn with_jumps(nodes: Vec<(f64, f64)>, assembly: &Assembly) -> Self {
+        Steps { jumps: true, ..Steps::new(nodes, assembly) }
     }
 
     pub fn clear(&mut self) {
@@ -82,12 +91,18 @@ impl Steps {
         self.contacts.extend(contact);
     }
 
-    pub fn instant(&self, at: usize) -> Instant<'_> {
+    fn instant(&self, at: usize) -> Instant<'_> {
         let [n, axes, _] = self.size;
         let (displacement, rest) = self.instants[at * (3 * n + axes)..].split_at(n);
         let (velocity, rest) = rest.split_at(n);
         let (acceleration, rest) = rest.split_at(n);
         Instant { displacement, velocity, acceleration, force: &rest[..axes] }
+    }
+
+    /// Both ends of a step.
+    pub fn ends(&self, step: usize) -> [Instant<'_>; 2] {
+        let first = if self.jumps { 2 * step } else { step };
+        [self.instant(first), self.instant(first + 1)]
     }
 
     pub fn node(&self, at: usize) -> Node<'_> {

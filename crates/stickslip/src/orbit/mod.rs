@@ -74,7 +74,8 @@ pub(crate) fn history<'a>(
             _ => None,
         });
         let mut reaches = sliders.filter(|(_, limit)| *limit > 0.0).map(|(stiffness, limit)| limit / stiffness);
-        stuck.contains(&motion.name) || reaches.any(|reach| travel <= 2.0 * reach)
+        let inner = law.masing().is_some_and(|law| travel <= 2.0 * law.slips_at());
+        stuck.contains(&motion.name) || inner || reaches.any(|reach| travel <= 2.0 * reach)
     };
     let kept = laws.zip(joints).filter(|(law, motion)| holds(law, motion));
     kept.map(|(_, motion)| motion.name.clone()).collect()

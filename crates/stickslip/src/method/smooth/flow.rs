@@ -349,7 +349,7 @@ impl SmoothFlow {
 }
 
 /// Weights of the stages of a step in the value of its collocation polynomial at `s`, in lengths of the step from its start.
-fn onward(s: f64) -> [f64; STAGES] {
+pub(in crate::method) fn onward(s: f64) -> [f64; STAGES] {
     std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - C[r]) / (C[q] - C[r])).product())
 }
 
@@ -361,7 +361,7 @@ fn forces(assembly: &Assembly, laws: &[RatePoint], force: &mut [f64]) {
 }
 
 /// Time derivative of a state, where the laws are these.
-fn slope(
+pub(in crate::method) fn slope(
     assembly: &Assembly,
     (state, load, force): (&[f64], &mut [f64], &mut [f64]),
     laws: &[RatePoint],

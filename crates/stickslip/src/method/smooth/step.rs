@@ -139,6 +139,9 @@ pub(crate) struct StageLoads {
 pub(crate) struct Step {
     /// Unknowns: stage velocities along the axes (stage after stage), then internal states (stage after stage).
     pub unknown: Vec<f64>,
+    /// Axes along which nothing moves: there the unknown is no velocity, and the law makes the force of it that keeps the
+    /// velocity at zero.
+    pub held: Vec<bool>,
     /// Stage forces along the axes.
     pub force: DVector<f64>,
     /// The laws at the stages, stage after stage; those of the last stage are those of the end.
@@ -184,6 +187,7 @@ impl Step {
         let (j, unknowns) = (assembly.axes.len(), STAGES * (assembly.axes.len() + assembly.internal));
         Step {
             unknown: vec![0.0; unknowns],
+            held: vec![false; j],
             force: DVector::zeros(STAGES * j),
             points: (0..STAGES).flat_map(|_| points(assembly)).collect(),
             linear: DVector::zeros(2 * assembly.n),
@@ -323,10 +327,14 @@ impl Step {
         for at in 0..unknowns {
             jacobian[at * unknowns + at] = 1.0;
         }
+        let held = |at: usize| self.held[at % j];
+        for at in (0..STAGES * j).filter(|at| held(*at)) {
+            jacobian[at * unknowns + at] = 0.0;
+        }
         // velocities
         let g = eliminated.velocity_from_force.as_slice(); // column after column
         for row in 0..STAGES * j {
-            self.residual[row] = self.unknown[row] - self.free[row];
+            self.residual[row] = if held(row) { -self.free[row] } else { self.unknown[row] - self.free[row] };
         }
         for stage in 0..STAGES {
             for (q, joint) in assembly.joints.iter().enumerate() {
@@ -514,7 +522,7 @@ impl Step {
 
     /// Makes the filter for the laws `at` the start of the step; false if it is singular.
     pub fn prepare_filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint]) -> bool {
-        self.filter.prepare(assembly, eliminated, at)
+        self.filter.prepare(assembly, eliminated, at, &self.held)
     }
 
     /// Replaces an error estimate by the filtered one, so that stiff components do not dominate it.
@@ -525,7 +533,7 @@ impl Step {
     /// The same by the laws at the end of the step that was solved last; false if that filter is singular.
     pub fn filter_at_end(&mut self, assembly: &Assembly, eliminated: &Eliminated, error: &mut [f64]) -> bool {
         let at = &self.points[(STAGES - 1) * assembly.joints.len()..];
-        let regular = self.filter.prepare(assembly, eliminated, at);
+        let regular = self.filter.prepare(assembly, eliminated, at, &self.held);
         if regular {
             self.filter.apply(assembly, eliminated, at, error);
         }
@@ -584,7 +592,7 @@ impl Filter {
         }
     }
 
-    fn prepare(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint]) -> bool {
+    fn prepare(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], held: &[bool]) -> bool {
         let (rate, j) = (REAL / eliminated.length, assembly.axes.len());
         self.rate = rate;
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
@@ -615,7 +623,7 @@ impl Filter {
         let g = &eliminated.filter[2];
         let matrix = self.axes.zeros(j);
         for row in 0..j {
-            matrix[row * j + row] = 1.0;
+            matrix[row * j + row] = f64::from(u8::from(!held[row]));
             for (joint, answer) in assembly.joints.iter().zip(&self.answers) {
                 for (e, column) in joint.axes().enumerate() {
                     let gains = joint.axes().enumerate().map(|(d, a)| g[(row, a)] * answer[d * joint.directions + e]);

@@ -135,13 +135,16 @@ const SMALL: f64 = 1e-150;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, CoulombArctan, Gap, Jenkins, JenkinsArctan};
+    use crate::law::{Coulomb, CoulombArctan, Gap, Iwan, Jenkins, JenkinsArctan};
 
     #[test]
     fn laws_hold_as_they_do_in_small_motion() {
         let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
         assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
         assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
+        // micro-slip from the first movement on is no limit: told is that of all of it
+        let iwan = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
+        assert_eq!(Hold::of(&iwan, 0), spring);
         assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
         assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
         // a stop holds once it is pressed, and not where it only touches

@@ -53,6 +53,7 @@ pub(in super::super) struct Alternation {
     pub(super) moment: Vec<f64>,
     pub(super) intervals: Vec<super::events::Interval>,
     pub(super) extremes: Vec<super::events::Extreme>,
+    pub(super) branches: super::masing::Branches,
     pub(super) grid: super::events::Grid,
     pub(super) march: super::memory::Memory,
 }
@@ -109,6 +110,7 @@ impl Alternation {
             row: vec![ZERO; harmonics.len()],
             intervals: Vec::new(),
             extremes: Vec::new(),
+            branches: super::masing::Branches::default(),
             grid: super::events::Grid::new(top),
             march: super::memory::Memory::default(),
             harmonics,

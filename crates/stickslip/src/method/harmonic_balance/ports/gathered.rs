@@ -38,6 +38,10 @@ impl Gathered {
             return Ok(());
         }
         let scale = law.scale();
+        if joint.axes().len() == 1 && law.masing().is_some() {
+            self.add(j, joint, Kernel::Masing(law.clone()), (0.0, scale, 0.0));
+            return Ok(());
+        }
         if let Some(prox) = law.prox() {
             if !(scale.is_finite() && scale > 0.0) {
                 return Err(unsupported("its resolvent has no finite scale of forces"));
@@ -117,7 +121,7 @@ impl Gathered {
             match &mut port.kernel {
                 Kernel::Rigid(rigid) => rigid.limit *= sum,
                 Kernel::Prox(of) => of.times *= sum,
-                Kernel::Sliders(_) | Kernel::Step(_) | Kernel::Rate(_) => {}
+                Kernel::Sliders(_) | Kernel::Masing(_) | Kernel::Step(_) | Kernel::Rate(_) => {}
             }
             port.scale *= sum;
             port.series /= sum;

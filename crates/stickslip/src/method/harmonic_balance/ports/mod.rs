@@ -13,6 +13,7 @@ mod barrier;
 mod events;
 mod gathered;
 mod march;
+mod masing;
 mod memory;
 mod prox;
 mod rate;
@@ -29,7 +30,7 @@ pub(super) use memory::{REPEATS, at_once};
 use prox::{Rigid, Times};
 use sliders::Part;
 
-use crate::law::{MOST_DIRECTIONS, Prox, SharedLaw};
+use crate::law::{MOST_DIRECTIONS, Masing, Prox, SharedLaw};
 use crate::method::MethodError;
 use crate::model::{Axis, Cyclic, System, SystemJoint};
 use nalgebra::DMatrix;
@@ -48,6 +49,8 @@ enum Kernel {
     Rigid(Rigid),
     /// A law by its resolvent.
     Prox(Times),
+    /// A law by its curve of first loading: the force is exact for the series.
+    Masing(SharedLaw),
     /// A law by its return map.
     Step(SharedLaw),
     /// A law by its rates.
@@ -180,7 +183,7 @@ impl Port {
                     0.0
                 }
             }
-            Kernel::Step(law) | Kernel::Rate(law) => {
+            Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => {
                 // a rate law at a frequency at which its states follow
                 let at_rest = crate::method::guess::at_rest(&**law, 1.0);
                 (0..self.axes).map(|a| at_rest[(a, a)].norm()).fold(0.0, f64::max)
@@ -193,7 +196,7 @@ impl Port {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::closed).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
-            Kernel::Step(law) | Kernel::Rate(law) => match law.closed() {
+            Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed() {
                 Some(closed) => closed[axis],
                 None => crate::method::guess::at_rest(&**law, 1.0)[(axis, axis)].re,
             },
@@ -204,6 +207,7 @@ impl Port {
     pub fn reach(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::reach).fold(0.0, f64::max),
+            Kernel::Masing(law) => law.masing().map_or(0.0, Masing::slips_at),
             _ => 0.0,
         }
     }
@@ -217,7 +221,7 @@ impl Port {
     fn states(&self) -> usize {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().filter(|part| matches!(part, Part::Slider { .. })).count(),
-            Kernel::Step(law) => law.step().map_or(0, |step| step.states()),
+            Kernel::Step(law) | Kernel::Masing(law) => law.step().map_or(0, |step| step.states()),
             Kernel::Rate(law) => law.rate().map_or(0, |rate| rate.states()),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0,
         }
@@ -401,6 +405,11 @@ impl Alternation {
         }
         match &port.kernel {
             Kernel::Sliders(parts) => self.slide(parts, &port.static_state, &motion, force, tangent),
+            Kernel::Masing(law) => {
+                if let Some(law) = law.masing() {
+                    self.masing(law, &port.static_state, &motion, force, tangent);
+                }
+            }
             Kernel::Rate(law) => {
                 if let Some(rate) = law.rate() {
                     self.rate(rate, port, omega, &motion, force, tangent);
@@ -455,6 +464,9 @@ impl Alternation {
     pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
         if let Kernel::Sliders(parts) = &port.kernel {
             return self.sample_slides(parts, &port.static_state, c);
+        }
+        if let Kernel::Masing(law) = &port.kernel {
+            return self.sample_masing(&**law, &port.static_state, c);
         }
         let mut out = vec![ZERO; c.len()];
         if let Kernel::Step(law) = &port.kernel

@@ -119,7 +119,7 @@ impl Alternation {
     }
 
     /// The motion on the grid that tells its turning points apart, and these.
-    fn find(&mut self, c: &[Complex64]) {
+    pub(super) fn find(&mut self, c: &[Complex64]) {
         let Grid { fourier, pairs, value, slope } = &mut self.grid;
         pairs.clear();
         pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
@@ -285,7 +285,7 @@ impl Alternation {
     }
 
     /// The phase between two neighbouring turning points at which the motion passes `value`, upwards or downwards.
-    fn passage(&self, series: Series, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
+    pub(super) fn passage(&self, series: Series, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
         let n = self.grid.value.len() as isize;
         let angle = TAU / n as f64;
         let u = |i: isize| self.grid.value[i.rem_euclid(n) as usize];
@@ -317,7 +317,7 @@ impl Alternation {
         let [stiffness, integrals, _] = &mut self.spectra;
         stiffness.fill(ZERO);
         for interval in &self.intervals {
-            integrate(interval, integrals);
+            integrate_over((interval.begin, interval.end), integrals);
             for (sum, integral) in stiffness.iter_mut().zip(&*integrals) {
                 *sum += integral * (interval.stiffness / TAU);
             }
@@ -367,7 +367,7 @@ impl Alternation {
 
 /// Adds `f Re(row δU)` to the derivative by the parts of U.
 #[inline]
-fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
+pub(super) fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
     for (to, r) in to.chunks_exact_mut(2).zip(row) {
         to[0] += f * r.re;
         to[1] -= f * r.im;
@@ -375,14 +375,14 @@ fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
 }
 
 /// `∫ e^{-jmθ} dθ` over an interval, for m from zero on.
-fn integrate(interval: &Interval, out: &mut [Complex64]) {
-    let width = interval.end - interval.begin;
+pub(super) fn integrate_over((begin, end): (f64, f64), out: &mut [Complex64]) {
+    let width = end - begin;
     if width >= TAU {
         out.fill(ZERO);
         out[0] = Complex64::new(TAU, 0.0);
         return;
     }
-    let (middle, half) = (Complex64::cis(-0.5 * (interval.begin + interval.end)), Complex64::cis(0.5 * width));
+    let (middle, half) = (Complex64::cis(-0.5 * (begin + end)), Complex64::cis(0.5 * width));
     let (mut turn, mut reach) = (middle, half);
     out[0] = Complex64::new(width, 0.0);
     for (m, out) in out.iter_mut().enumerate().skip(1) {

@@ -1,0 +1,70 @@
+//! A joint that rests, or slips in one direction: a smooth law each.
+
+use crate::law::{Contact, Law, LawInfo, MOST_DIRECTIONS, Rate, RateLaw, Relative, SharedLaw};
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+/// What the faces of a joint do until the next switch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Mode {
+    /// They rest on each other: their relative velocity is zero, and the force is what that takes.
+    Held,
+    /// They slip in the direction of this sign.
+    Slip(f64),
+}
+
+impl Mode {
+    pub fn contact(self) -> Contact {
+        match self {
+            Mode::Held => Contact::Stick,
+            Mode::Slip(sign) => Contact::slip(sign),
+        }
+    }
+}
+
+/// A law of friction in one mode. What is held has its force as the unknown in the place of the velocity: as a damper of
+/// unit size that knows no velocity.
+#[derive(Debug, Clone)]
+struct InMode {
+    law: SharedLaw,
+    mode: Mode,
+    /// Force per unknown of a joint that is held, N s/m: makes its size that of a velocity.
+    unit: f64,
+}
+
+/// The law of a joint that slides, in a mode.
+pub(super) fn in_mode(law: &SharedLaw, mode: Mode, unit: f64) -> SharedLaw {
+    Arc::new(InMode { law: law.clone(), mode, unit })
+}
+
+impl Law for InMode {
+    fn info(&self) -> &'static LawInfo {
+        self.law.info()
+    }
+    fn values(&self) -> Vec<f64> {
+        self.law.values()
+    }
+    fn scale(&self) -> f64 {
+        self.law.scale()
+    }
+    fn is_odd(&self) -> bool {
+        false
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+}
+
+impl RateLaw for InMode {
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; MOST_DIRECTIONS] {
+        let v = motion.velocity[0];
+        let force = match self.mode {
+            Mode::Held => v * self.unit,
+            Mode::Slip(sign) => {
+                let (force, slope) = self.law.sliding().map_or((0.0, 0.0), |law| law.slip_force(v.re()));
+                ((v - v.re()) * slope + force) * sign
+            }
+        };
+        [force, S::from(0.0), S::from(0.0)]
+    }
+}
