@@ -14,8 +14,9 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |error: std::io::Error| io(path, &error);
     let found = std::fs::metadata(path).map_err(failed)?;
     if found.is_dir() {
-        let problem = "this is a folder, a file was expected".into();
-        return Err(Error::new(Kind::Io, Location::File, problem, "give the name of a file in it").of(path));
+        let help = format!("name the files of matrices in it, as in {}", path.join("stiffness.mtx").display());
+        let problem = "this is a folder, a file is needed".to_owned();
+        return Err(Error::new(Kind::Io, Location::File, problem, help).of(path));
     }
     if !found.is_file() {
         let problem = "this is a device or a pipe, which has no size".into();

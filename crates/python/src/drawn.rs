@@ -76,7 +76,8 @@ pub fn mode(found: &Mode, system: &System) -> (Table, Figure) {
     let phases: Vec<Vec<f64>> = found.points.iter().map(ModePoint::phases).collect();
     for (i, (place, along)) in system.places().iter().zip(system.seen()).enumerate() {
         let (name, unit) = (column_name(place), along.unit());
-        columns.push(numbers(&format!("{name}_amplitude_{unit}"), &|point| point.places[i].norm()));
+        columns.push(numbers(&format!("{name}_amplitude_{unit}"), &|point| point.amplitudes[i]));
+        columns.push(numbers(&format!("{name}_first_harmonic_{unit}"), &|point| point.places[i].norm()));
         let phase = phases.iter().map(|all| all[i].to_degrees()).collect();
         columns.push(Column::numbers(&format!("{name}_phase_deg"), phase));
     }

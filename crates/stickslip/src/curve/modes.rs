@@ -39,6 +39,8 @@ pub struct ModePoint {
     pub viscous: f64,
     /// First harmonic of every place, m: the shape, with the phases that friction leaves.
     pub places: Vec<Complex64>,
+    /// Half of the way from one end of the motion to the other of every place, m, with all harmonics.
+    pub amplitudes: Vec<f64>,
 }
 
 impl ModePoint {
@@ -49,7 +51,7 @@ impl ModePoint {
     /// use num_complex::Complex64;
     /// use stickslip::curve::modes::ModePoint;
     /// let places = vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, -2.0)];
-    /// let point = ModePoint { amplitude: 1.0, omega: 1.0, damping: 0.0, viscous: 0.0, places };
+    /// let point = ModePoint { amplitude: 1.0, omega: 1.0, damping: 0.0, viscous: 0.0, places, amplitudes: vec![1.0, 2.0] };
     /// assert_eq!(point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(), [std::f64::consts::PI, 0.0]);
     /// ```
     pub fn phases(&self) -> Vec<f64> {
@@ -266,6 +268,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
         damping: state.damping,
         viscous: equations.viscous(state),
         places: equations.places(state),
+        amplitudes: equations.half_ranges(state),
     }
 }
 

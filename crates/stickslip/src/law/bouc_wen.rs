@@ -80,6 +80,9 @@ impl Law for BoucWen {
     fn scale(&self) -> f64 {
         self.stiffness * self.bound()
     }
+    fn springs(&self) -> Option<[Vec<f64>; 2]> {
+        Some([vec![0.0], vec![self.stiffness]])
+    }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }

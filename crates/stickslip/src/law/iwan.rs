@@ -136,6 +136,9 @@ impl Law for Iwan {
     fn scale(&self) -> f64 {
         self.limit
     }
+    fn macro_slip(&self) -> Option<f64> {
+        (self.limit > 0.0).then(|| self.slips_at())
+    }
     /// With a number of elements.
     fn pieces(&self) -> Option<Vec<Piece>> {
         if self.limit == 0.0 {

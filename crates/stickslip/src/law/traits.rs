@@ -71,6 +71,15 @@ pub trait Law: Debug + Send + Sync {
     fn closed(&self) -> Option<Vec<f64>> {
         None
     }
+    /// The springs (N/m) that the joint is in its linear references, free of friction and stuck, one stiffness for every direction, of a law that
+    /// slips and has no parameter `limit`.
+    fn springs(&self) -> Option<[Vec<f64>; 2]> {
+        None
+    }
+    /// The relative displacement (m) at which all of it slips, of a law that slips little by little before (micro-slip, macro-slip).
+    fn macro_slip(&self) -> Option<f64> {
+        None
+    }
     /// The size of its forces, N, for tolerances and guesses: a slip limit, or infinity if nothing bounds them.
     fn scale(&self) -> f64 {
         f64::INFINITY

@@ -71,6 +71,10 @@ impl Law for Valanis {
     fn scale(&self) -> f64 {
         self.stiffness / self.lambda * self.sliding()
     }
+    /// Free of friction the spring in slip is left.
+    fn springs(&self) -> Option<[Vec<f64>; 2]> {
+        Some([vec![self.slip_stiffness], vec![self.stiffness]])
+    }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }

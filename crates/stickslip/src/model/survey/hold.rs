@@ -1,6 +1,7 @@
 //! How a joint holds while its sliders stand.
 
 use super::super::SystemJoint;
+use super::linear::Link;
 use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 
 /// A joint while its sliders stand.
@@ -17,6 +18,10 @@ pub(super) struct Stuck {
     pub(super) closed: f64,
     /// The force that presses the faces at rest, N, of a normal direction.
     pub(super) pressed: Option<f64>,
+    /// Viscous damping in small motion, free of friction and as it holds, kg/s.
+    pub(super) damping: [f64; 2],
+    /// Whether it slips little by little, and `hold` has the limit at which all of it does.
+    pub(super) gradual: bool,
 }
 
 impl Stuck {
@@ -31,9 +36,27 @@ impl Stuck {
                 Hold::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
                 Hold::Spring { .. } | Hold::Rigid { .. } => 0.0,
             };
-            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, closed, pressed }
+            let held = if matches!(hold, Hold::Rigid { .. }) { 0.0 } else { small_damping(law, axis) };
+            let damping = [law.free().map_or(0.0, |free| small_damping(&*free, axis)), held];
+            let gradual = law.macro_slip().is_some();
+            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, closed, pressed, damping, gradual }
         })
         .collect()
+    }
+}
+
+impl Stuck {
+    /// The spring and damper that it is while it holds, if it is any.
+    pub(super) fn held(&self) -> Option<Link> {
+        let stiffness = if let Hold::Spring { stiffness, .. } = self.hold { stiffness } else { 0.0 };
+        let damping = self.damping[1];
+        (stiffness > 0.0 || damping > 0.0).then(|| Link { at: self.at.clone(), stiffness, damping })
+    }
+
+    /// The damper that it is free of friction, if it is any.
+    pub(super) fn free(&self) -> Option<Link> {
+        let damping = self.damping[0];
+        (damping > 0.0).then(|| Link { at: self.at.clone(), stiffness: 0.0, damping })
     }
 }
 
@@ -55,6 +78,9 @@ pub(super) enum Hold {
 impl Hold {
     /// Along one of the law's axes.
     fn of(law: &dyn Law, axis: usize) -> Hold {
+        if let Some(displacement) = law.macro_slip() {
+            return Hold::Spring { stiffness: small_stiffness(law, axis), limit: law.scale(), displacement };
+        }
         let Some(branches) = law.sliders() else { return Hold::smooth(law, axis) };
         let branches = || branches.iter().filter(|branch| branch.static_limit > 0.0);
         let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.static_limit);
@@ -114,6 +140,15 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
     rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
     let by_states = (0..z.len()).map(|s| point.force_slope(axis)[2 * count + s] * point.rate_slope(s)[count + axis]);
     point.force_slope(axis)[axis] + by_states.sum::<f64>()
+}
+
+/// Viscous damping in motion that is small in every direction, kg/s: what velocity alone makes of the force, states standing.
+fn small_damping(law: &dyn Law, axis: usize) -> f64 {
+    let Some(rate) = law.rate() else { return 0.0 };
+    let (count, rest, z) = (law.directions(), [0.0; MOST_DIRECTIONS], vec![0.0; rate.states()]);
+    let mut point = RatePoint::new(count, z.len());
+    rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
+    point.force_slope(axis)[count + axis]
 }
 
 /// The force along an axis of a law that has not moved, N.

@@ -26,11 +26,14 @@ pub struct Modes {
 pub struct FirstSlip {
     /// Name of the joint.
     pub joint: String,
-    /// Limit of the slider that gives way first, N; zero if the joint carries nothing.
+    /// Limit of the slider that gives way first, N; zero if the joint carries nothing. Of a joint that slips little by little the one at which all of
+    /// it slips.
     pub limit: f64,
     /// Relative displacement from the unloaded state at which it gives way, m; `None` if it holds rigidly until the
     /// limit.
     pub displacement: Option<f64>,
+    /// Whether it slips little by little before that: micro-slip at every load.
+    pub gradual: bool,
     /// Of the direction along which faces press on each other, which opens and closes and never slips: the force with
     /// which they do where nothing gives way, N, zero if they are apart. `None` along the others.
     pub pressed: Option<f64>,

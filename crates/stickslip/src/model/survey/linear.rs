@@ -54,7 +54,9 @@ impl Linear {
         let mut stiffness = full.stiffness.clone();
         links.iter().for_each(|link| add(&mut stiffness, &link.at, link.stiffness));
         let part = |matrix: &DMatrix<f64>| turn.tr_mul(&(matrix * &turn));
-        let (mass, damping, stiffness) = (part(&full.mass), part(&full.damping), part(&stiffness));
+        let mut damping = full.damping.clone();
+        links.iter().for_each(|link| add(&mut damping, &link.at, link.damping));
+        let (mass, damping, stiffness) = (part(&full.mass), part(&damping), part(&stiffness));
         let Some((values, shapes)) = natural(&mass, &stiffness) else {
             return Linear { modes: Modes { lost: r, ..Modes::default() }, shapes: None };
         };

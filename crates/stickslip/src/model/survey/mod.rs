@@ -69,21 +69,17 @@ impl Model {
             .filter(|joint| joint.closed > 0.0 && !joint.at.is_empty())
             .map(|joint| Link { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
             .collect();
-        let held: Vec<Link> = joints
-            .iter()
-            .filter_map(|joint| match joint.hold {
-                Hold::Spring { stiffness, .. } => Some(Link { at: joint.at.clone(), stiffness, damping: 0.0 }),
-                _ => None,
-            })
-            .filter(|link| !link.at.is_empty())
-            .collect();
+        let moving = || joints.iter().filter(|joint| !joint.at.is_empty());
+        let held: Vec<Link> = moving().filter_map(Stuck::held).collect();
+        let dampers: Vec<Link> = moving().filter_map(Stuck::free).collect();
+        let dampers: Vec<&Link> = dampers.iter().collect();
         let rigid: Vec<&[(usize, f64)]> = joints
             .iter()
             .filter(|joint| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty())
             .map(|joint| joint.at.as_slice())
             .collect();
         if self.substructure.is_some() || self.moves_bodies() {
-            let free = Linear::of_matrices(system.structure().full(), &[], &[]);
+            let free = Linear::of_matrices(system.structure().full(), &dampers, &[]);
             let stuck = |held: &[&Link]| Linear::of_matrices(system.structure().full(), held, &rigid);
             let (stuck, closed) = with_faces(&held, &faces, &stuck);
             return Ok(Survey { free, stuck, closed, at_rest, system, joints, loose, unpressed });
@@ -101,7 +97,7 @@ impl Model {
             .filter(|link| !link.at.is_empty())
             .collect();
         let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
-        let free = Linear::new(&mass, &springs.iter().collect::<Vec<_>>(), &[]);
+        let free = Linear::new(&mass, &springs.iter().chain(dampers).collect::<Vec<_>>(), &[]);
         let stuck = |held: &[&Link]| {
             let all: Vec<&Link> = springs.iter().chain(held.iter().copied()).collect();
             Linear::new(&mass, &all, &rigid)
@@ -167,6 +163,7 @@ impl Survey {
                 joint: joint.name.clone(),
                 limit,
                 displacement,
+                gradual: joint.gradual,
                 pressed: joint.pressed,
                 at_rest: carried.filter(|_| !rigid),
             }

@@ -1,6 +1,7 @@
 //! The loads of stuck joints under the excitation, and the motion at which they let go.
 
 use super::hold::{Hold, Stuck};
+use super::linear::Link;
 use super::{Onset, Survey};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -32,6 +33,10 @@ const STIFFEST: f64 = 1e-3;
 /// Relative distance of frequencies up to which two modes are a pair.
 const EQUAL: f64 = 1e-9;
 
+/// A damping ratio that is rounding, and the share of its parts to which the work of an excitation on a mode cancels by rounding.
+const UNDAMPED: f64 = 1e-12;
+const UNDRIVEN: f64 = 1e-9;
+
 /// Degrees of freedom and joints up to which borders are refined.
 const REFINED: usize = 40;
 
@@ -51,6 +56,27 @@ impl Survey {
             return None;
         }
         (0..self.joints.len()).map(|joint| self.onset_of(joint, &omegas, &shares)).collect()
+    }
+
+    /// Frequencies (rad/s) of the modes without any damping that the excitation drives at their resonance in a range of drive frequencies, all joints
+    /// free: linear motion has no bound there.
+    pub fn undamped(&self, from: f64, to: f64) -> Vec<f64> {
+        let Some(shapes) = &self.free.shapes else { return Vec::new() };
+        let driven = |index: usize, omega: f64| {
+            let shape = shapes.column(index);
+            self.system.loads().iter().filter(|load| load.harmonic > 0).any(|load| {
+                let at = omega / f64::from(load.harmonic);
+                let (mut power, mut size) = (Complex64::ZERO, 0.0);
+                for (force, x) in load.at(at).iter().zip(shape.iter()) {
+                    power += *force * *x;
+                    size += (*force * *x).norm();
+                }
+                (from..=to).contains(&at) && power.norm() > UNDRIVEN * size
+            })
+        };
+        let modes = self.free.modes.elastic.iter().enumerate();
+        let bare = modes.filter(|(_, mode)| mode.damping.abs() <= UNDAMPED);
+        bare.filter(|(index, mode)| driven(*index, mode.omega)).map(|(_, mode)| mode.omega).collect()
     }
 
     /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure, of two modes of one
@@ -94,6 +120,14 @@ impl Survey {
         let forces = Cholesky::new(normal)?.solve(&(w.transpose() * rest));
         let share = |(index, joint): (usize, &Stuck)| match joint.hold {
             Hold::Nothing => 0.0,
+            // any motion makes a part of it slip
+            Hold::Spring { .. } if joint.gradual => {
+                if motion(joint) == 0.0 {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
+            }
             Hold::Spring { displacement, .. } => motion(joint).abs() / displacement,
             Hold::Rigid { limit } => {
                 rigid.iter().position(|r| *r == index).map_or(0.0, |column| forces[column].abs() / limit)
@@ -205,11 +239,12 @@ impl Survey {
             system.joints()[joint].axes()[axis].imposed_at(h)
         };
         for (index, joint) in self.joints.iter().enumerate() {
-            if let Hold::Spring { stiffness, .. } = joint.hold {
+            if let Some(Link { stiffness, damping, .. }) = joint.held() {
+                let stiffness = Complex64::new(stiffness, w * damping);
                 for (i, wi) in &joint.at {
-                    b[*i] -= imposed(index) * (wi * stiffness);
+                    b[*i] -= imposed(index) * (stiffness * *wi);
                     for (j, wj) in &joint.at {
-                        a[(*i, *j)] += wi * wj * stiffness;
+                        a[(*i, *j)] += stiffness * (wi * wj);
                     }
                 }
             }

@@ -227,22 +227,23 @@ impl Model {
             let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<Link> {
                 turned.rows(at).into_iter().map(|at| Link { at, stiffness, damping }).collect()
             };
-            let free: Vec<Link> =
+            let springs: Vec<Link> =
                 springs.iter().flat_map(|s| link(&ends(&s.between), s.stiffness, s.damping)).collect();
+            let of = |one: Link| link(&one.at, one.stiffness, one.damping);
+            let dampers: Vec<Link> = stuck.iter().filter_map(Stuck::free).flat_map(of).collect();
             let (mut held, mut rigid) = (Vec::new(), Vec::new());
             for joint in &stuck {
                 match joint.hold {
                     Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
-                    Hold::Nothing => {}
-                    Hold::Spring { stiffness, .. } => held.extend(link(&joint.at, stiffness, 0.0)),
+                    Hold::Nothing | Hold::Spring { .. } => held.extend(joint.held().into_iter().flat_map(of)),
                     Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
                 }
             }
             let weigh = |x: &DVector<f64>| x.component_mul(&DVector::from_column_slice(&mass));
             let once = |linear: Linear| turned.once(linear.modes, linear.shapes, lowest, &weigh);
             let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-            let free_ones = once(Linear::new(&mass, &free.iter().collect::<Vec<_>>(), &[]));
-            let stuck_ones = once(Linear::new(&mass, &free.iter().chain(&held).collect::<Vec<_>>(), &rigid));
+            let free_ones = once(Linear::new(&mass, &springs.iter().chain(&dampers).collect::<Vec<_>>(), &[]));
+            let stuck_ones = once(Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid));
             turned.modes(free_ones, stuck_ones, &places)
         };
         Ok(Some((0..=sectors / 2).map(wave).collect()))
@@ -274,15 +275,16 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
         let wave = sector.wave(diameter).ok()?;
         let (structure, double) = (wave.structure(), wave.is_double());
         let turned = Turned { dofs: sector.dofs(), sectors, diameter, double };
-        let link = |at: &[(usize, f64)], stiffness: f64| -> Vec<Link> {
-            turned.rows(at).into_iter().map(|at| Link { at, stiffness, damping: 0.0 }).collect()
+        let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<Link> {
+            turned.rows(at).into_iter().map(|at| Link { at, stiffness, damping }).collect()
         };
+        let of = |one: Link| link(&one.at, one.stiffness, one.damping);
+        let dampers: Vec<Link> = stuck.iter().filter_map(Stuck::free).flat_map(of).collect();
         let (mut held, mut rigid) = (Vec::new(), Vec::new());
         for joint in &stuck {
             match joint.hold {
-                Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed)),
-                Hold::Nothing => {}
-                Hold::Spring { stiffness, .. } => held.extend(link(&joint.at, stiffness)),
+                Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
+                Hold::Nothing | Hold::Spring { .. } => held.extend(joint.held().into_iter().flat_map(of)),
                 Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
             }
         }
@@ -300,7 +302,7 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
                 of_large(structure, links, if double { lowest.saturating_mul(2) } else { lowest })?;
             Some(turned.once(modes, Some(shapes), lowest, &|x| DVector::from_vec(mass.times(x.as_slice()))))
         };
-        Some(turned.modes(modes(&[], &[])?, modes(&held, &rigid)?, places))
+        Some(turned.modes(modes(&dampers, &[])?, modes(&held, &rigid)?, places))
     };
     (0..=sectors / 2).map(wave).collect()
 }
@@ -312,13 +314,15 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matr
         let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
         Matrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
     };
-    let mut springs = Vec::new();
-    for link in links {
-        for &(i, a) in &link.at {
-            springs.extend(link.at.iter().map(|&(k, b)| (i, k, link.stiffness * (a * b))));
-        }
-    }
-    let (mass, damping, stiffness) = (part(0, Vec::new())?, part(1, Vec::new())?, part(2, springs)?);
+    let along = |value: fn(&Link) -> f64| {
+        let entries = |link: &Link| {
+            let pairs = link.at.iter().flat_map(|&(i, a)| link.at.iter().map(move |&(k, b)| (i, k, a * b)));
+            pairs.map(|(i, k, weight)| (i, k, value(link) * weight)).collect::<Vec<_>>()
+        };
+        links.iter().filter(|link| value(link) != 0.0).flat_map(entries).collect::<Vec<_>>()
+    };
+    let mass = part(0, Vec::new())?;
+    let (damping, stiffness) = (part(1, along(|link| link.damping))?, part(2, along(|link| link.stiffness))?);
     // free motions are none of the elastic ones that are asked for
     let wanted = Wanted::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
     let found = NaturalModes::new(&Analysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;

@@ -3,6 +3,28 @@
 use super::{ModeEquations, ModeState, ZERO};
 use crate::model::Axis;
 use num_complex::Complex64;
+use std::f64::consts::TAU;
+use stickslip_numerics::maximum::maximum;
+
+/// Samples of a period for each of its harmonics, among which the ends of a motion are sought, and how close they are found, as a part of their distance.
+const SAMPLES: f64 = 16.0;
+const CLOSE: f64 = 1e-6;
+
+/// Half of the way from the least to the largest value of a sum of harmonics, each with its number.
+fn half_range(terms: &[(f64, Complex64)]) -> f64 {
+    let value = |t: f64| terms.iter().map(|(h, x)| (x * Complex64::from_polar(1.0, h * t)).re).sum::<f64>();
+    let highest = terms.iter().map(|(h, _)| *h).fold(1.0, f64::max);
+    let count = (SAMPLES * highest) as usize;
+    let step = TAU / count as f64;
+    let end = |sign: f64| {
+        let sampled = (0..count).map(|i| (i, sign * value(i as f64 * step)));
+        let (top, best) = sampled.fold((0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
+        let bracket = ((top as f64 - 1.0) * step, (top as f64 + 1.0) * step);
+        let found = maximum(bracket, |a, b| b - a <= CLOSE * step, |t| Ok::<f64, ()>(sign * value(t)));
+        found.map_or(best, |found| found.1.max(best))
+    };
+    0.5 * (end(1.0) + end(-1.0))
+}
 
 impl ModeEquations<'_> {
     /// `xᴴ M y` of two shapes.
@@ -54,6 +76,19 @@ impl ModeEquations<'_> {
         self.at_places(self.first(state))
     }
 
+    /// Half of the way that every place covers from one end of its motion to the other, m.
+    pub fn half_ranges(&self, state: &ModeState) -> Vec<f64> {
+        let n = self.system.dofs();
+        let series: Vec<Vec<Complex64>> = state.x.chunks_exact(n).map(|x| self.at_places(x)).collect();
+        let harmonics = &self.alternation.harmonics;
+        let of_place = |place: usize| {
+            let terms: Vec<(f64, Complex64)> =
+                harmonics.iter().zip(&series).map(|(h, places)| (*h as f64, places[place])).collect();
+            half_range(&terms)
+        };
+        (0..self.system.seen().len()).map(of_place).collect()
+    }
+
     /// What the places see of a motion of all degrees of freedom.
     pub fn at_places(&self, x: &[Complex64]) -> Vec<Complex64> {
         let at = |place: &Axis| place.rows().iter().map(|(row, weight)| x[*row] * *weight).sum();
@@ -67,5 +102,22 @@ impl ModeEquations<'_> {
         let x = self.first(state);
         let conjugate: Vec<Complex64> = x.iter().map(Complex64::conj).collect();
         self.in_masses(&conjugate, x).norm() / self.in_masses(x, x).re
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_of_a_motion_has_all_harmonics() {
+        let of = |third: f64| half_range(&[(1.0, Complex64::new(0.0, -2.0)), (3.0, Complex64::new(0.0, third))]);
+        // 2 sin t - sin(3t)/5 is largest at 90 degrees, 2 sin t + sin(3t) elsewhere: at sin² t = 5/12, where it is (5 - 5/3) sin t
+        assert!((of(0.2) - 2.2).abs() < 1e-12, "{}", of(0.2));
+        let expected = (10.0 / 3.0) * (5.0f64 / 12.0).sqrt();
+        assert!((of(-1.0) - expected).abs() < 1e-12, "{} {expected}", of(-1.0));
+        // a mean is no motion
+        let with_mean = half_range(&[(0.0, Complex64::new(5.0, 0.0)), (1.0, Complex64::new(3.0, 4.0))]);
+        assert!((with_mean - 5.0).abs() < 1e-12, "{with_mean}");
     }
 }
