@@ -150,7 +150,7 @@ pub enum Command {
     New {
         /// Template (see `stickslip list templates`)
         template: String,
-        /// File to write; standard output when absent
+        /// File to write, none that is there already; NAME.toml of the template when absent, `-` is standard output
         file: Option<PathBuf>,
     },
     /// List what there is

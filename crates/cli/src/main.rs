@@ -23,9 +23,10 @@ use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
 use ending::{Ending, print};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use stickslip_report::stream::Start;
+use stickslip_study::templates;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -94,22 +95,34 @@ fn main() -> ExitCode {
     ending.code()
 }
 
+/// `stickslip new`: writes the study of a template into a file of its name, or of the one that is given; `-` prints it.
 fn new(name: &str, file: Option<&Path>) -> Ending {
-    let Some(template) = stickslip_study::templates::find(name) else {
-        let names: Vec<&str> = stickslip_study::templates::TABLE.iter().map(|t| t.name).collect();
-        complain!("error: there is no template `{name}`; there are {}", names.join(", "));
+    let Some(template) = templates::find(name) else {
+        let meant = templates::nearest(name).map_or_else(String::new, |near| format!("did you mean `{near}`? "));
+        let names: Vec<&str> = templates::TABLE.iter().map(|t| t.name).collect();
+        complain!("error: there is no template `{name}`; {meant}there are {}", names.join(", "));
         return Ending::WrongInput;
     };
-    let Some(file) = file else { return print(template.study) };
+    let own = PathBuf::from(format!("{name}.toml"));
+    let file = file.unwrap_or(&own);
+    if file == Path::new("-") {
+        return print(template.study);
+    }
     let written = std::fs::OpenOptions::new()
         .write(true)
         .create_new(true)
         .open(file)
         .and_then(|mut f| f.write_all(template.study.as_bytes()));
     match written {
-        Ok(()) => Ending::Done,
+        Ok(()) => {
+            complain!("{} is written; `stickslip run {}` computes it", file.display(), file.display());
+            Ending::Done
+        }
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-            complain!("error: {} is there already and stays as it is; choose another name", file.display());
+            complain!(
+                "error: {} is there already and stays as it is; name another file, as in `stickslip new {name} other.toml`, or `-` to print it",
+                file.display()
+            );
             Ending::WrongInput
         }
         Err(error) => Ending::Failed(format!("{}: {error}", file.display())),

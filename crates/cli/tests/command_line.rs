@@ -427,12 +427,22 @@ fn lists_templates_schema_and_completions() {
     assert_eq!(code(&stickslip(folder.path(), &["completions", "bash"])), 0);
     for template in stickslip_study::templates::TABLE {
         let file = format!("{}.toml", template.name);
-        assert_eq!(code(&stickslip(folder.path(), &["new", template.name, &file])), 0);
+        let output = stickslip(folder.path(), &["new", template.name]);
+        assert!(code(&output) == 0 && output.stdout.is_empty() && stderr(&output).contains(&file), "{output:?}");
+        assert_eq!(fs::read_to_string(folder.path().join(&file)).unwrap(), template.study);
         assert_eq!(code(&stickslip(folder.path(), &["check", &file])), 0);
+        assert_eq!(code(&stickslip(folder.path(), &["new", template.name])), 2, "an existing file stays");
         assert_eq!(code(&stickslip(folder.path(), &["new", template.name, &file])), 2, "an existing file stays");
+        let printed = stickslip(folder.path(), &["new", template.name, "-"]);
+        assert!(code(&printed) == 0 && printed.stdout == template.study.as_bytes());
     }
     let output = stickslip(folder.path(), &["new", "blade-cuple"]);
-    assert!(code(&output) == 2 && stderr(&output).contains("blade-couple"));
+    assert!(code(&output) == 2 && stderr(&output).contains("did you mean `blade-couple`?"), "{}", stderr(&output));
+    let output = stickslip(folder.path(), &["new", "bladed-rign"]);
+    assert!(code(&output) == 2 && stderr(&output).contains("did you mean `bladed-ring`?"), "{}", stderr(&output));
+    assert!(!folder.path().join("bladed-rign.toml").exists());
+    let output = stickslip(folder.path(), &["inspect", "."]);
+    assert!(code(&output) == 2 && stderr(&output).contains("a folder, a file is needed"), "{}", stderr(&output));
 }
 
 #[test]

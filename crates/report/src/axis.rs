@@ -77,6 +77,14 @@ impl Range {
         (self.measure(value) - self.measure(self.from)) / self.span()
     }
 
+    /// What stands at a part of the axis: the inverse of [`Range::part`].
+    pub(crate) fn at(self, part: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => self.from + part * (self.to - self.from),
+            Scale::Log => exp10(self.measure(self.from) + part * self.span()),
+        }
+    }
+
     pub(crate) fn contains(self, value: f64) -> bool {
         value >= self.from && value <= self.to
     }

@@ -58,8 +58,8 @@ pub(crate) fn has_data(panel: &Panel) -> bool {
 pub(crate) fn layers(panel: &Panel) -> Vec<&Series> {
     let mut series: Vec<&Series> = panel.series.iter().collect();
     series.sort_by_key(|s| match (s.style, s.emphasis) {
-        (Style::Marks, _) => 5,
-        (_, Emphasis::Reference) => 0,
+        (Style::Marks | Style::Missing, _) => 5,
+        (_, Emphasis::Reference | Emphasis::OwnReference) => 0,
         (Style::Band | Style::Stripe, _) => 1,
         (Style::Bars, _) => 2,
         (_, Emphasis::Pale) => 3,
@@ -173,10 +173,12 @@ pub(crate) struct Entry {
     pub line: Option<Style>,
     /// Whether marks carry the label.
     pub marks: bool,
-    /// Whether an area carries the label: a band or bars.
+    /// Whether an area carries the label, a band or bars, or crosses do.
     pub area: Option<Style>,
     /// Whether all that carries the label is pale.
     pub pale: bool,
+    /// Whether it is a reference.
+    pub reference: bool,
 }
 
 /// Longest legend; of what is beyond only the number is told.
@@ -194,9 +196,12 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
             continue;
         }
         let colour = shades.colour(series);
-        let value = series.value.filter(|_| shades.bar.is_some() && series.emphasis != Emphasis::Reference);
+        // what stands for all values of the colours has a name
+        let nameless = !series.emphasis.is_reference() && series.style != Style::Missing;
+        let value = series.value.filter(|_| shades.bar.is_some() && nameless);
         let (line, marks, area) = match line_style(series) {
             Style::Marks => (None, true, None),
+            style @ Style::Missing => (None, false, Some(style)),
             style @ (Style::Band | Style::Bars) => (None, false, Some(style)),
             style => (Some(style), false, None),
         };
@@ -214,15 +219,16 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
             }
             None => {
                 let label = series.label.clone();
-                entries.push((Entry { label, colour, line, marks, area, pale }, value, value.is_none()));
+                let reference = series.emphasis.is_reference();
+                entries.push((Entry { label, colour, line, marks, area, pale, reference }, value, value.is_none()));
             }
         }
     }
     let mut entries: Vec<Entry> = entries.into_iter().filter(|(_, _, named)| *named).map(|(entry, ..)| entry).collect();
-    let reference = Colour::reference();
-    entries.sort_by_key(|entry| match entry {
-        entry if entry.colour == reference => 2,
-        entry => u8::from(entry.line.is_none() && entry.area.is_none()),
+    entries.sort_by_key(|entry| match entry.area {
+        _ if entry.reference => 2,
+        Some(Style::Missing) => 1,
+        area => u8::from(entry.line.is_none() && area.is_none()),
     });
     let more = entries.len().saturating_sub(MOST);
     entries.truncate(MOST);
@@ -237,7 +243,8 @@ const REFERENCE_REACH: f64 = 2.0;
 
 /// Whether so many results are in a panel that they need thin lines and small marks.
 pub(crate) fn crowded(panel: &Panel) -> bool {
-    panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal).count() > CROWD
+    let results = panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal && s.style != Style::Missing);
+    results.count() > CROWD
 }
 
 /// A panel with more results than this is crowded.
@@ -302,7 +309,8 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
     let fixed = Range::fixed(&panel.x);
     let inside = |p: &(f64, f64)| fixed.is_none_or(|range| range.contains(p.0));
     let values = |reference: bool| {
-        panel.series.iter().filter(move |s| (s.emphasis == Emphasis::Reference) == reference).flat_map(move |series| {
+        let shown = panel.series.iter().filter(|series| series.style != Style::Missing);
+        shown.filter(move |s| s.emphasis.is_reference() == reference).flat_map(move |series| {
             let area = matches!(series.style, Style::Band | Style::Bars);
             points(panel, series)
                 .enumerate()
@@ -358,9 +366,17 @@ pub(crate) fn bar_slot(panel: &Panel, x: Range) -> f64 {
     }
 }
 
+/// Distance of rows of crosses from each other, and of the first from the lower edge, as a part of the height of a panel.
+const CROSSES: f64 = 0.03;
+
+/// Where a row of crosses stands, as a part of the height of a panel.
+pub(crate) fn row_of_crosses(series: &Series) -> f64 {
+    CROSSES * series.y.first().copied().unwrap_or(1.0)
+}
+
 /// Whether x never goes back (marks do not count).
 fn is_curve(panel: &Panel, series: &Series) -> bool {
-    if series.style == Style::Marks {
+    if matches!(series.style, Style::Marks | Style::Missing) {
         return true;
     }
     let mut last = f64::NEG_INFINITY;
@@ -417,8 +433,15 @@ mod tests {
     fn a_label_stands_once_in_the_legend() {
         let (entries, more) = legend(&samples::response().figure);
         assert_eq!(entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), ["a₁", "a₂", "a₃", "peak"]);
-        let peak =
-            Entry { label: "peak".into(), colour: Colour::many(), line: None, marks: true, area: None, pale: false };
+        let peak = Entry {
+            label: "peak".into(),
+            colour: Colour::many(),
+            line: None,
+            marks: true,
+            area: None,
+            pale: false,
+            reference: false,
+        };
         assert_eq!((&entries[3], more), (&peak, 0));
     }
 
@@ -462,7 +485,7 @@ mod tests {
                     "{}",
                     panel.title
                 );
-                let results = panel.series.iter().filter(|s| s.emphasis != Emphasis::Reference);
+                let results = panel.series.iter().filter(|s| !s.emphasis.is_reference() && s.style != Style::Missing);
                 for point in results.flat_map(|s| drawn(panel, s)) {
                     let free = panel.x.range.is_none() && panel.y.range.is_none();
                     assert!(!free || x.contains(point.0) && y.contains(point.1), "{}: {point:?}", panel.title);

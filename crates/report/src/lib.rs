@@ -40,6 +40,7 @@
 //! assert!(stickslip_report::html::to_html(&figure, "plotly.js").contains("plotly.js"));
 //! ```
 
+mod answers;
 pub mod assemble;
 mod axis;
 mod clip;

@@ -1,10 +1,13 @@
 //! A dataset for the terminal: what was computed, the small tables, what failed, where the files are.
 
+use crate::answers::worst_first;
 use crate::stored::COMPARISON;
+use serde_json::Value as Json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip_study::dataset::{Dataset, Table, Values};
+use stickslip_study::dataset::{Column, Dataset, Table, Values};
+use stickslip_study::units;
 
 /// How the text is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -16,7 +19,7 @@ pub struct Terminal {
 }
 
 /// Tables longer than this are left to their files, or cut if they hold the main numbers of a study.
-const ROWS: usize = 24;
+const ROWS: usize = 20;
 /// Tables with the main numbers: these, and all whose names end in `_summary`.
 const MAIN: [&str; 6] = ["summary", "peaks", "optimum", "turns", "orbits", "differences"];
 /// Widest table, in characters, where the width of a line is unknown or larger.
@@ -49,7 +52,9 @@ impl Terminal {
         for table in &dataset.tables {
             let main = MAIN.contains(&table.name.as_str()) || table.name.ends_with("_summary");
             if (1..=ROWS).contains(&table.rows()) || main && table.rows() > 0 {
-                let _ = write!(out, "\n{}\n{}", clean(&table.name), shown(table, width));
+                let sorted = worst_first(table).filter(|_| table.name == "peaks");
+                let written = in_written_units(sorted.as_ref().unwrap_or(table), &dataset.record.study["units"]);
+                let _ = write!(out, "\n{}\n{}", clean(&table.name), shown((&table.name, &written), width));
             }
         }
         out.push('\n');
@@ -193,6 +198,38 @@ fn unit_of(name: &str, largest: f64) -> (&str, &'static str, i32, &'static str) 
     (quantity, unit, power, prefix)
 }
 
+/// A table with those columns in the units in which the study states them for which `written` has one.
+fn in_written_units<'t>(table: &'t Table, written: &'t Json) -> Vec<Written<'t>> {
+    let one = |column: &'t Column| {
+        let unit = written[&column.name].as_str();
+        let converted = unit.and_then(|unit| {
+            let own = column.unit()?;
+            let factor = units::ratio(&own, unit)?;
+            let values = column.as_numbers()?.iter().map(|value| rounded(value * factor)).collect();
+            Some((Values::Number(values), unit))
+        });
+        Written { column, converted }
+    };
+    table.columns.iter().map(one).collect()
+}
+
+/// A column, with its values in another unit if the study states them in one.
+struct Written<'t> {
+    column: &'t Column,
+    converted: Option<(Values, &'t str)>,
+}
+
+impl Written<'_> {
+    fn values(&self) -> &Values {
+        self.converted.as_ref().map_or(&self.column.values, |(values, _)| values)
+    }
+}
+
+/// A number without the rounding of a change of units.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.12e}").parse().unwrap_or(value)
+}
+
 /// One value of a column with this name, rounded, with its unit.
 pub(crate) fn quantity(name: &str, value: f64) -> String {
     let (_, unit, power, prefix) = unit_of(name, value.abs());
@@ -200,14 +237,20 @@ pub(crate) fn quantity(name: &str, value: f64) -> String {
     format!("{number} {prefix}{unit}").trim_end().to_owned()
 }
 
+/// Digits of a quantity in the unit of the study: frequencies need them.
+const WRITTEN_DIGITS: i32 = 7;
 /// Digits of a difference.
 const DIFFERENCE_DIGITS: i32 = 3;
 
 /// Heading and cells of a column for people.
-fn column(name: &str, values: &Values) -> (String, Vec<String>) {
+fn column(name: &str, values: &Values, written: Option<&str>) -> (String, Vec<String>) {
     let Values::Number(numbers) = values else {
         return (name.replace('_', " "), (0..values.len()).map(|row| clean(&crate::csv::cell(values, row))).collect());
     };
+    if let Some(unit) = written {
+        let (quantity, ..) = unit_of(name, 0.0);
+        return (format!("{} ({unit})", quantity.replace('_', " ")), engineering(numbers, WRITTEN_DIGITS));
+    }
     let largest = numbers.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()));
     let (quantity, unit, power, prefix) = unit_of(name, largest);
     let scaled: Vec<f64> = numbers.iter().map(|v| v / 10f64.powi(power)).collect();
@@ -252,13 +295,14 @@ struct Shown<'a> {
 }
 
 /// The first rows of a table with aligned columns, no wider than `limit`, and what is left out.
-fn shown(table: &Table, limit: usize) -> String {
-    let rows = table.rows().min(ROWS);
+fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
+    let all_rows = table.first().map_or(0, |one| one.values().len());
+    let rows = all_rows.min(ROWS);
     let mut columns: Vec<Shown<'_>> = table
-        .columns
         .iter()
-        .map(|c| {
-            let (heading, cells) = column(&c.name, &head(&c.values, rows));
+        .map(|one| {
+            let (c, unit) = (one.column, one.converted.as_ref().map(|(_, unit)| *unit));
+            let (heading, cells) = column(&c.name, &head(one.values(), rows), unit);
             let heading = clean(&heading);
             let width = cells.iter().chain([&heading]).map(|text| text.chars().count()).max().unwrap_or(0);
             let right = matches!(c.values, Values::Number(_) | Values::Integer(_));
@@ -285,11 +329,11 @@ fn shown(table: &Table, limit: usize) -> String {
         }
         let _ = writeln!(out, "{}", line.trim_end());
     }
-    let more = [(table.rows() - rows, "row"), (all - columns.len(), "column")];
+    let more = [(all_rows - rows, "row"), (all - columns.len(), "column")];
     let more: Vec<String> =
         more.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} more {what}{}", plural(*n))).collect();
     if !more.is_empty() {
-        let _ = writeln!(out, "  … and {} in {}.csv", more.join(", "), clean(&table.name));
+        let _ = writeln!(out, "  … and {} in {}.csv", more.join(", "), clean(name));
     }
     out
 }
@@ -334,7 +378,6 @@ fn head(values: &Values, rows: usize) -> Values {
 mod tests {
     use super::*;
     use crate::samples;
-    use stickslip_study::dataset::Column;
 
     #[test]
     fn tables_have_engineering_units_and_sensible_digits() {
@@ -430,13 +473,34 @@ results/fig02/: loops_summary.csv, figure.svg
         // evidence goes first, then what stands last: 16 + 16 for the first two leave room for three of 26
         assert!(table[0].contains("amplitude (mm)") && table[0].contains("name 2") && !table[0].contains("name 3"));
         assert!(!table[0].contains("residual") && !table[0].contains("iterations"), "{}", table[0]);
-        assert_eq!(*table.last().unwrap(), "  … and 6 more rows, 7 more columns in peaks.csv");
+        assert_eq!(*table.last().unwrap(), "  … and 10 more rows, 7 more columns in peaks.csv");
         assert!(table.iter().all(|l| l.chars().count() <= WIDTH));
-        assert!(table[24].contains("24"), "{}", table[24]);
+        assert!(table[20].contains("20"), "{}", table[20]);
         let narrow = Terminal { width: Some(60), ..Terminal::default() }.text(&long("loops_summary", 2), &[]);
         assert!(narrow.contains("in loops_summary.csv") && narrow.lines().all(|l| l.chars().count() <= 60), "{narrow}");
         // other long tables stay in their files
         assert!(!Terminal::default().text(&long("curve", 30), &[]).contains("amplitude (mm)"));
+    }
+
+    /// Speeds and stiffnesses stand as the study states them; what it does not state has a unit by size.
+    #[test]
+    fn columns_have_the_units_of_the_study() {
+        let one = |name: &str, value: f64| Column::numbers(name, vec![value]);
+        let columns =
+            vec![one("n_Hz", 50.0), one("kt_N_per_m", 8e3), one("frequency_Hz", 54.0), one("amplitude_m", 2e-3)];
+        let tables = vec![Table { name: "peaks".to_owned(), columns }];
+        let mut dataset = Dataset { tables, ..samples::response() };
+        let units = |units: Json| serde_json::json!({ "units": units });
+        dataset.record.study = units(serde_json::json!({ "n_Hz": "rpm", "kt_N_per_m": "N/mm", "frequency_Hz": "rpm" }));
+        let lines = |dataset: &Dataset| -> Vec<String> {
+            let text = Terminal::default().text(dataset, &[]);
+            let table = text.lines().skip_while(|line| *line != "peaks").skip(1).take(2);
+            table.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
+        };
+        assert_eq!(lines(&dataset), ["n (rpm) kt (N/mm) frequency (rpm) amplitude (mm)", "3000 8 3240 2"]);
+        // a record without them leaves SI
+        dataset.record.study = Json::Null;
+        assert_eq!(lines(&dataset), ["n (Hz) kt (kN/m) frequency (Hz) amplitude (mm)", "50 8 54 2"]);
     }
 
     #[test]
@@ -471,7 +535,7 @@ results/fig02/: loops_summary.csv, figure.svg
         for (name, heading) in
             [("alpha_s_per_m", "alpha (s/m)"), ("v_m_per_s", "v (m/s)"), ("rate_Hz_per_s", "rate (Hz/s)"), ("n", "n")]
         {
-            assert_eq!(column(name, &Values::Number(vec![2.0])).0, heading);
+            assert_eq!(column(name, &Values::Number(vec![2.0]), None).0, heading);
         }
     }
 

@@ -25,6 +25,16 @@ pub(crate) fn amplitude_in(place: &str, unit: &str) -> String {
     format!("{place}_amplitude_{unit}")
 }
 
+/// The size of the first harmonic of a place, m.
+pub(crate) fn first_harmonic_of(place: &str) -> String {
+    first_harmonic_in(place, "m")
+}
+
+/// The same in its unit: m, or rad of a rotation.
+pub(crate) fn first_harmonic_in(place: &str, unit: &str) -> String {
+    format!("{place}_first_harmonic_{unit}")
+}
+
 /// The phase of its first harmonic against the drive, degrees; in free vibration against the place that moves most.
 pub(crate) fn phase_of(place: &str) -> String {
     format!("{place}_phase_deg")

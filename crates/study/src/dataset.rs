@@ -379,6 +379,11 @@ impl Series {
     pub fn marks(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Marks, ..Series::line(label, x, y, colour) }
     }
+    /// Crosses at abscissae without a value, in a row above the lower edge, from 1.
+    pub fn missing(label: impl Into<String>, x: Vec<f64>, row: usize, colour: usize) -> Series {
+        let y = vec![row as f64; x.len()];
+        Series { style: Style::Missing, ..Series::line(label, x, y, colour) }
+    }
     /// A filled band between two curves over the same abscissae, for example percentiles.
     pub fn band(label: impl Into<String>, x: Vec<f64>, lower: Vec<f64>, upper: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Band, base: lower, ..Series::line(label, x, upper, colour) }
@@ -400,6 +405,10 @@ impl Series {
     pub fn reference(self) -> Series {
         Series { emphasis: Emphasis::Reference, ..self }
     }
+    /// The same curve as a reference of one case among others, in its colour.
+    pub fn reference_of_its_own(self) -> Series {
+        Series { emphasis: Emphasis::OwnReference, ..self }
+    }
     /// The same curve, of this value of the varied parameter.
     pub fn of(self, value: f64) -> Series {
         Series { value: Some(value), ..self }
@@ -416,6 +425,15 @@ pub enum Emphasis {
     Pale,
     /// What a result is compared with (all joints free, all joints stuck): grey and dashed, behind all others.
     Reference,
+    /// What one result among several is compared with: in its colour, thin, behind all others.
+    OwnReference,
+}
+
+impl Emphasis {
+    /// Whether the curve is what results are compared with.
+    pub fn is_reference(self) -> bool {
+        matches!(self, Emphasis::Reference | Emphasis::OwnReference)
+    }
 }
 
 /// How a curve is drawn.
@@ -428,8 +446,10 @@ pub enum Style {
     Dashed,
     /// Dots.
     Dotted,
-    /// Marks without a line (peaks, failed points).
+    /// Marks without a line (peaks).
     Marks,
+    /// Crosses at the lower edge of the panel, at abscissae that have no value (failed points); `y` is the row of crosses, from 1.
+    Missing,
     /// Filled between [`Series::base`] and `y`.
     Band,
     /// A bar at every abscissa, from [`Series::base`] to `y`; several series of bars stand side by side.

@@ -107,8 +107,8 @@ impl<'a> Drawing<'a> {
     pub(crate) fn varied_axis(&self, stretches: &[Stretch], which: usize) -> Option<Axis> {
         let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
-            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.on_axis().0)).collect();
-        let unit = last.on_axis().1;
+            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.as_written().0)).collect();
+        let unit = last.as_written().1;
         let axis = Axis {
             whole: unit.is_empty() && values.iter().all(|value| value.fract() == 0.0),
             ..Axis::new(&last.name, unit)

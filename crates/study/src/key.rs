@@ -118,7 +118,7 @@ pub enum Within {
 pub(crate) fn within(range: law::Range) -> Within {
     match range {
         law::Range::Positive | law::Range::Count(_) => Within::Positive,
-        law::Range::ZeroOrMore => Within::AtLeastZero,
+        law::Range::ZeroOrMore | law::Range::UpTo(_) => Within::AtLeastZero,
         law::Range::Any | law::Range::Within(..) => Within::Finite,
     }
 }
@@ -150,6 +150,9 @@ impl Key {
         !matches!(self.takes, Takes::Refused(_))
     }
 }
+
+/// The key of a damping as a share of the critical one.
+pub(crate) const RATIO: &str = "damping_ratio";
 
 /// A key that is looked for and cannot be: why, and what to do instead.
 pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {

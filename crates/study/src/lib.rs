@@ -27,6 +27,8 @@ mod kind;
 pub mod kinds;
 mod linear;
 pub mod memory;
+mod mistaken;
+mod mixed;
 mod names;
 mod near;
 mod note;

@@ -16,7 +16,10 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
             // one slip in a short word, a third of a long one; or an abbreviation such as `freq`
             let near = distance <= (length / 3).max(usize::from(length > 1));
             let abbreviation = lower.chars().count() >= 3 && other.starts_with(&lower);
-            (near || abbreviation).then_some((distance, candidate))
+            // `frequency response`, `nonlinear modes`
+            let parts = || lower.split(|c: char| !c.is_alphanumeric());
+            let within = other.chars().count() >= 3 && parts().any(|part| part == other);
+            (near || abbreviation || within).then_some((distance, candidate))
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
@@ -54,6 +57,7 @@ mod tests {
         assert_eq!(nearest("Damping", keys), Some("damping"));
         assert_eq!(nearest("damp", keys), Some("damping"));
         assert_eq!(nearest("colour", keys), None);
+        assert_eq!(nearest("viscous damping", keys), Some("damping"));
         assert_eq!((nearest("61", ["6", "1"]), nearest("61.x", ["6.x"])), (None, None));
         assert_eq!(nearest(&"x".repeat(100_000), keys), None);
         assert_eq!(one_of(keys), "`between`, `stiffness` or `damping`");

@@ -47,12 +47,51 @@ pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, S
         _ => refuse(format!("the file cannot be read: {error}"), None),
     };
     if std::fs::metadata(path).map_err(failed)?.is_dir() {
-        return Err(refuse("this is a folder, a study file (TOML) is needed".to_owned(), None));
+        let help = is_results(path).then(|| format!("`stickslip plot {name}` draws the results in it again"));
+        return Err(refuse("this is a folder, a study file (TOML) is needed".to_owned(), help));
+    }
+    if let Some((what, help)) = no_study(path) {
+        return Err(refuse(format!("this is {what}, a study file (TOML) is needed"), Some(help)));
     }
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(failed)?;
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     read_bytes(&name, &bytes, overrides)
+}
+
+/// The ends of the names of results, and what such a file is.
+const RESULTS: [(&str, &str); 7] = [
+    ("csv", "a table of numbers"),
+    ("parquet", "a table of numbers"),
+    ("json", "a record of results"),
+    ("svg", "a figure"),
+    ("png", "a figure"),
+    ("pdf", "a figure"),
+    ("html", "a page"),
+];
+
+/// What a file is that its name says to be no study, and what to do with it.
+fn no_study(path: &Path) -> Option<(&'static str, String)> {
+    let end = path.extension()?.to_str()?.to_lowercase();
+    if let Some((_, what)) = RESULTS.iter().find(|(known, _)| *known == end) {
+        let folder = path.parent().filter(|folder| is_results(folder));
+        let help = match folder {
+            Some(folder) => format!("`stickslip plot {}` draws the results in its folder again", folder.display()),
+            None => "`stickslip new TEMPLATE` writes a study file to start from".to_owned(),
+        };
+        return Some((what, help));
+    }
+    let matrices = ["mtx", "mat", "npz", "npy", "op4", "pch", "sti", "mas", "dof", "rsa", "full"];
+    matrices.contains(&end.as_str()).then(|| {
+        let help =
+            format!("`stickslip inspect {}` says what is in it; a study names it in [structure]", path.display());
+        ("a file of matrices", help)
+    })
+}
+
+/// Whether a folder holds the results of a run.
+fn is_results(folder: &Path) -> bool {
+    folder.join("record.json").is_file()
 }
 
 /// A file beside `path` whose name is like it.

@@ -3,6 +3,7 @@
 //! The reader checks files against this table, and the documentation and the JSON Schema for editors are generated from it. Laws and
 //! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
 
+use crate::key::RATIO;
 use crate::kind::Kind;
 use crate::sample::{DESIGNS, DISTRIBUTIONS, WITHIN};
 use crate::substructure::REDUCTIONS;
@@ -94,7 +95,8 @@ pub const FIGURE: &[Key] = &[
         "references",
         Takes::Flag,
         "false",
-        "adds the linear responses with all joints free and all joints stuck, of the first case, to a response; none behind percentiles of draws",
+        "adds the linear responses with all joints free and all joints stuck to a response; where they differ from case to case each is in the colour of its \
+         case, of more than seven those of the first and the last; none behind percentiles of draws",
         "true",
     ),
     optional("x", Takes::Choice(scale_names), "scale of the horizontal axis", "\"log\""),
@@ -379,8 +381,15 @@ const SPRING: &[Key] = &[
     optional(
         "damping",
         Takes::Quantity(Dimension::DAMPING, Within::Finite),
-        "viscous damping in parallel; between rotations in N m s/rad",
+        "viscous damping in parallel; in percent it is a `damping_ratio`; between rotations in N m s/rad",
         "\"0.2 kg/s\"",
+    ),
+    optional(
+        RATIO,
+        Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
+        "instead of `damping`: share of the critical damping of this spring with the mass at its end, c = 2 zeta sqrt(k m); between two masses m is \
+         m1 m2/(m1 + m2)",
+        "\"2 %\"",
     ),
     REPEAT,
 ];

@@ -1,13 +1,16 @@
 //! What the lists state: the model, or one sector of a disk and how its forces go around.
 
 use crate::error::Problem;
+use crate::key::RATIO;
 use crate::stated::{Lists, ModelStatement};
 use crate::statement::{Environment, Stated, StatedTable};
 use crate::substructure;
-use crate::values::Values;
+use crate::values::{Given, Values};
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
-use stickslip::model::{Around, Body, Element, Force, Joint, Mass, Model, Motion, ROTATIONS, Spring, with_rotations};
+use stickslip::model::{
+    Around, Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, Spring, with_rotations,
+};
 
 /// The places of the structure by matrices.
 fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
@@ -91,8 +94,18 @@ pub(crate) fn sector_of(
     }
     for (i, table) in lists.spring.iter().enumerate() {
         let values = resolve(Element::Spring(i), table);
-        let (stiffness, damping) = (number(&values, "stiffness"), number(&values, "damping"));
-        model.springs.push(Spring { between: between(&values), stiffness, damping });
+        let mut spring = Spring {
+            between: between(&values),
+            stiffness: number(&values, "stiffness"),
+            damping: number(&values, "damping"),
+        };
+        if let Some(ratio) = values.quantity(RATIO) {
+            match critical_damping(&spring, lists, &model.masses) {
+                Ok(critical) => spring.damping = ratio * critical,
+                Err(why) => wrong.push(no_ratio(table, &why)),
+            }
+        }
+        model.springs.push(spring);
     }
     let displacements = |directions: &[String]| {
         let turns = |along: &&String| ROTATIONS.contains(&along.as_str());
@@ -155,6 +168,38 @@ fn inertia(table: &StatedTable, directions: &[String], stated: &[f64]) -> Result
 
 fn plural(moments: usize) -> String {
     if moments == 1 { "one moment of inertia".to_owned() } else { format!("{moments} moments of inertia") }
+}
+
+/// The critical damping `2 sqrt(k m)` of a spring with the mass at its end, kg/s; of two masses with `m1 m2/(m1 + m2)`. What is missing for that in words.
+fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f64, String> {
+    let node = |name: &str| name.strip_prefix(NEXT).unwrap_or(name).split('.').next().unwrap_or_default().to_owned();
+    let moved = |name: &str| {
+        lists.motion.iter().any(
+            |table| matches!(table.entry("on").map(|on| &on.value), Some(Stated::Fixed(Given::Text(on))) if on == name),
+        )
+    };
+    let inverse_mass = |name: &String| match masses.iter().find(|mass| mass.name == node(name)) {
+        Some(mass) => Ok(1.0 / mass.mass),
+        None if name == GROUND || moved(name) => Ok(0.0),
+        None => Err(format!("the mass of `{name}` is not known here")),
+    };
+    let [a, b] = &spring.between;
+    let compliance = inverse_mass(a)? + inverse_mass(b)?;
+    if !(compliance > 0.0 && compliance.is_finite()) {
+        return Err("no mass moves on this spring".to_owned());
+    }
+    if spring.stiffness <= 0.0 {
+        return Err("this spring has no stiffness".to_owned());
+    }
+    Ok(2.0 * (spring.stiffness / compliance).sqrt())
+}
+
+/// That a share of the critical damping has no meaning at a spring.
+fn no_ratio(table: &StatedTable, why: &str) -> Problem {
+    let message = format!("a share of the critical damping needs a stiffness and a mass, and {why}");
+    Problem::new(table.location_of(RATIO, None), RATIO, table.with_turn(&message)).help(
+        "write damping = \"2*zeta*sqrt(k*m)\" with the parameters zeta, k, m, the mass that moves; [structure] has `modal_damping`",
+    )
 }
 
 /// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the

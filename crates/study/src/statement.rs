@@ -154,7 +154,7 @@ impl Quantity {
         example: &str,
         environment: &Environment<'_>,
     ) -> Result<f64, Problem> {
-        let number = value.to(dimension).map_err(|(message, help)| {
+        let number = value.written_as(&self.text, dimension).map_err(|(message, help)| {
             let bare = self.expression.parameters().find(|i| environment.values[*i].dimension.is_none());
             let help = help
                 .or_else(|| {

@@ -9,6 +9,7 @@ use crate::immovable::{immovable, too_slow, too_soft};
 use crate::info::{Complaint, KindInfo};
 use crate::key::VERSION;
 use crate::memory;
+use crate::mixed::with_unit;
 use crate::near::{nearest, one_of, shown};
 use crate::sample::{Drawn, Sample};
 use crate::sector::{none_around, sector_of};
@@ -16,6 +17,7 @@ use crate::stated::{Matrices, ModelStatement, problem_of};
 use crate::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
 use crate::stiffened::Exports;
 use crate::substructure;
+use crate::units;
 use crate::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
@@ -122,6 +124,8 @@ pub struct VariedValue {
     pub si: f64,
     /// Its dimension, if the file tells.
     pub dimension: Option<Dimension>,
+    /// The unit in which the file states it, if it has one: `rpm`.
+    pub unit: Option<String>,
     /// For legends: `Ft = 2 N`.
     pub text: String,
 }
@@ -156,11 +160,24 @@ impl VariedValue {
         }
     }
 
+    /// The value and its unit as the file states it, for the scale of colours.
+    pub fn as_written(&self) -> (f64, String) {
+        match self.unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
+            Some((name, unit)) => (rounded(self.si / unit.scale("1")), name.to_owned()),
+            None => self.on_axis(),
+        }
+    }
+
     /// The value and its unit for the axis of a figure, as in [`VariedValue::column`].
     pub fn on_axis(&self) -> (f64, String) {
         let unit = self.dimension.and_then(table_unit).map_or(String::new(), |(_, unit)| unit);
         (self.column().1, unit)
     }
+}
+
+/// A number without the rounding of a change of units.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.12e}").parse().unwrap_or(value)
 }
 
 /// One case of a study: one combination of the varied parameters.
@@ -492,6 +509,7 @@ impl Study {
             "number_of_cases": self.cases(),
             "seed": self.seed(),
             "matrices": self.matrices_check(),
+            "units": self.written_units(),
             "cases": cases,
         })
     }
@@ -585,6 +603,8 @@ impl Study {
                 VariedPoints::List(list) => choice.get(&varied.index).and_then(|(_, point)| list.get(*point)),
                 VariedPoints::Range { .. } | VariedPoints::Drawn(_) => None,
             };
+            let unit = self.written_unit(varied).filter(|(_, dimension)| value.dimension == Some(*dimension));
+            let unit = unit.map(|(unit, _)| unit);
             // as the user wrote it, if that is a number with its unit
             let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
                 Some(quantity)
@@ -592,11 +612,34 @@ impl Study {
                 {
                     quantity.text.trim().to_owned()
                 }
-                _ => displayed(value.si, value.dimension),
+                _ => match unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
+                    Some((name, unit)) => format!("{} {name}", displayed(value.si / unit.scale("1"), None)),
+                    None => displayed(value.si, value.dimension),
+                },
             };
-            VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension }
+            VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension, unit }
         });
         values.collect()
+    }
+
+    /// The unit in which the values of a varied parameter are stated, or else the parameter, with what it measures.
+    fn written_unit(&self, varied: &Varied) -> Option<(String, Dimension)> {
+        let own = &self.parameters[varied.index].quantity;
+        let mut all = varied.points.quantities().chain([own]);
+        all.find_map(with_unit).map(|(unit, _, dimension)| (unit.to_owned(), dimension))
+    }
+
+    /// The units in which the file states what columns of tables have in SI, by column.
+    fn written_units(&self) -> serde_json::Map<String, Json> {
+        let varied = self.varied_values(0).unwrap_or_default();
+        let of_varied = varied.iter().filter_map(|value| Some((value.column().0, Json::from(value.unit.clone()?))));
+        let frequency = self.study.entry("frequency").and_then(|entry| match &entry.value {
+            Stated::List(list, _) => list.first(),
+            Stated::Range { from, .. } | Stated::Adaptive { from, .. } => Some(from),
+            _ => None,
+        });
+        let drive = frequency.and_then(with_unit).map(|(unit, ..)| ("frequency_Hz".to_owned(), Json::from(unit)));
+        of_varied.chain(drive).collect()
     }
 
     fn resolve(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {

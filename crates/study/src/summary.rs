@@ -100,6 +100,8 @@ pub struct JointSummary {
     pub limit: f64,
     /// Relative displacement at which it gives way, m; `None` if it holds rigidly until then.
     pub displacement: Option<f64>,
+    /// Whether it slips little by little before: micro-slip, and macro-slip at the limit.
+    pub gradual: bool,
     /// Of the direction along which faces press on each other: the force with which they do where nothing gives way, N, zero if
     /// they are apart. `None` along those that slip.
     pub pressed: Option<f64>,
@@ -121,7 +123,8 @@ const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
 const LARGE: usize = 60;
 
-/// Times the excitation, beyond which the first slip is one by rounding: what symmetry keeps from a joint loads it by the last digits of the others.
+/// Times the excitation, beyond which the first slip is one by rounding: what symmetry keeps from a joint loads it by the last digits of the others. A
+/// share of it below which the load is one by rounding too: that of an undamped resonance has no bound.
 const UNLOADED: f64 = 1e6;
 
 /// What the excitation does to a joint as a share of its limit, zero where that is rounding.
@@ -161,6 +164,7 @@ impl ModelSummary {
             name: slip.joint,
             limit: slip.limit,
             displacement: slip.displacement,
+            gradual: slip.gradual,
             pressed: slip.pressed,
             at_rest: slip.at_rest,
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
@@ -236,6 +240,7 @@ impl ModelSummary {
             json!({
                 "name": joint.name,
                 "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
+                "slips_gradually": joint.gradual,
                 "pressed_N": joint.pressed,
                 "pressed_at_rest_N": joint.at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),

@@ -42,6 +42,18 @@ pub fn find(name: &str) -> Option<&'static Template> {
     TABLE.iter().find(|template| template.name == name)
 }
 
+/// The name of the template that was probably meant by another one.
+///
+/// # Example
+/// ```
+/// use stickslip_study::templates;
+/// assert_eq!(templates::nearest("bladed-rign"), Some("bladed-ring"));
+/// assert_eq!(templates::nearest("bicycle"), None);
+/// ```
+pub fn nearest(name: &str) -> Option<&'static str> {
+    crate::near::nearest(name, TABLE.iter().map(|template| template.name))
+}
+
 impl Template {
     /// One line of what it is.
     pub fn summary(&self) -> &'static str {

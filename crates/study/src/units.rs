@@ -159,12 +159,12 @@ pub(crate) fn nearest_unit(name: &str) -> Option<String> {
     same.cloned().or_else(|| nearest(name, all.iter().map(String::as_str)).map(str::to_owned))
 }
 
-/// How many of the unit `to` one of the unit `from` is; `None` if they measure different things, or one is no single unit that is known.
+/// How many of the unit `to` one of the unit `from` is; `None` if they measure different things, or one is no unit that is known.
 pub fn ratio(from: &str, to: &str) -> Option<f64> {
     if from == to {
         return Some(1.0);
     }
-    let (from, to) = (find(from)?, find(to)?);
+    let (from, to) = (parse(from)?, parse(to)?);
     (from.dimension == to.dimension).then(|| from.scale("1") / to.scale("1"))
 }
 

@@ -20,7 +20,7 @@ pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
 
 /// Of a kind that looks for resonances in a range of frequencies.
 pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
-    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
+    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).chain(undamped(cases)).collect()
 }
 
 /// Of a kind that takes its frequencies as they are: the same, and whether they lie close enough for the resonances.
@@ -49,6 +49,24 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
         "every force and motion is constant in time: nothing vibrates".to_owned()
     } else {
         "there is no force and no motion that is not zero: nothing vibrates; add a [[force]] or a [[motion]]".to_owned()
+    })
+}
+
+/// A resonance within the range that nothing damps but the joints.
+fn undamped(cases: &[Surveyed]) -> Option<String> {
+    let found = |one: &Surveyed| {
+        let (from, to) = range(&one.case)?;
+        one.survey.undamped(from, to).first().copied()
+    };
+    // what is said holds for every case
+    let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
+    let hertz = significant(all.first()? / TAU, 6);
+    let advice = "give a spring `damping`, or damping_ratio = \"0.5 %\"";
+    Some(match cases[0].survey.system().joints().is_empty() {
+        true => format!("nothing damps the resonance at {hertz} Hz: the response has no bound there; {advice}"),
+        false => format!(
+            "nothing but the joints damps the resonance at {hertz} Hz: where they do not bound it, the response has no bound; {advice}"
+        ),
     })
 }
 

@@ -515,3 +515,162 @@ fn what_is_wrong_in_a_template_names_the_values_of_the_user() {
     let found = error(study("m = \"-5 g\"\nmu = 0.2\nspeed = \"5000 rpm\"", ""));
     assert!(found.message().starts_with("the value of `m` makes"), "{found}");
 }
+
+/// A mass on a spring with a joint, some lines of it replaced.
+fn oscillator(edits: &[(&str, &str)]) -> String {
+    let text = r#"schema = 1
+[parameters]
+n = "1000 rpm"
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "10 N/mm * (1 + (n/(6000 rpm))^2)"
+damping = "2 N s/m"
+[[joint]]
+name = "j"
+between = ["m", "ground"]
+law = { kind = "jenkins", stiffness = "2 N/mm", limit = "1 N" }
+[[force]]
+on = "m"
+amplitude = "2 N"
+[study]
+kind = "response"
+frequency = { from = "14 Hz", to = "19 Hz", points = 11 }
+"#;
+    edits.iter().fold(text.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    })
+}
+
+/// The oscillator with these edits is refused, about this key, in these words.
+fn refused(edits: &[(&str, &str)], key: &str, words: &[&str]) {
+    let error = read_study("bad.toml", &oscillator(edits), &[]).map(|_| edits).unwrap_err();
+    let all: Vec<&StudyError> = std::iter::once(&error).chain(error.others()).collect();
+    let said = all.iter().map(|error| format!("{error} — {}", error.help_text().unwrap_or_default()));
+    let said: Vec<String> = said.collect();
+    let about = all.iter().zip(&said).filter(|(error, _)| error.key() == Some(key)).map(|(_, text)| text);
+    let about: Vec<&String> = about.collect();
+    assert!(about.iter().any(|text| words.iter().all(|word| text.contains(word))), "{key}, {words:?}: {said:#?}");
+}
+
+#[test]
+fn quantities_of_another_dimension_say_what_was_meant() {
+    let stiffness = "10 N/mm * (1 + (n/(6000 rpm))^2)";
+    refused(&[(stiffness, "10 N/mm^2")], "stiffness", &["this is a pressure", "10 N/mm"]);
+    refused(&[("limit = \"1 N\"", "limit = \"1 MPa\"")], "limit", &["this is a pressure", "area"]);
+    refused(&[("1 kg", "0.05 kg m^2")], "mass", &["rotation", "kg m^2 as kg"]);
+    refused(&[(stiffness, "2000 N m/rad")], "stiffness", &["N m/rad as N/m"]);
+    refused(&[("2 N s/m", "0.05 N m s/rad")], "damping", &["N m s/rad as N s/m"]);
+    refused(&[("amplitude = \"2 N\"", "amplitude = \"10 N m\"")], "amplitude", &["N m as N"]);
+    refused(&[("amplitude = \"2 N\"", "amplitude = \"2 g\"")], "amplitude", &["`g` is the gram", "9.80665 m/s^2"]);
+}
+
+#[test]
+fn the_drive_frequency_is_no_parameter() {
+    let amplitude = "amplitude = \"2 N\"";
+    for name in ["frequency", "Omega", "omega"] {
+        let with = format!("amplitude = \"2 N * ({name}/(10 Hz))^2\"");
+        refused(&[(amplitude, &with)], "amplitude", &[name, "not the drive frequency", "kind = \"orbit\"", "vary"]);
+    }
+}
+
+#[test]
+fn a_normal_load_of_a_law_without_one() {
+    let law = "limit = \"1 N\"";
+    let friction = "mu = 0.3, normal = \"10 N\"";
+    refused(&[(law, friction)], "mu", &["`jenkins` takes `stiffness` and `limit`", "0.3 * 10 N", "`friction-contact`"]);
+    refused(&[(law, friction)], "normal", &["`jenkins` takes `stiffness` and `limit`", "`friction-contact`"]);
+    // what another law has is said of it
+    refused(&[(law, "limit = \"1 N\", chi = -0.5")], "chi", &["`chi` is a parameter of `iwan`"]);
+}
+
+#[test]
+fn a_step_in_a_range_becomes_a_number_of_points() {
+    let points = "points = 11";
+    refused(&[(points, "step = \"0.5 Hz\", tolerance = \"1 %\"")], "step", &["`tolerance`", "points = 11 instead"]);
+    refused(&[(points, "step = \"0.5 Hz\"")], "step", &["both ends included: points = 11"]);
+    refused(&[(points, "points = 6, increment = \"1 Hz\"")], "increment", &["points = 6"]);
+}
+
+#[test]
+fn words_that_hold_the_right_one_lead_to_it() {
+    for (kind, meant) in
+        [("frequency response", "response"), ("nonlinear modes", "modes"), ("hysteresis loop", "hysteresis")]
+    {
+        let with = format!("kind = \"{kind}\"");
+        refused(&[("kind = \"response\"", &with)], "kind", &[&format!("did you mean `{meant}`?")]);
+    }
+}
+
+/// A bare number is SI, which beside quantities in another unit is a trap: 1200 would be 72,000 rpm.
+#[test]
+fn bare_numbers_beside_other_units() {
+    let study = "points = 11 }";
+    let vary = |values: &str| format!("points = 11 }}\nvary = {{ n = {values} }}");
+    for values in ["[\"1100 rpm\", 1200]", "[1200]", "{ from = \"1100 rpm\", to = 1200, points = 3 }"] {
+        refused(
+            &[(study, &vary(values))],
+            "n",
+            &["1200 counts as 1200 Hz", "quantities in rpm", "\"1200 rpm\" or \"1200 Hz\""],
+        );
+    }
+    refused(&[("{ from = \"14 Hz\", to = \"19 Hz\", points = 11 }", "[\"840 rpm\", 900]")], "frequency", &["900 Hz"]);
+    // from outside as well
+    let error = read_study("n.toml", &oscillator(&[]), &[("n".to_owned(), "1200".to_owned())]).unwrap_err();
+    assert!(error.to_string().contains("1200 counts as 1200 Hz"), "{error}");
+    // where both are the same, and zero in any unit, nothing is said
+    for values in ["[\"18 Hz\", 20]", "[\"1100 rpm\", 0]"] {
+        let edits = [(study, &*vary(values)), ("n = \"1000 rpm\"", "n = \"17 Hz\"")];
+        let edits = if values.contains("rpm") { &edits[..1] } else { &edits[..] };
+        assert!(read_study("n.toml", &oscillator(edits), &[]).is_ok(), "{values}");
+    }
+}
+
+/// Zeta of a spring and the mass at its end is c = 2 zeta sqrt(k m).
+#[test]
+fn damping_as_a_share_of_the_critical_one() {
+    let spring = |damping: &str| {
+        oscillator(&[("damping = \"2 N s/m\"", damping), ("10 N/mm * (1 + (n/(6000 rpm))^2)", "10 N/mm")])
+    };
+    let damping = |text: &str| {
+        let study = read_study("s.toml", text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        study.case(0).unwrap().model.springs.iter().map(|spring| spring.damping).collect::<Vec<f64>>()
+    };
+    // 2 * 0.02 * sqrt(10,000 N/m * 1 kg)
+    for text in ["damping = \"2 %\"", "damping_ratio = \"2 %\"", "damping_ratio = 0.02"] {
+        assert!((damping(&spring(text))[0] - 4.0).abs() < 1e-12, "{text}");
+    }
+    assert_eq!(damping(&spring("damping = 0.02")), [0.02], "a bare number is in kg/s");
+    // between 1 kg and 3 kg the mass is 3/4 kg: 2 * 0.02 * sqrt(10,000 * 0.75)
+    let between = "[[mass]]\nname = \"b\"\nmass = \"3 kg\"\n[[spring]]\nbetween = [\"m\", \"b\"]\nstiffness = \"10 N/mm\"\ndamping_ratio = \"2 %\"\n[[joint]]";
+    let two = spring("damping = \"2 %\"").replacen("[[joint]]", between, 1);
+    assert!((damping(&two)[1] - 3.464_101_615_137_754_6).abs() < 1e-12, "{:?}", damping(&two));
+    refused(&[("damping =", "damping_ratio = \"1 %\"\ndamping =")], "damping_ratio", &["exclude each other"]);
+    let other = [
+        ("between = [\"m\", \"ground\"]\nstiffness", "between = [\"x\", \"ground\"]\nstiffness"),
+        ("damping = \"2 N s/m\"", "damping = \"2 %\""),
+    ];
+    refused(&other, "damping_ratio", &["the mass of `x` is not known", "2*zeta*sqrt(k*m)"]);
+    let massless = [("1 kg", "0 kg"), ("damping = \"2 N s/m\"", "damping = \"2 %\"")];
+    refused(&massless, "damping_ratio", &["no mass moves"]);
+}
+
+#[test]
+fn results_are_no_study() {
+    let folder = std::env::temp_dir().join(format!("stickslip-no-study-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("curve.csv"), "frequency_Hz,m_amplitude_m\n1,2\n").unwrap();
+    std::fs::write(folder.join("k.mtx"), "%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 1\n").unwrap();
+    let said = |name: &str| {
+        let error = read_file(&folder.join(name), &[]).unwrap_err();
+        format!("{error} — {}", error.help_text().unwrap_or_default())
+    };
+    assert!(said("curve.csv").contains("a table of numbers, a study file (TOML) is needed"), "{}", said("curve.csv"));
+    assert!(said("k.mtx").contains("stickslip inspect"), "{}", said("k.mtx"));
+    std::fs::write(folder.join("record.json"), "{}").unwrap();
+    assert!(said("curve.csv").contains("stickslip plot"), "{}", said("curve.csv"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}

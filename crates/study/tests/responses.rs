@@ -1,7 +1,7 @@
 //! What a response can be asked for beside its curve, against closed forms of linear oscillators and against sums over single loops.
 
 use std::f64::consts::TAU;
-use stickslip_study::dataset::{Dataset, Emphasis, Panel, Table, Values};
+use stickslip_study::dataset::{Dataset, Emphasis, Panel, Style, Table, Values};
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
@@ -71,6 +71,72 @@ references = true
         references.map(|series| series.label.as_str()).collect::<Vec<_>>(),
         ["all joints free", "all joints stuck"]
     );
+}
+
+/// Three forces have three pairs of linear structures, each in the colour of its case; three limits have one.
+#[test]
+fn references_belong_to_their_cases() {
+    let study = |vary: &str| {
+        let text = format!(
+            r#"
+schema = 1
+[parameters]
+F = "1 N"
+Ft = "1 N"
+[[mass]]
+name = "body"
+mass = "1 kg"
+[[spring]]
+between = ["body", "ground"]
+stiffness = "10 N/mm"
+damping = "2 N s/m"
+[[joint]]
+name = "foot"
+between = ["body", "ground"]
+law = {{ kind = "jenkins", stiffness = "2 N/mm", limit = "Ft" }}
+[[force]]
+on = "body"
+amplitude = "F"
+[study]
+kind = "response"
+frequency = {{ from = "14 Hz", to = "19 Hz", points = 11 }}
+vary = {{ {vary} }}
+[figure]
+references = true
+"#
+        );
+        dataset(&text)
+    };
+    let found = study("F = [\"1 N\", \"2 N\", \"4 N\"]");
+    let (force, frequency) = (numbers(&found, "references", "F_N"), numbers(&found, "references", "frequency_Hz"));
+    for (what, k) in [("free", 10e3), ("stuck", 12e3)] {
+        let column = format!("body_{what}_amplitude_m");
+        for (i, amplitude) in numbers(&found, "references", &column).into_iter().enumerate() {
+            let omega = TAU * frequency[i];
+            let expected = force[i] / (k - omega * omega).hypot(2.0 * omega);
+            assert!((amplitude / expected - 1.0).abs() < 1e-9, "{what} at {} N: {amplitude} {expected}", force[i]);
+        }
+    }
+    let lines = |found: &Dataset, emphasis: Emphasis| -> Vec<(String, usize)> {
+        let series = found.figure.panels[0].series.iter().filter(|series| series.emphasis == emphasis);
+        series.map(|series| (series.label.clone(), series.colour)).collect()
+    };
+    let of = |what: &str, colour: usize| (format!("all joints {what}, of each case"), colour);
+    let own: Vec<(String, usize)> = (0..3).flat_map(|case| [of("free", case), of("stuck", case)]).collect();
+    assert_eq!((lines(&found, Emphasis::OwnReference), lines(&found, Emphasis::Reference)), (own, Vec::new()));
+    // a limit changes no linear structure
+    let alike = study("Ft = [\"1 N\", \"2 N\", \"4 N\"]");
+    let grey = ["all joints free", "all joints stuck"].map(|label| (label.to_owned(), 0));
+    assert_eq!(
+        (lines(&alike, Emphasis::OwnReference), lines(&alike, Emphasis::Reference)),
+        (Vec::new(), grey.to_vec())
+    );
+    assert_eq!(numbers(&alike, "references", "Ft_N").iter().filter(|limit| **limit != 1.0).count(), 0);
+    // of many cases the first and the last are named
+    let many = study("F = { from = \"1 N\", to = \"9 N\", points = 9 }");
+    let named: Vec<String> = lines(&many, Emphasis::OwnReference).into_iter().map(|(label, _)| label).collect();
+    let expected = ["free, F = 1 N", "stuck, F = 1 N", "free, F = 9 N", "stuck, F = 9 N"];
+    assert_eq!(named, expected.map(|end| format!("all joints {end}")));
 }
 
 #[test]
@@ -979,4 +1045,86 @@ frequency = {{ from = "1 Hz", to = "2 Hz", points = 21 }}
     let softer = study("100 N/m * (1 - 0.02*i)");
     assert_eq!(worst(&softer), "b8");
     assert!(softer.figure.panels[0].title.contains("worst is b8"), "{}", softer.figure.panels[0].title);
+}
+
+/// At its undamped resonance a force grows a motion without bound that friction does not hold: crosses stand there, and the legend counts them.
+#[test]
+fn points_without_an_orbit_are_drawn_and_counted() {
+    let text = r#"
+schema = 1
+[parameters]
+Ft = "1 N"
+[[mass]]
+name = "a"
+mass = "1 kg"
+[[spring]]
+between = ["a", "ground"]
+stiffness = "10 N/mm"
+[[joint]]
+name = "foot"
+between = ["a", "ground"]
+law = { kind = "coulomb", limit = "Ft" }
+[[force]]
+on = "a"
+amplitude = "4 N"
+[study]
+kind = "response"
+frequency = ["12 Hz", "15.915494309189533 Hz", "18 Hz"]
+vary = { Ft = ["1 N", "2 N", "6 N"] }
+peaks = false
+[method]
+kind = "event-driven"
+"#;
+    // 4 N grow without bound where the limit is below pi/4 of them, 3.14 N (Den Hartog 1931): 1 N and 2 N, not 6 N
+    let found = dataset(text);
+    let status = table(&found, "curve").texts("status").unwrap();
+    let failed: Vec<usize> = (0..9).filter(|row| !status[*row].starts_with("converged")).collect();
+    assert_eq!(failed, [1, 4], "{status:?}");
+    let crosses: Vec<(&str, Vec<f64>, usize)> = found.figure.panels[0]
+        .series
+        .iter()
+        .filter(|series| series.style == Style::Missing)
+        .map(|series| (series.label.as_str(), series.x.clone(), series.colour))
+        .collect();
+    let x = vec![15.915_494_309_189_533];
+    assert_eq!(crosses, [("2 points without an orbit", x.clone(), 0), ("2 points without an orbit", x, 1)]);
+}
+
+/// Backbone of a mass on a cubic spring: the half of peak to peak has the third harmonic in it, the first harmonic has a column of its own.
+#[test]
+fn modes_tell_amplitude_and_first_harmonic() {
+    let text = r#"
+schema = 1
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/m"
+[[joint]]
+name = "j"
+between = ["m", "ground"]
+law = { kind = "cubic", stiffness = "1 N/m^3" }
+[study]
+kind = "modes"
+amplitude = { from = "1 mm", to = "2 m", points = 9 }
+harmonics = 15
+"#;
+    let found = dataset(text);
+    let (whole, first) = (numbers(&found, "modes", "m_amplitude_m"), numbers(&found, "modes", "m_first_harmonic_m"));
+    let omega = numbers(&found, "modes", "frequency_Hz");
+    // free vibration of x'' + x + x^3 = 0 from x = a: the period is 4 K(m)/sqrt(1 + a^2) with the parameter m = a^2/(2 (1 + a^2))
+    let period = |a: f64| {
+        let (mut mean, mut other) = (1.0, (1.0 - a * a / (2.0 * (1.0 + a * a))).sqrt());
+        for _ in 0..40 {
+            (mean, other) = (0.5 * (mean + other), f64::sqrt(mean * other));
+        }
+        4.0 * (std::f64::consts::FRAC_PI_2 / mean) / (1.0 + a * a).sqrt()
+    };
+    for i in 0..whole.len() {
+        assert!((omega[i] * period(whole[i]) - 1.0).abs() < 1e-6, "{} Hz at {} m", omega[i], whole[i]);
+    }
+    let last = whole.len() - 1;
+    // at two metres the third harmonic is 3 % of the first
+    assert!(whole[last] / first[last] > 1.02 && (whole[0] / first[0] - 1.0).abs() < 1e-6, "{whole:?} {first:?}");
 }

@@ -889,3 +889,126 @@ fn what_only_rounding_loads_does_not_slip() {
     let none = first("0 N");
     assert!(none.contains("the excitation does not reach it"), "{none}");
 }
+
+/// A mass of 1 kg on 10 N/mm, 2 N s/m, with a joint of this law under a force.
+fn rubbing(law: &str, edits: &[(&str, &str)]) -> String {
+    let text = format!(
+        r#"
+schema = 1
+[[mass]]
+name = "body"
+mass = "1 kg"
+[[spring]]
+between = ["body", "ground"]
+stiffness = "10 N/mm"
+damping = "2 N s/m"
+[[joint]]
+name = "foot"
+between = ["body", "ground"]
+law = {{ {law} }}
+[[force]]
+on = "body"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = {{ from = "14 Hz", to = "19 Hz", points = 101 }}
+"#
+    );
+    edits.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    })
+}
+
+const JENKINS: &str = "kind = \"jenkins\", stiffness = \"2 N/mm\", limit = \"1 N\"";
+
+#[test]
+fn resonances_without_damping() {
+    let undamped = [("damping = \"2 N s/m\"\n", "")];
+    // 15.9155 Hz = sqrt(10,000 N/m / 1 kg)/2 pi
+    warns(&rubbing(JENKINS, &undamped), &["nothing but the joints damps the resonance at 15.9155 Hz", "damping_ratio"]);
+    silent(&rubbing(JENKINS, &[]));
+    // beyond the range, and where no force drives it, it does no harm
+    let range = ("from = \"14 Hz\"", "from = \"17 Hz\"");
+    silent(&rubbing(JENKINS, &[undamped[0], range]));
+    // bristles have viscous friction while they slip freely: 2 N s/m
+    let lugre = "kind = \"lugre\", stiffness = \"2 N/mm\", viscous = \"2 N s/m\", limit = \"1 N\", static_limit = \"1 N\", velocity = \"1 mm/s\"";
+    let free = summary(&rubbing(lugre, &undamped));
+    assert!((free.free.elastic[0].damping - 0.01).abs() < 1e-12 && free.warnings.is_empty(), "{:?}", free.warnings);
+}
+
+#[test]
+fn models_without_mass() {
+    let massless = rubbing(JENKINS, &[("mass = \"1 kg\"", "mass = \"0 kg\"")]);
+    warns(&massless, &["the mass of `body` is zero", "nothing resonates"]);
+}
+
+#[test]
+fn stiffnesses_that_no_structure_has() {
+    let stiff = JENKINS.replace("2 N/mm", "2e9 N/mm");
+    warns(&rubbing(&stiff, &[]), &["225", "stiffness of `foot`, 2e12 N/m", "`coulomb`"]);
+    let spring = rubbing(
+        JENKINS,
+        &[("stiffness = \"10 N/mm\"", "stiffness = \"1e13 N/m\""), ("14 Hz", "4 kHz"), ("19 Hz", "600 kHz")],
+    );
+    let warnings = summary(&spring).warnings;
+    assert!(warnings.iter().any(|warning| warning.contains("between `body` and `ground`")), "{warnings:?}");
+}
+
+/// Bristles that bend are springs with dampers: (s1 + s2)/(2 sqrt((s0 + k) m)) = 316.6278/(2 sqrt(100,002)) at sqrt(100,002)/2 pi = 50.33 Hz.
+#[test]
+fn stuck_bristles_damp() {
+    let law = "kind = \"lugre\", stiffness = \"1e5 N/m\", damping = \"316.2278 N s/m\", viscous = \"0.4 N s/m\", limit = \"1 N\", static_limit = \"1.5 N\", velocity = \"0.001 m/s\"";
+    let text = rubbing(
+        law,
+        &[
+            ("stiffness = \"10 N/mm\"\ndamping = \"2 N s/m\"", "stiffness = \"2 N/m\""),
+            ("1 N\"\n[study]", "1 mN\"\n[study]"),
+        ],
+    );
+    let found = summary(&text);
+    let stuck = found.stuck.elastic[0];
+    assert!((stuck.omega / std::f64::consts::TAU - 50.329_7).abs() < 1e-3, "{stuck:?}");
+    assert!((stuck.damping - 0.500_628).abs() < 1e-6, "{stuck:?}");
+    assert!(found.to_string().contains("50.33 Hz, damping 50 %"), "{found}");
+}
+
+/// An Iwan joint of 4 N slips as a whole at FS (1 + beta)/(KT (beta + (chi+1)/(chi+2))) = 4.105 mm, and by parts before.
+#[test]
+fn an_iwan_joint_says_its_macro_slip() {
+    let law = "kind = \"iwan\", stiffness = \"2 N/mm\", limit = \"4 N\", chi = -0.5, beta = 0.3";
+    let found = summary(&rubbing(law, &[]));
+    let text = found.to_string();
+    assert!(text.contains("macro-slip at 4 N, 4.105 mm of relative displacement, micro-slip before"), "{text}");
+    // stuck, 1 N against 2 N s/m at sqrt(12,000) rad/s: 4.564 mm, over 4.105 mm
+    assert!(text.contains("; made to macro-slip in 17."), "{text}");
+    let mild = summary(&rubbing(law, &[("amplitude = \"1 N\"", "amplitude = \"0.1 N\"")])).to_string();
+    assert!(mild.contains("micro-slip alone, up to 11.1 % of that at 17.43"), "{mild}");
+    assert!(!text.contains("e-1"), "no rounding is told as a force: {text}");
+    let undamped = summary(&rubbing(law, &[("damping = \"2 N s/m\"\n", "")])).to_string();
+    assert!(undamped.contains("any excitation is enough at its undamped resonance at 17.43455 Hz"), "{undamped}");
+}
+
+/// Bouc-Wen tends to stiffness/(beta + gamma), and has both references: free of force, and the spring of small motion.
+#[test]
+fn bouc_wen_has_one_limit_and_both_references() {
+    let law = "kind = \"bouc-wen\", stiffness = \"15 N/mm\", beta = \"0.6 /mm\", gamma = \"0.2 /mm\", exponent = 1";
+    let text = rubbing(
+        law,
+        &[("points = 101 }", "points = 3 }\n[figure]\nreferences = true"), ("from = \"14 Hz\"", "from = \"15 Hz\"")],
+    );
+    let found = summary(&text);
+    assert!(found.to_string().contains("slips at 18.75 N, 1.25 mm of relative displacement"), "{found}");
+    assert!(found.warnings.iter().all(|warning| !warning.contains("slip limit")), "{:?}", found.warnings);
+    let data = run(&study(&text), &Context::unwatched(1)).unwrap();
+    let table = data.tables.iter().find(|table| table.name == "references").unwrap();
+    let column = |name: &str| table.numbers(name).unwrap();
+    let linear = |k: f64, f: f64| {
+        let omega = std::f64::consts::TAU * f;
+        1.0 / (k - omega * omega).hypot(2.0 * omega)
+    };
+    for (i, f) in column("frequency_Hz").iter().enumerate() {
+        assert!((column("body_free_amplitude_m")[i] / linear(10e3, *f) - 1.0).abs() < 1e-9);
+        assert!((column("body_stuck_amplitude_m")[i] / linear(25e3, *f) - 1.0).abs() < 1e-9);
+    }
+}

@@ -78,7 +78,10 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
         if titles.len() == 1 { first.dataset.title.clone() } else { format!("Comparison of {} runs", runs.len()) };
     let figures: Vec<(&str, &Figure)> =
         labels.iter().map(String::as_str).zip(runs.iter().map(|run| &run.dataset.figure)).collect();
-    let figure = Figure { title: title.clone(), ..overlay(&figures) };
+    let joined = overlay(&figures);
+    let named = [title.as_str(), &joined.title];
+    let figure_title = named.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" – ");
+    let figure = Figure { title: figure_title, ..joined };
     let about = runs.iter().zip(&labels).map(|(run, label)| {
         serde_json::json!({
             "folder": run.folder.display().to_string(),

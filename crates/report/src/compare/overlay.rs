@@ -1,13 +1,13 @@
 //! The figures of several runs in one.
 
-use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Series, Style};
+use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 use stickslip_study::units;
 /// Line styles of the runs, in turn: a curve that hides another lets it through.
 const STYLES: [Style; 3] = [Style::Solid, Style::Dashed, Style::Dotted];
 /// Colours of the palette.
 const COLOURS: usize = crate::colour::PALETTE.len();
 
-/// Figures in one: panels of the same title and quantities become one.
+/// Figures in one: panels of the same title and quantities become one. The title says which run has which dashes, where colours tell curves apart.
 pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
     let names = curve_names(figures);
     let mut panels: Vec<Panel> = Vec::new();
@@ -26,19 +26,13 @@ pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
             run.add(panel, target);
         }
     }
-    // values of a parameter have a scale of colours instead of names
-    if figures.iter().any(|(_, figure)| figure.varied.is_some()) && names.len() > COLOURS {
-        let key = style_key(figures);
-        for panel in &mut panels {
-            let title = [panel.title.as_str(), &key];
-            panel.title = title.into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>().join("; ");
-        }
-    }
-    Figure { panels, sharing: figures[0].1.sharing, varied: figures[0].1.varied.clone(), ..Figure::default() }
+    // curves of one name have one colour, and the runs their dashes
+    let title = if names.len() > 1 { style_key(figures) } else { String::new() };
+    Figure { title, panels, sharing: figures[0].1.sharing, varied: figures[0].1.varied.clone() }
 }
 
 fn is_curve(series: &Series) -> bool {
-    series.style != Style::Marks && series.emphasis != Emphasis::Reference
+    !matches!(series.style, Style::Marks | Style::Missing) && !series.emphasis.is_reference()
 }
 
 /// The labels of all curves, each once.
@@ -95,7 +89,7 @@ impl Run<'_> {
         }
         for series in &panel.series {
             let converted = converted(series, factors);
-            if series.emphasis == Emphasis::Reference {
+            if series.emphasis.is_reference() {
                 self.add_reference(converted, target);
             } else {
                 let colour = self.colour(series, panel);
@@ -106,40 +100,56 @@ impl Run<'_> {
 
     /// The linear structure is the same one, or one more.
     fn add_reference(&self, series: Series, target: &mut Panel) {
-        if target.series.iter().any(|s| (&s.x, &s.y, s.style) == (&series.x, &series.y, series.style)) {
+        if target.series.iter().any(|known| is_same_line(known, &series)) {
             return;
         }
-        let again = target.series.iter().any(|s| s.label == series.label);
+        let again = self.index > 0 && target.series.iter().any(|s| s.label == series.label);
         let label = if again { format!("{}, {}", series.label, self.label) } else { series.label.clone() };
         target.series.push(Series { label, ..series });
     }
 
-    /// That of the curve's name, in the shift of this run; marks have the colour of the curve that they stand on.
+    /// That of the curve's name; a lone curve has another one in every run, and so have runs that have no dashes of their own. Marks have the colour of
+    /// the curve that they stand on.
     fn colour(&self, series: &Series, panel: &Panel) -> usize {
         let owner = if is_curve(series) {
             Some(series)
         } else {
-            let same = |s: &&Series| s.style != Style::Marks && s.colour == series.colour && s.value == series.value;
+            let same = |s: &&Series| is_curve(s) && s.colour == series.colour && s.value == series.value;
             panel.series.iter().find(same)
         };
         let place = owner.and_then(|owner| self.names.iter().position(|name| *name == owner.label)).unwrap_or(0);
         let shift = if self.names.len().is_multiple_of(COLOURS) { COLOURS / 2 } else { self.names.len() };
-        place + self.index * shift
+        let again = if self.names.len() > 1 { self.index / STYLES.len() } else { self.index };
+        place + again * shift
     }
 
     fn styled(&self, series: Series, colour: usize) -> Series {
         let line = matches!(series.style, Style::Solid | Style::Dashed | Style::Dotted);
         Series {
-            label: match (is_curve(&series), self.names.len()) {
-                (false, _) => series.label.clone(),
-                (true, 1) => self.label.to_owned(),
-                (true, _) => format!("{}, {}", series.label, self.label),
+            label: match (series.style, self.names.len()) {
+                (Style::Marks, _) => series.label.clone(),
+                (Style::Missing, _) => format!("{}, {}", series.label, self.label),
+                (_, 1) => self.label.to_owned(),
+                // runs beyond the dashes have colours of their own
+                (_, _) if self.index >= STYLES.len() => format!("{}, {}", series.label, self.label),
+                (_, _) => series.label.clone(),
             },
             colour,
             style: if line { STYLES[self.index % STYLES.len()] } else { series.style },
             ..series
         }
     }
+}
+
+/// Relative difference up to which two methods draw one line.
+const ONE_LINE: f64 = 1e-6;
+
+/// Whether two references cannot be told apart.
+fn is_same_line(a: &Series, b: &Series) -> bool {
+    let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= ONE_LINE * a.abs().max(b.abs());
+    let all = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(near);
+    let look = |s: &Series| (s.emphasis, s.style, s.colour);
+    look(a) == look(b) && all(&a.x, &b.x) && all(&a.y, &b.y)
 }
 
 /// Factors from the units of one panel to those of another; `None` if these measure something else.
@@ -193,5 +203,51 @@ mod tests {
             "1 N | 2 N"
         );
         assert_eq!(overlay(&[("a", &figure("", "mm", 2.0)), ("b", &figure("", "N", 2.0))]).panels.len(), 2);
+    }
+
+    /// Of the linear structures of three cases each run has one line, unless they differ.
+    #[test]
+    fn references_of_the_cases_stand_once() {
+        let cases = |factor: f64| {
+            let mut figure = figure("", "mm", 2.0);
+            let own = |case: usize| {
+                let y = factor * (case as f64 + 1.0);
+                let line = Series::line("all joints free, of each case", vec![1.0, 2.0], vec![y, y], case);
+                line.reference_of_its_own()
+            };
+            figure.panels[0].series = (0..3).map(own).collect();
+            figure
+        };
+        let labels = |factor: f64| {
+            let whole = overlay(&[("exact", &cases(1.0)), ("series", &cases(factor))]);
+            whole.panels[0].series.iter().map(|series| series.label.clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(1.0 + 1e-9), vec!["all joints free, of each case"; 3]);
+        assert_eq!(labels(1.5)[3..], vec!["all joints free, of each case, series"; 3]);
+    }
+
+    /// Colour is the case, dashes are the run, and the title says which.
+    #[test]
+    fn cases_keep_their_colours_in_every_run() {
+        let cases = |y: f64| {
+            let mut figure = figure("", "mm", y);
+            let line = |label: &str, colour: usize| Series::line(label, vec![1.0, 2.0], vec![y, y], colour);
+            figure.panels[0].series = vec![line("Ft = 1 N", 0), line("Ft = 2 N", 1)];
+            figure.panels[0].series.push(Series::missing("3 points without an orbit", vec![1.5], 1, 1));
+            figure
+        };
+        let whole = overlay(&[("exact", &cases(2.0)), ("series", &cases(3.0))]);
+        let drawn: Vec<(&str, usize, Style)> =
+            whole.panels[0].series.iter().map(|s| (s.label.as_str(), s.colour, s.style)).collect();
+        let expected = [
+            ("Ft = 1 N", 0, Style::Solid),
+            ("Ft = 2 N", 1, Style::Solid),
+            ("3 points without an orbit, exact", 1, Style::Missing),
+            ("Ft = 1 N", 0, Style::Dashed),
+            ("Ft = 2 N", 1, Style::Dashed),
+            ("3 points without an orbit, series", 1, Style::Missing),
+        ];
+        assert_eq!(drawn, expected);
+        assert_eq!(whole.title, "solid: exact, dashed: series");
     }
 }

@@ -87,6 +87,7 @@ fn fixed(case: &Case) -> Vec<VariedValue> {
             name: name.clone(),
             si: *si,
             dimension: *dimension,
+            unit: None,
             text: String::new(),
         })
         .collect()

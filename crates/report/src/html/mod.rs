@@ -204,6 +204,9 @@ fn sample(entry: &Entry) -> String {
         )
     };
     match entry.area {
+        Some(Style::Missing) => {
+            out.push_str("<path d=\"M12 4L18 10M12 10L18 4\" style=\"stroke: var(--colour)\" stroke-width=\"1.5\"/>");
+        }
         Some(Style::Band) => out.push_str(&area(0, 30, AREA)),
         Some(_) => out.push_str(&area(8, 14, opacity)),
         None => {}

@@ -86,6 +86,14 @@ impl Drawn<'_> {
                     json!({ "color": GROUND, "size": 8, "line": { "color": colour, "width": 2 } })
                 };
             }
+            Style::Missing => {
+                let y = self.axes.y.at(frame::row_of_crosses(series));
+                trace["y"] = json!(self.y.numbers(series.x.iter().map(|_| y)));
+                trace["mode"] = json!("markers");
+                trace["marker"] = json!({ "symbol": "x-thin", "size": 6, "line": { "color": colour, "width": 1.5 } });
+                let x = hover("x", &self.panel.x, self.x.power);
+                trace["hovertemplate"] = json!(format!("{x}<br>no orbit<extra></extra>"));
+            }
             Style::Band => {
                 trace["fillcolor"] = json!(ink.area(&shade));
                 self.band(series, &mut trace, &colour);
@@ -94,7 +102,8 @@ impl Drawn<'_> {
             Style::Stripe => return self.stripe(series, ink).into_iter().collect(),
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let dots = self.lonely_points(series, &trace, &colour);
-                let width = if series.emphasis == Emphasis::Pale || crowd { 1.0 } else { 2.0 };
+                let thin = matches!(series.emphasis, Emphasis::Pale | Emphasis::OwnReference);
+                let width = if thin || crowd { 1.0 } else { 2.0 };
                 let dash = dash(frame::line_style(series));
                 trace["mode"] = json!("lines");
                 trace["line"] = json!({ "color": colour, "width": width, "simplify": false, "dash": dash });
@@ -203,7 +212,7 @@ fn dash(style: Style) -> &'static str {
     match style {
         Style::Dashed => "7px,4px",
         Style::Dotted => "2px,3px",
-        Style::Solid | Style::Marks | Style::Band | Style::Bars | Style::Stripe => "solid",
+        Style::Solid | Style::Marks | Style::Missing | Style::Band | Style::Bars | Style::Stripe => "solid",
     }
 }
 

@@ -1,6 +1,6 @@
 //! An SVG document as it grows: lines, areas, marks, text.
 
-use super::style::{AXIS, LABEL, MARK, TEXT};
+use super::style::{AXIS, CROSS, LABEL, MARK, TEXT};
 use crate::clip::Point;
 use crate::font::{self, Weight};
 use std::fmt::Write;
@@ -131,6 +131,15 @@ impl Svg {
         let _ = writeln!(
             self.0,
             "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"{stroke}\"/>"
+        );
+    }
+
+    /// A cross: a point without a value.
+    pub(super) fn cross(&mut self, (x, y): Point, colour: &str) {
+        let [left, right, top, bottom] = [x - CROSS, x + CROSS, y - CROSS, y + CROSS].map(short);
+        let _ = writeln!(
+            self.0,
+            "<path d=\"M{left} {top}L{right} {bottom}M{left} {bottom}L{right} {top}\" stroke=\"{colour}\" stroke-width=\"1.4\"/>"
         );
     }
 

@@ -262,6 +262,7 @@ fn place_legend((entries, more): (Vec<Entry>, usize), width: f64, top: f64) -> (
         marks: false,
         area: None,
         pale: false,
+        reference: false,
     });
     let mut rows: Vec<(f64, Vec<Item>)> = Vec::new();
     for item in entries.into_iter().chain(rest).map(broken) {

@@ -54,7 +54,7 @@ pub fn to_svg(figure: &Figure) -> String {
 /// The dashes of a line style, if it has any.
 fn dashes(style: Style) -> Option<&'static str> {
     match style {
-        Style::Solid | Style::Marks | Style::Band | Style::Bars | Style::Stripe => None,
+        Style::Solid | Style::Marks | Style::Missing | Style::Band | Style::Bars | Style::Stripe => None,
         Style::Dashed => Some("7 4"),
         Style::Dotted => Some("2 3"),
     }
@@ -64,6 +64,7 @@ fn draw_entry(svg: &mut Svg, Placed { entry, lines, x, y }: &Placed) {
     let colour = &entry.colour.light;
     let opacity = if entry.pale { PALE } else { 1.0 };
     match entry.area {
+        Some(Style::Missing) => svg.cross((x + SAMPLE.0 / 2.0, *y), colour),
         Some(Style::Band) => svg.area(&box_around(*x, y - 5.0, SAMPLE.0, 10.0), colour, AREA),
         Some(_) => svg.area(&box_around(x + 8.0, y - 6.0, 14.0, 12.0), colour, opacity),
         None => {}
@@ -184,6 +185,12 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
                     svg.mark(point, colour, size);
                 }
             }
+            Style::Missing => {
+                let y = plot.top + plot.height * (1.0 - frame::row_of_crosses(series));
+                for point in series.x.iter().map(|x| (x_of(x), y)).filter(|p| plot.window().contains(*p)) {
+                    svg.cross(point, colour);
+                }
+            }
             Style::Stripe => draw_stripe(svg, series, plot, shades),
             Style::Band => draw_band(svg, panel, series, plot, colour),
             Style::Bars => {
@@ -195,7 +202,8 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
             }
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let pale = series.emphasis == Emphasis::Pale;
-                let width = if pale || crowd { THIN } else { LINE };
+                let thin = pale || crowd || series.emphasis == Emphasis::OwnReference;
+                let width = if thin { THIN } else { LINE };
                 let opacity = if pale { PALE } else { 1.0 };
                 let pen = Pen { colour, width, dashes: dashes(frame::line_style(series)), opacity };
                 draw_line(svg, panel, series, plot, &pen);

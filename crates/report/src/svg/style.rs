@@ -16,6 +16,7 @@ pub(super) const LINE: f64 = 1.8;
 pub(super) const THIN: f64 = 1.0;
 pub(super) const MARK: f64 = 3.8;
 pub(super) const SMALL_MARK: f64 = 2.0;
+pub(super) const CROSS: f64 = 2.8;
 /// The colour bar: its width, and the number of steps that look continuous.
 pub(super) const BAR: f64 = 16.0;
 pub(super) const BAR_STEPS: usize = 96;

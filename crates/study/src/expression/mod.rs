@@ -256,7 +256,7 @@ fn call(function: &str, a: Value) -> Result<Value, String> {
 /// ```
 pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, Fault> {
     let value = Expression::compile::<&str>(text, &[])?.evaluate(&[])?;
-    value.to(dimension).map_err(|(message, help)| Fault { span: 0..text.len(), message, help })
+    value.written_as(text, dimension).map_err(|(message, help)| Fault { span: 0..text.len(), message, help })
 }
 
 #[cfg(test)]

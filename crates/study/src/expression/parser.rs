@@ -7,6 +7,13 @@ use crate::units::{self, Fault, Names};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 
+/// What people call the drive frequency, in small letters.
+const OF_THE_DRIVE: [&str; 5] = ["frequency", "freq", "omega", "ohm", "w"];
+/// How a model depends on the drive frequency.
+const OF_PARAMETERS: &str = "expressions know parameters, not the drive frequency of each point; make the frequency a parameter, \
+                             f = \"100 Hz\" in [parameters], use `f` here, and ask for kind = \"orbit\" with frequency = \"f\" and \
+                             vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
+
 /// Parentheses and powers inside each other.
 const DEEPEST: usize = 64;
 
@@ -251,6 +258,8 @@ impl Parser<'_> {
             fault.help(help)
         } else if let Some(near) = nearest(name, self.names.iter().copied()) {
             fault.help(format!("did you mean `{near}`?"))
+        } else if OF_THE_DRIVE.contains(&name.to_lowercase().as_str()) {
+            fault.help(OF_PARAMETERS)
         } else if let Some(unit) = units::nearest_unit(name).filter(|_| !self.steps.is_empty()) {
             fault.help(format!("did you mean the unit `{unit}`?"))
         } else {

@@ -1,5 +1,6 @@
 //! Numbers with and without a dimension.
 
+use crate::mistaken;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 
@@ -30,6 +31,11 @@ impl Value {
     /// # Errors
     /// Message and help, if the dimension is another one.
     pub fn to(self, expected: Dimension) -> Result<f64, (String, Option<String>)> {
+        self.written_as("", expected)
+    }
+
+    /// The same of what was written as `text`.
+    pub(crate) fn written_as(self, text: &str, expected: Dimension) -> Result<f64, (String, Option<String>)> {
         let Some(found) = self.dimension else {
             return self.in_si_unit_of(expected);
         };
@@ -45,7 +51,7 @@ impl Value {
             ),
             (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
             (true, std::cmp::Ordering::Less) => Some("a radian is left over: divide by `1 rad`".to_owned()),
-            _ => None,
+            _ => mistaken::advice(expected, found, text),
         };
         Err((format!("expected {}, found {}", described(expected), described(found)), help))
     }

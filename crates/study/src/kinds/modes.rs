@@ -2,7 +2,7 @@
 
 use super::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
 use super::wheel::{self, Around};
-use crate::columns::{amplitude_in, amplitude_of, phase_of};
+use crate::columns::{amplitude_in, amplitude_of, first_harmonic_in, first_harmonic_of, phase_of};
 use crate::cost::{Cost, Costing, Shape};
 use crate::dataset::{Axis, Figure, Panel, Series, Table, Values as Cells};
 use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
@@ -77,7 +77,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let elimination = costing.eliminated((harmonics + 1.0) * costing.masses);
     Cost {
         tables: vec![
-            Shape { rows, numbers: costing.varied + 4.0 + 2.0 * costing.places, words: 0.0 },
+            Shape { rows, numbers: costing.varied + 4.0 + 3.0 * costing.places, words: 0.0 },
             Shape { rows: costing.cases, numbers: costing.varied + 5.0, words: 0.0 },
         ],
         drawn: 2.0 * rows,
@@ -133,10 +133,11 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
         rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
-        let motions = point.places.iter().zip(point.phases());
+        let motions = point.places.iter().zip(&point.amplitudes).zip(point.phases());
         let places = prepared.system.places().iter().zip(prepared.system.seen());
-        for ((place, along), (x, phase)) in places.zip(motions) {
-            rows.number(&amplitude_in(place, along.unit()), x.norm());
+        for ((place, along), ((x, amplitude), phase)) in places.zip(motions) {
+            rows.number(&amplitude_in(place, along.unit()), *amplitude);
+            rows.number(&first_harmonic_in(place, along.unit()), x.norm());
             rows.number(&phase_of(place), phase.to_degrees());
         }
         rows.integer("stretch", stretch);
@@ -252,6 +253,7 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
 /// Of every case the place that moves most at the largest amplitude; of a disk the shapes at both ends of the amplitudes as well.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
+    // results of before have the first harmonic alone, under this name
     let column = |place: &String| amplitude_of(place);
     let displacements: Vec<String> = system
         .places()
@@ -330,7 +332,11 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cas
         let (unit, factor) = display_unit(most, "m");
         let words = format!("{mode} at {} {unit}", significant(most * factor, 3));
         let frequency = format!("{} Hz", significant(at("frequency_Hz"), 5));
-        let moves = shown.iter().map(|name| (name.as_str(), at(&amplitude_of(name)), at(&phase_of(name))));
+        let size = |name: &str| match table.column(&first_harmonic_of(name)) {
+            Some(_) => at(&first_harmonic_of(name)),
+            None => at(&amplitude_of(name)),
+        };
+        let moves = shown.iter().map(|name| (name.as_str(), size(name), at(&phase_of(name))));
         wheel::panel(&Around::of_ring(moves)?, ring.sectors, join([stretch.label(), words, frequency]), cases)
     };
     ends.into_iter().filter_map(wheel).collect()

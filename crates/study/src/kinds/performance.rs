@@ -233,7 +233,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let varied = if outer == 1 { drawing.varied_axis(&stretches, 0) } else { None };
     let value = |curve: usize| {
         let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
-        parameter.map(|parameter| parameter.on_axis().0)
+        parameter.map(|parameter| parameter.as_written().0)
     };
     let panel = |title: String, series| Panel {
         title,

@@ -108,7 +108,9 @@ fn cost(costing: &Costing<'_>) -> Cost {
         (Some(resonances), _) => peaks / PEAKS * resonances.min(PEAKS),
         (None, _) => peaks,
     };
-    let linear = if costing.study.wants_references() { costing.frequencies * REFERENCE_POINTS as f64 } else { 0.0 };
+    // those of cases that differ in their limits alone are the same
+    let others = references::others(costing.study);
+    let linear = (costing.frequencies * REFERENCE_POINTS as f64 * others).floor();
     // a tuned disk takes a sector's time, and its curve the frequencies of the other
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
     let shapes = match costing.case.model.ring {
@@ -122,7 +124,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         tables: vec![
             costing.orbits(points),
             Shape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
-            Shape { rows: linear, numbers: 1.0 + 2.0 * costing.places, words: 0.0 },
+            Shape { rows: linear, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
             Shape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
             Shape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
             costing.orbits((OTHERS * back).floor()),
@@ -201,7 +203,7 @@ fn compute(work: &Work<'_>) -> Computed {
     } else {
         part.tables.push(Rows::default());
     }
-    if work.study.wants_references() && case.index == 0 {
+    if work.study.wants_references() && !references::are_known(work.study, case) {
         let (rows, absent) = references(work, &stretch.omegas);
         part.tables.push(rows);
         part.notes.extend(absent.into_iter().map(Note::Said));

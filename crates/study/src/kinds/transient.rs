@@ -3,9 +3,9 @@
 use super::keys::MOST_SAMPLES;
 use super::orbit::write_sample;
 use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Figure, Panel, Series};
+use crate::dataset::{Axis, Figure, Panel, Series, Table};
 use crate::decay::{Decay, Motion};
-use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, numbers};
+use crate::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, largest, numbers, thinned, words};
 use crate::draws;
 use crate::info::Complaint;
 use crate::info::KindInfo;
@@ -18,7 +18,7 @@ use crate::point::location_of;
 use crate::rows::Rows;
 use crate::values::{Values, hertz};
 use crate::warnings::moved;
-use crate::words::shown_hertz;
+use crate::words::{display_unit, shown_hertz};
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -357,6 +357,30 @@ fn read_off(
 /// A column.
 const TIME: &str = "time_s";
 
+/// Damping over amplitude, cycle by cycle, of the place that moves most, with a curve for every case.
+fn damping(drawing: &Drawing<'_>, table: &Table, places: &[String]) -> Panel {
+    let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
+    let stretches = drawing.stretches(table);
+    let line = |(colour, stretch): (usize, &&Stretch)| {
+        let x = numbers(table, "amplitude_m", stretch.rows.clone()).iter().map(|x| x * factor).collect();
+        let y = numbers(table, "damping_ratio", stretch.rows.clone()).iter().map(|y| 100.0 * y).collect();
+        let place = words(table, "mass").get(stretch.rows.start).cloned().unwrap_or_default();
+        // one case has the colour that its place has beside it
+        if stretch.varied.is_empty() {
+            let colour = places.iter().position(|name| *name == place).unwrap_or(colour);
+            return Series::line(place, x, y, colour);
+        }
+        Series::line(stretch.label(), x, y, colour)
+    };
+    Panel {
+        title: "damping of each cycle".to_owned(),
+        x: Axis::new("amplitude", unit).log(),
+        y: Axis::new("equivalent damping ratio", "%"),
+        series: thinned(&stretches, MOST_CURVES).iter().enumerate().map(line).collect(),
+        ..Panel::default()
+    }
+}
+
 /// A panel for every case and drive, with a line for every place.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system()) else { return Figure::default() };
@@ -392,5 +416,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     let mut panels = draws::panels(drawing, &drawing.stretches(motion), &of_case);
     panels.truncate(MOST_PANELS);
+    if let Some(decay) =
+        drawing.table("decay").filter(|_| drawing.study.draws().is_none() && panels.len() < MOST_PANELS)
+    {
+        panels.push(damping(drawing, decay, system.places()));
+    }
     Figure { panels, ..Figure::default() }
 }

@@ -78,7 +78,14 @@ impl Reader {
             doc: p.doc,
             example: example_of(p.dimension),
         }));
-        Some(Stated::Law(row, self.table(table, &keys, &format!("law `{}`", row.name))))
+        let before = self.problems.len();
+        let stated = self.table(table, &keys, &format!("law `{}`", row.name));
+        for problem in
+            self.problems[before..].iter_mut().filter(|problem| keys.iter().all(|key| key.name != problem.key))
+        {
+            problem.help = of_another_law(row, &problem.key).or(problem.help.take());
+        }
+        Some(Stated::Law(row, stated))
     }
 
     pub(super) fn method(&mut self, root: &Table) -> Option<StatedTable> {
@@ -153,6 +160,34 @@ impl Reader {
             _ => StatedTable { location: Location::default(), entries: Vec::new(), turn: Default::default() },
         }
     }
+}
+
+/// What people call the coefficient of friction, and the load that presses the faces, in small letters.
+const COEFFICIENTS: [&str; 6] = ["mu", "mue", "coefficient", "friction", "friction_coefficient", "cof"];
+const LOADS: [&str; 8] = ["normal", "n", "n0", "fn", "preload", "normal_load", "normal_force", "load"];
+
+/// What to do about a key that a law does not have and another one has, or that speaks of its normal load.
+fn of_another_law(row: &LawInfo, key: &str) -> Option<String> {
+    let word = key.to_lowercase();
+    let own = one_of(row.parameters.iter().map(|parameter| parameter.key)).replace(" or ", " and ");
+    let has = |key: &str| row.parameters.iter().any(|parameter| parameter.key == key);
+    if COEFFICIENTS.contains(&word.as_str()) || LOADS.contains(&word.as_str()) {
+        let limit =
+            "under a constant normal load that is the coefficient of friction times the load, limit = \"0.3 * 10 N\"";
+        let contact = "a load that changes with the motion has the law `friction-contact`, by `friction` and `preload`";
+        return match (has("friction"), has("limit")) {
+            (true, _) => {
+                Some(format!("`{}` takes {own}: the coefficient is `friction`, the load at rest `preload`", row.name))
+            }
+            (false, true) => {
+                Some(format!("`{}` takes {own}: `limit` is the friction force; {limit}; {contact}", row.name))
+            }
+            (false, false) => Some(format!("`{}` takes {own}; {contact}", row.name)),
+        };
+    }
+    let others = law::TABLE.iter().filter(|other| other.parameters.iter().any(|parameter| parameter.key == key));
+    let others: Vec<&str> = others.map(|other| other.name).collect();
+    (!others.is_empty()).then(|| format!("`{}` takes {own}; `{key}` is a parameter of {}", row.name, one_of(others)))
 }
 
 /// An example of a quantity, for messages.

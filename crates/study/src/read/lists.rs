@@ -4,15 +4,28 @@ use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
 use crate::error::{Location, Problem};
 use crate::expression::is_reserved;
+use crate::key::RATIO;
 use crate::near::shown;
 use crate::repeat::{Index, Repetition};
-use crate::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes};
+use crate::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes, Within};
 use crate::stated::Lists;
-use crate::statement::StatedTable;
+use crate::statement::{Stated, StatedTable};
+use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
 
 /// Largest value of an index: names stay short, and sums of indices exact.
 const LARGEST_INDEX: u64 = 1_000_000;
+
+/// A damping in percent is a share of the critical one.
+fn percent(spring: &mut StatedTable) {
+    for entry in spring.entries.iter_mut().filter(|entry| entry.key == "damping") {
+        if let Stated::Quantity { quantity, dimension, within, example } = &mut entry.value
+            && quantity.text.trim_end().ends_with('%')
+        {
+            (entry.key, *dimension, *within, *example) = (RATIO, Dimension::NONE, Within::AtLeastZero, "\"2 %\"");
+        }
+    }
+}
 
 impl Reader {
     pub(super) fn lists(&mut self, root: &Table) -> Option<Lists> {
@@ -69,7 +82,12 @@ impl Reader {
             }
         }
         lists.turn();
+        lists.spring.iter_mut().for_each(percent);
         for spring in &lists.spring {
+            if let (Some(_), Some(ratio)) = (spring.entry("damping"), spring.entry(RATIO)) {
+                let message = format!("`damping` and `{RATIO}` exclude each other");
+                self.problems.push(Problem::new(&ratio.location, RATIO, message).help("leave one of them out"));
+            }
             if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
                 let message = "a spring needs a stiffness, a damping, or both";
                 self.problems

@@ -5,6 +5,7 @@ use crate::cause;
 use crate::document::{Content, Entry, Node, Table};
 use crate::error::Problem;
 use crate::expression::is_reserved;
+use crate::mixed::mixed;
 use crate::near::{nearest, one_of, shown};
 use crate::sample::{DESIGNS, DISTRIBUTIONS, Design, Drawn, MOST_SOBOL, Sample, WITHIN};
 use crate::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, Takes};
@@ -87,6 +88,10 @@ impl Reader {
             };
             let node = Node { location, value: Content::Text { text: text.clone(), inner: Some(0) } };
             if let Some(quantity) = self.quantity(name, &node) {
+                let own = &parameters[index].quantity;
+                if self.template != Some(own.location.source) {
+                    self.problems.extend(mixed(name, [own, &quantity]));
+                }
                 parameters[index].quantity = quantity;
             }
         }
@@ -121,6 +126,7 @@ impl Reader {
         let mut varied = Vec::new();
         for entry in &table.entries {
             let Some(index) = self.parameter(entry, "vary") else { continue };
+            let before = self.problems.len();
             let points = match &entry.node.value {
                 Content::List(list) => self.quantities(&entry.key, list, &entry.node.location).map(VariedPoints::List),
                 Content::Table(table) => self
@@ -128,6 +134,13 @@ impl Reader {
                     .map(|(from, to, points)| VariedPoints::Range { from, to, points }),
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| VariedPoints::List(vec![quantity])),
             };
+            // the parameter says its unit, too; what a template says of it nobody reads here
+            let own = &parameters[index].quantity;
+            if let Some(points) = points.as_ref().filter(|_| self.template != Some(own.location.source)) {
+                let known = self.problems.len();
+                let beside = mixed(&entry.key, std::iter::once(own).chain(points.quantities()));
+                self.problems.extend(beside.filter(|_| known == before));
+            }
             varied.extend(points.map(|points| Varied { index, location: entry.node.location.clone(), points }));
         }
         let which: Vec<usize> = varied.iter().map(|varied| varied.index).collect();

@@ -5,6 +5,7 @@ use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
 use crate::error::{Location, Problem};
 use crate::expression::Expression;
+use crate::mixed::mixed;
 use crate::near::{nearest, one_of, shown};
 use crate::schema::{self, Key, MOST_POINTS, Presence, Takes, Within};
 use crate::statement::{Order, Quantity, Stated, StatedEntry, StatedTable, Weights};
@@ -28,6 +29,7 @@ impl Reader {
                         }
                     }
                 };
+                let help = self.by_steps(table, entry, keys).unwrap_or(help);
                 let message = format!("{owner} has no key `{}`", shown(&entry.key));
                 self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message).help(help));
             }
@@ -42,6 +44,28 @@ impl Reader {
                 self.problems.push(Problem::new(&table.location, key.name, message).help(help));
             }
         }
+    }
+
+    /// What to do about a `step` in a range, which takes a number of points or a tolerance.
+    fn by_steps(&self, table: &Table, entry: &Entry, keys: &[Key]) -> Option<String> {
+        let is_range = keys.iter().any(|key| key.name == "from") && keys.iter().any(|key| key.name == "to");
+        if !is_range || nearest(&entry.key, ["step", "steps", "increment", "spacing"]).is_none() {
+            return None;
+        }
+        let number = |key: &str| match &table.get(key)?.node.value {
+            Content::Text { text, .. } => self.compile(text).ok()?.evaluate(&[]).ok().map(|value| value.si),
+            Content::Number { value, .. } => Some(*value),
+            _ => None,
+        };
+        let steps = || Some((number("to")? - number("from")?) / number(&entry.key)?);
+        let count = steps().filter(|steps| steps.is_finite() && *steps >= 1.0).map(|steps| steps.round() + 1.0);
+        let points = count.map_or_else(|| "`points`".to_owned(), |count| format!("points = {count}"));
+        Some(match table.get("tolerance") {
+            Some(_) => format!(
+                "with `tolerance` the points stand where the curve needs them, and there is no step; for equal steps write {points} instead of both"
+            ),
+            None => format!("write the number of values, both ends included: {points}"),
+        })
     }
 
     pub(super) fn table(&mut self, table: &Table, keys: &[Key], owner: &str) -> StatedTable {
@@ -366,7 +390,9 @@ impl Reader {
             self.problems.push(problem);
             return None;
         }
-        list.iter().map(|node| self.quantity(key, node)).collect()
+        let quantities: Vec<Quantity> = list.iter().map(|node| self.quantity(key, node)).collect::<Option<_>>()?;
+        self.problems.extend(mixed(key, &quantities));
+        Some(quantities)
     }
 
     pub(super) fn range(&mut self, table: &Table, keys: &[Key], owner: &str) -> Option<(Quantity, Quantity, usize)> {
@@ -384,7 +410,10 @@ impl Reader {
                 Stated::Quantity { quantity: from, .. },
                 Stated::Quantity { quantity: to, .. },
                 Stated::Fixed(Given::Count(points)),
-            ) => Some((from, to, usize::try_from(points).ok()?)),
+            ) => {
+                self.problems.extend(mixed(owner, [&from, &to]));
+                Some((from, to, usize::try_from(points).ok()?))
+            }
             _ => None,
         }
     }

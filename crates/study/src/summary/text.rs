@@ -1,6 +1,6 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary, Orbits, load};
+use super::{JointSummary, ModelSummary, Orbits, UNLOADED, load};
 use crate::words::{bytes_text, plural, quantity, significant};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -66,15 +66,14 @@ impl ModelSummary {
         if joint.limit.is_infinite() {
             return "a spring at rest, never slips".to_owned();
         }
+        let (limit, slip) = (quantity(joint.limit, "N"), if joint.gradual { "macro-slip" } else { "slip" });
         let mut text = match joint.displacement {
             Some(displacement) => {
-                format!(
-                    "slips at {}, {} of relative displacement",
-                    quantity(joint.limit, "N"),
-                    quantity(displacement, "m")
-                )
+                let verb = if joint.gradual { "macro-slip at" } else { "slips at" };
+                let before = if joint.gradual { ", micro-slip before" } else { "" };
+                format!("{verb} {limit}, {} of relative displacement{before}", quantity(displacement, "m"))
             }
-            None => format!("slips at {}, rigid until then", quantity(joint.limit, "N")),
+            None => format!("slips at {limit}, rigid until then"),
         };
         let Some(onset) = &joint.onset else { return text };
         let several = self.range.is_some_and(|(from, to)| from < to);
@@ -84,10 +83,14 @@ impl ModelSummary {
             return text + "; the motion forces it to slip";
         }
         let factor = significant(1.0 / onset.largest, 3);
+        let resonant = onset.largest > UNLOADED;
         if onset.largest == 0.0 {
             text += "; the excitation does not reach it";
         } else if load(onset) == 0.0 {
             text += "; sticks, under a million times the excitation too";
+        } else if onset.slips.is_empty() && joint.gradual {
+            let share = significant(100.0 * onset.largest, 3);
+            text += &format!("; micro-slip alone, up to {share} % of that{at}");
         } else if onset.slips.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
         } else if several {
@@ -96,9 +99,15 @@ impl ModelSummary {
             if let Some(more @ 1..) = onset.slips.len().checked_sub(STRETCHES) {
                 stretches.push(format!("{more} more"));
             }
-            text += &format!("; made to slip in {}; {factor} of the excitation is enough{at}", stretches.join(", "));
+            let stretches = stretches.join(", ");
+            text += &match resonant {
+                true => {
+                    format!("; made to {slip} in {stretches}; any excitation is enough at its undamped resonance{at}")
+                }
+                false => format!("; made to {slip} in {stretches}; {factor} of the excitation is enough{at}"),
+            };
         } else {
-            text += &format!("; made to slip, {factor} of the excitation is enough");
+            text += &format!("; made to {slip}, {factor} of the excitation is enough");
         }
         text
     }

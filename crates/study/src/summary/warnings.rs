@@ -10,7 +10,7 @@ use crate::words::significant;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
-use stickslip::model::{Axis, Loose};
+use stickslip::model::{Axis, FirstSlip, Loose, Modes};
 use stickslip::structure::ReducedComponent;
 
 /// Names that a warning lists; of more it gives the number.
@@ -21,6 +21,8 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Ve
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
     warnings.extend(still(&cases[0]));
+    warnings.extend(massless(&cases[0]));
+    warnings.extend(overstiff(&cases[0]));
     warnings.extend(structure(&cases[0]));
     warnings.extend(unused(study));
     if let Some(environment) = first_values(study) {
@@ -89,6 +91,56 @@ fn preloaded(cases: &[Surveyed]) -> Option<String> {
          force with `harmonic = 0` that does",
         if bodies.len() == 1 { "it" } else { "them" }
     ))
+}
+
+/// A model of which no part has a mass.
+fn massless(one: &Surveyed) -> Option<String> {
+    let (model, structure) = (&one.case.model, one.survey.system().structure());
+    let none = model.substructure.is_none() && model.masses.iter().all(|mass| mass.mass == 0.0);
+    (none && structure.dofs() > 0).then(|| {
+        let names: Vec<String> = model.masses.iter().map(|mass| mass.name.clone()).collect();
+        let are = if names.len() == 1 { "is" } else { "are" };
+        format!(
+            "the mass of {} {are} zero, and there is no other: nothing resonates, the springs alone answer",
+            listed(&names)
+        )
+    })
+}
+
+/// A stiffness that makes a frequency as no structure has it.
+fn overstiff(one: &Surveyed) -> Option<String> {
+    let (model, survey) = (&one.case.model, &one.survey);
+    if model.substructure.is_some() || survey.is_too_large() {
+        return None;
+    }
+    let highest = |modes: &Modes| modes.elastic.last().map_or(0.0, |mode| mode.omega) / TAU;
+    let (free, stuck) = (highest(survey.free()), highest(survey.stuck()));
+    if free.max(stuck) <= USUAL.1 {
+        return None;
+    }
+    let spring = model.springs.iter().max_by(|a, b| a.stiffness.total_cmp(&b.stiffness)).filter(|_| free > USUAL.1);
+    let slips = survey.first_slip();
+    let stiffness = |slip: &FirstSlip| slip.displacement.map_or(0.0, |u| if u > 0.0 { slip.limit / u } else { 0.0 });
+    let joint = slips.iter().filter(|slip| slip.limit.is_finite());
+    let joint = joint.max_by(|a, b| stiffness(a).total_cmp(&stiffness(b)));
+    let of = |stiffness: f64| displayed(stiffness, Some(Dimension::STIFFNESS));
+    let hertz = significant(free.max(stuck), 3);
+    Some(match (spring, joint) {
+        (Some(spring), _) => {
+            let [a, b] = &spring.between;
+            format!(
+                "the model vibrates at up to {hertz} Hz: is the stiffness between `{a}` and `{b}`, {}, right?",
+                of(spring.stiffness)
+            )
+        }
+        (None, Some(joint)) => format!(
+            "with all joints stuck the model vibrates at up to {hertz} Hz: is the stiffness of `{}`, {}, right? A joint that does not give way until it \
+             slips has the law `coulomb`",
+            joint.joint,
+            of(stiffness(joint))
+        ),
+        (None, None) => format!("the model vibrates at up to {hertz} Hz: are its stiffnesses and masses right?"),
+    })
 }
 
 /// Joints between places that are the same: of the same rows, or both held.

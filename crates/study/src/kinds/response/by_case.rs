@@ -10,8 +10,12 @@ use crate::words::significant;
 
 /// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
 const LIGHT: f64 = 0.5;
+/// The colour of crosses where no place has a value: the last of the palette.
+const MISSING: usize = 6;
 /// Bars of a panel that still tell one from the next: two for each of 60 blades.
 const BARS: usize = 120;
+/// Bars whose heights differ by no more than this share are those of equal sectors.
+const ALIKE: f64 = 1e-5;
 /// Masses that are drawn behind the largest of them, those with the highest peaks: the curves of thousands would be one grey area in megabytes.
 const BEHIND: usize = 100;
 
@@ -61,7 +65,8 @@ impl Drawn<'_> {
     /// The masses of one case: each, or the largest of them before all others.
     fn masses_of(&self, stretch: &Stretch) -> Panel {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
-        panel.series.extend(self.references(&names));
+        panel.series.extend(self.references(&names, &[(0, stretch)]));
+        panel.series.extend(self.missing(stretch, 1, MISSING));
         if self.single() {
             // of a place that is no mass nobody knows how heavy it is
             let mass = |place: usize| match self.system.seen()[place].rows() {
@@ -130,11 +135,14 @@ impl Drawn<'_> {
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
+        // bars of one height, those of a tuned disk, say nothing
+        let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > ALIKE * bars.y[0].abs());
+        let differ = series.iter().any(differ);
         let title = join([stretch.label(), format!("at {} Hz", significant(frequency, 6))]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
         let of = wheel::left_out(shape.len(), places);
         let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone(), of]), first);
         let title = join([title, wheel::left_out(series.len(), places)]);
-        Some([Some(Panel { title, x, y, series, ..Panel::default() }), wheel])
+        Some([differ.then(|| Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
 }

@@ -94,8 +94,17 @@ impl Drawn<'_> {
         } else if panels == 1 && self.system.places().len() > 1 {
             panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
         }
-        panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass])));
-        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+        let cases: Vec<(usize, &Stretch)> = thinned(group, MOST_CURVES).into_iter().enumerate().collect();
+        panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass]), &cases));
+        // a row of crosses for each case, while there are few
+        let failing = cases.iter().filter(|(_, stretch)| !self.without_orbit(stretch).is_empty()).count();
+        let mut row = 0;
+        for (colour, stretch) in cases {
+            if let Some(crosses) = self.missing(stretch, row + 1, colour) {
+                let value = stretch.varied.last().map(|varied| varied.as_written().0);
+                panel.series.push(Series { value, ..crosses });
+                row += usize::from(failing <= SINGLE);
+            }
             let (x, y) = match mass {
                 Some(name) => self.line(stretch, name),
                 None => {
@@ -166,5 +175,5 @@ impl Drawn<'_> {
 fn of_case(stretch: &Stretch, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
     let last = stretch.varied.last();
     let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
-    Series { value: last.map(|varied| varied.on_axis().0), ..Series::line(label, x, y, colour) }
+    Series { value: last.map(|varied| varied.as_written().0), ..Series::line(label, x, y, colour) }
 }

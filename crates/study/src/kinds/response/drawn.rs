@@ -2,7 +2,6 @@
 
 use super::super::shares::{self, State};
 use super::super::wheel::{self, of_sector};
-use super::tables;
 use crate::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
 use crate::drawing::{Drawing, Stretch, join, numbers};
@@ -41,6 +40,8 @@ pub(super) struct Drawn<'a> {
     pub(super) shown: Vec<(String, usize)>,
     /// The orbits of the way back where they are others, and the rows of each case.
     pub(super) way_back: Option<(&'a Table, Vec<Stretch>)>,
+    /// The linear structures, and the rows of each case that has its own.
+    pub(super) references: Option<(&'a Table, Vec<Stretch>)>,
     /// Those inside the range.
     pub(super) peaks: Vec<PeakOf>,
     /// What a disk does at its peaks, and the rows of each case.
@@ -56,6 +57,8 @@ pub(super) struct Drawn<'a> {
     /// From the values of tables to those on the axes.
     pub(super) factor: (f64, f64),
     pub(super) force_factor: f64,
+    /// Points without an orbit among all that are drawn.
+    pub(super) failed: usize,
     /// How many of the cases are shown, if not all.
     pub(super) left_out: Option<String>,
 }
@@ -192,26 +195,74 @@ impl Drawn<'_> {
         })
     }
 
-    /// Grey curves of the linear structures: of one mass, or the largest over the shown ones.
-    pub(super) fn references(&self, names: &[&str]) -> Vec<Series> {
-        let Some(table) = self.drawing.table(tables::REFERENCES) else { return Vec::new() };
-        let x: Vec<f64> = numbers(table, DRIVE, 0..table.rows()).iter().map(|x| x * self.factor.0).collect();
-        [("free", Style::Solid), ("stuck", Style::Dotted)]
-            .into_iter()
-            .map(|(what, style)| {
-                let all: Vec<Vec<f64>> = names
-                    .iter()
-                    .map(|name| numbers(table, &amplitude_of(&format!("{name}_{what}")), 0..table.rows()))
-                    .collect();
-                let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
-                let y: Vec<f64> = y.collect();
-                let of = if names.len() > 1 { ", largest" } else { "" };
-                let line = Series::line(format!("all joints {what}{of}"), x.clone(), y, 0);
-                Series { style, ..line.reference() }
-            })
-            // why one is absent stands in the notes
-            .filter(|line| line.y.iter().any(|y| y.is_finite()))
-            .collect()
+    /// Curves of the linear structures of some cases, each with its colour: of one mass, or the largest over the shown ones. Those that all cases share are grey;
+    /// where they differ each has the colour of its case, of many cases the first and the last have theirs.
+    pub(super) fn references(&self, names: &[&str], cases: &[(usize, &Stretch)]) -> Vec<Series> {
+        let Some((table, known)) = &self.references else { return Vec::new() };
+        // a case without rows has those of the case before
+        let of = |case: usize| known.iter().rev().find(|own| own.case <= case);
+        let mut own: Vec<(usize, &Stretch, &Stretch)> = Vec::new();
+        for (colour, stretch) in cases {
+            let Some(reference) = of(stretch.case) else { continue };
+            if own.iter().all(|(_, _, found)| found.rows != reference.rows) {
+                own.push((*colour, stretch, reference));
+            }
+        }
+        let found = own.len();
+        if found > SINGLE {
+            own = vec![own[0], own[own.len() - 1]];
+        }
+        let (several, thinned) = (own.len() > 1, own.len() < found);
+        let mut lines: Vec<Series> = Vec::new();
+        for (colour, stretch, reference) in own {
+            for line in self.reference(table, reference, names) {
+                // curves of one parameter that does not change them stand once
+                if lines.iter().any(|known| (&known.x, &known.y) == (&line.x, &line.y)) {
+                    continue;
+                }
+                if !several {
+                    lines.push(line.reference());
+                    continue;
+                }
+                let whose = if thinned { stretch.label() } else { "of each case".to_owned() };
+                let (label, value) =
+                    (format!("{}, {whose}", line.label), stretch.varied.last().map(|v| v.as_written().0));
+                lines.push(Series { label, value, colour, ..line.reference_of_its_own() });
+            }
+        }
+        lines
+    }
+
+    /// Crosses where a case has no orbit, in this row from below.
+    pub(super) fn missing(&self, stretch: &Stretch, row: usize, colour: usize) -> Option<Series> {
+        let x = self.without_orbit(stretch);
+        let count = self.failed;
+        let label = format!("{count} point{} without an orbit", crate::words::plural(count));
+        (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
+    }
+
+    /// Frequencies, on the axis, at which a case has no orbit.
+    pub(super) fn without_orbit(&self, stretch: &Stretch) -> Vec<f64> {
+        let all = self.all(stretch);
+        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
+        let failed = |i: &usize| !all.is_empty() && all.iter().all(|values| values[*i].is_nan());
+        (0..x.len()).filter(failed).map(|i| x[i] * self.factor.0).collect()
+    }
+
+    /// The two curves of one case.
+    fn reference(&self, table: &Table, stretch: &Stretch, names: &[&str]) -> Vec<Series> {
+        let rows = stretch.rows.clone();
+        let x: Vec<f64> = numbers(table, DRIVE, rows.clone()).iter().map(|x| x * self.factor.0).collect();
+        let line = |(what, style): (&str, Style)| {
+            let column = |name: &&str| numbers(table, &amplitude_of(&format!("{name}_{what}")), rows.clone());
+            let all: Vec<Vec<f64>> = names.iter().map(column).collect();
+            let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
+            let of = if names.len() > 1 { ", largest" } else { "" };
+            Series { style, ..Series::line(format!("all joints {what}{of}"), x.clone(), y.collect(), 0) }
+        };
+        // why one is absent stands in the notes
+        let lines = [("free", Style::Dashed), ("stuck", Style::Dotted)].into_iter().map(line);
+        lines.filter(|line| line.y.iter().any(|y| y.is_finite())).collect()
     }
 
     pub(super) fn panel(&self, title: String) -> Panel {

@@ -4,7 +4,7 @@ use super::super::shares;
 use super::drawn::{Drawn, PeakOf, force};
 use super::{amplification, tables};
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
-use crate::dataset::{Axis, Figure, Panel, Sharing};
+use crate::dataset::{Axis, Figure, Panel, Sharing, Table};
 use crate::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
 use crate::histogram;
 use crate::words::display_unit;
@@ -31,11 +31,12 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
     let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
     let stretches = drawing.stretches(curve);
-    let drawn = Drawn {
+    let mut drawn = Drawn {
         drawing,
         curve,
         index: curve.index(),
         way_back: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.stretches(table))),
+        references: drawing.table(tables::REFERENCES).map(|table| (table, references_by_case(drawing, table))),
         peaks: peaks_by_case(drawing),
         shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.stretches(table))),
         factor: (x_factor, y_factor),
@@ -47,8 +48,10 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
         shown,
         joints,
         faces,
+        failed: 0,
         left_out: drawing.left_out(stretches.len()),
     };
+    drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
     let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
         Layout::Cases => {
             // colours are those of maps: the curves of one panel have names
@@ -84,6 +87,15 @@ fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
         histogram::panel(&heights, &x, &join([words, "largest peak".to_owned()]), "draws")
     };
     drawn.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
+}
+
+/// The rows of the linear structures case by case. Results of before have those of the first case alone, and no varied parameters beside them.
+fn references_by_case(drawing: &Drawing<'_>, table: &Table) -> Vec<Stretch> {
+    let varied = drawing.study.varied_values(0).unwrap_or_default();
+    if table.columns.first().is_some_and(|column| column.name == DRIVE) {
+        return vec![Stretch { case: 0, varied, rows: 0..table.rows() }];
+    }
+    drawing.stretches(table)
 }
 
 /// The peaks inside the range.

@@ -4,6 +4,7 @@ use crate::columns::{FREQUENCY as DRIVE, amplitude_in};
 use crate::linear::Reference;
 use crate::note::WARNING;
 use crate::rows::Rows;
+use crate::study::{Case, Study};
 use crate::values::hertz;
 use crate::work::{Prepared, Work};
 use stickslip::method::{self, MethodError, Options, Solver};
@@ -12,6 +13,32 @@ use stickslip::orbit::Orbit;
 
 /// Points of the linear references between two points of the curve: their peaks are sharper than that of any damped curve.
 pub(super) const REFERENCE_POINTS: usize = 4;
+
+/// Whether the case before has the same references: nothing of the linear structures, their excitation and the frequencies differs.
+pub(super) fn are_known(study: &Study, case: &Case) -> bool {
+    let before = case.index.checked_sub(1).and_then(|index| study.case(index).ok());
+    before.is_some_and(|before| {
+        let alike = |reference: Reference| match (reference.model(&before.model), reference.model(&case.model)) {
+            (Ok(before), Ok(case)) => before == case,
+            (before, case) => before.is_err() && case.is_err(),
+        };
+        before.frequencies == case.frequencies && Reference::ALL.into_iter().all(alike)
+    })
+}
+
+/// Cases that are looked at for their number.
+const LOOKED_AT: usize = 9;
+
+/// About how many cases have references of their own, by some of them; none if none are asked for.
+pub(super) fn others(study: &Study) -> f64 {
+    if !study.wants_references() {
+        return 0.0;
+    }
+    let (cases, looked) = (study.cases(), study.cases().min(LOOKED_AT));
+    let looked_at = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
+    let own = looked_at.filter(|case| !are_known(study, case)).count();
+    own as f64 * cases as f64 / looked as f64
+}
 
 /// A solver of a linear reference: its joints have other laws than those for which the method was chosen, so that any may do.
 fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
@@ -44,6 +71,7 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
     let curves = Reference::ALL.map(|reference| (reference.name(), follow(reference)));
     let mut rows = Rows::linear();
     for (i, omega) in omegas.iter().enumerate() {
+        rows.varied(&prepared.case);
         rows.number(DRIVE, hertz(*omega));
         for (what, curve) in &curves {
             for (place, (name, along)) in prepared.system.places().iter().zip(prepared.system.seen()).enumerate() {
