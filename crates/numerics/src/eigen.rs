@@ -9,6 +9,7 @@
 //! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and 10.5; Parlett and Reinsch (1969) for the balance.
 
 use crate::dense::{cholesky_in_blocks, solve_lower_in_blocks};
+use crate::interrupt;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::{ColMut, MatMut, MatRef, Par, Spec};
@@ -217,6 +218,7 @@ fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     let mut found = Vec::with_capacity(n);
     let (mut end, mut steps) = (n, 0);
     while end > 0 {
+        interrupt::check();
         // the part that hangs together, from below
         let mut start = end - 1;
         while start > 0 && h[(start, start - 1)].norm() > small {
@@ -293,6 +295,7 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
     basis.set_column(0, &first.normalize());
     let mut check = FIRST.min(most);
     for k in 0..most {
+        interrupt::check();
         let mut next = matrix * basis.column(k);
         let before = next.norm();
         // twice, for the digits that the first time cancels

@@ -3,6 +3,8 @@
 //! `A P⁻¹ y = b`, `x = P⁻¹ y`: of all x in the space of `P⁻¹ b, P⁻¹ A P⁻¹ b, …` the one with the least residual, which is that of the equations themselves.
 //! Source: Saad and Schultz (1986); Saad, "Iterative Methods for Sparse Linear Systems" (2003), Sec. 6.5 and 9.3.2.
 
+use crate::interrupt;
+
 /// What a solution may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -134,6 +136,7 @@ impl Gmres {
         self.product.resize(n, 0.0);
         let mut count = 0;
         while count < vectors.min(products) {
+            interrupt::check();
             self.sum.clear();
             self.sum.extend_from_slice(&self.basis[count * n..]);
             precondition(&mut self.sum);

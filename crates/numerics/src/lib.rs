@@ -9,6 +9,7 @@ pub mod dual;
 pub mod eigen;
 pub mod extremes;
 pub mod fourier;
+pub mod interrupt;
 pub mod krylov;
 pub mod leading;
 pub mod lu;

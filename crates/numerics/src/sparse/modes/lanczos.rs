@@ -2,6 +2,7 @@
 
 use super::found::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
+use crate::interrupt;
 use crate::sparse::{Factor, Matrix, columns};
 use nalgebra::DMatrix;
 
@@ -77,6 +78,7 @@ impl<'a> Lanczos<'a> {
                 return Ok(false);
             }
         }
+        interrupt::check();
         let n = self.n;
         let mut block = std::mem::take(&mut self.heavy);
         self.factor.solve(&mut block);

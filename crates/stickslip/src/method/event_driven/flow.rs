@@ -11,6 +11,7 @@ use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::sync::Arc;
+use stickslip_numerics::interrupt;
 use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -157,6 +158,7 @@ impl SegmentedMotion {
             return Err(Breakdown::Undecidable { time });
         }
         loop {
+            interrupt::check();
             let (pattern, driven) = self
                 .memory
                 .pattern(&self.mechanics, &self.drive, &self.decision.contacts)

@@ -8,7 +8,7 @@ use super::mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
 use super::open::{open, shorten};
 use super::solve::{GROWS, HALVINGS, SHORTENS};
 use num_complex::Complex64;
-use stickslip_numerics::dense;
+use stickslip_numerics::{dense, interrupt};
 
 /// Weight of `ln a` in the arc length: a tenth of the shape counts as much as a fifth of the amplitude.
 const AMPLITUDE: f64 = 0.5;
@@ -199,6 +199,7 @@ impl ModeEquations<'_> {
         let mut enough = SOLVED;
         let mut iteration = 0;
         while iteration <= ITERATIONS {
+            interrupt::check();
             let solved = now <= enough;
             self.border((&point, &scale), &jacobian, row, &mut bordered);
             if solved {

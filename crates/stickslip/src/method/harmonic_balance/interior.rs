@@ -14,6 +14,7 @@ use super::equations::{Level, OPEN, Slopes, Solution};
 use super::ports::{Alternation, Barrier, Port, Ports, block};
 use super::solve::{Goal, Lost};
 use num_complex::Complex64;
+use stickslip_numerics::interrupt;
 
 /// Samples of a period for the wave of the highest harmonic: Newton's method goes on with all of them.
 const SAMPLED: usize = 16;
@@ -62,6 +63,7 @@ impl Level {
         let Some(mut along) = self.begin_interior(ports, omega, motion) else { return false };
         let (mut mark, mut waited) = (f64::INFINITY, 0);
         for _ in 0..MOST {
+            interrupt::check();
             let left = along.each().map(Barrier::left).fold(0.0, f64::max);
             if left <= DECIDED {
                 return true;

@@ -21,7 +21,7 @@ use crate::method::MethodError;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
-use stickslip_numerics::dense;
+use stickslip_numerics::{dense, interrupt};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Newton iterations at one amplitude; 2 to 10 are usual.
@@ -396,6 +396,7 @@ impl<'a> ModeEquations<'a> {
         self.evaluate(&state, (&start, a), &mut residual, Some(&mut jacobian));
         let mut now = norm(&residual);
         for _ in 0..ITERATIONS {
+            interrupt::check();
             if now <= SOLVED {
                 return Some(state);
             }

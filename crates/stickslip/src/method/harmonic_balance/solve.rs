@@ -8,7 +8,7 @@ use super::equations::{Level, Slopes, Solution};
 use super::ports::{Port, Ports};
 use super::sparse::Along;
 use num_complex::Complex64;
-use stickslip_numerics::dense;
+use stickslip_numerics::{dense, interrupt};
 
 /// Newton iterations; 3 to 15 are usual.
 const ITERATIONS: usize = 60;
@@ -170,6 +170,7 @@ impl Level {
         // forces that wander are found by proximal points
         let hope = if ports.has_forces() { PATIENCE } else { most };
         for _ in 0..most {
+            interrupt::check();
             let found = residual <= solved || (waited > PATIENCE && least <= ROUNDED);
             if found || self.is_exhausted(ports) || (waited > hope && least < f64::INFINITY) {
                 break;

@@ -8,6 +8,7 @@ use crate::law::Relative;
 use crate::method::assembly::{Assembly, PlacedLaw};
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::interrupt;
 use stickslip_numerics::lu::Lu;
 
 /// The structure eliminated for one step length.
@@ -153,6 +154,7 @@ impl Step {
         let mut converged = j == 0;
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
+            interrupt::check();
             if !self.evaluate(assembly, eliminated, drive, (time, &state[n..2 * n])) || !self.lu.factorise() {
                 return false;
             }

@@ -8,6 +8,7 @@
 use crate::law::{RatePoint, Relative};
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
+use stickslip_numerics::interrupt;
 use stickslip_numerics::lu::Lu;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
 use stickslip_numerics::short::{add, add_product, add_product_of_rows};
@@ -227,6 +228,7 @@ impl Step {
         }
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
+            interrupt::check();
             self.evaluate(assembly, eliminated, loads);
             self.linearise(assembly, eliminated, state);
             if !self.lu.factorise() {

@@ -14,6 +14,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::interrupt;
 
 /// The same as [`REPEATS`] where they come no closer.
 const ROUNDED: f64 = 1e-9;
@@ -183,6 +184,7 @@ impl Alternation {
         z: &DVector<f64>,
         mut rows: Option<&mut Vec<f64>>,
     ) -> Option<DVector<f64>> {
+        interrupt::check();
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
         let size = (m + d) * width(march);
