@@ -69,7 +69,7 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
         return Err(error::model(py, message));
     }
     let deviation = given.get_item("deviation")?.ok_or_else(|| missing("deviation"))?;
-    let mut deviations = quantity::many(&deviation, Dimension::NONE, "`deviation`")?;
+    let mut deviations = quantity::many(&deviation, Some(Dimension::NONE), "`deviation`")?;
     let listed = deviations.len() != 1 || (deviation.hasattr("__len__")? && deviation.cast::<PyString>().is_err());
     match (listed, given.get_item("seed")?) {
         (true, Some(_)) => return Err(error::model(py, "a list of deviations needs no `seed`")),

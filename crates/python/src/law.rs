@@ -1,20 +1,34 @@
 //! Laws by name, with quantities as keyword arguments.
 
-use crate::python_law::Written;
+use crate::python_law::{self, Size, Written};
 use crate::{error, quantity};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw};
 
 /// What happens where two places rub or touch; made by `stickslip.law` or `stickslip.rate_law`.
+///
+/// A law does not change; it can be copied and pickled, one written in Python where it stands at
+/// the top of a module under its own name.
 #[pyclass(frozen, module = "stickslip", name = "Law")]
 pub struct PyLaw {
     pub law: SharedLaw,
     /// The law behind it, if it is written in Python.
     pub written: Option<Arc<Written>>,
+}
+
+/// A function and its arguments, by which a pickle makes a thing anew.
+type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+impl PyLaw {
+    /// The law of a joint.
+    pub fn of(law: SharedLaw) -> PyLaw {
+        PyLaw { written: python_law::written(&law), law }
+    }
 }
 
 #[pymethods]
@@ -40,11 +54,123 @@ impl PyLaw {
         self.law.directions()
     }
 
+    /// Compares the derivatives of a law written in Python with difference quotients, and returns
+    /// the largest error, relative to the largest such derivative. Raises `ValueError`, which names
+    /// the derivative and the instant, where it is more than ``tolerance``.
+    ///
+    /// ``u`` (m), ``v`` (m/s) and ``z`` are instants at which to compare, of shape (n,) or
+    /// (directions, n) and (states, n); without them 64 are drawn, up to 1 mm, 1 m/s and 0.9
+    /// ``state_scale``.
+    ///
+    /// >>> import stickslip
+    /// >>> law = stickslip.rate_law(lambda u, v, z: 1e9 * u**3, derivatives=lambda u, v, z: [[2e9 * u**2, 0 * v]])
+    /// >>> law.check_derivatives()  # doctest: +ELLIPSIS
+    /// Traceback (most recent call last):
+    ///     ...
+    /// ValueError: the derivative of `<lambda>` is wrong: the force by u is ...
+    #[pyo3(signature = (u=None, v=None, z=None, *, tolerance=1e-5))]
+    fn check_derivatives(
+        slf: &Bound<'_, Self>,
+        u: Option<Bound<'_, PyAny>>,
+        v: Option<Bound<'_, PyAny>>,
+        z: Option<Bound<'_, PyAny>>,
+        tolerance: f64,
+    ) -> PyResult<f64> {
+        let Some(written) = &slf.get().written else {
+            return Err(PyTypeError::new_err(
+                "the derivatives of laws that are built in are exact; a law of `rate_law` has some to check",
+            ));
+        };
+        written.kernel.bind(slf.py()).call_method1("check_derivatives", (slf, u, v, z, tolerance))?.extract()
+    }
+
+    fn __eq__(&self, other: &PyLaw) -> bool {
+        *self.law == *other.law
+    }
+
+    fn __hash__(&self) -> u64 {
+        self.law
+            .values()
+            .iter()
+            .fold(self.law.info() as *const LawInfo as u64, |hash, value| hash.rotate_left(7) ^ value.to_bits())
+    }
+
     fn __repr__(&self) -> String {
         let pairs = self.law.info().parameters.iter().zip(self.law.values());
         let pairs: String = pairs.map(|(parameter, value)| format!(", {}={value}", parameter.key)).collect();
         format!("<stickslip.Law {}{pairs}>", self.name())
     }
+
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        let _ = memo; // it does not change
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let (py, this) = (slf.py(), slf.get());
+        if let Some(written) = &this.written {
+            return written.kernel.bind(py).call_method1("pickled", (slf,))?.extract();
+        }
+        let values = this.law.values().into_pyobject(py)?;
+        Ok((py.import("stickslip._core")?.getattr("_law")?, (this.name(), values).into_pyobject(py)?.into_any()))
+    }
+
+    /// The function of a law written in Python, as it is called.
+    #[getter]
+    fn _kernel(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.written.as_ref().map(|written| written.kernel.clone_ref(py))
+    }
+
+    /// The size of its states.
+    #[getter]
+    fn _state_scale(&self) -> f64 {
+        self.law.rate().map_or(1.0, |rate| rate.state_scale())
+    }
+
+    /// The same law with other values of its parameters, in SI.
+    fn _with(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<PyLaw> {
+        let mut law = self.law.clone();
+        for (key, value) in values {
+            law = with(&law, &key, value).map_err(|message| error::model(py, message))?;
+        }
+        Ok(PyLaw { law, written: self.written.clone() })
+    }
+}
+
+/// A law with another value of one parameter, SI, or why there is none.
+pub fn with(law: &SharedLaw, key: &str, value: f64) -> Result<SharedLaw, String> {
+    let changed = law.with(key, value).ok_or_else(|| format!("law `{}` has no parameter `{key}`", law.name()))?;
+    // that a law written in Python is odd was tried when it was made
+    let checked = if python_law::is_written(law) {
+        changed.consistent()
+    } else {
+        changed.check().map_err(|cause| cause.to_string())
+    };
+    match checked {
+        Ok(()) if value.is_finite() => Ok(changed),
+        Ok(()) => Err(format!("{}: `{key}` must be finite, found {value}", law.name())),
+        Err(message) if python_law::is_written(law) => Err(format!("{}: {message}", law.name())),
+        Err(message) => Err(message),
+    }
+}
+
+/// A built-in law from its pickle: its name and all values, SI.
+#[pyfunction]
+pub fn _law(py: Python<'_>, name: &str, values: Vec<f64>) -> PyResult<PyLaw> {
+    let row = row(py, name)?;
+    if values.len() != row.parameters.len() {
+        return Err(error::model(
+            py,
+            format!("this is no pickled law: `{name}` has {} parameters", row.parameters.len()),
+        ));
+    }
+    let values = row.parameters.iter().map(|parameter| parameter.key).zip(values).collect();
+    let law = row.build(&values).map_err(|cause| error::model(py, cause))?;
+    Ok(PyLaw { law, written: None })
 }
 
 /// The row of a law, or an exception that names those that there are.
@@ -112,34 +238,65 @@ pub fn laws(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(all)
 }
 
+/// A size of a law that is written in Python: a number, or the name of a parameter.
+fn size(given: &Bound<'_, PyAny>, what: &str, law: &str, parameters: &[(String, Dimension)]) -> PyResult<Size> {
+    let py = given.py();
+    if let Ok(name) = given.cast::<PyString>() {
+        let at = parameters.iter().position(|(parameter, _)| *name == parameter.as_str());
+        return at.map(Size::Parameter).ok_or_else(|| {
+            error::model(
+                py,
+                format!(
+                    "`{what}` of law `{law}` must be a number or the name of a parameter, found {:?}",
+                    name.to_string_lossy()
+                ),
+            )
+        });
+    }
+    match quantity::number(given)? {
+        Some(number) if number > 0.0 && (number.is_finite() || what == "scale") => Ok(Size::Number(number)),
+        _ => Err(error::model(py, format!("`{what}` of law `{law}` must be more than zero, found {given}"))),
+    }
+}
+
 /// A law in rate form from Python's functions; `stickslip.rate_law` wraps it.
 #[pyfunction]
-#[pyo3(signature = (name, value, linearise, *, directions, states, state_scale, scale, odd, passive))]
+#[pyo3(signature = (name, kernel, *, directions, states, parameters, state_scale, scale, odd, passive))]
 #[allow(clippy::too_many_arguments)] // one for each keyword of `rate_law`
 pub fn _rate_law(
     py: Python<'_>,
     name: &str,
-    value: Py<PyAny>,
-    linearise: Py<PyAny>,
+    kernel: Py<PyAny>,
     directions: usize,
     states: usize,
-    state_scale: f64,
-    scale: f64,
+    parameters: &Bound<'_, PyDict>,
+    state_scale: &Bound<'_, PyAny>,
+    scale: &Bound<'_, PyAny>,
     odd: bool,
     passive: bool,
 ) -> PyResult<PyLaw> {
     if !(1..=MOST_DIRECTIONS).contains(&directions) {
         return Err(error::model(py, format!("a law has 1 to {MOST_DIRECTIONS} directions, found {directions}")));
     }
-    if !(state_scale.is_finite() && state_scale > 0.0 && scale > 0.0) {
-        let message = format!(
-            "`scale` and `state_scale` of law `{name}` must be more than zero, found {scale} and {state_scale}"
-        );
-        return Err(error::model(py, message));
+    let (mut keys, mut values) = (Vec::new(), Vec::new());
+    for (key, value) in parameters {
+        let key: String = key.extract()?;
+        if !stickslip::model::is_identifier(&key) {
+            return Err(error::model(
+                py,
+                format!("parameter `{key}` of law `{name}` must have letters, digits and _ as its name"),
+            ));
+        }
+        let (value, dimension) = quantity::of_any_dimension(&value, &format!("`{key}` of law `{name}`"))?;
+        keys.push((key, dimension));
+        values.push(value);
     }
-    let mut law = Written::new(name, value, linearise);
+    let mut law = Written::new(name, kernel, &keys);
     (law.directions, law.states, law.odd, law.passive) = (directions, states, odd, passive);
-    (law.state_scale, law.scale) = (state_scale, scale);
-    let written = Arc::new(law);
-    Ok(PyLaw { law: written.law(), written: Some(written) })
+    law.state_scale = size(state_scale, "state_scale", name, &keys)?;
+    law.scale = size(scale, "scale", name, &keys)?;
+    let written = law.shared();
+    let law = written.law(values);
+    law.consistent().map_err(|message| error::model(py, format!("law `{name}`: {message}")))?;
+    Ok(PyLaw { law, written: Some(written) })
 }

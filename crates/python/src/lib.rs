@@ -6,6 +6,7 @@ mod drawn;
 mod error;
 mod law;
 mod lend;
+mod lock;
 mod matrices;
 mod model;
 mod orbit;
@@ -16,6 +17,7 @@ mod python_law;
 mod quantity;
 mod result;
 mod rows;
+mod stored;
 mod study;
 mod watch;
 
@@ -28,15 +30,17 @@ mod _core {
     use pyo3::types::PyDict;
 
     #[pymodule_export]
-    use crate::law::_rate_law;
+    use crate::law::{_law, _rate_law};
     #[pymodule_export]
     use crate::law::{PyLaw, laws, named};
     #[pymodule_export]
-    use crate::model::PyModel;
+    use crate::lock::{_lock, Lock};
+    #[pymodule_export]
+    use crate::model::{_model, _orbit, PyModel};
     #[pymodule_export]
     use crate::orbit::PyOrbit;
     #[pymodule_export]
-    use crate::result::{_result, PyResultSet, Table};
+    use crate::result::{_result, _table, PyResultSet, Table};
     #[pymodule_export]
     use crate::study::{_joined, _study, PyStudy};
 

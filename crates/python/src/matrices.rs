@@ -1,6 +1,7 @@
 //! Matrices of mass, damping and stiffness from NumPy and SciPy.
 
 use crate::error;
+use crate::watch::apart;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -74,7 +75,8 @@ pub fn component(
     };
     let (mass, stiffness) = (matrix(mass, "mass")?, matrix(stiffness, "stiffness")?);
     let damping = damping.map(|damping| matrix(damping, "damping")).transpose()?;
-    py.detach(|| Component::new(names, mass, damping, stiffness)).map_err(|cause| error::model(py, cause))
+    let made = apart(py, move || Component::new(names, mass, damping, stiffness))?;
+    made.map_err(|cause| error::model(py, cause))
 }
 
 /// The places of a model on a structure of n rows, and what the rows are called.

@@ -4,15 +4,15 @@ use crate::law::PyLaw;
 use crate::orbit::{PyOrbit, instants};
 use crate::points::{Asked, along_frequencies, along_parameters, said};
 use crate::progress::{bar, close};
-use crate::python_law::Written;
 use crate::result::PyResultSet;
 use crate::rows::{self, Row};
-use crate::watch::{Watch, watched};
-use crate::{disk, drawn, error, matrices, parameters, quantity};
+use crate::study::PyStudy;
+use crate::watch::{Watch, alone, apart, watched};
+use crate::{disk, drawn, error, matrices, parameters, quantity, stored};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict, PyList};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -50,8 +50,9 @@ pub struct PyModel {
     model: Model,
     /// Of forces and imposed motions how they go around a disk, where something is said of it.
     around: [Vec<Option<Around>>; 2],
-    /// Laws that Python wrote, to ask them what they raised.
-    written: Vec<Arc<Written>>,
+    /// The study and the case of which it is the model, if it is one: its structure by matrices is
+    /// that of the study.
+    study: Option<(PyStudy, usize)>,
     /// The system and what finds its orbits, as asked for last.
     ready: Mutex<Option<Ready>>,
 }
@@ -59,6 +60,8 @@ pub struct PyModel {
 /// A system with a solver of it.
 struct Ready {
     key: (String, Options),
+    /// The model as it was then.
+    model: Arc<PyModel>,
     /// Borrows from `system`, and is dropped before it.
     solver: Box<dyn Solver + Send>,
     system: Arc<System>,
@@ -77,9 +80,19 @@ fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solv
 const MOST_SURVEYED: usize = 600;
 
 impl PyModel {
-    /// The model of a study.
+    /// This model.
     pub fn from_model(model: Model) -> Self {
         PyModel { model, ..PyModel::default() }
+    }
+
+    /// The model of a case of a study.
+    pub fn of_study(study: &PyStudy, case: usize, model: Model) -> Self {
+        PyModel { study: Some((study.clone(), case)), ..PyModel::from_model(model) }
+    }
+
+    /// The same, with nothing computed of it.
+    fn copied(&self) -> PyModel {
+        PyModel { around: self.around.clone(), study: self.study.clone(), ..PyModel::from_model(self.model.clone()) }
     }
 
     /// The model is another one from now on; what was a ring may have other sectors.
@@ -94,7 +107,7 @@ impl PyModel {
                            model.disk(24) is the ring of 24";
             return Err(error::model(py, message));
         }
-        self.model.assemble().map_err(|cause| refused(py, &cause, &self.model))
+        alone(py, || self.model.assemble())?.map_err(|cause| refused(py, &cause, &self.model))
     }
 
     fn asked(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Asked> {
@@ -102,9 +115,58 @@ impl PyModel {
         Ok(Asked { system: Arc::new(self.system(py)?), method })
     }
 
-    /// What a law in Python raised stands above what a method made of it.
-    fn raised(&self) -> PyResult<()> {
-        self.written.iter().try_for_each(|law| law.raised().map_or(Ok(()), Err))
+    /// The orbit at a frequency (rad/s); `made` gives the method and its options where the solver
+    /// that is kept may be another one's.
+    fn search(
+        &self,
+        py: Python<'_>,
+        omega: f64,
+        start: Option<Vec<f64>>,
+        (method, plain): (&str, bool),
+        made: impl FnOnce() -> PyResult<(Box<dyn Method>, Options)>,
+    ) -> PyResult<PyOrbit> {
+        // who waits for it does not keep Python waiting
+        let mut ready = self.ready.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
+        // without options a solver that is kept is known by its name alone
+        let same = |ready: &Ready| plain && ready.key.0 == method && ready.key.1.is_empty();
+        if !ready.as_ref().is_some_and(same) {
+            let (made, options) = made()?;
+            let key = (method.to_owned(), options);
+            if ready.as_ref().is_none_or(|ready| ready.key != key) {
+                let system = Arc::new(self.system(py)?);
+                let solver = alone(py, || kept_solver(&*made, &system))?.map_err(|cause| error::method(py, cause))?;
+                *ready = Some(Ready { key, model: Arc::new(self.copied()), solver, system });
+            }
+        }
+        let Some(found) = ready.as_mut() else { unreachable!("a solver was made above") };
+        let n = 2 * found.system.dofs();
+        if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
+            return Err(error::model(
+                py,
+                format!("`start` must hold displacements and velocities, {n} numbers, found {}", start.len()),
+            ));
+        }
+        let outcome = alone(py, || found.solver.orbit(omega, start.as_deref()));
+        let outcome = match outcome {
+            Ok(outcome) => outcome,
+            Err(ended) => {
+                // what was interrupted is no solver any more
+                *ready = None;
+                return Err(ended);
+            }
+        };
+        let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
+        if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.start.len()) {
+            let message = format!(
+                "`start` has {} numbers, and by this method an orbit of this model begins with {}: give the `start` of such an orbit",
+                start.len(),
+                orbit.start.len()
+            );
+            return Err(error::model(py, message));
+        }
+        let recipe =
+            Recipe { model: found.model.clone(), method: found.key.0.clone(), options: found.key.1.clone(), start };
+        Ok(PyOrbit { orbit, system: found.system.clone(), recipe })
     }
 
     fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, told: Told) -> PyResultSet {
@@ -242,7 +304,8 @@ impl PyModel {
         };
         let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
-        py.detach(|| made.model.assemble()).map_err(|cause| refused(py, &cause, &made.model))?;
+        let model = made.model.clone();
+        apart(py, move || model.assemble().map(drop))?.map_err(|cause| refused(py, &cause, &made.model))?;
         Ok(made)
     }
 
@@ -276,7 +339,6 @@ impl PyModel {
 
     /// Adds a joint: two places or nodes that rub or touch by this law. ``u`` is the motion of ``a`` relative to ``b``.
     fn joint(&mut self, name: String, a: String, b: String, law: &PyLaw) {
-        self.written.extend(law.written.clone());
         self.model.joints.push(Joint { name, between: [a, b], law: law.law.clone() });
         self.changed();
     }
@@ -349,20 +411,23 @@ impl PyModel {
     /// >>> abs(orbit.amplitude["blade_7"] / orbit.amplitude["blade_0"] - 1) < 1e-9
     /// True
     #[pyo3(signature = (sectors, *, mistuning=None))]
-    fn disk(&self, py: Python<'_>, sectors: usize, mistuning: Option<&Bound<'_, PyDict>>) -> PyResult<PyModel> {
+    fn disk(&self, py: Python<'_>, sectors: usize, mistuning: Option<&Bound<'_, PyAny>>) -> PyResult<PyModel> {
+        let mistuning = mistuning.map(|given| quantity::dictionary(given, "`mistuning`")).transpose()?;
         let all = |which: usize, count: usize| -> Vec<Around> {
             let said = |i: usize| self.around[which].get(i).copied().flatten();
             (0..count).map(|i| said(i).unwrap_or(Around::EngineOrder(0))).collect()
         };
         let forces = all(0, self.model.forces.len());
         let disk = Disk { sectors, forces, motions: all(1, self.model.motions.len()) };
-        let model = disk::ring(py, &self.model, &disk, mistuning)?.map_err(|cause| refused(py, &cause, &self.model))?;
-        Ok(PyModel { written: self.written.clone(), ..PyModel::from_model(model) })
+        let model = disk::ring(py, &self.model, &disk, mistuning.as_ref())?
+            .map_err(|cause| refused(py, &cause, &self.model))?;
+        Ok(PyModel::from_model(model))
     }
 
     /// Gives parameters other values: ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness": 1e5, "a.force": 5})``.
-    fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyDict>) -> PyResult<()> {
-        let along = parameters::along(py, &self.model, Some(values), &mut vec![1.0])?;
+    fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        let values = quantity::dictionary(values, "what `set` is given")?;
+        let along = parameters::along(py, &self.model, Some(&values), &mut vec![1.0])?;
         if let Some((name, values)) = along.iter().find(|(_, values)| values.len() > 1) {
             return Err(error::model(
                 py,
@@ -371,7 +436,7 @@ impl PyModel {
         }
         let mut model = self.model.clone();
         for (name, values) in &along {
-            parameters::put(&mut model, name, values[0]).map_err(|cause| error::model(py, cause))?;
+            parameters::put(&mut model, name, values[0]).map_err(|message| error::model(py, message))?;
         }
         self.model = model;
         self.changed();
@@ -420,15 +485,15 @@ impl PyModel {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let asked = self.asked(py, method, options)?;
-        let prepared = py.detach(|| advised(&*asked.method, &asked.system).map(|_| asked.method.choice(&asked.system)));
-        self.raised()?;
+        let prepared =
+            alone(py, || advised(&*asked.method, &asked.system).map(|_| asked.method.choice(&asked.system)))?;
         let choice = prepared.map_err(|cause| error::method(py, cause))?;
         let out = PyDict::new(py);
         out.set_item("places", asked.system.places())?;
         out.set_item("joints", self.joints())?;
         out.set_item("method", choice.to_string())?;
         if asked.system.dofs() <= MOST_SURVEYED {
-            let survey = py.detach(|| self.model.survey()).map_err(|cause| refused(py, &cause, &self.model))?;
+            let survey = alone(py, || self.model.survey())?.map_err(|cause| refused(py, &cause, &self.model))?;
             let hertz =
                 |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
             out.set_item("free_Hz", hertz(survey.free()))?;
@@ -447,51 +512,18 @@ impl PyModel {
         py: Python<'_>,
         frequency: &Bound<'_, PyAny>,
         method: &str,
-        start: Option<numpy::PyReadonlyArray1<'_, f64>>,
+        start: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyOrbit> {
         let omega = one_frequency(frequency)?;
-        let start: Option<Vec<f64>> = start.map(|start| start.as_array().to_vec());
+        let start = start.map(|start| quantity::numbers(start, "`start`")).transpose()?;
         if start.iter().flatten().any(|value| !value.is_finite()) {
             let message =
                 "`start` must hold numbers, as the `start` of a neighbouring orbit does; found one that is not finite";
             return Err(error::model(py, message));
         }
-        // without options a solver that is kept is known by its name alone
-        // who waits for it does not keep Python waiting
-        let mut ready = self.ready.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         let plain = options.is_none_or(|options| options.is_empty());
-        let same = |ready: &Ready| plain && ready.key.0 == method && ready.key.1.is_empty();
-        if !ready.as_ref().is_some_and(same) {
-            let (made, options) = built(py, method, options)?;
-            let key = (method.to_owned(), options);
-            if ready.as_ref().is_none_or(|ready| ready.key != key) {
-                let system = Arc::new(self.system(py)?);
-                let solver = py.detach(|| kept_solver(&*made, &system));
-                self.raised()?;
-                *ready = Some(Ready { key, solver: solver.map_err(|cause| error::method(py, cause))?, system });
-            }
-        }
-        let Some(found) = ready.as_mut() else { unreachable!("a solver was made above") };
-        let n = 2 * found.system.dofs();
-        if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
-            return Err(error::model(
-                py,
-                format!("`start` must hold displacements and velocities, {n} numbers, found {}", start.len()),
-            ));
-        }
-        let outcome = py.detach(|| found.solver.orbit(omega, start.as_deref()));
-        self.raised()?;
-        let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
-        if let Some(start) = start.filter(|start| start.len() != orbit.start.len()) {
-            let message = format!(
-                "`start` has {} numbers, and by this method an orbit of this model begins with {}: give the `start` of such an orbit",
-                start.len(),
-                orbit.start.len()
-            );
-            return Err(error::model(py, message));
-        }
-        Ok(PyOrbit { orbit, system: found.system.clone() })
+        self.search(py, omega, start, (method, plain), || built(py, method, options))
     }
 
     /// Orbits at many frequencies, or with many values of parameters, by one call: a :class:`Result` with the table ``curve`` and a figure.
@@ -505,15 +537,16 @@ impl PyModel {
         &self,
         py: Python<'_>,
         frequency: &Bound<'_, PyAny>,
-        vary: Option<&Bound<'_, PyDict>>,
+        vary: Option<&Bound<'_, PyAny>>,
         method: &str,
         threads: Option<usize>,
         progress: Option<Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyResultSet> {
         let start = Instant::now();
-        let mut omegas = quantity::many(frequency, Dimension::FREQUENCY, "frequency")?;
-        let along = parameters::along(py, &self.model, vary, &mut omegas)?;
+        let mut omegas = quantity::many(frequency, Some(Dimension::FREQUENCY), "frequency")?;
+        let vary = vary.map(|vary| quantity::dictionary(vary, "`vary`")).transpose()?;
+        let along = parameters::along(py, &self.model, vary.as_ref(), &mut omegas)?;
         let asked = self.asked(py, method, options)?;
         let bar = bar(py, progress, "response")?;
         let watch =
@@ -527,7 +560,6 @@ impl PyModel {
             (rows, context.threads)
         });
         close(bar)?;
-        self.raised()?;
         let (rows, threads) = outcome?;
         let rows = rows.map_err(|refusal| refusal.raised(py))?;
         let at = |index: usize| {
@@ -570,14 +602,16 @@ impl PyModel {
     fn modes(
         &self,
         py: Python<'_>,
-        amplitude: (f64, f64),
+        amplitude: &Bound<'_, PyAny>,
         mode: usize,
         points: usize,
         harmonics: usize,
         samples: usize,
     ) -> PyResult<PyResultSet> {
         let start = Instant::now();
-        let (low, high) = amplitude;
+        let [low, high] = quantity::numbers(amplitude, "`amplitude`")?[..] else {
+            return Err(error::model(py, "`amplitude` must be two numbers, the smallest and the largest"));
+        };
         if !(low.is_finite() && high.is_finite() && 0.0 < low && low < high)
             || mode == 0
             || points < 2
@@ -594,15 +628,33 @@ impl PyModel {
             ));
         }
         let system = self.system(py)?;
-        let request = ModeRequest { mode: mode - 1, range: amplitude, points, harmonics, samples };
-        let outcome = py.detach(|| self::mode(&system, request));
-        self.raised()?;
+        let request = ModeRequest { mode: mode - 1, range: (low, high), points, harmonics, samples };
+        let system = Arc::new(system);
+        let moved = system.clone();
+        let outcome = apart(py, move || self::mode(&moved, request))?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
         let (table, figure) = drawn::mode(&found, &system);
         let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
         told.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
         told.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
         Ok(self.result("modes", "Nonlinear mode", vec![table], figure, told))
+    }
+
+    fn __copy__(&self) -> PyModel {
+        self.copied()
+    }
+
+    fn __deepcopy__(&self, memo: Bound<'_, PyAny>) -> PyModel {
+        let _ = memo; // what it refers to does not change
+        self.copied()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let bytes =
+            stored::bytes(&self.model, &self.around, self.study.is_some()).map_err(|cause| error::model(py, cause))?;
+        let laws = self.model.joints.iter().map(|joint| Py::new(py, PyLaw::of(joint.law.clone())));
+        let laws = PyList::new(py, laws.collect::<PyResult<Vec<_>>>()?)?;
+        Ok((py.import("stickslip._core")?.getattr("_model")?, (PyBytes::new(py, &bytes), laws, self.study.clone())))
     }
 
     fn __repr__(&self) -> String {
@@ -618,4 +670,58 @@ impl PyModel {
             own.unwrap_or_default()
         )
     }
+}
+
+/// A pickled model: its parts, the laws of its joints, and the study of which it has its structure.
+type Pickled<'py> = (Bound<'py, PyBytes>, Bound<'py, PyList>, Option<(PyStudy, usize)>);
+
+/// A model from its pickle.
+#[pyfunction]
+#[pyo3(signature = (bytes, laws, study))]
+pub fn _model(
+    py: Python<'_>,
+    bytes: &[u8],
+    laws: Vec<PyRef<'_, PyLaw>>,
+    study: Option<(PyStudy, usize)>,
+) -> PyResult<PyModel> {
+    let laws = laws.iter().map(|law| law.law.clone()).collect();
+    let (mut model, around) = stored::model(bytes, laws).map_err(|cause| error::model(py, cause))?;
+    if let Some((study, case)) = &study {
+        let of_study = study.model_of(py, *case)?;
+        (model.substructure, model.places) = (of_study.substructure, of_study.places);
+    }
+    Ok(PyModel { around, study, ..PyModel::from_model(model) })
+}
+
+/// How an orbit was sought: the same search gives the same bits.
+pub struct Recipe {
+    pub model: Arc<PyModel>,
+    pub method: String,
+    pub options: Options,
+    pub start: Option<Vec<f64>>,
+}
+
+impl Recipe {
+    /// The model, as it was then.
+    pub fn model(&self) -> PyModel {
+        self.model.copied()
+    }
+}
+
+/// An orbit from its pickle: frequency in rad/s, options in SI.
+#[pyfunction]
+pub fn _orbit(
+    py: Python<'_>,
+    model: PyRef<'_, PyModel>,
+    omega: f64,
+    method: &str,
+    options: Options,
+    start: Option<Vec<f64>>,
+) -> PyResult<PyOrbit> {
+    let made = || {
+        let row = method::find(method).ok_or_else(|| error::method(py, format!("there is no method `{method}`")))?;
+        let built = (row.build)(&options).map_err(|cause| error::method(py, cause))?;
+        Ok((built, options.clone()))
+    };
+    model.search(py, omega, start, (method, false), made)
 }

@@ -1,16 +1,22 @@
 //! An orbit as Python sees it: numbers on demand.
 
-use crate::error;
+use crate::model::{PyModel, Recipe};
+use crate::watch::alone;
+use crate::{error, quantity};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
+use stickslip::method::Options;
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_study::hertz;
 
 /// A periodic motion, with the evidence for it.
+///
+/// An orbit does not change. Its pickle holds the model and how it was sought; reading it computes
+/// the orbit again, with the same bits.
 ///
 /// >>> import stickslip
 /// >>> couple = stickslip.Study.from_template("blade-couple").model()
@@ -24,6 +30,7 @@ use stickslip_study::hertz;
 pub struct PyOrbit {
     pub orbit: Orbit,
     pub system: Arc<System>,
+    pub recipe: Recipe,
 }
 
 fn dict<'py, V: IntoPyObject<'py>>(
@@ -117,7 +124,7 @@ impl PyOrbit {
         evidence.set_item("residual", found.residual)?;
         evidence.set_item("energy_gap", found.energy_gap)?;
         evidence.set_item("truncation", found.truncation)?;
-        evidence.set_item("return_defect", self.orbit.return_defect())?;
+        evidence.set_item("return_defect", alone(py, || self.orbit.return_defect())?)?;
         evidence.set_item("status", found.accuracy.status())?;
         evidence.set_item("iterations", found.iterations)?;
         evidence.set_item("switches", found.switches)?;
@@ -128,17 +135,17 @@ impl PyOrbit {
 
     /// Whether no small disturbance grows; ``None`` if that is not known.
     #[getter]
-    fn stable(&self) -> Option<bool> {
-        self.orbit.is_stable()
+    fn stable(&self, py: Python<'_>) -> PyResult<Option<bool>> {
+        alone(py, || self.orbit.is_stable())
     }
 
     /// Floquet multipliers of a period, by falling modulus; ``None`` if there is no return map.
     #[getter]
-    fn multipliers<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<numpy::Complex64>>> {
-        let multipliers = py.detach(|| self.orbit.multipliers())?;
+    fn multipliers<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<numpy::Complex64>>>> {
+        let Some(multipliers) = alone(py, || self.orbit.multipliers())? else { return Ok(None) };
         let multipliers: Vec<numpy::Complex64> =
             multipliers.into_iter().map(|value| numpy::Complex64::new(value.re, value.im)).collect();
-        Some(multipliers.to_pyarray(py))
+        Ok(Some(multipliers.to_pyarray(py)))
     }
 
     /// State at t = 0: displacements (m), velocities (m/s), then the states of joints. A start for neighbouring orbits.
@@ -167,16 +174,16 @@ impl PyOrbit {
     fn sample<'py>(
         &self,
         py: Python<'py>,
-        times: Option<numpy::PyReadonlyArray1<'py, f64>>,
+        times: Option<&Bound<'py, PyAny>>,
         points: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
         let times: Vec<f64> = match times {
-            Some(times) => times.as_array().iter().copied().collect(),
+            Some(times) => quantity::numbers(times, "`times`")?,
             None => self.times(instants(py, points)?),
         };
         let n = self.orbit.places.len();
         let mut signals: [Vec<f64>; 3] = Default::default();
-        py.detach(|| {
+        alone(py, || {
             for &time in &times {
                 let sample = self.orbit.sample(time);
                 for (signal, values) in
@@ -185,7 +192,7 @@ impl PyOrbit {
                     signal.extend(self.system.seen().iter().map(|place| place.along(values)));
                 }
             }
-        });
+        })?;
         let out = PyDict::new(py);
         out.set_item("time_s", times.to_pyarray(py))?;
         let names = ["displacement_m", "velocity_m_per_s", "acceleration_m_per_s2"];
@@ -209,7 +216,7 @@ impl PyOrbit {
         };
         let d = self.system.joints()[index].axes().len();
         let points = instants(py, points)?;
-        let (times, signals) = py.detach(|| self.loop_of(index, points));
+        let (times, signals) = alone(py, || self.loop_of(index, points))?;
         let out = PyDict::new(py);
         out.set_item("time_s", times.to_pyarray(py))?;
         for (name, signal) in ["displacement_m", "velocity_m_per_s", "force_N"].into_iter().zip(signals) {
@@ -218,6 +225,21 @@ impl PyOrbit {
             out.set_item(name, array)?;
         }
         Ok(out)
+    }
+
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        let _ = memo; // it does not change
+        slf
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'_>)> {
+        let Recipe { method, options, start, .. } = &self.recipe;
+        let of = (self.recipe.model(), self.orbit.omega, method.as_str(), options.clone(), start.clone());
+        Ok((py.import("stickslip._core")?.getattr("_orbit")?, of))
     }
 
     fn __repr__(&self) -> String {
@@ -230,6 +252,9 @@ impl PyOrbit {
         )
     }
 }
+
+/// A pickled orbit: model, frequency in rad/s, method, options and start.
+type Pickled<'a> = (PyModel, f64, &'a str, Options, Option<Vec<f64>>);
 
 fn rows<'py>(py: Python<'py>, values: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_vec(py, values).reshape([rows, columns])

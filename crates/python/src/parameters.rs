@@ -1,11 +1,9 @@
 //! The parameters of a model, by their names: those that calls set and vary.
 
-use crate::{error, quantity};
+use crate::{error, law, python_law, quantity};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
-use stickslip::law::BuildError;
 use stickslip::model::Model;
 
 /// How the points of a response are told apart: values of parameters, one for each point.
@@ -15,7 +13,7 @@ pub type Along = Vec<(String, Vec<f64>)>;
 ///
 /// # Errors
 /// The value is none that the law can have. Those of masses, springs, forces and motions are checked when the model is assembled.
-pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), BuildError> {
+pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
     let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
     match key {
         "mass" => model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value),
@@ -30,32 +28,32 @@ pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), BuildError> 
         }
         _ => {
             for joint in model.joints.iter_mut().filter(|joint| joint.name == of) {
-                let info = joint.law.info();
-                let keys = info.parameters.iter().map(|parameter| parameter.key);
-                let mut values: BTreeMap<&str, f64> = keys.zip(joint.law.values()).collect();
-                values.insert(key, value);
-                joint.law = info.build(&values)?;
+                joint.law = law::with(&joint.law, key, value)?;
             }
         }
     }
     Ok(())
 }
 
-/// The dimension of a parameter of the model; `None` if it has none of this name.
-pub fn dimension(model: &Model, name: &str) -> Option<Dimension> {
+/// The dimension of a parameter of the model, `None` where any will do; `None` if it has none of
+/// this name.
+pub fn dimension(model: &Model, name: &str) -> Option<Option<Dimension>> {
     let (of, key) = name.rsplit_once('.')?;
     let springs = || model.springs.iter().any(|spring| spring.between.join("-") == of);
     match key {
-        "mass" => model.masses.iter().any(|mass| mass.name == of).then_some(Dimension::MASS),
-        "force" => model.forces.iter().any(|force| force.on == of).then_some(Dimension::FORCE),
-        "motion" => model.motions.iter().any(|motion| motion.on == of).then_some(Dimension::LENGTH),
-        "stiffness" if of.contains('-') => springs().then_some(Dimension::STIFFNESS),
-        "damping" if of.contains('-') => springs().then_some(Dimension::DAMPING),
+        "mass" => model.masses.iter().any(|mass| mass.name == of).then_some(Some(Dimension::MASS)),
+        "force" => model.forces.iter().any(|force| force.on == of).then_some(Some(Dimension::FORCE)),
+        "motion" => model.motions.iter().any(|motion| motion.on == of).then_some(Some(Dimension::LENGTH)),
+        "stiffness" if of.contains('-') => springs().then_some(Some(Dimension::STIFFNESS)),
+        "damping" if of.contains('-') => springs().then_some(Some(Dimension::DAMPING)),
         _ => {
             let law = &model.joints.iter().find(|joint| joint.name == of)?.law;
             let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;
+            if python_law::is_written(law) && parameter.dimension == Dimension::NONE {
+                return Some(None); // its author gave a number in SI
+            }
             // what is raised to a power that is no whole number is a plain number
-            Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE))
+            Some(Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE)))
         }
     }
 }

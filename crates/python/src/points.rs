@@ -64,7 +64,7 @@ pub fn along_parameters(
         disk::of_any_sectors(&mut model);
         let at = |message: String| format!("point {index}: {message}");
         for (name, values) in along {
-            parameters::put(&mut model, name, values[index]).map_err(|cause| Refusal::Model(at(cause.to_string())))?;
+            parameters::put(&mut model, name, values[index]).map_err(|message| Refusal::Model(at(message)))?;
         }
         let system = model.assemble().map_err(|cause| Refusal::Model(at(said(&cause, &model))))?;
         let solver = advised(&*asked.method, &system);

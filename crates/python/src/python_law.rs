@@ -1,33 +1,43 @@
 //! Laws written in Python, in rate form: `f = h(u, u', z)`, `z' = g(u, u', z)` over arrays of instants.
 //!
 //! Python is called with arrays. Derivatives come from `stickslip/_rate.py`: exact ones by dual arrays, or the author's own.
-//! What a call raises is kept, the motion is answered with NaN so that the method gives up, and the exception is raised when it has.
+//! What a call raises ends the computation at once: it unwinds to the call of the package that
+//! began it, which raises it.
 
 use crate::error;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use stickslip::law::{Law, LawInfo, MOST_DIRECTIONS, Rate, RatePoint, Relative, SharedLaw};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use stickslip::dimension::Dimension;
+use stickslip::law::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Rate, RatePoint, Relative, SharedLaw};
+use stickslip_numerics::interrupt;
 
-/// What a law that Python wrote is to Rust.
+/// A size that is a number, or the value of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Size {
+    Number(f64),
+    /// Its place among the parameters.
+    Parameter(usize),
+}
+
+/// What a law that Python wrote is to Rust, whatever the values of its parameters.
 pub struct Written {
     info: &'static LawInfo,
-    /// Tells laws of one name apart.
-    number: f64,
-    /// `(u, v, z) -> (f, z')`, all two-dimensional: row, instant.
-    value: Py<PyAny>,
-    /// The same with the derivatives by `u, v, z`: arrays of rows of forces and rates, columns of arguments, instant.
-    linearise: Py<PyAny>,
+    /// Tells laws of one name and the same parameters apart.
+    number: u64,
+    /// `_rate._Kernel`: its `value` and `linearise` are called with `u, v, z`, all two-dimensional
+    /// (row, instant), and the values of parameters.
+    pub kernel: Py<PyAny>,
     pub directions: usize,
     pub states: usize,
-    pub state_scale: f64,
-    pub scale: f64,
+    pub state_scale: Size,
+    pub scale: Size,
     pub odd: bool,
     pub passive: bool,
-    wrong: Mutex<Option<PyErr>>,
 }
 
 impl fmt::Debug for Written {
@@ -36,151 +46,227 @@ impl fmt::Debug for Written {
     }
 }
 
-/// Rows of laws by name: each name is kept once for as long as the process lives, as all that refers to a law asks for it without end.
-static ROWS: Mutex<BTreeMap<String, &'static LawInfo>> = Mutex::new(BTreeMap::new());
+/// What tells rows of laws apart: the name, and of each parameter its name and dimension.
+type Signature = (String, Vec<(String, Dimension)>);
+
+/// Rows of laws: each is kept for as long as the process lives, as all that refers to a law asks
+/// for it without end.
+static ROWS: Mutex<BTreeMap<Signature, &'static LawInfo>> = Mutex::new(BTreeMap::new());
+/// The laws that there are, by number: with other values of parameters they are built from these.
+static LAWS: Mutex<BTreeMap<u64, Weak<Written>>> = Mutex::new(BTreeMap::new());
 static NUMBER: AtomicU64 = AtomicU64::new(0);
 
-fn row(name: &str) -> &'static LawInfo {
+fn kept(text: &str) -> &'static str {
+    Box::leak(text.to_owned().into_boxed_str())
+}
+
+fn row(name: &str, parameters: &[(String, Dimension)]) -> &'static LawInfo {
     let mut rows = ROWS.lock().unwrap_or_else(PoisonError::into_inner);
-    rows.entry(name.to_owned()).or_insert_with(|| {
+    rows.entry((name.to_owned(), parameters.to_vec())).or_insert_with(|| {
+        let parameter = |(key, dimension): &(String, Dimension)| {
+            Parameter::new(kept(key), *dimension, Range::Any, "a parameter of a law written in Python")
+        };
         Box::leak(Box::new(LawInfo {
-            name: Box::leak(name.to_owned().into_boxed_str()),
+            name: kept(name),
             summary: "a law written in Python",
-            // its numbers are Python's
-            parameters: &[],
+            parameters: Vec::leak(parameters.iter().map(parameter).collect()),
             sample: &[],
-            build: |_| panic!("a law without parameters is never built from them"),
+            build,
         }))
     })
 }
 
+/// The law with these values: those of its parameters, then its number.
+fn build(values: &[f64]) -> SharedLaw {
+    let (number, values) = values.split_last().map_or((u64::MAX, values), |(number, rest)| (*number as u64, rest));
+    let laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
+    match laws.get(&number).and_then(Weak::upgrade) {
+        Some(written) => written.law(values.to_vec()),
+        None => unreachable!("a law is built from one that is there"),
+    }
+}
+
+/// What a law is behind, if it was written in Python.
+pub fn written(law: &SharedLaw) -> Option<Arc<Written>> {
+    let number = law.values().get(law.info().parameters.len()).copied()?;
+    LAWS.lock().unwrap_or_else(PoisonError::into_inner).get(&(number as u64)).and_then(Weak::upgrade)
+}
+
+/// Whether the number of a law written in Python stands behind the values of its parameters.
+pub fn is_written(law: &SharedLaw) -> bool {
+    law.values().len() > law.info().parameters.len()
+}
+
 impl Written {
-    /// A law of one direction without states, to be told what else it is.
-    pub fn new(name: &str, value: Py<PyAny>, linearise: Py<PyAny>) -> Self {
+    /// A law of one direction without states, to be told what else it is before it is
+    /// [shared](Written::shared).
+    pub fn new(name: &str, kernel: Py<PyAny>, parameters: &[(String, Dimension)]) -> Self {
         Written {
-            info: row(name),
-            number: NUMBER.fetch_add(1, Ordering::Relaxed) as f64,
-            value,
-            linearise,
+            info: row(name, parameters),
+            number: NUMBER.fetch_add(1, Ordering::Relaxed),
+            kernel,
             directions: 1,
             states: 0,
-            state_scale: 1.0,
-            scale: f64::INFINITY,
+            state_scale: Size::Number(1.0),
+            scale: Size::Number(f64::INFINITY),
             odd: false,
             passive: false,
-            wrong: Mutex::new(None),
         }
     }
 
-    /// The law.
-    pub fn law(self: &Arc<Self>) -> SharedLaw {
-        Arc::new(Shown(self.clone()))
+    /// Makes it known by its number.
+    pub fn shared(self) -> Arc<Self> {
+        let shared = Arc::new(self);
+        LAWS.lock().unwrap_or_else(PoisonError::into_inner).insert(shared.number, Arc::downgrade(&shared));
+        shared
     }
 
-    /// What a call raised since this was asked last.
-    pub fn raised(&self) -> Option<PyErr> {
-        self.wrong.lock().unwrap_or_else(PoisonError::into_inner).take()
+    /// The law with these values of its parameters.
+    pub fn law(self: &Arc<Self>, values: Vec<f64>) -> SharedLaw {
+        Arc::new(Shown { written: self.clone(), values })
+    }
+}
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        LAWS.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.number);
+    }
+}
+
+/// The law that methods see.
+#[derive(Debug)]
+struct Shown {
+    written: Arc<Written>,
+    values: Vec<f64>,
+}
+
+impl Shown {
+    fn size(&self, size: Size) -> f64 {
+        match size {
+            Size::Number(number) => number,
+            Size::Parameter(at) => self.values[at],
+        }
     }
 
-    fn keep(&self, error: PyErr) {
-        self.wrong.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-    }
-
-    /// Calls Python at one instant. Of `out` the first are the forces, then the rates.
-    fn call(&self, motion: &Relative<f64>, z: &[f64], out: &mut [f64], slopes: Option<&mut [f64]>) {
-        let outcome = Python::attach(|py| self.answer(py, motion, z, out, slopes));
-        if let Err(error) = outcome {
-            self.keep(error);
-            out.fill(f64::NAN);
+    /// Asks Python at instants. Of `out`, (row, instant), the first rows are the forces, then the
+    /// rates; of `slopes`, (row, argument, instant). What Python raises ends the computation.
+    fn ask(&self, motions: &[Relative<f64>], z: &[f64], linear: bool) -> (Vec<f64>, Vec<f64>) {
+        interrupt::check();
+        match Python::attach(|py| self.answer(py, motions, z, linear)) {
+            Ok(answer) => answer,
+            Err(error) => {
+                interrupt::throw(Box::new(error));
+                // nobody is there to raise it: an answer that no method takes
+                let rows = self.written.directions + self.written.states;
+                let arguments = rows + self.written.directions;
+                (vec![f64::NAN; rows * motions.len()], vec![f64::NAN; rows * arguments * motions.len()])
+            }
         }
     }
 
     fn answer(
         &self,
         py: Python<'_>,
-        motion: &Relative<f64>,
+        motions: &[Relative<f64>],
         z: &[f64],
-        out: &mut [f64],
-        slopes: Option<&mut [f64]>,
-    ) -> PyResult<()> {
-        let d = self.directions;
-        let column = |values: &[f64]| PyArray1::from_slice(py, values).reshape([values.len(), 1]);
-        let arguments = (column(&motion.displacement[..d])?, column(&motion.velocity[..d])?, column(z)?);
-        let function = if slopes.is_some() { &self.linearise } else { &self.value };
-        let answer = function.bind(py).call1(arguments)?;
-        let fill = |into: &mut [f64], array: Bound<'_, PyAny>, what: &str| {
-            let array = array.cast_into::<PyArray2<f64>>().map_err(PyErr::from)?;
-            let array = array.readonly();
-            if array.len() != into.len() {
-                let message = format!(
-                    "law `{}` returned {} {what} where {} were expected",
-                    self.info.name,
-                    array.len(),
-                    into.len()
-                );
-                return Err(error::model(py, message));
-            }
-            into.iter_mut().zip(array.as_array()).for_each(|(into, value)| *into = *value);
-            Ok(())
+        linear: bool,
+    ) -> PyResult<(Vec<f64>, Vec<f64>)> {
+        let Written { directions, states, .. } = *self.written;
+        let n = motions.len();
+        let array = |rows: usize, value: &dyn Fn(usize, usize) -> f64| {
+            let values: Vec<f64> =
+                (0..rows).flat_map(|row| (0..n).map(move |i| (row, i))).map(|(row, i)| value(row, i)).collect();
+            PyArray1::from_vec(py, values).reshape([rows, n])
         };
-        fill(out, answer.get_item(0)?, "forces and rates")?;
-        match slopes {
-            Some(slopes) => fill(slopes, answer.get_item(1)?, "derivatives"),
-            None => Ok(()),
+        let u = array(directions, &|row, i| motions[i].displacement[row])?;
+        let v = array(directions, &|row, i| motions[i].velocity[row])?;
+        let z = array(states, &|row, i| z[i * states + row])?;
+        let values = PyTuple::new(py, &self.values)?;
+        let name = if linear { "linearise" } else { "value" };
+        let answer = self.written.kernel.bind(py).call_method1(name, (u, v, z, values))?;
+        let read = |array: Bound<'_, PyAny>, length: usize, what: &str| {
+            let array = array.cast_into::<PyArray2<f64>>().map_err(PyErr::from)?.readonly();
+            if array.len() != length {
+                let (name, found) = (self.written.info.name, array.len());
+                return Err(error::model(
+                    py,
+                    format!("law `{name}` returned {found} {what} where {length} were expected"),
+                ));
+            }
+            Ok(array.as_array().iter().copied().collect::<Vec<f64>>())
+        };
+        let rows = directions + states;
+        let out = read(answer.get_item(0)?, rows * n, "forces and rates")?;
+        let slopes = match linear {
+            true => read(answer.get_item(1)?, rows * (rows + directions) * n, "derivatives")?,
+            false => Vec::new(),
+        };
+        Ok((out, slopes))
+    }
+}
+
+impl Shown {
+    /// Forces, rates and their derivatives at instants.
+    fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
+        let (out, slopes) = self.ask(motions, z, true);
+        let n = motions.len();
+        for (i, point) in points.iter_mut().enumerate() {
+            (0..directions).for_each(|a| point.force[a] = out[a * n + i]);
+            point.rate.iter_mut().enumerate().for_each(|(s, rate)| *rate = out[(directions + s) * n + i]);
+            point.slopes_mut().iter_mut().enumerate().for_each(|(at, slope)| *slope = slopes[at * n + i]);
         }
     }
 }
 
-/// The law that methods see.
-#[derive(Debug)]
-struct Shown(Arc<Written>);
-
 impl Law for Shown {
     fn info(&self) -> &'static LawInfo {
-        self.0.info
+        self.written.info
     }
     fn values(&self) -> Vec<f64> {
-        vec![self.0.number]
+        self.values.iter().copied().chain([self.written.number as f64]).collect()
     }
     fn directions(&self) -> usize {
-        self.0.directions
+        self.written.directions
     }
     fn scale(&self) -> f64 {
-        self.0.scale
+        self.size(self.written.scale)
     }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }
     fn is_odd(&self) -> bool {
-        self.0.odd
+        self.written.odd
     }
     fn is_incrementally_passive(&self) -> bool {
-        self.0.passive
+        self.written.passive
+    }
+    fn consistent(&self) -> Result<(), String> {
+        let sizes = [("scale", self.scale()), ("state_scale", self.size(self.written.state_scale))];
+        match sizes.into_iter().find(|(_, size)| size.is_nan() || *size <= 0.0) {
+            Some((name, size)) => Err(format!("its `{name}` must be more than zero, found {size}")),
+            None => Ok(()),
+        }
     }
 }
 
 impl Rate for Shown {
     fn states(&self) -> usize {
-        self.0.states
+        self.written.states
     }
     fn state_scale(&self) -> f64 {
-        self.0.state_scale
+        self.size(self.written.state_scale)
     }
     fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
         false
     }
     fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS] {
-        let mut out = vec![0.0; self.0.directions + self.0.states];
-        self.0.call(motion, z, &mut out, None);
+        let (out, _) = self.ask(std::slice::from_ref(motion), z, false);
         let mut force = [0.0; MOST_DIRECTIONS];
-        force[..self.0.directions].copy_from_slice(&out[..self.0.directions]);
-        rate.copy_from_slice(&out[self.0.directions..]);
+        force[..self.written.directions].copy_from_slice(&out[..self.written.directions]);
+        rate.copy_from_slice(&out[self.written.directions..]);
         force
     }
     fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint) {
-        let mut out = vec![0.0; self.0.directions + self.0.states];
-        self.0.call(motion, z, &mut out, Some(point.slopes_mut()));
-        point.force[..directions].copy_from_slice(&out[..directions]);
-        point.rate.copy_from_slice(&out[directions..]);
+        self.linearise_many(directions, std::slice::from_ref(motion), z, std::slice::from_mut(point));
     }
 }

@@ -2,10 +2,13 @@
 
 use crate::error;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{
+    PyBool, PyByteArray, PyBytes, PyComplex, PyDict, PyFloat, PyFrozenSet, PyInt, PyMapping, PyMemoryView, PySet,
+    PyString,
+};
 use std::f64::consts::PI;
 use stickslip::dimension::Dimension;
-use stickslip_study::expression::quantity;
+use stickslip_study::expression::{Expression, quantity};
 
 /// A quantity of this dimension, in SI; `what` says whose it is, for the message.
 pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResult<f64> {
@@ -16,31 +19,184 @@ pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResul
             error::model(py, format!("{what} = {:?}: {}{help}", text.to_string_lossy(), fault.message))
         });
     }
-    let number: f64 = value.extract().map_err(|_| {
+    let number = number(value)?.ok_or_else(|| {
         let unit =
             dimension.name_and_unit().map_or_else(|| dimension.to_string(), |(name, unit)| format!("{name} ({unit})"));
-        let kind = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
-        error::model(py, format!("{what} must be a {unit}: a number in SI or a string with a unit, found {kind}"))
+        error::model(
+            py,
+            format!("{what} must be a {unit}: a number in SI or a string with a unit, found {}", kind(value)),
+        )
     })?;
     if !number.is_finite() {
         return Err(error::model(py, format!("{what} must be finite, found {number}")));
     }
-    // the unit of frequencies in all tables; the rounding is that of the unit in a study file
-    Ok(if dimension == Dimension::FREQUENCY { 2.0 * number * PI } else { number })
+    Ok(from_unit(number, dimension))
+}
+
+/// A quantity of any dimension, in SI, and which one it has.
+pub fn of_any_dimension(value: &Bound<'_, PyAny>, what: &str) -> PyResult<(f64, Dimension)> {
+    let dimension = match value.cast::<PyString>() {
+        Ok(text) => Expression::compile::<&str>(text.to_str()?, &[])
+            .and_then(|expression| expression.evaluate(&[]))
+            .map_err(|fault| {
+                error::model(value.py(), format!("{what} = {:?}: {}", text.to_string_lossy(), fault.message))
+            })?
+            .dimension
+            .unwrap_or(Dimension::NONE),
+        Err(_) => Dimension::NONE,
+    };
+    Ok((si(value, dimension, what)?, dimension))
 }
 
 /// One quantity or many of them, in SI: a number, a string, or a sequence of them such as an array.
-pub fn many(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResult<Vec<f64>> {
-    if value.cast::<PyString>().is_ok() || value.extract::<f64>().is_ok_and(|_| value.len().is_err()) {
-        return Ok(vec![si(value, dimension, what)?]);
+/// Of `None` as dimension any will do.
+pub fn many(value: &Bound<'_, PyAny>, dimension: Option<Dimension>, what: &str) -> PyResult<Vec<f64>> {
+    let one = |value: &Bound<'_, PyAny>| match dimension {
+        Some(dimension) => si(value, dimension, what),
+        None => Ok(of_any_dimension(value, what)?.0),
+    };
+    if value.cast::<PyString>().is_ok() || number(value)?.is_some() {
+        return Ok(vec![one(value)?]);
     }
-    if let Ok(array) = value.extract::<numpy::PyReadonlyArray1<'_, f64>>() {
-        let numbers: Vec<f64> = array.as_array().iter().copied().collect();
+    let dimension = dimension.unwrap_or(Dimension::NONE);
+    if let Some(numbers) = array(value, what)? {
         if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
             return Err(error::model(value.py(), format!("{what} must be finite, found {number}")));
         }
-        let factor = |number: f64| if dimension == Dimension::FREQUENCY { 2.0 * number * PI } else { number };
-        return Ok(numbers.into_iter().map(factor).collect());
+        return Ok(numbers.into_iter().map(|number| from_unit(number, dimension)).collect());
     }
-    value.try_iter()?.map(|one| si(&one?, dimension, what)).collect()
+    if !is_sequence(value)? {
+        return Err(no_sequence(value, what));
+    }
+    value.try_iter()?.map(|item| one(&item?)).collect()
+}
+
+/// Numbers without a unit: an array or a sequence.
+pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
+    if let Some(numbers) = array(value, what)? {
+        return Ok(numbers);
+    }
+    if value.cast::<PyString>().is_ok() || !is_sequence(value)? {
+        return Err(no_sequence(value, what));
+    }
+    let plain = |item: Bound<'_, PyAny>| number(&item)?.ok_or_else(|| no_sequence(value, what));
+    value.try_iter()?.map(|item| plain(item?)).collect()
+}
+
+/// A frequency in Hz, such that the same comes back where it is given as a number; of other
+/// dimensions the value in SI.
+pub fn in_unit(si: f64, dimension: Option<Dimension>) -> f64 {
+    let is_frequency = |dimension| dimension == Dimension::FREQUENCY || dimension == Dimension::SWEEP_RATE;
+    if !dimension.is_some_and(is_frequency) {
+        return si;
+    }
+    let nearest = si / (2.0 * PI);
+    // beside the rounding of this division stands the number whose multiple is rounded to `si`
+    let candidates = [nearest, nearest.next_up(), nearest.next_down()];
+    candidates.into_iter().find(|hertz| 2.0 * hertz * PI == si).unwrap_or(nearest)
+}
+
+/// The unit of frequencies in all tables is Hz; the rounding is that of the unit in a study file.
+fn from_unit(number: f64, dimension: Dimension) -> f64 {
+    if dimension == Dimension::FREQUENCY { 2.0 * number * PI } else { number }
+}
+
+/// A real number of Python or NumPy; `None` for anything else, which may have a length or be
+/// complex, masked, a flag or bytes.
+pub fn number(value: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
+    if value.cast::<PyFloat>().is_ok() {
+        return value.extract().map(Some);
+    }
+    if value.cast::<PyBool>().is_ok() || value.cast::<PyComplex>().is_ok() || is_bytes(value) {
+        return Ok(None);
+    }
+    if value.cast::<PyInt>().is_ok() {
+        return value.extract().map(Some);
+    }
+    if let Ok(dtype) = value.getattr("dtype") {
+        let plain =
+            is_real(&dtype) && value.getattr("ndim").is_ok_and(|ndim| ndim.extract::<usize>().is_ok_and(|n| n == 0));
+        return if plain && !is_masked(value)? { value.call_method0("item")?.extract().map(Some) } else { Ok(None) };
+    }
+    // fractions, decimals and other numbers
+    Ok(if value.hasattr("__float__")? && !value.hasattr("__len__")? { value.extract().ok() } else { None })
+}
+
+/// The numbers of a one-dimensional array of numbers, such as NumPy's, a column of pandas or a
+/// range of memory; `None` for what is no such array.
+fn array(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Option<Vec<f64>>> {
+    let py = value.py();
+    if !value.hasattr("__array__")? || is_masked(value)? {
+        return Ok(None);
+    }
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (value,))?;
+    if !is_real(&array.getattr("dtype")?) {
+        return Ok(None);
+    }
+    let ndim: usize = array.getattr("ndim")?.extract()?;
+    if ndim != 1 {
+        return Err(error::model(
+            py,
+            format!("{what} must be one number or a list of them, found an array of {ndim} dimensions"),
+        ));
+    }
+    let array = numpy.call_method1("asarray", (array, "float64"))?;
+    let array: numpy::PyReadonlyArray1<'_, f64> = array.extract()?;
+    Ok(Some(array.as_array().iter().copied().collect()))
+}
+
+/// Integers and reals; no flags, complex numbers, words or times.
+fn is_real(dtype: &Bound<'_, PyAny>) -> bool {
+    let kind = dtype.getattr("kind").and_then(|kind| kind.extract::<String>());
+    kind.is_ok_and(|kind| matches!(kind.as_str(), "f" | "i" | "u"))
+}
+
+fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    value.is_instance(&value.py().import("numpy.ma")?.getattr("MaskedArray")?)
+}
+
+fn is_bytes(value: &Bound<'_, PyAny>) -> bool {
+    value.cast::<PyBytes>().is_ok() || value.cast::<PyByteArray>().is_ok() || value.cast::<PyMemoryView>().is_ok()
+}
+
+/// Whether its items are values in an order: those of a dictionary or a set are not.
+fn is_sequence(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let unordered =
+        value.cast::<PyDict>().is_ok() || value.cast::<PySet>().is_ok() || value.cast::<PyFrozenSet>().is_ok();
+    if unordered || is_bytes(value) || is_masked(value)? || value.try_iter().is_err() {
+        return Ok(false);
+    }
+    let abc = value.py().import("collections.abc")?;
+    Ok(!value.is_instance(&abc.getattr("Mapping")?)? && !value.is_instance(&abc.getattr("Set")?)?)
+}
+
+fn no_sequence(value: &Bound<'_, PyAny>, what: &str) -> PyErr {
+    let message = format!(
+        "{what} must be one value or a list of them, numbers in SI or strings with units, found {}",
+        kind(value)
+    );
+    error::model(value.py(), message)
+}
+
+/// A mapping as a dictionary.
+pub fn dictionary<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyDict>> {
+    if let Ok(dict) = value.cast::<PyDict>() {
+        return Ok(dict.clone());
+    }
+    if !value.is_instance(&value.py().import("collections.abc")?.getattr("Mapping")?)? {
+        return Err(error::model(value.py(), format!("{what} must be a dictionary, found {}", kind(value))));
+    }
+    let dict = PyDict::new(value.py());
+    dict.update(value.cast::<PyMapping>()?)?;
+    Ok(dict)
+}
+
+/// What kind of thing it is, in a word.
+fn kind(value: &Bound<'_, PyAny>) -> String {
+    let name = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
+    match value.getattr("dtype").and_then(|dtype| dtype.str().map(|text| text.to_string())) {
+        Ok(dtype) if dtype != name => format!("{name} of {dtype}"),
+        _ => name,
+    }
 }

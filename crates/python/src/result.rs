@@ -7,7 +7,7 @@ use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stickslip_report::{Outputs, html, png, svg, terminal::Terminal, write_dataset};
-use stickslip_study::dataset::{self, Dataset, Values};
+use stickslip_study::dataset::{self, Column, Dataset, Values};
 use stickslip_study::results::worst_evidence;
 
 /// What a run yields: tables, a figure, notes, and the record of how it was made.
@@ -121,12 +121,14 @@ impl PyResultSet {
         self.dataset.tables.len()
     }
 
-    /// Writes the files of the command into ``folder/NAME/`` and returns their paths. ``only`` names outputs: csv, json, svg, png, html.
+    /// Writes the files of the command into ``folder/NAME/`` and returns their paths: tables as
+    /// CSV, the record as JSON, the figure as SVG, PNG and a page of HTML. ``only`` names outputs
+    /// instead: csv, parquet, json, svg, png, html; the record is always among them.
     #[pyo3(signature = (folder, only=None))]
     fn save<'py>(&self, py: Python<'py>, folder: PathBuf, only: Option<Vec<String>>) -> PyResult<Bound<'py, PyList>> {
         let outputs = match only {
             Some(only) => Outputs::only(&only).map_err(|cause| error::report(py, cause))?,
-            None => Outputs::all(),
+            None => Outputs::usual(),
         };
         let files = py.detach(|| write_dataset(&self.dataset, &folder, &outputs));
         PyList::new(py, files.map_err(|cause| error::report(py, cause))?)
@@ -180,14 +182,53 @@ impl PyResultSet {
         py.detach(|| Terminal { colour: false, width: None }.text(&self.dataset, &[]))
     }
 
-    fn __eq__(&self, other: &PyResultSet) -> bool {
-        *self.dataset == *other.dataset
+    /// Whether all tables, the figure, and what is said of them are the same. A number that does
+    /// not exist equals one that does not either.
+    fn __eq__(&self, py: Python<'_>, other: &PyResultSet) -> bool {
+        py.detach(|| same(&self.dataset, &other.dataset))
+    }
+
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        let _ = memo; // it does not change
+        slf
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let bytes = py.detach(|| rmp_serde::to_vec_named(&*self.dataset)).map_err(|cause| error::report(py, cause))?;
         Ok((py.import("stickslip._core")?.getattr("_result")?, (PyBytes::new(py, &bytes),)))
     }
+}
+
+/// Whether two datasets are the same, where NaN equals NaN.
+fn same(one: &Dataset, other: &Dataset) -> bool {
+    let without_tables = |whole: &Dataset| {
+        let Dataset { name, title, source, kind, tables: _, figure, notes, failures, record } = whole;
+        serde_json::to_value((name, title, source, kind, figure, notes, failures, record)).ok()
+    };
+    std::ptr::eq(one, other)
+        || (one.tables.len() == other.tables.len()
+            && one.tables.iter().zip(&other.tables).all(|(one, other)| same_table(one, other))
+            && without_tables(one) == without_tables(other))
+}
+
+fn same_table(one: &dataset::Table, other: &dataset::Table) -> bool {
+    let same_number = |(one, other): (&f64, &f64)| one == other || (one.is_nan() && other.is_nan());
+    let same_column = |(one, other): (&Column, &Column)| {
+        one.name == other.name
+            && match (&one.values, &other.values) {
+                (Values::Number(one), Values::Number(other)) => {
+                    one.len() == other.len() && one.iter().zip(other).all(same_number)
+                }
+                (one, other) => one == other,
+            }
+    };
+    one.name == other.name
+        && one.columns.len() == other.columns.len()
+        && one.columns.iter().zip(&other.columns).all(same_column)
 }
 
 /// A result from its pickle.
@@ -210,13 +251,20 @@ fn escaped(text: &str) -> String {
 
 /// A table: named columns of equal length; units stand at the end of their names.
 ///
-/// ``table["blade1_amplitude_m"]`` is a NumPy array over the memory of the result, without a copy and read-only. pandas, polars and pyarrow read
-/// the whole table by Arrow's PyCapsule interface.
+/// ``table["blade1_amplitude_m"]`` is a NumPy array over the memory of the result, without a copy
+/// and read-only. A table is a mapping from names to columns, ``len(table)`` is its number of rows,
+/// as of a ``DataFrame``. pyarrow and others read the whole table by Arrow's PyCapsule interface,
+/// in which a number that does not exist is null, and so do `to_arrow`, `to_pandas` and
+/// `to_polars`; ``pandas.DataFrame(table)`` and ``polars.DataFrame(table)`` take the columns, in
+/// which it is NaN. ``numpy.asarray(table)`` has the shape of the table: real numbers, or objects
+/// where a column holds words or flags.
 ///
 /// >>> import stickslip
 /// >>> table = stickslip.Study.from_template("element").run()["loops"]
 /// >>> table["displacement_m"].flags.owndata
 /// False
+/// >>> dict(table).keys() == set(table.columns)
+/// True
 #[pyclass(frozen, module = "stickslip")]
 pub struct Table {
     dataset: Arc<Dataset>,
@@ -279,16 +327,89 @@ impl Table {
         }
     }
 
-    fn __contains__(&self, column: &str) -> bool {
-        self.table().column(column).is_some()
+    fn __contains__(&self, column: &Bound<'_, PyAny>) -> bool {
+        column.extract::<&str>().is_ok_and(|column| self.table().column(column).is_some())
     }
 
-    /// Row ``index`` as a dictionary.
-    fn row<'py>(slf: Bound<'py, Self>, index: usize) -> PyResult<Bound<'py, PyDict>> {
-        let (py, table) = (slf.py(), slf.get().table());
-        if index >= table.rows() {
-            return Err(PyIndexError::new_err(format!("there is no row {index}, there are {}", table.rows())));
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        PyList::new(py, self.columns())?.call_method0("__iter__")
+    }
+
+    /// Names of the columns.
+    fn keys(&self) -> Vec<&str> {
+        self.columns()
+    }
+
+    /// The columns.
+    fn values<'py>(slf: Bound<'py, Self>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        slf.get().columns().into_iter().map(|name| Table::__getitem__(slf.clone(), name)).collect()
+    }
+
+    /// Names and columns.
+    fn items<'py>(slf: Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+        let names = slf.get().columns().into_iter();
+        names.map(|name| Ok((name.to_owned(), Table::__getitem__(slf.clone(), name)?))).collect()
+    }
+
+    /// A column, or ``default`` where there is none of this name.
+    #[pyo3(signature = (column, default=None))]
+    fn get<'py>(
+        slf: Bound<'py, Self>,
+        column: &str,
+        default: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        if slf.get().table().column(column).is_none() {
+            return Ok(default);
         }
+        Table::__getitem__(slf, column).map(Some)
+    }
+
+    /// What libraries that ask for a dictionary take it for: pandas builds frames of dictionaries,
+    /// and of no other mappings.
+    #[getter]
+    fn __class__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        py.import("stickslip._tables")?.getattr("Mapped")
+    }
+
+    /// The table as one array of its shape.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        slf: Bound<'py, Self>,
+        dtype: Option<Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("stickslip._tables")?.getattr("to_array")?.call1((slf, dtype, copy))
+    }
+
+    fn _repr_html_(slf: Bound<'_, Self>) -> PyResult<Bound<'_, PyAny>> {
+        tables(&slf, "to_html")
+    }
+
+    fn __eq__(&self, other: &Table) -> bool {
+        same_table(self.table(), other.table())
+    }
+
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        let _ = memo; // it does not change
+        slf
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = py.detach(|| rmp_serde::to_vec_named(self.table())).map_err(|cause| error::report(py, cause))?;
+        Ok((py.import("stickslip._core")?.getattr("_table")?, (PyBytes::new(py, &bytes),)))
+    }
+
+    /// Row ``index`` as a dictionary; a negative one counts from the end.
+    fn row<'py>(slf: Bound<'py, Self>, index: isize) -> PyResult<Bound<'py, PyDict>> {
+        let (py, table) = (slf.py(), slf.get().table());
+        let at = if index < 0 { table.rows().checked_add_signed(index) } else { Some(index as usize) };
+        let Some(index) = at.filter(|at| *at < table.rows()) else {
+            return Err(PyIndexError::new_err(format!("there is no row {index}, there are {}", table.rows())));
+        };
         let row = PyDict::new(py);
         for column in &table.columns {
             match &column.values {
@@ -332,6 +453,13 @@ impl Table {
         let (rows, columns) = self.shape();
         format!("<stickslip.Table {}: {rows} rows, {columns} columns: {}>", self.name(), self.columns().join(", "))
     }
+}
+
+/// A table from its pickle.
+#[pyfunction]
+pub fn _table(py: Python<'_>, bytes: &[u8]) -> PyResult<Table> {
+    let table = py.detach(|| rmp_serde::from_slice(bytes));
+    table.map(Table::alone).map_err(|cause| error::report(py, format!("this is no pickled table: {cause}")))
 }
 
 fn tables<'py>(table: &Bound<'py, Table>, function: &str) -> PyResult<Bound<'py, PyAny>> {

@@ -1,16 +1,17 @@
 //! Studies: files, texts and dictionaries, read, checked and run.
 
-use crate::error;
 use crate::model::PyModel;
 use crate::progress::{bar, close};
 use crate::result::{PyResultSet, Table};
-use crate::watch::{Watch, watched};
+use crate::watch::{Watch, alone, apart, watched};
+use crate::{error, quantity};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use stickslip::dimension::Dimension;
+use stickslip::model::Model;
 use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::{self, Column, Values};
 use stickslip_study::run::{Checked, check, redrawn, units};
@@ -45,8 +46,15 @@ impl PyStudy {
             return Ok(checked.clone());
         }
         // the lock is not held meanwhile: another call may check too, and what it finds is the same
-        let checked = py.detach(|| check(&self.study)).map_err(|cause| error::study(py, &cause))?;
+        let study = self.study.clone();
+        let checked = apart(py, move || check(&study))?.map_err(|cause| error::study(py, &cause))?;
         Ok(kept().insert(Arc::new(checked)).clone())
+    }
+
+    /// The model of a case.
+    pub fn model_of(&self, py: Python<'_>, index: usize) -> PyResult<Model> {
+        let case = alone(py, || self.study.case(index))?;
+        Ok(case.map_err(|cause| error::study(py, &cause))?.model)
     }
 
     fn finished(
@@ -54,16 +62,16 @@ impl PyStudy {
         file: String,
         overrides: Vec<(String, String)>,
         method: Option<String>,
-        read: impl FnOnce(&[(String, String)]) -> Result<stickslip_study::Study, StudyError> + Send,
+        read: impl FnOnce(&[(String, String)]) -> Result<stickslip_study::Study, StudyError> + Send + 'static,
     ) -> PyResult<PyStudy> {
-        let name = method.clone();
-        let study = py.detach(|| {
-            let study = read(&overrides)?;
+        let (name, set) = (method.clone(), overrides.clone());
+        let study = apart(py, move || {
+            let study = read(&set)?;
             match name {
                 Some(name) => study.with_method(&name),
                 None => Ok(study),
             }
-        });
+        })?;
         let study = Arc::new(study.map_err(|cause| error::study(py, &cause))?);
         Ok(PyStudy { study, file, overrides, method, checked: Arc::default() })
     }
@@ -93,7 +101,10 @@ fn typed(
         let text = if let Ok(text) = value.cast::<PyString>() {
             text.to_str()?.to_owned()
         } else {
-            let number: f64 = value.extract()?;
+            let number = quantity::number(&value)?.filter(|number| number.is_finite()).ok_or_else(|| {
+                let message = format!("`{name}` takes a finite number in SI or a string with a unit, found {value}");
+                error::model(value.py(), message)
+            })?;
             let unit = match dimension(&name)? {
                 None | Some(Dimension::NONE) => String::new(),
                 Some(Dimension::FREQUENCY) => " Hz".to_owned(),
@@ -124,8 +135,9 @@ impl PyStudy {
     #[staticmethod]
     #[pyo3(signature = (text, name="study", **set))]
     fn from_text(py: Python<'_>, text: &str, name: &str, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
-        let (file, bytes) = (name.to_owned(), text.as_bytes());
-        let study = PyStudy::finished(py, name.to_owned(), Vec::new(), None, move |set| read_bytes(&file, bytes, set))?;
+        let (file, text) = (name.to_owned(), text.to_owned());
+        let read = move |set: &[(String, String)]| read_bytes(&file, text.as_bytes(), set);
+        let study = PyStudy::finished(py, name.to_owned(), Vec::new(), None, read)?;
         study.set(py, set)
     }
 
@@ -134,7 +146,7 @@ impl PyStudy {
     #[pyo3(signature = (tables, name="study", **set))]
     fn from_dict(
         py: Python<'_>,
-        tables: Bound<'_, PyDict>,
+        tables: Bound<'_, PyAny>,
         name: &str,
         set: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyStudy> {
@@ -233,20 +245,22 @@ impl PyStudy {
         self.study.varied()
     }
 
-    /// The parameters of case ``index``: values in SI, frequencies in rad/s.
+    /// The parameters of case ``index``: values in SI, frequencies in Hz, as :meth:`set` takes
+    /// them.
     #[pyo3(signature = (index=0))]
     fn parameters<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyDict>> {
         let case = self.study.case(index).map_err(|cause| error::study(py, &cause))?;
         let parameters = PyDict::new(py);
-        case.parameters.iter().try_for_each(|(name, (si, _))| parameters.set_item(name, si))?;
+        case.parameters
+            .iter()
+            .try_for_each(|(name, (si, dimension))| parameters.set_item(name, quantity::in_unit(*si, *dimension)))?;
         Ok(parameters)
     }
 
     /// The model of case ``index``, to compute with by calls.
     #[pyo3(signature = (index=0))]
     fn model(&self, py: Python<'_>, index: usize) -> PyResult<PyModel> {
-        let case = self.study.case(index).map_err(|cause| error::study(py, &cause))?;
-        Ok(PyModel::from_model(case.model))
+        Ok(PyModel::of_study(self, index, self.model_of(py, index)?))
     }
 
     /// What is known before anything is computed, as text: modes with joints free and stuck, when joints slip, warnings, size and time.

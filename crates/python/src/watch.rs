@@ -1,12 +1,18 @@
-//! Long work: on threads of Rust, while Python's lock is free, with progress and Ctrl-C.
+//! Long work: while Python's lock is free, with progress, and ended at once by Ctrl-C or by what a
+//! law in Python raises.
+//!
+//! Work that is to end unwinds, see [`stickslip_numerics::interrupt`]: what it was changing is
+//! lost.
 
 use crate::error;
 use pyo3::prelude::*;
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+use stickslip_numerics::interrupt::{self, Interrupted, Stop};
 use stickslip_study::run::Context;
 
 /// How often progress is told and Ctrl-C looked for.
@@ -24,6 +30,57 @@ pub struct Watch {
     pub total: Option<u64>,
 }
 
+/// Does short `work` on this thread.
+pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
+    let (begun, looked) = (Instant::now(), AtomicU64::new(0));
+    let kept = raised.clone();
+    let stop = Stop::asking(move || {
+        let now = begun.elapsed().as_millis() as u64;
+        if now < looked.load(Ordering::Relaxed) + LOOK.as_millis() as u64 {
+            return false;
+        }
+        looked.store(now, Ordering::Relaxed);
+        let error = Python::attach(|py| py.check_signals()).err();
+        let ends = error.is_some();
+        *kept.lock().unwrap_or_else(PoisonError::into_inner) = error;
+        ends
+    });
+    let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(|| stop.watch(work))));
+    outcome.map_err(|panic| ended(panic, raised.lock().unwrap_or_else(PoisonError::into_inner).take()))
+}
+
+/// Does long `work` on a thread of its own, which Ctrl-C leaves behind where it cannot end at once.
+pub fn apart<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    let stop = Stop::new();
+    let (send, receive) = mpsc::channel();
+    let watched = stop.clone();
+    let spawned = std::thread::Builder::new().spawn(move || {
+        // nobody listens any more if it was left behind
+        let _ = send.send(catch_unwind(AssertUnwindSafe(|| watched.watch(work))));
+    });
+    spawned.map_err(|cause| error::exception(py, "StickslipError", format!("no thread: {cause}")))?;
+    let receive = Mutex::new(receive);
+    loop {
+        let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
+        match next {
+            Ok(outcome) => return outcome.map_err(|panic| ended(panic, None)),
+            Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
+            Err(mpsc::RecvTimeoutError::Timeout) => py.check_signals().inspect_err(|_| stop.set())?,
+        }
+    }
+}
+
+/// The exception that ended work: what a law raised, or what Ctrl-C did. Any other panic is a bug,
+/// and goes on.
+fn ended(panic: Box<dyn Any + Send>, interrupted: Option<PyErr>) -> PyErr {
+    match (panic.downcast::<PyErr>(), interrupted) {
+        (Ok(error), _) => *error,
+        (Err(panic), Some(error)) if panic.is::<Interrupted>() => error,
+        (Err(panic), _) => resume_unwind(panic),
+    }
+}
+
 /// The process in which threads were first made: those of a fork are gone.
 static PROCESS: OnceLock<u32> = OnceLock::new();
 /// Pools that nobody uses, by their number of threads: calls beside each other have threads of their own.
@@ -33,6 +90,8 @@ static POOLS: Mutex<BTreeMap<usize, Vec<rayon::ThreadPool>>> = Mutex::new(BTreeM
 struct Lent {
     number: usize,
     pool: Option<rayon::ThreadPool>,
+    /// What ends their work.
+    stop: Stop,
 }
 
 impl Lent {
@@ -43,6 +102,9 @@ impl Lent {
 
 impl Drop for Lent {
     fn drop(&mut self) {
+        if self.stop.is_set() {
+            return; // they may still be at work
+        }
         let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
         pools.entry(self.number).or_default().extend(self.pool.take());
     }
@@ -69,11 +131,12 @@ fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
             .build()
             .map_err(|cause| error::exception(py, "StickslipError", format!("no threads: {cause}")))?,
     };
-    Ok(Lent { number, pool: Some(pool) })
+    let stop = Stop::new();
+    pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
+    Ok(Lent { number, pool: Some(pool), stop })
 }
 
-/// Does `work` on the threads of a pool. Meanwhile progress is told and Ctrl-C stops the work, which then has as long to end as it needs for
-/// the orbits that are under way.
+/// Does `work` on the threads of a pool. Meanwhile progress is told, and Ctrl-C ends the work.
 pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Context) -> T + Send) -> PyResult<T> {
     let lent = lent(py, watch.threads)?;
     let pool = lent.pool();
@@ -104,6 +167,7 @@ pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Contex
                     let look = py.check_signals().and_then(|()| tell(py, watch, &done, &mut told));
                     if let Err(error) = look {
                         stop.store(true, Ordering::Relaxed);
+                        lent.stop.set();
                         wrong = Some(error);
                     }
                 }
@@ -112,7 +176,7 @@ pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Contex
         if let Some(error) = wrong {
             return Err(error);
         }
-        let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
+        let outcome = outcome.map_err(|panic| ended(panic, None))?;
         py.check_signals()?;
         tell(py, watch, &done, &mut told)?;
         Ok(outcome)

@@ -117,8 +117,13 @@ def test_a_campaign_that_is_killed_goes_on(study, whole, tmp_path):
 
 def test_a_folder_of_another_study_is_refused(study, tmp_path):
     stickslip.campaign(study.set(Ft="1 N"), out=tmp_path, processes=1)
-    with pytest.raises(stickslip.CampaignError, match="another study"):
-        stickslip.campaign(study, out=tmp_path)
+    for other, words in [
+        (study, "the same with other values of parameters .Ft = 1 N"),
+        (study.set(Ft="1 N").method("event-driven"), "by another method"),
+        (stickslip.Study.from_text(CASES.replace("13", "14"), name="many").set(Ft="1 N"), "its line 6 is"),
+    ]:
+        with pytest.raises(stickslip.CampaignError, match=f"another study: .*{words}"):
+            stickslip.campaign(other, out=tmp_path)
     with pytest.raises(stickslip.CampaignError, match="no campaign"):
         stickslip.Campaign(tmp_path / "nothing")
     with pytest.raises(stickslip.CampaignError, match="no table `curves`"):
@@ -147,9 +152,117 @@ def test_matrices_that_change_are_refused(tmp_path):
     matrix("k.mtx", 8.1e4)
     with pytest.raises(stickslip.CampaignError, match="other matrices"):
         stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c")
-    # a worker whose files are not those of the one who asked
-    failed = stickslip.campaign(study, out=tmp_path / "d", processes=1).failed
-    assert failed and all("other matrices" in reason for reason in failed.values())
+    # processes whose files are not those of the one who asked: no fault of a unit
+    with pytest.raises(stickslip.CampaignError, match="other matrices"):
+        stickslip.campaign(study, out=tmp_path / "d", processes=1)
+    assert not list((tmp_path / "d" / "done").iterdir())
+
+
+def test_a_second_campaign_in_a_folder_is_refused_while_the_first_one_writes(study, whole, tmp_path):
+    script = tmp_path / "run.py"
+    script.write_text(
+        textwrap.dedent(
+            f"""
+            import stickslip
+            if __name__ == "__main__":
+                stickslip.campaign(stickslip.Study.from_text({CASES!r}, name="many"), out="c", processes=1, seconds=0.01)
+            """
+        )
+    )
+    first = subprocess.Popen([sys.executable, script], cwd=tmp_path)
+    try:
+        deadline = time.monotonic() + 60
+        while not list((tmp_path / "c").glob("done/*.json")) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        os.kill(first.pid, signal.SIGSTOP)
+        with pytest.raises(stickslip.CampaignError, match="another campaign is writing into .*: wait for its end"):
+            stickslip.campaign(study, out=tmp_path / "c", processes=1)
+        # reading it is no writing
+        assert stickslip.Campaign(tmp_path / "c").points["converged"] > 0
+    finally:
+        os.kill(first.pid, signal.SIGCONT)
+        assert first.wait(60) == 0
+    again = stickslip.campaign(study, out=tmp_path / "c", processes=1)
+    assert again.is_complete and sum(again.points.values()) == study.points
+    same_bits(again.result(), whole)
+
+
+@pytest.mark.parametrize("damage", ["missing", "cut", "flipped", "record", "records", "folder"])
+def test_parts_that_are_missing_or_damaged_are_computed_again(study, whole, tmp_path, damage):
+    done = stickslip.campaign(study, out=tmp_path, processes=1, seconds=0.05)
+    part = done.files("curve")[1]
+    record = tmp_path / "done" / f"{part.stem}.json"
+    data = part.read_bytes()
+    if damage == "missing":
+        part.unlink()
+    elif damage == "cut":
+        part.write_bytes(data[: len(data) // 2])
+    elif damage == "flipped":
+        part.write_bytes(data[:40] + bytes([data[40] ^ 255]) + data[41:])
+    elif damage == "record":
+        record.write_bytes(record.read_bytes()[:10])
+    elif damage == "records":
+        start, stop = (int(number) for number in record.stem.split("-"))
+        record.with_name(f"{start:012}-{stop + 1:012}.json").write_bytes(record.read_bytes())
+    else:
+        for file in (tmp_path / "parts" / "curve").iterdir():
+            file.unlink()
+        (tmp_path / "parts" / "curve").rmdir()
+    seen = stickslip.Campaign(tmp_path)
+    if damage != "flipped":  # that only its checksum tells
+        assert seen.damaged and (damage == "records" or not seen.is_complete)
+    if not seen.is_complete:
+        with pytest.raises(stickslip.CampaignError, match="damaged or missing"):
+            seen.result()
+    with pytest.warns(UserWarning, match="damaged or lack a part"):
+        repaired = stickslip.campaign(study, out=tmp_path, processes=1)
+    assert repaired.is_complete and not repaired.damaged and repaired.points == whole.points
+    result = repaired.result()
+    assert len(result["curve"]) == len(whole["curve"]) == study.points
+    same_bits(result, whole)
+
+
+def test_a_script_without_its_guard_gets_one_error_and_its_correction_computes_all(tmp_path):
+    script = tmp_path / "noguard.py"
+    lines = ["import stickslip", "done = stickslip.campaign(stickslip.Study.from_template('blade-couple'), out='ng', processes=2)", "print('ok', done.failed)"]
+    script.write_text("\n".join(lines))
+    ended = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1 and "ok" not in ended.stdout
+    assert ended.stderr.count("Traceback") == 1 and '__name__ == "__main__"' in ended.stderr and len(ended.stderr) < 5000
+    assert not list((tmp_path / "ng" / "done").iterdir())
+    corrected = [lines[0], 'if __name__ == "__main__":', *("    " + line for line in lines[1:])]
+    script.write_text("\n".join(corrected))
+    ended = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "ok {}\n", "")
+
+
+def test_ctrl_c_ends_a_campaign_and_its_processes(tmp_path):
+    script = tmp_path / "run.py"
+    script.write_text(
+        textwrap.dedent(
+            """
+            import signal, stickslip
+            if __name__ == "__main__":
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+                stickslip.campaign(stickslip.Study.from_text(LONG), out="c", processes=2, seconds=30)
+            """
+        ).replace("LONG", repr(CASES.replace("13", "400_001")))
+    )
+    process = subprocess.Popen([sys.executable, script], cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    deadline = time.monotonic() + 60
+    while len(list((tmp_path / "c").glob("done/*.json"))) < 4 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    time.sleep(0.5)
+    pressed = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
+    _, errors = process.communicate(timeout=60)
+    assert time.monotonic() - pressed < 1.5
+    assert errors.count("Traceback") == 1 and "KeyboardInterrupt" in errors
+    deadline = time.monotonic() + 30
+    with pytest.raises(ProcessLookupError):
+        while time.monotonic() < deadline:
+            os.killpg(process.pid, 0)
+            time.sleep(0.05)
 
 
 class Scripted:
@@ -176,7 +289,7 @@ class Scripted:
                 raise _campaign._Failed(f"unit {unit} broke down", "tcp://first")
         return _campaign._work(_campaign._pickled(self.study), start, stop)
 
-    def close(self):
+    def close(self, at_once):
         pass
 
 
@@ -195,7 +308,9 @@ def test_a_unit_that_fails_is_tried_elsewhere_and_kept_with_its_reason(study, wh
         assert finished.table(library="pyarrow").count_rows() == len(whole["curve"]) * (study.units - 1) // study.units
         with pytest.raises(stickslip.CampaignError, match="units that failed"):
             finished.result()
-        again = stickslip.campaign(study, out=tmp_path, processes=1, retry=True)
+        with pytest.warns(UserWarning, match="1 of .* units failed, the first is unit 7: unit 7 broke down"):
+            assert stickslip.campaign(study, out=tmp_path, processes=1, retry=False).failed
+        again = stickslip.campaign(study, out=tmp_path, processes=1)
         same_bits(again.result(), whole)
     else:
         same_bits(finished.result(), whole)
@@ -233,23 +348,3 @@ def test_what_a_campaign_cannot_begin_with(tmp_path):
         with pytest.raises(error, match=words):
             stickslip.campaign(given.pop("study"), **given)
         assert not (tmp_path / "out").exists()
-
-
-def test_sobol_indices_are_those_of_ishigami():
-    pytest.importorskip("scipy")
-    # Ishigami and Homma (1990), a = 7, b = 0.1: closed forms
-    a, b = 7.0, 0.1
-    first = np.array([0.5 * (1 + b * np.pi**4 / 5) ** 2, a**2 / 8, 0.0])
-    both = b**2 * np.pi**8 * (1 / 18 - 1 / 50)
-    total = first + np.array([both, 0.0, both])
-    variance = first.sum() + both
-
-    def ishigami(x):
-        return np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
-
-    found = stickslip.statistics.sobol(ishigami, [(-np.pi, np.pi)] * 3, count=8192, seed=3)
-    np.testing.assert_allclose(found["first"], first / variance, atol=0.02)
-    np.testing.assert_allclose(found["total"], total / variance, atol=0.02)
-    x = np.random.default_rng(2).uniform(-np.pi, np.pi, (20_000, 3))
-    given = [stickslip.statistics.first_order(x[:, i], ishigami(x)) for i in range(3)]
-    np.testing.assert_allclose(given, first / variance, atol=0.03)

@@ -380,3 +380,87 @@ def test_errors_name_the_part():
     model.mass("a", -1)
     with pytest.raises(stickslip.ModelError, match="mass `a`, `mass`"):
         model.orbit(1)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        b"121 Hz",
+        bytearray(b"121"),
+        memoryview(b"121"),
+        {121.0: 1},
+        {"frequency": 121.0},
+        {121.0},
+        frozenset([121.0]),
+        np.ma.array([121.0, 122.0], mask=[False, True]),
+        np.ma.masked,
+        121 + 0j,
+        np.complex128(121),
+        np.complex64(121),
+        np.array([121.0 + 1j]),
+        [121.0, 1j],
+        True,
+        np.bool_(True),
+        np.array([True]),
+        np.array([b"121 Hz"]),
+        np.array([[121.0]]),
+        np.datetime64("2020-01-01"),
+        None,
+        [[121.0]],
+        float("nan"),
+        [121.0, float("inf")],
+    ],
+    ids=lambda wrong: f"{type(wrong).__name__}-{wrong!r}"[:40],
+)
+def test_what_is_no_number_is_refused_with_words(wrong):
+    model = couple()
+    with pytest.raises(stickslip.ModelError, match="frequency must be"):
+        model.response(wrong)
+    with pytest.raises(stickslip.ModelError, match="`shroud.limit` must be"):
+        model.response(121, vary={"shroud.limit": wrong})
+    with pytest.raises(stickslip.ModelError, match="frequency must be"):
+        model.orbit(wrong)
+    with pytest.raises(stickslip.ModelError, match="mass of `c` must be"):
+        model.mass("c", wrong)
+
+
+@pytest.mark.parametrize(
+    "right",
+    [
+        [121, 122],
+        (121.0, "122 Hz"),
+        range(121, 123),
+        np.array([121, 122]),
+        np.array([121, 122], dtype=np.float32),
+        np.array([121, 122], dtype=np.uint8),
+        np.array(["121 Hz", "122 Hz"]),
+        [np.float64(121), np.int32(122)],
+        (frequency for frequency in (121, 122)),
+        [np.array(121.0), np.array(122)],
+    ],
+    ids=lambda right: type(right).__name__,
+)
+def test_every_list_of_numbers_is_taken(right):
+    assert couple().response(right)["curve"]["frequency_Hz"].tolist() == [121.0, 122.0]
+
+
+def test_numbers_of_numpy_and_lists_are_taken_wherever_numbers_are():
+    pandas, fractions = pytest.importorskip("pandas"), pytest.importorskip("fractions")
+    model = stickslip.Model()
+    model.mass("m", np.float32(1.0))
+    model.spring("m", "ground", stiffness=np.int64(10_000), damping=fractions.Fraction(1, 2))
+    model.force("m", np.array(2.0), phase=np.float16(0.5), harmonic=np.int8(1))
+    assert model.response(pandas.Series([10.0, 11.0]))["curve"]["frequency_Hz"].tolist() == [10.0, 11.0]
+    orbit = model.orbit(np.uint16(10))
+    assert orbit.amplitude == model.orbit(10.0).amplitude
+    again = model.orbit(10.0, start=list(orbit.start))
+    assert again.amplitude["m"] == pytest.approx(orbit.amplitude["m"], rel=1e-9)
+    assert orbit.sample([0.0, 0.01])["time_s"].tolist() == [0.0, 0.01]
+    assert orbit.sample(points=np.int64(4))["time_s"].shape == (4,)
+    model.joint("j", "m", "ground", stickslip.law("cubic", stiffness=np.float64(1e9)))
+    assert len(model.modes(np.array([1e-4, 1e-3]), points=np.int64(3), harmonics=3, samples=64)["modes"]) >= 3
+    assert stickslip.Study.from_template("element").set(Ft=np.float32(2.5)).parameters()["Ft"] == 2.5
+    with pytest.raises(stickslip.ModelError, match="finite number"):
+        stickslip.Study.from_template("element").set(Ft=2.5 + 0j)
+    with pytest.raises(stickslip.ModelError, match="two numbers"):
+        model.modes([1e-4])

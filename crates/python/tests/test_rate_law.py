@@ -5,7 +5,7 @@ import pytest
 from conftest import couple
 
 import stickslip
-from stickslip._rate import Dual
+from stickslip._dual import Dual
 
 K, LIMIT = 1e4, 2.0
 
@@ -77,6 +77,108 @@ def test_a_law_may_act_along_two_directions():
     assert abs(orbit.first_harmonic["m.y"]) == pytest.approx(1 / abs(1e4 - omega**2 + 3j * omega), rel=1e-9)
 
 
+TWO = {
+    "stack": lambda u, v: np.stack([3.0 * v[0], 3.0 * v[1]]),
+    "whole": lambda u, v: 3.0 * v,
+    "list": lambda u, v: [3.0 * v[0], 3.0 * v[1]],
+    "tuple rows": lambda u, v: np.vstack([3.0 * v[0], 3.0 * v[1]]),
+    "matrix": lambda u, v: np.array([[3.0, 0.0], [0.0, 3.0]]) @ v,
+    "in place": lambda u, v: _filled(v),
+    "einsum": lambda u, v: np.einsum("ij,jn->in", 3.0 * np.eye(2), v),
+}
+
+
+def _filled(v):
+    out = np.zeros_like(v)
+    out[0] = 3.0 * v[0]
+    out[1:] += 3.0 * v[1:]
+    return out
+
+
+@pytest.mark.parametrize("form", TWO)
+def test_a_law_of_two_directions_may_use_every_form_of_array(form):
+    law = stickslip.rate_law(lambda u, v, z: TWO[form](u, v), directions=2)
+    assert law.check_derivatives() < 1e-6
+    model = stickslip.Model()
+    model.mass("m", 1.0, directions=["x", "y"])
+    for place in ("m.x", "m.y"):
+        model.spring(place, "ground", stiffness=1e4)
+        model.force(place, 1.0)
+    model.joint("d", "m", "ground", law)
+    omega = 20 * np.pi
+    found = model.orbit(10.0, method="harmonic-balance").first_harmonic
+    for place in ("m.x", "m.y"):
+        assert abs(found[place]) == pytest.approx(1 / abs(1e4 - omega**2 + 3j * omega), rel=1e-9)
+
+
+ONE = {
+    "rows": lambda u, v, z, rate: (LIMIT * z[0], rate[None]),
+    "list": lambda u, v, z, rate: (LIMIT * z[0], [rate]),
+    "plain": lambda u, v, z, rate: (LIMIT * z[0], rate),
+    "row of force": lambda u, v, z, rate: ((LIMIT * z)[:1], rate.reshape(1, -1)),
+    "whole states": lambda u, v, z, rate: (LIMIT * z[0], K / LIMIT * (v - abs(v) * z)),
+}
+
+
+@pytest.mark.parametrize("form", ONE)
+def test_a_law_with_a_state_may_return_every_form_of_array(form):
+    law = stickslip.rate_law(lambda u, v, z: ONE[form](u, v, z, K / LIMIT * (v - abs(v) * z[0])), states=1, scale=LIMIT)
+    assert law.check_derivatives() < 1e-6
+    one, other = (couple(each).orbit(118.0, method="harmonic-balance", harmonics=3) for each in (law, dahl))
+    assert one.amplitude["blade1"] == pytest.approx(other.amplitude["blade1"], rel=1e-12)
+
+
+@stickslip.rate_law(states=1, parameters={"stiffness": "10 N/mm", "limit": LIMIT}, scale="limit", odd=True)
+def with_parameters(u, v, z, stiffness, limit):
+    return limit * z[0], stiffness / limit * (v - abs(v) * z)
+
+
+def test_parameters_of_a_law_are_set_and_varied():
+    assert with_parameters.parameters == {"stiffness": K, "limit": LIMIT}
+    options = {"method": "harmonic-balance", "harmonics": 5}
+    model = couple(with_parameters)
+    model.set({"shroud.stiffness": "12 N/mm", "shroud.limit": "3 N"})
+    rust = couple(stickslip.law("dahl", stiffness=12e3, limit=3.0)).orbit(118.0, **options)
+    assert model.orbit(118.0, **options).amplitude["blade1"] == pytest.approx(rust.amplitude["blade1"], rel=1e-9)
+    limits = [1.5, 2.0, 2.5]
+    own = couple(with_parameters).response(118.0, vary={"shroud.limit": limits}, **options)["curve"]
+    rust = couple(stickslip.law("dahl", stiffness=K, limit=2.0)).response(118.0, vary={"shroud.limit": limits}, **options)["curve"]
+    np.testing.assert_allclose(own["blade1_amplitude_m"], rust["blade1_amplitude_m"], rtol=1e-9)
+    assert own["shroud_limit"].tolist() == limits
+    # the law of before is what it was
+    assert with_parameters.parameters["limit"] == LIMIT
+    for values, words in [
+        ({"shroud.limit": 0.0}, "scale"),
+        ({"shroud.stiffness": "3 N"}, "stiffness"),
+        ({"shroud.friction": 3.0}, "no parameter"),
+    ]:
+        with pytest.raises(stickslip.ModelError, match=words):
+            model.set(values)
+    with pytest.raises(stickslip.ModelError, match="name of a parameter"):
+        stickslip.rate_law(lambda u, v, z, a: u, parameters={"a": 1.0}, scale="b")
+
+
+def test_wrong_derivatives_are_found_by_one_call():
+    def law(u, v, z):
+        return LIMIT * z[0], (K / LIMIT * (v - abs(v) * z[0]))[None]
+
+    def slopes(u, v, z, wrong=1.0):
+        by = np.zeros((2, 3, u.size))
+        by[0, 2] = LIMIT
+        by[1, 1] = wrong * K / LIMIT * (1 - np.sign(v) * z[0])
+        by[1, 2] = -K / LIMIT * abs(v)
+        return by
+
+    assert stickslip.rate_law(law, states=1, derivatives=slopes).check_derivatives() < 1e-8
+    wrong = stickslip.rate_law(law, states=1, derivatives=lambda u, v, z: slopes(u, v, z, 1.01))
+    with pytest.raises(ValueError, match="rate 0 by v is .*differences have"):
+        wrong.check_derivatives()
+    with pytest.raises(ValueError, match="rate 0 by v"):
+        wrong.check_derivatives(u=[0.0], v=[1.0], z=[[0.5]])
+    with pytest.raises(TypeError, match="built in"):
+        stickslip.law("dahl", stiffness=K, limit=LIMIT).check_derivatives()
+
+
 def test_what_a_law_raises_is_raised():
     @stickslip.rate_law(states=1)
     def wrong(u, v, z):
@@ -118,7 +220,7 @@ FUNCTIONS = [
 def test_dual_arrays_have_the_derivatives_that_differences_have(function):
     a, b = np.array([-0.7, 0.05, 0.4, 0.9]), np.array([0.3, 0.8, 1.1, 0.6])
     ones, zeros = np.ones_like(a), np.zeros_like(a)
-    dual = function(Dual(a, np.stack([ones, zeros])), Dual(b, np.stack([zeros, ones])))
+    dual = function(Dual(a, np.stack([ones, zeros])), Dual(b, np.stack([zeros, ones])))  # rows: derivatives by a and b
     step = 1e-6
     by_a = (function(a + step, b) - function(a - step, b)) / (2 * step)
     by_b = (function(a, b + step) - function(a, b - step)) / (2 * step)

@@ -59,6 +59,23 @@ def test_a_dictionary_is_a_study():
     assert study.set(Ft=2.5).set(Ft="4 N").parameters() == {"Ft": 4.0}
 
 
+@pytest.mark.parametrize("template", stickslip.templates())
+def test_setting_the_parameters_of_a_study_changes_nothing(template):
+    study = stickslip.Study.from_template(template)
+    parameters = study.parameters()
+    again = study.set(**parameters)
+    assert again.parameters() == parameters
+    if study.cases == 1:
+        assert again.model().matrices.keys() == study.model().matrices.keys()
+
+
+def test_frequencies_among_parameters_are_in_hertz():
+    text = LONG.replace("[study]", '[parameters]\nspeed = "2000 rpm"\nFt = "2 N"\n[study]').replace("points = 200001", "points = 3")
+    study = stickslip.Study.from_text(text.replace('from = "110 Hz"', 'from = "speed"'))
+    assert study.parameters()["speed"] == pytest.approx(2000 / 60, rel=1e-15)
+    assert study.set(speed=50).parameters()["speed"] == 50.0
+
+
 def test_errors_have_the_text_of_the_command(command, tmp_path):
     file = tmp_path / "wrong.toml"
     file.write_text(command("new", "element").stdout.replace("kt", "kx", 1).replace("law", "lwa"))

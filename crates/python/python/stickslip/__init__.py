@@ -10,9 +10,10 @@ read without a copy, a figure, and the record of the run.
 """
 
 from . import statistics
-from ._campaign import Campaign, CampaignError, campaign
+from ._campaign import Campaign, campaign
 from ._core import Law, Model, Orbit, Result, Study, Table, __version__, law, laws, templates
 from ._errors import MethodError, ModelError, OrbitError, ReportError, StickslipError, StudyError
+from ._folder import CampaignError
 from ._rate import rate_law
 
 __all__ = [

@@ -1,28 +1,43 @@
 """Campaigns: the units of a study on many processes or machines, kept part by part, so that nothing is computed twice.
 
-A campaign's folder holds ``campaign.json`` (the study), ``parts/`` (for each batch of units one Parquet file for each table) and ``done/`` (what is
-to be said of a batch, written last: a batch without it counts as never computed).
+`_folder.py` says what stands in a campaign's folder.
 """
 
 from __future__ import annotations
 
+import importlib
 import io
+import itertools
 import json
+import multiprocessing
+import operator
 import os
 import pickle
+import signal
 import time
+import warnings
 from collections import deque
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, Protocol, SupportsIndex, overload
 
-from ._errors import StickslipError
+import numpy as np
+
+from . import _folder
+from ._folder import FORMAT, CampaignError
+from ._progress import bar
 
 if TYPE_CHECKING:
-    from ._core import Study
+    from numpy.typing import ArrayLike, NDArray
 
-#: The version of the folder's layout.
-FORMAT = 1
+    from ._core import Result, Study
+
+    Progress = bool | Callable[[int, int], object] | None
+    Percent = float | Sequence[float] | NDArray[np.float64]
+
 #: How long a batch should take, s: a task of Dask costs some milliseconds, and what a killed worker loses is one batch.
 BATCH_SECONDS = 5.0
 #: Batches that wait or run for each thread of the workers: enough that none is idle, few enough to keep the sizes up to date.
@@ -31,13 +46,25 @@ AHEAD = 2
 GROWTH = 4
 #: Times that a batch is tried, the later ones elsewhere where there is an elsewhere.
 TRIES = 2
+#: The name of the processes that compute.
+WORKER = "stickslip-campaign"
+#: What a script without its guard is told.
+GUARD = (
+    'a script has to start a campaign under `if __name__ == "__main__":`, because every process that computes reads the script again; '
+    "a campaign cannot be started by a script that comes from standard input"
+)
 
 
-class CampaignError(StickslipError):
-    """A campaign that cannot begin or go on."""
-
-
-def campaign(study, *, out, client=None, processes=None, seconds=BATCH_SECONDS, progress=None, retry=False):
+def campaign(
+    study: Study,
+    *,
+    out: str | os.PathLike[str],
+    client: Any = None,
+    processes: SupportsIndex | None = None,
+    seconds: float = BATCH_SECONDS,
+    progress: Progress = None,
+    retry: bool = True,
+) -> Campaign:
     """Computes all units of ``study`` that ``out`` does not hold yet, and returns the :class:`Campaign`.
 
     ``client``: a Dask client (``distributed.Client``); workers need this package, not this folder. Without one ``processes`` processes of this
@@ -45,50 +72,82 @@ def campaign(study, *, out, client=None, processes=None, seconds=BATCH_SECONDS, 
     ``seconds``: how long a batch should take; its size follows the measured cost. ``progress``: ``True`` for a bar by tqdm, or a function of the
     units done and of all.
 
-    A unit that fails is tried once more, elsewhere, and is then kept with its reason: :attr:`Campaign.failed`; ``retry=True`` tries those again. A campaign that was interrupted,
-    killed or short of workers goes on when it is called again, and ends with the same numbers, which are those of the command bit for bit.
+    A unit that fails is tried once more, elsewhere, and is then kept with its reason: :attr:`Campaign.failed`. The next call tries those units
+    again unless ``retry=False``. A campaign that was interrupted, killed or short of workers goes on when it is called again, and ends with the
+    same numbers, which are those of the command bit for bit. Parts that are missing or damaged are computed again, with a warning. One campaign at a
+    time writes into a folder: a second one is refused.
     """
     from ._core import Study as Known
 
+    _must_not_be_a_worker()
     if not isinstance(study, Known):
         raise TypeError(f'`study` must be a stickslip.Study, such as Study.from_file("couple.toml") gives, found {study!r}')
-    if processes is not None and (not isinstance(processes, int) or processes < 1):
+    if processes is not None and _count(processes) < 1:
         raise ValueError(f"`processes` must be a whole number from 1, found {processes!r}")
     if not seconds > 0:
         raise ValueError(f"`seconds` that a batch takes must be more than zero, found {seconds!r}")
-    if Path(out).exists() and not Path(out).is_dir():
+    folder = Path(out)
+    if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"`out` must be a folder for the parts of the campaign, and {out} is a file")
-    begun = Campaign._begin(study, Path(out))
-    if retry and begun.failed:
-        begun._forget_failed()
-        begun = Campaign(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    held = _folder.lock(folder)
+    try:
+        begun = Campaign._begin(study, folder, retry=bool(retry))
+        if not begun.is_complete:
+            workers = _Dask(client, study) if client is not None else _Local(processes, study)
+            _run(begun, workers, float(seconds), progress)
+        finished = Campaign(folder)
+    finally:
+        held.release()
+    if finished.failed:
+        unit, reason = next(iter(finished.failed.items()))
+        warnings.warn(f"{len(finished.failed)} of {finished.units} units failed, the first is unit {unit}: {reason}", stacklevel=2)
+    return finished
+
+
+def _count(value: SupportsIndex) -> int:
+    """A whole number, or 0 for what is none."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        return 0
+
+
+def _must_not_be_a_worker() -> None:
+    """A process that reads the script of its parent again must not start a campaign."""
+    process = multiprocessing.current_process()
+    if getattr(process, "_inheriting", False):
+        if process.name == WORKER:
+            raise SystemExit(1)  # the parent says why
+        raise CampaignError(GUARD)
+
+
+def _run(begun: Campaign, workers: _Workers, seconds: float, progress: Progress) -> None:
     todo = begun._missing()
-    if not todo:
-        return begun
     total, done = begun.units, begun.units - sum(stop - start for start, stop in todo)
-    report = _progress(progress, study.name)
-    workers = _Dask(client, study) if client is not None else _Local(processes, study)
+    report = _progress(progress, begun.name)
+    whole = False
     try:
         _compute(begun, workers, todo, seconds, lambda units: report and report(done + units, total))
+        whole = True
     finally:
-        workers.close()
-        if hasattr(report, "_stickslip_close"):
+        workers.close(at_once=not whole)
+        if report is not None and hasattr(report, "_stickslip_close"):
             report._stickslip_close()
-    return Campaign(out)
 
 
-def _progress(progress, name: str):
-    if progress is True:
-        from ._progress import bar
-
+def _progress(progress: Progress, name: str) -> Callable[[int, int], object] | None:
+    if callable(progress):
+        return progress
+    if progress:
         return bar(name)
-    return progress or None
+    return None
 
 
 class _Batches:
     """The ranges to compute, in batches of a size that follows what units cost."""
 
-    def __init__(self, todo, seconds: float) -> None:
+    def __init__(self, todo: Iterable[tuple[int, int]], seconds: float) -> None:
         self._todo, self._seconds = deque(todo), seconds
         self._size = 1
         self._cost: float | None = None
@@ -101,7 +160,7 @@ class _Batches:
         wanted = int(self._seconds / max(self._cost, 1e-9))
         self._size = max(1, min(wanted, GROWTH * self._size))
 
-    def next(self, threads: int):
+    def next(self, threads: int) -> tuple[int, int] | None:
         """The next range for one of so many threads; ``None`` if there is no more."""
         if not self._todo:
             return None
@@ -115,11 +174,33 @@ class _Batches:
         return start, stop
 
 
-def _compute(campaign: Campaign, workers, todo, seconds: float, tell) -> None:
-    batches, units = _Batches(todo, seconds), 0
-    running: dict = {}
+class _Workers(Protocol):
+    """What computes batches."""
 
-    def begin(start, stop, tries=0, avoid=None):
+    @property
+    def threads(self) -> int:
+        """Batches that it computes beside each other."""
+
+    def submit(self, start: int, stop: int, tries: int, avoid: str | None) -> Any:
+        """Begins a batch, if possible not where it is to be avoided; a future."""
+
+    def wait(self, running: list[Any]) -> Iterable[Any]:
+        """Futures that have finished, one or more."""
+
+    def answer(self, future: Any) -> dict[str, Any]:
+        """What a batch yielded, or its exception."""
+
+    def close(self, at_once: bool) -> None:
+        """Ends it, with what is running or after that."""
+
+
+def _compute(
+    campaign: Campaign, workers: _Workers, todo: Iterable[tuple[int, int]], seconds: float, tell: Callable[[int], object]
+) -> None:
+    batches, units = _Batches(todo, seconds), 0
+    running: dict[Any, tuple[int, int, int]] = {}
+
+    def begin(start: int, stop: int, tries: int = 0, avoid: str | None = None) -> None:
         running[workers.submit(start, stop, tries, avoid)] = (start, stop, tries)
 
     while True:
@@ -136,6 +217,8 @@ def _compute(campaign: Campaign, workers, todo, seconds: float, tell) -> None:
             start, stop, tries = running.pop(future)
             try:
                 answer = workers.answer(future)
+            except CampaignError:
+                raise
             except Exception as error:  # whatever a worker or its death makes of it
                 tries, where = tries + 1, getattr(error, "where", None)
                 if tries < TRIES:
@@ -173,18 +256,22 @@ def _pickled(study: Study) -> bytes:
     return pickle.dumps((study, study._matrices))
 
 
-def _work(pickled: bytes, start: int, stop: int) -> dict:
-    """Computes units on a worker: the tables as Parquet, and what is to be said of them."""
-    import pyarrow
-    import pyarrow.parquet
+def _unpickled(pickled: bytes) -> Study:
+    """The study on a worker."""
+    study, matrices = pickle.loads(pickled)
+    if study._matrices != matrices:
+        raise CampaignError("the files of [structure] hold other matrices than where the campaign began")
+    return study  # type: ignore[no-any-return]
 
+
+def _work(pickled: bytes, start: int, stop: int) -> dict[str, Any]:
+    """Computes units on a worker: the tables as Parquet, and what is to be said of them."""
+    pyarrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     study = _STUDIES.get(pickled)
     if study is None:
         while len(_STUDIES) >= _MOST_STUDIES:
             _STUDIES.pop(next(iter(_STUDIES)))
-        study, matrices = pickle.loads(pickled)
-        if study._matrices != matrices:
-            raise CampaignError("the files of [structure] hold other matrices than where the campaign began")
+        study = _unpickled(pickled)
         study._batch(0, 0)  # checks it: no cost of a batch
         _STUDIES[pickled] = study
     begin = time.perf_counter()
@@ -192,7 +279,7 @@ def _work(pickled: bytes, start: int, stop: int) -> dict:
     tables = {}
     for table in batch["tables"]:
         data = io.BytesIO()
-        pyarrow.parquet.write_table(pyarrow.table(table), data, compression="zstd")
+        parquet.write_table(pyarrow.table(table), data, compression="zstd")
         tables[table.name] = data.getvalue()
     return {"told": batch["told"], "points": batch["points"], "tables": tables, "seconds": time.perf_counter() - begin}
 
@@ -205,14 +292,12 @@ class _Failed(Exception):
         self.where = where
 
 
-def _work_on_dask(pickled: bytes, start: int, stop: int) -> dict:
+def _work_on_dask(pickled: bytes, start: int, stop: int) -> dict[str, Any]:
     """The same, but an error comes back with the worker's address."""
-    from distributed import get_worker
-
     try:
         return _work(pickled, start, stop)
     except Exception as error:
-        return {"error": _reason(error), "where": get_worker().address}
+        return {"error": _reason(error), "where": importlib.import_module("distributed").get_worker().address}
 
 
 #: How long the number of a cluster's threads is taken as known, s; clusters grow and shrink.
@@ -222,12 +307,10 @@ KNOWN_SECONDS = 2.0
 class _Dask:
     """Workers of a Dask cluster."""
 
-    def __init__(self, client, study) -> None:
-        from distributed import as_completed
-
+    def __init__(self, client: Any, study: Study) -> None:
         self._client, self._name, self._study = client, study.name, _pickled(study)
-        self._finished = as_completed([], with_results=False)
-        self._running: set = set()
+        self._finished = importlib.import_module("distributed").as_completed([], with_results=False)
+        self._running: set[Any] = set()
         self._known, self._threads = float("-inf"), 1
 
     @property
@@ -237,7 +320,7 @@ class _Dask:
             self._known, self._threads = time.monotonic(), max(1, sum(self._client.nthreads().values()))
         return self._threads
 
-    def submit(self, start: int, stop: int, tries: int, avoid):
+    def submit(self, start: int, stop: int, tries: int, avoid: str | None) -> Any:
         others = [worker for worker in self._client.nthreads() if worker != avoid]
         elsewhere = {"workers": others, "allow_other_workers": True} if avoid and others else {}
         # the name is what the dashboard shows
@@ -247,10 +330,10 @@ class _Dask:
         self._running.add(future)
         return future
 
-    def wait(self, _running):
+    def wait(self, running: list[Any]) -> Iterable[Any]:
         return [next(self._finished)]
 
-    def answer(self, future):
+    def answer(self, future: Any) -> dict[str, Any]:
         self._running.discard(future)
         try:
             answer = future.result()
@@ -259,58 +342,79 @@ class _Dask:
         future.release()
         if "error" in answer:
             raise _Failed(answer["error"], answer["where"])
-        return answer
+        return answer  # type: ignore[no-any-return]
 
-    def close(self) -> None:
+    def close(self, at_once: bool) -> None:
         self._finished.clear()
         self._client.cancel(list(self._running))
+
+
+class _Worker(SpawnProcess):
+    """A process that computes, known by its name while it reads the script of its parent."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **{**options, "name": WORKER})
+
+
+class _Spawn(SpawnContext):
+    """Processes that begin anew: a fork would have the locks of this process, and none of its threads."""
+
+    Process = _Worker
+
+
+def _leave_ctrl_c_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _ready(pickled: bytes) -> None:
+    """Whether a process can compute batches of this study."""
+    importlib.import_module("pyarrow.parquet")
+    _unpickled(pickled)
 
 
 class _Local:
     """Processes of this machine."""
 
-    def __init__(self, processes, study) -> None:
-        self.threads = processes or os.cpu_count() or 1
+    def __init__(self, processes: SupportsIndex | None, study: Study) -> None:
+        self.threads = os.cpu_count() or 1 if processes is None else operator.index(processes)
         self._study = _pickled(study)
         self._pool: ProcessPoolExecutor | None = None
 
-    def submit(self, start: int, stop: int, tries: int, _avoid):
-        import multiprocessing
-        from concurrent.futures.process import BrokenProcessPool
+    def _begun(self) -> ProcessPoolExecutor:
+        """New processes. What keeps one of them from its work would keep all, and is no fault of a unit: it ends the campaign."""
+        pool = ProcessPoolExecutor(self.threads, mp_context=_Spawn(), initializer=_leave_ctrl_c_to_the_parent)
+        self._pool = pool
+        try:
+            pool.submit(_ready, self._study).result()
+        except BrokenProcessPool:
+            raise CampaignError(f"a process of this machine ended before it began to compute: {GUARD}") from None
+        except Exception as error:
+            raise CampaignError(f"processes of this machine cannot compute this study: {_reason(error)}") from error
+        return pool
 
+    def submit(self, start: int, stop: int, tries: int, avoid: str | None) -> Any:
         for _ in range(2):
-            if self._pool is None:
-                # a fork would have the locks of this process, and none of its threads
-                self._pool = ProcessPoolExecutor(self.threads, mp_context=multiprocessing.get_context("spawn"))
             try:
-                return self._pool.submit(_work, self._study, start, stop)
+                return (self._pool or self._begun()).submit(_work, self._study, start, stop)
             except BrokenProcessPool:
                 # a process died, and all that ran fails; new ones take over
-                self._pool.shutdown(wait=False)
-                self._pool = None
+                self.close(at_once=True)
         raise CampaignError("processes of this machine cannot be started")
 
-    def wait(self, running):
-        from concurrent.futures import FIRST_COMPLETED, wait
-
+    def wait(self, running: list[Future[dict[str, Any]]]) -> Iterable[Any]:
         return wait(running, return_when=FIRST_COMPLETED).done
 
-    def answer(self, future):
+    def answer(self, future: Future[dict[str, Any]]) -> dict[str, Any]:
         return future.result()
 
-    def close(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Writes a file that is there whole or not at all, also after a fall of the machine."""
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    with open(aside, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(aside, path)
+    def close(self, at_once: bool) -> None:
+        pool, self._pool = self._pool, None
+        if pool is None:
+            return
+        if at_once:
+            for process in list((getattr(pool, "_processes", None) or {}).values()):
+                process.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 class Campaign:
@@ -319,7 +423,7 @@ class Campaign:
     ``campaign.table("curve")`` reads all parts lazily; :meth:`result` joins them and draws the figure of the study.
     """
 
-    def __init__(self, out) -> None:
+    def __init__(self, out: str | os.PathLike[str]) -> None:
         self.folder = Path(out)
         try:
             head = json.loads((self.folder / "campaign.json").read_text("utf-8"))
@@ -327,13 +431,15 @@ class Campaign:
             raise CampaignError(f"{self.folder} holds no campaign: there is no campaign.json in it") from None
         except ValueError as error:
             raise CampaignError(f"{self.folder / 'campaign.json'} cannot be read: {error}") from None
-        if head.get("format") != FORMAT:
-            raise CampaignError(f"{self.folder} has the format {head.get('format')}, and this version reads {FORMAT}")
-        self._head = head
-        self._done = sorted(self._read_done())
+        if not isinstance(head, dict) or head.get("format") != FORMAT:
+            found = head.get("format") if isinstance(head, dict) else None
+            raise CampaignError(f"{self.folder} has the format {found}, and this version reads {FORMAT}")
+        self._head: dict[str, Any] = head
+        self._done, self._useless = _folder.read(self.folder, self.units)
 
     @classmethod
-    def _begin(cls, study, out: Path) -> Campaign:
+    def _begin(cls, study: Study, out: Path, *, retry: bool = False) -> Campaign:
+        """The campaign of a study in a folder that this process has locked, with nothing in it that is not whole."""
         head = {
             "format": FORMAT,
             "version": study.version,
@@ -344,58 +450,43 @@ class Campaign:
             "matrices": study._matrices,
         }
         head = json.loads(json.dumps(head))
-        if (out / "campaign.json").exists():
-            there = cls(out)
-            # the file may have moved
-            for key, what in (("version", lambda head: head["version"]), ("study", lambda head: head["study"][1:])):
-                if what(there._head) != what(head):
-                    found = f": version {there._head['version']}, and this is {head['version']}" if key == "version" else ""
-                    raise CampaignError(f"{out} holds the campaign of another {key}{found}; choose another folder, or remove that one")
-            if there._head.get("matrices") != head["matrices"]:
-                raise CampaignError(f"{out} holds a campaign with other matrices: the files of [structure] have changed; choose another folder")
-            return there
         for folder in ("parts", "done"):
             (out / folder).mkdir(parents=True, exist_ok=True)
-        _write(out / "campaign.json", json.dumps(head, indent=1).encode())
+        if not (out / "campaign.json").exists():
+            _folder.write(out / "campaign.json", json.dumps(head, indent=1).encode())
+            return cls(out)
+        there = cls(out)
+        if lies := _difference(there._head, head):
+            raise CampaignError(f"{out} holds the campaign of {lies}; choose another folder, or remove that one")
+        _folder.clear(out)
+        batches, useless = _folder.read(out, there.units, checksums=True)
+        if useless:
+            count = there.units - sum(batch.stop - batch.start for batch in batches)
+            message = f"{len(useless)} batches in {out} are damaged or lack a part: their units are computed again, {count} units are left"
+            warnings.warn(message, stacklevel=3)
+        failed = [batch for batch in batches if retry and batch.told.get("failed")]
+        for file in [*useless, *(out / "done" / f"{batch.stem}.json" for batch in failed)]:
+            file.unlink()
         return cls(out)
 
-    def _read_done(self):
-        """Ranges that are kept: start, stop, file."""
-        for file in (self.folder / "done").glob("*-*.json"):
-            start, _, stop = file.stem.partition("-")
-            if start.isdigit() and stop.isdigit():
-                yield int(start), int(stop), file
-
     def _missing(self) -> list[tuple[int, int]]:
-        missing, at = [], 0
-        for start, stop, _ in [*self._done, (self.units, self.units, None)]:
-            if start < at:
-                raise CampaignError(f"{self.folder / 'done'} holds unit {start} twice: two campaigns wrote into it")
-            if start > at:
-                missing.append((at, start))
-            at = max(at, stop)
-        return missing
+        return list(_folder.missing(self._done, self.units))
 
-    def _keep(self, start: int, stop: int, answer: dict) -> None:
-        stem = f"{start:012}-{stop:012}"
-        for name, data in answer.pop("tables").items():
-            folder = self.folder / "parts" / name
-            folder.mkdir(exist_ok=True)
-            _write(folder / f"{stem}.parquet", data)
-        _write(self.folder / "done" / f"{stem}.json", json.dumps(answer).encode())
+    def _keep(self, start: int, stop: int, answer: dict[str, Any]) -> None:
+        _folder.keep(self.folder, start, stop, answer, answer.pop("tables"))
 
     @property
     def name(self) -> str:
         """Name of the study."""
-        return self._head["name"]
+        return str(self._head["name"])
 
     @property
     def units(self) -> int:
         """Units of the study."""
-        return self._head["units"]
+        return int(self._head["units"])
 
     @property
-    def study(self):
+    def study(self) -> Study:
         """The study, as it was computed."""
         from ._core import _study
 
@@ -407,31 +498,29 @@ class Campaign:
         """Whether every unit was computed or given up."""
         return not self._missing()
 
-    def _told(self) -> list[tuple[int, int, dict]]:
-        return [(start, stop, json.loads(file.read_text("utf-8"))) for start, stop, file in self._done]
+    @property
+    def damaged(self) -> int:
+        """Batches that are damaged or lack a part; the next call of `campaign` computes their units again."""
+        return len(self._useless)
 
     @property
     def failed(self) -> dict[int, str]:
         """Units that were given up, with the reason."""
-        return {start: told["failed"] for start, _, told in self._told() if told.get("failed")}
-
-    def _forget_failed(self) -> None:
-        for unit in self.failed:
-            (self.folder / "done" / f"{unit:012}-{unit + 1:012}.json").unlink()
+        return {batch.start: batch.told["failed"] for batch in self._done if batch.told.get("failed")}
 
     @property
     def points(self) -> dict[str, int]:
         """Points by status."""
         points: dict[str, int] = {}
-        for _, _, told in self._told():
-            for status, count in told.get("points", {}).items():
+        for batch in self._done:
+            for status, count in batch.told.get("points", {}).items():
                 points[status] = points.get(status, 0) + count
         return points
 
     @property
     def seconds(self) -> float:
         """Time that the workers spent on it, s."""
-        return sum(told.get("seconds", 0.0) for _, _, told in self._told())
+        return float(sum(batch.told.get("seconds", 0.0) for batch in self._done))
 
     @property
     def tables(self) -> list[str]:
@@ -441,45 +530,43 @@ class Campaign:
     def files(self, table: str) -> list[Path]:
         """The Parquet files of a table, in the order of the units."""
         folder = self.folder / "parts" / table
-        files = [folder / f"{file.stem}.parquet" for _, _, file in self._done]
-        found = [file for file in files if file.exists()]
+        found = [folder / f"{batch.stem}.parquet" for batch in self._done if table in batch.told["parts"]]
         if not found:
             raise CampaignError(f"there is no table `{table}`, there are {', '.join(self.tables) or 'none yet'}")
         return found
 
-    def table(self, name=None, *, library="polars"):
+    def table(self, name: str | None = None, *, library: Literal["polars", "pyarrow"] = "polars") -> Any:
         """All parts of a table, lazily and in order: a ``polars.LazyFrame``, or with ``library="pyarrow"`` a ``pyarrow.dataset.Dataset``.
 
         ``name`` is the main table of the study without it.
         """
         files = self.files(name or self._main())
         if library == "polars":
-            import polars
-
-            return polars.scan_parquet(files)
+            return importlib.import_module("polars").scan_parquet(files)
         if library == "pyarrow":
-            import pyarrow.dataset
-
-            return pyarrow.dataset.dataset([str(file) for file in files], format="parquet")
+            return importlib.import_module("pyarrow.dataset").dataset([str(file) for file in files], format="parquet")
         raise ValueError(f"library must be polars or pyarrow, found {library!r}")
 
     def _main(self) -> str:
         return next((name for name in self.study.tables if name in self.tables), "")
 
-    def _column(self, column, table):
-        import numpy as np
-        import pyarrow.dataset  # noqa: F401
-
+    def _column(self, column: str, table: str | None) -> NDArray[np.float64]:
         read = self.table(table, library="pyarrow").to_table(columns=[column])
         return np.asarray(read[column].to_numpy(), float)
 
-    def percentiles(self, column: str, percent=(5, 50, 95), *, by=None, table=None):
+    @overload
+    def percentiles(self, column: str, percent: Percent = ..., *, by: None = None, table: str | None = None) -> Any: ...
+
+    @overload
+    def percentiles(
+        self, column: str, percent: Percent = ..., *, by: str, table: str | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+    def percentiles(self, column: str, percent: Percent = (5, 50, 95), *, by: str | None = None, table: str | None = None) -> Any:
         """Percentiles of a column over all points that have a value; with ``by`` at each value of another column.
 
         Returns an array (percent), or the values of ``by`` (n) and an array (n, percent).
         """
-        import numpy as np
-
         values = self._column(column, table)
         if by is None:
             return np.nanpercentile(values, percent)
@@ -488,25 +575,25 @@ class Campaign:
         parts = np.split(values[order], np.cumsum(np.bincount(where))[:-1])
         return groups, np.array([np.nanpercentile(part, percent) for part in parts])
 
-    def exceedance(self, column: str, levels, *, table=None):
+    def exceedance(self, column: str, levels: ArrayLike, *, table: str | None = None) -> NDArray[np.float64]:
         """The share of points whose value is above each of the levels; points without a value count for nothing."""
         from .statistics import exceedance
 
         return exceedance(self._column(column, table), levels)
 
-    def sensitivity(self, column: str, inputs, *, table=None):
+    def sensitivity(self, column: str, inputs: Iterable[str], *, table: str | None = None) -> dict[str, float]:
         """First-order Sobol indices of a column by the given columns of inputs, see :func:`stickslip.statistics.first_order`."""
         from .statistics import first_order
 
         return {one: first_order(self._column(one, table), self._column(column, table)) for one in inputs}
 
-    def plot(self, column: str, *, by, percent=(5, 25, 50, 75, 95), table=None, axes=None):
+    def plot(
+        self, column: str, *, by: str, percent: Sequence[float] = (5, 25, 50, 75, 95), table: str | None = None, axes: Any = None
+    ) -> Any:
         """Percentiles of a column over another one as bands, drawn with matplotlib; returns its ``Figure``."""
-        import matplotlib.pyplot as plt
-
         x, bands = self.percentiles(column, percent, by=by, table=table)
         if axes is None:
-            _, axes = plt.subplots(layout="constrained")
+            _, axes = importlib.import_module("matplotlib.pyplot").subplots(layout="constrained")
         half = len(percent) // 2
         for low in range(half):
             high = len(percent) - 1 - low
@@ -519,34 +606,53 @@ class Campaign:
         axes.legend()
         return axes.figure
 
-    def result(self):
+    def result(self) -> Result:
         """All parts joined in memory, with the figure of the study: the :class:`Result` that :meth:`Study.run` gives, and the files that the
         command writes.
         """
         from ._core import _joined
 
         if not self.is_complete or self.failed:
-            lacks = "units that failed" if self.is_complete else "units that were not computed yet"
+            open_units = "units whose parts are damaged or missing" if self.damaged else "units that were not computed yet"
+            lacks = "units that failed" if self.is_complete else open_units
             raise CampaignError(f"{self.folder} has {lacks}: there is no whole result; read its tables instead")
-        import pyarrow.dataset  # noqa: F401
-
-        study, told = self.study, self._told()
+        study = self.study
         tables = []
         for name in study.tables:
             if name in self.tables:
                 whole = self.table(name, library="pyarrow").to_table()
                 columns = [(column, str(whole.schema.field(column).type), _plain(whole[column])) for column in whole.column_names]
                 tables.append((name, columns))
-        return _joined(study, tables, [one["told"] for _, _, one in told], self.seconds)
+        return _joined(study, tables, [batch.told["told"] for batch in self._done], self.seconds)
 
     def __repr__(self) -> str:
-        done = sum(stop - start for start, stop, _ in self._done)
-        failed = len(self.failed)
-        lost = f", {failed} failed" if failed else ""
+        done = sum(batch.stop - batch.start for batch in self._done)
+        counts = ((len(self.failed), "failed"), (self.damaged, "batches damaged"))
+        lost = "".join(f", {count} {what}" for count, what in counts if count)
         return f"<stickslip.Campaign {self.name}: {done} of {self.units} units{lost}, in {self.folder}>"
 
 
-def _plain(column):
+def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str | None:
+    """What the campaign in a folder has that differs from this one, in words; the study's file may have moved."""
+    (_, text, overrides, method), (_, our_text, our_overrides, our_method) = theirs["study"], ours["study"]
+    if theirs["version"] != ours["version"]:
+        return f"another version: {theirs['version']}, and this is {ours['version']}"
+    if text != our_text:
+        lines = itertools.zip_longest(text.splitlines(), our_text.splitlines(), fillvalue="")
+        changed = next(((line, one, other) for line, (one, other) in enumerate(lines, 1) if one != other), None)
+        where = "its lines end otherwise" if changed is None else "its line {} is `{}`, and this one's `{}`".format(*changed)
+        return f"another study: {where}"
+    if overrides != our_overrides:
+        words = ", ".join(f"{name} = {value}" for name, value in overrides) or "none of them set"
+        return f"another study: the same with other values of parameters ({words})"
+    if method != our_method:
+        return f"another study: the same by another method ({method or 'its own'})"
+    if theirs.get("matrices") != ours["matrices"]:
+        return "a study with other matrices: the files of [structure] have changed"
+    return None
+
+
+def _plain(column: Any) -> Any:
     """A column as Rust takes it: an array of numbers, or a list."""
     kind = str(column.type)
     if kind == "double":

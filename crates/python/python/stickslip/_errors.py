@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 
 class StickslipError(Exception):
     """What all exceptions of the package are."""
@@ -34,11 +37,11 @@ class StudyError(StickslipError, ValueError):
         #: What to do.
         self.help = help
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Callable[..., StudyError], tuple[str, dict[str, Any]]]:
         return (_study_error, (str(self), self.__dict__))
 
 
-def _study_error(message: str, attributes: dict) -> StudyError:
+def _study_error(message: str, attributes: dict[str, Any]) -> StudyError:
     return StudyError(message, **attributes)
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from typing import Any
+
+import numpy as np
 
 
-def plot(figure: dict, axes=None):
+def plot(figure: dict[str, Any], axes: Any = None) -> Any:
     """Draws the figure of a result, one pair of axes for each panel, and returns matplotlib's ``Figure``."""
-    import matplotlib.pyplot as plt
-    import numpy as np
-
+    plt = importlib.import_module("matplotlib.pyplot")
     panels = figure["panels"]
     if axes is None:
         columns = max(1, math.ceil(math.sqrt(len(panels))))
@@ -25,12 +27,12 @@ def plot(figure: dict, axes=None):
             raise ValueError(f"the figure has {len(panels)} panels, and there are {len(axes)} axes")
         drawing = axes[0].figure if axes else plt.figure()
     for panel, pair in zip(panels, axes):
-        _panel(panel, pair, figure.get("varied"))
+        _panel(panel, pair)
     return drawing
 
 
-def _panel(panel: dict, axes, varied) -> None:
-    labels = set()
+def _panel(panel: dict[str, Any], axes: Any) -> None:
+    labels: set[str] = set()
     for series in panel["series"]:
         # a number that does not exist interrupts a curve
         x, y, base = ([math.nan if value is None else value for value in series[key]] for key in ("x", "y", "base"))

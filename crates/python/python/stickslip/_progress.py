@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Callable
+from typing import Any
 
-def bar(name: str):
+
+def bar(name: str) -> Callable[[int, int | None], object] | None:
     """A function of the points done and of all that draws a bar; ``None`` without tqdm."""
     try:
-        from tqdm.auto import tqdm
+        tqdm = importlib.import_module("tqdm.auto").tqdm
     except ImportError:
         return None
     return _Bar(tqdm(desc=name, unit="point", leave=False))
 
 
 class _Bar:
-    def __init__(self, line) -> None:
+    def __init__(self, line: Any) -> None:
         self._line = line
 
     def __call__(self, done: int, total: int | None) -> None:

@@ -1,54 +1,105 @@
-"""Laws written in Python: force and rates as a function of arrays, with exact derivatives by dual arrays."""
+"""Laws written in Python: force and rates as a function of arrays, with exact derivatives by dual arrays (`_dual.py`)."""
 
 from __future__ import annotations
 
+import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from . import _core
+from ._dual import Dual
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from ._core import Law, Quantity
+
+    Array = NDArray[np.float64]
+
+#: Steps of difference quotients, relative to the size of an argument: the cube root of rounding, where central differences are best.
+DIFFERENCE = 1e-5
+
+
+@overload
+def rate_law(
+    function: Callable[..., Any],
+    *,
+    states: int = ...,
+    directions: int = ...,
+    parameters: Mapping[str, Quantity] | None = ...,
+    derivatives: Callable[..., Any] | None = ...,
+    scale: float | str = ...,
+    state_scale: float | str = ...,
+    odd: bool = ...,
+    passive: bool = ...,
+    name: str | None = ...,
+) -> Law: ...
+
+
+@overload
+def rate_law(
+    function: None = None,
+    *,
+    states: int = ...,
+    directions: int = ...,
+    parameters: Mapping[str, Quantity] | None = ...,
+    derivatives: Callable[..., Any] | None = ...,
+    scale: float | str = ...,
+    state_scale: float | str = ...,
+    odd: bool = ...,
+    passive: bool = ...,
+    name: str | None = ...,
+) -> Callable[[Callable[..., Any]], Law]: ...
 
 
 def rate_law(
-    function: Callable | None = None,
+    function: Callable[..., Any] | None = None,
     *,
     states: int = 0,
     directions: int = 1,
-    derivatives: Callable | None = None,
-    scale: float = math.inf,
-    state_scale: float = 1.0,
+    parameters: Mapping[str, Quantity] | None = None,
+    derivatives: Callable[..., Any] | None = None,
+    scale: float | str = math.inf,
+    state_scale: float | str = 1.0,
     odd: bool = False,
     passive: bool = False,
     name: str | None = None,
-):
+) -> Law | Callable[[Callable[..., Any]], Law]:
     """A law in rate form: ``f, dz = function(u, v, z)``.
 
     ``u`` (m) and ``v = u'`` (m/s) are arrays of n instants, of shape (n,) for one direction, else (directions, n); ``z`` has shape (states, n), in
-    your units. Return the force ``f`` (N, the shape of ``u``) and the rates ``dz`` (states, n), or ``f`` alone without states. Write them with
-    operators and NumPy's functions: derivatives are then exact, by dual arrays.
+    your units. Return the force ``f`` (N, the shape of ``u``) and the rates ``dz`` (states, n), or ``f`` alone without states; a list of rows will do
+    for an array, and a number for a row. Write them with operators and NumPy's functions, for all instants alike: derivatives are then exact, by
+    dual arrays.
 
-    ``derivatives(u, v, z)`` returns them instead: shape (directions + states, 2 directions + states, n), row by row those of ``f`` and ``dz`` by
-    ``u``, ``v`` and ``z``.
-    ``scale``: the size of its forces, N, such as a slip limit; ``state_scale``: that of its states. ``odd``: ``f(-u) = -f(u)`` for whole histories;
-    ``passive``: two motions under it never gain energy from their difference. Claim neither where you are not sure: they speed up, and wrong
-    claims make wrong orbits.
+    ``parameters``: names and values, numbers in SI or strings with units. The function gets them as keyword arguments, and ``Model.set`` and
+    ``vary`` know them as ``JOINT.NAME``.
+    ``derivatives(u, v, z)`` returns the derivatives instead: shape (directions + states, 2 directions + states, n), row by row those of ``f`` and
+    ``dz`` by ``u``, ``v`` and ``z``. :meth:`Law.check_derivatives` compares them with difference quotients.
+    ``scale``: the size of its forces, N, such as a slip limit; ``state_scale``: that of its states; each a number or the name of a parameter.
+    ``odd``: ``f(-u) = -f(u)`` for whole histories; ``passive``: two motions under it never gain energy from their difference. Claim neither where
+    you are not sure: they speed up, and wrong claims make wrong orbits.
 
     The law lives in harmonic balance, shooting and transients. Usable as a decorator.
 
     >>> import numpy as np, stickslip
-    >>> stiffness, limit = 1e4, 2.0
-    >>> @stickslip.rate_law(states=1, scale=limit, odd=True)
-    ... def dahl(u, v, z):
-    ...     return limit * z[0], (stiffness / limit * (v - abs(v) * z[0]))[None]
+    >>> @stickslip.rate_law(states=1, parameters={"stiffness": "10 N/mm", "limit": "2 N"}, scale="limit", odd=True)
+    ... def dahl(u, v, z, stiffness, limit):
+    ...     return limit * z[0], stiffness / limit * (v - abs(v) * z)
     >>> dahl
-    <stickslip.Law dahl>
+    <stickslip.Law dahl, stiffness=10000, limit=2>
+    >>> dahl.check_derivatives() < 1e-6
+    True
     """
     if function is None:
         return lambda function: rate_law(
             function,
             states=states,
             directions=directions,
+            parameters=parameters,
             derivatives=derivatives,
             scale=scale,
             state_scale=state_scale,
@@ -58,218 +109,181 @@ def rate_law(
         )
     if not callable(function):
         raise TypeError(f"a law is a function of u, v, z, found {function!r}")
-    kernel = _Kernel(function, derivatives, directions, states)
-    if odd:
-        kernel.must_be_odd(state_scale)
-    return _core._rate_law(
-        name or str(getattr(function, "__name__", "law")),
-        kernel.value,
-        kernel.linearise,
+    kernel = _Kernel(function, derivatives, directions, states, tuple(parameters or ()))
+    law = _core._rate_law(
+        name or kernel.name,
+        kernel,
         directions=directions,
         states=states,
+        parameters=dict(parameters or {}),
         state_scale=state_scale,
         scale=scale,
         odd=odd,
         passive=passive,
     )
+    if odd:
+        kernel.must_be_odd(law)
+    return law
+
+
+def _by_name(module: str, name: str) -> Any:
+    """What a module calls by this name, for pickles."""
+    found: Any = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
 
 
 class _Kernel:
-    """A law as Rust calls it: arguments (rows, n), answers (directions + states, n)."""
+    """A law as Rust calls it: arguments (rows, n) and values of parameters, answers (directions + states, n)."""
 
-    def __init__(self, function, derivatives, directions: int, states: int) -> None:
+    def __init__(
+        self, function: Callable[..., Any], derivatives: Callable[..., Any] | None, directions: int, states: int, parameters: tuple[str, ...]
+    ) -> None:
         self._function, self._derivatives = function, derivatives
-        self._directions, self._states = directions, states
+        self._directions, self._states, self._parameters = int(directions), int(states), parameters
+        self.name = str(getattr(function, "__name__", "law"))
 
-    def _call(self, u, v, z) -> list:
+    def pickled(self, law: Law) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """How a pickle finds the law: by the name of its function in a module, where it is the law, or its function."""
+        module, name = getattr(self._function, "__module__", None), getattr(self._function, "__qualname__", "")
+        try:
+            found = _by_name(module or "", name)
+        except (ImportError, AttributeError, ValueError):
+            found = None
+        if isinstance(found, _core.Law) and found._kernel is self:
+            return _renewed, (module, name, law.parameters)
+        message = f"law `{law.name}` cannot be pickled: its function must be decorated, or its law stand, at the top of a module under its own name"
+        raise _pickling_error(message)
+
+    def _call(self, u: Any, v: Any, z: Any, values: Sequence[float]) -> list[Any]:
         """The rows of forces and rates."""
         if self._directions == 1:
             u, v = u[0], v[0]
-        force, rates = self._parts(self._function(u, v, z))
-        forces = [force] if self._directions == 1 else [force[i] for i in range(self._directions)]
-        return forces + [rates[i] for i in range(self._states)]
+        force, rates = self._parts(self._function(u, v, z, **dict(zip(self._parameters, values))))
+        return self._rows(force, self._directions, "force") + self._rows(rates, self._states, "rates")
 
-    def _parts(self, answer) -> tuple:
+    def _parts(self, answer: Any) -> tuple[Any, Any]:
         """Force and rates of what the function returned."""
-        name = getattr(self._function, "__name__", "law")
         pair = answer if isinstance(answer, tuple) else (answer, ())
         if pair[0] is None:
-            raise TypeError(f"`{name}` returned None: return the force, or force and rates")
+            raise TypeError(f"`{self.name}` returned None: return the force, or force and rates")
         if len(pair) != 2 or (self._states > 0) != (answer is pair):
             wanted = f"(force, rates) for its {self._states} states" if self._states else "the force alone, as it has states=0"
-            raise TypeError(f"`{name}` must return {wanted}, and returned {len(pair) if answer is pair else 1} of them")
-        force, rates = pair
-        if hasattr(rates, "__len__") and len(rates) != self._states:
-            raise ValueError(f"`{name}` returned {len(rates)} rates for its {self._states} states")
-        return force, rates
+            raise TypeError(f"`{self.name}` must return {wanted}, and returned {len(pair) if answer is pair else 1} of them")
+        return pair[0], pair[1]
 
-    def must_be_odd(self, state_scale: float) -> None:
+    def _rows(self, answer: Any, count: int, what: str) -> list[Any]:
+        """The rows of an answer, each a number or an array of n instants."""
+        if isinstance(answer, (list, tuple)):
+            rows = list(answer)
+            if count == 1 and rows and all(np.ndim(row) == 0 for row in rows):
+                rows = [np.asarray(rows, float)]
+        else:
+            array = answer if isinstance(answer, Dual) else np.asarray(answer, float)
+            if array.ndim <= 1 and count == 1:
+                return [array]
+            rows = [array[i] for i in range(len(array))] if array.ndim == 2 else [array]
+        if len(rows) != count:
+            raise ValueError(f"`{self.name}` returned {len(rows)} {what} for its {count} {'states' if what == 'rates' else 'directions'}")
+        return rows
+
+    def must_be_odd(self, law: Law) -> None:
         """Tries the claim at some instants: who is not odd there is not odd."""
         n, shape = 13, (self._directions, 13)
         size = np.logspace(-6.0, 0.0, n)
         u, v = size * np.where(np.arange(n) % 2, 1.0, -1.0) + np.zeros(shape), 10.0 * size[::-1] + np.zeros(shape)
-        z = state_scale * np.linspace(-0.9, 0.7, n) + np.zeros((self._states, n))
+        z = law._state_scale * np.linspace(-0.9, 0.7, n) + np.zeros((self._states, n))
+        values = tuple(law.parameters.values())
         with np.errstate(all="ignore"):
-            there, back = self.value(u, v, z)[0], self.value(-u, -v, -z)[0]
+            there, back = self.value(u, v, z, values)[0], self.value(-u, -v, -z, values)[0]
         if not np.allclose(back, -there, rtol=1e-9, atol=1e-12 * np.nanmax(np.abs(there), initial=0.0), equal_nan=True):
-            name = getattr(self._function, "__name__", "law")
-            raise ValueError(f"`{name}` is not odd: its answer to -u, -v, -z is not the negative one; leave out odd=True")
+            raise ValueError(f"`{self.name}` is not odd: its answer to -u, -v, -z is not the negative one; leave out odd=True")
 
-    def value(self, u, v, z):
-        rows = self._call(u, v, z)
-        n = u.shape[1]
-        return (np.stack([np.broadcast_to(np.asarray(row, float), (n,)) for row in rows]),)
+    def value(self, u: Array, v: Array, z: Array, values: Sequence[float]) -> tuple[Array]:
+        rows = self._call(u, v, z, values)
+        out = np.empty((len(rows), u.shape[1]))
+        for into, row in zip(out, rows):
+            into[...] = row.value if isinstance(row, Dual) else row
+        return (out,)
 
-    def linearise(self, u, v, z):
-        n, arguments = u.shape[1], 2 * self._directions + self._states
-        rows = self._directions + self._states
+    def linearise(self, u: Array, v: Array, z: Array, values: Sequence[float]) -> tuple[Array, Array]:
+        n, d = u.shape[1], self._directions
+        arguments, rows = 2 * d + self._states, d + self._states
         if self._derivatives is not None:
-            values = self.value(u, v, z)[0]
-            inner = (u[0], v[0]) if self._directions == 1 else (u, v)
-            slopes = np.asarray(self._derivatives(*inner, z), float)
-            return values, np.broadcast_to(slopes, (rows, arguments, n)).reshape(rows * arguments, n)
-        seeds = np.eye(arguments)[:, :, None]
-        duals = [Dual(value, seed + np.zeros(n)) for value, seed in zip([*u, *v, *z], seeds)]
-        d = self._directions
-        answers = self._call(DualRows(duals[:d]), DualRows(duals[d : 2 * d]), DualRows(duals[2 * d :]))
-        values, slopes = np.empty((rows, n)), np.zeros((rows, arguments, n))
-        for row, answer in enumerate(answers):
+            inner = (u[0], v[0]) if d == 1 else (u, v)
+            given = np.asarray(self._derivatives(*inner, z, **dict(zip(self._parameters, values))), float)
+            return self.value(u, v, z, values)[0], np.broadcast_to(given, (rows, arguments, n)).reshape(rows * arguments, n)
+        duals = Dual.seeded(np.concatenate([u, v, z]))
+        out, slopes = np.empty((rows, n)), np.zeros((rows, arguments, n))
+        for row, answer in enumerate(self._call(duals[:d], duals[d : 2 * d], duals[2 * d :], values)):
             if isinstance(answer, Dual):
-                values[row], slopes[row] = answer.value, answer.slope
+                out[row], slopes[row] = answer.value, answer.slope
             else:
-                values[row] = np.asarray(answer, float)  # it depends on nothing
-        return values, slopes.reshape(rows * arguments, n)
+                out[row] = np.asarray(answer, float)  # it depends on nothing
+        return out, slopes.reshape(rows * arguments, n)
+
+    def check_derivatives(self, law: Law, u: ArrayLike | None, v: ArrayLike | None, z: ArrayLike | None, tolerance: float) -> float:
+        """The largest error of a derivative, see `Law.check_derivatives`."""
+        instants = self._instants(law, u, v, z)
+        n, d, m = instants.shape[1], self._directions, self._states
+        values = tuple(law.parameters.values())
+
+        def split(arguments: Array) -> tuple[Array, Array, Array]:
+            return arguments[:d], arguments[d : 2 * d], arguments[2 * d :]
+
+        out, slopes = self.linearise(*split(instants), values)
+        slopes = slopes.reshape(d + m, 2 * d + m, n)
+        worst = (0.0, "")
+        for argument in range(2 * d + m):
+            step = np.zeros_like(instants)
+            step[argument] = DIFFERENCE * np.max(np.abs(instants[argument]))
+            width = (instants + step)[argument] - (instants - step)[argument]
+            ahead, behind = self.value(*split(instants + step), values)[0], self.value(*split(instants - step), values)[0]
+            quotient = (ahead - behind) / width
+            # what rounding makes of a quotient
+            rounding = 10.0 * np.finfo(float).eps * np.abs(out).max(axis=1, keepdims=True) / width
+            size = np.maximum(np.abs(slopes[:, argument]), np.abs(quotient)).max(axis=1, keepdims=True)
+            error = np.maximum(np.abs(slopes[:, argument] - quotient) - rounding, 0.0) / np.where(size > 0.0, size, 1.0)
+            row, at = np.unravel_index(np.argmax(np.where(np.isnan(error), np.inf, error)), error.shape)
+            if not error[row, at] <= worst[0]:
+                names = (self._row_name(int(row)), self._argument_name(argument))
+                where = f"{names[0]} by {names[1]} is {slopes[row, argument, at]:.6g}, and differences have {quotient[row, at]:.6g}"
+                worst = (float(error[row, at]), f"{where}, at u = {instants[0, at]:.4g} m, v = {instants[d, at]:.4g} m/s")
+        if not worst[0] <= tolerance:
+            raise ValueError(f"the derivative of `{self.name}` is wrong: {worst[1]}")
+        return worst[0]
+
+    def _instants(self, law: Law, u: ArrayLike | None, v: ArrayLike | None, z: ArrayLike | None) -> Array:
+        """Arguments (rows, n): those that are given, and others drawn at random."""
+        n = max([1] + [np.asarray(given).shape[-1] for given in (u, v, z) if given is not None and np.ndim(given)])
+        n = n if n > 1 else 64
+        random = np.random.default_rng(1)
+        sizes = ((u, self._directions, 1e-3), (v, self._directions, 1.0), (z, self._states, 0.9 * law._state_scale))
+        rows = []
+        for given, count, size in sizes:
+            drawn = size * random.uniform(0.1, 1.0, (count, n)) * random.choice([-1.0, 1.0], (count, n))
+            rows.append(drawn if given is None else np.broadcast_to(np.asarray(given, float), (count, n)))
+        return np.concatenate(rows)
+
+    def _row_name(self, row: int) -> str:
+        if row >= self._directions:
+            return f"rate {row - self._directions}"
+        return "the force" if self._directions == 1 else f"force {row}"
+
+    def _argument_name(self, argument: int) -> str:
+        d = self._directions
+        if argument >= 2 * d:
+            return f"z[{argument - 2 * d}]"
+        name = "u" if argument < d else "v"
+        return name if d == 1 else f"{name}[{argument % d}]"
 
 
-class DualRows:
-    """Some dual arrays, by their number."""
-
-    def __init__(self, rows: list) -> None:
-        self._rows = rows
-
-    def __getitem__(self, index):
-        return self._rows[index] if not isinstance(index, tuple) else self._rows[index[0]][index[1:]]
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __iter__(self):
-        return iter(self._rows)
+def _renewed(module: str, name: str, parameters: dict[str, float]) -> Law:
+    """The law of a pickle, with the values that it had."""
+    law: Law = _by_name(module, name)
+    return law._with(parameters)
 
 
-#: Derivatives of functions of one argument x, from x and their value y.
-_ONE = {
-    np.negative: lambda x, y: -1.0,
-    np.positive: lambda x, y: 1.0,
-    np.absolute: lambda x, y: np.sign(x),
-    np.fabs: lambda x, y: np.sign(x),
-    np.sign: lambda x, y: 0.0,
-    np.square: lambda x, y: 2.0 * x,
-    np.sqrt: lambda x, y: 0.5 / y,
-    np.cbrt: lambda x, y: 1.0 / (3.0 * y * y),
-    np.reciprocal: lambda x, y: -y * y,
-    np.exp: lambda x, y: y,
-    np.expm1: lambda x, y: y + 1.0,
-    np.log: lambda x, y: 1.0 / x,
-    np.log1p: lambda x, y: 1.0 / (1.0 + x),
-    np.sin: lambda x, y: np.cos(x),
-    np.cos: lambda x, y: -np.sin(x),
-    np.tan: lambda x, y: 1.0 + y * y,
-    np.arcsin: lambda x, y: 1.0 / np.sqrt(1.0 - x * x),
-    np.arccos: lambda x, y: -1.0 / np.sqrt(1.0 - x * x),
-    np.arctan: lambda x, y: 1.0 / (1.0 + x * x),
-    np.sinh: lambda x, y: np.cosh(x),
-    np.cosh: lambda x, y: np.sinh(x),
-    np.tanh: lambda x, y: 1.0 - y * y,
-    np.arcsinh: lambda x, y: 1.0 / np.sqrt(1.0 + x * x),
-}
-
-
-def _power(x, n, y):
-    with np.errstate(divide="ignore", invalid="ignore"):
-        by_base = np.where(n == 0, 0.0, n * np.power(x, np.where(n == 0, 1.0, n - 1.0)))
-        by_exponent = np.where(x > 0, y * np.log(np.where(x > 0, x, 1.0)), 0.0)
-    return by_base, by_exponent
-
-
-#: Derivatives of functions of two arguments by both, from the arguments and their value.
-_TWO = {
-    np.add: lambda a, b, y: (1.0, 1.0),
-    np.subtract: lambda a, b, y: (1.0, -1.0),
-    np.multiply: lambda a, b, y: (b, a),
-    np.divide: lambda a, b, y: (1.0 / b, -y / b),
-    np.power: _power,
-    np.float_power: _power,
-    np.arctan2: lambda a, b, y: (b / (a * a + b * b), -a / (a * a + b * b)),
-    np.hypot: lambda a, b, y: (a / y, b / y),
-    np.maximum: lambda a, b, y: (np.where(a >= b, 1.0, 0.0), np.where(a >= b, 0.0, 1.0)),
-    np.minimum: lambda a, b, y: (np.where(a <= b, 1.0, 0.0), np.where(a <= b, 0.0, 1.0)),
-    np.copysign: lambda a, b, y: (np.sign(a) * np.where(np.signbit(b), -1.0, 1.0), 0.0),
-}
-
-#: Functions without a derivative, of which the value is what is asked for.
-_PLAIN = {
-    np.greater,
-    np.greater_equal,
-    np.less,
-    np.less_equal,
-    np.equal,
-    np.not_equal,
-    np.isfinite,
-    np.isnan,
-    np.signbit,
-}
-
-
-class Dual(np.lib.mixins.NDArrayOperatorsMixin):
-    """Values of shape (n,) with their derivatives by some arguments, (arguments, n)."""
-
-    __array_priority__ = 1000
-
-    def __init__(self, value, slope) -> None:
-        self.value, self.slope = value, slope
-
-    @property
-    def shape(self):
-        return np.shape(self.value)
-
-    def __len__(self) -> int:
-        return len(self.value)
-
-    def __getitem__(self, index):
-        if index is None or index == (None,) or index == (None, slice(None)):
-            return DualRows([self])
-        if index is Ellipsis or index == slice(None):
-            return self
-        raise TypeError("a law acts on all instants alike: it takes none of them out of an array; use numpy.where")
-
-    def __array_ufunc__(self, function, method, *inputs, **options):
-        if method != "__call__" or options:
-            return NotImplemented
-        values = [one.value if isinstance(one, Dual) else np.asarray(one) for one in inputs]
-        value = function(*values)
-        if function in _PLAIN:
-            return value
-        if function in _ONE:
-            factors = (_ONE[function](*values, value),)
-        elif function in _TWO:
-            factors = _TWO[function](*values, value)
-        else:
-            raise TypeError(f"no derivative of numpy.{function.__name__} is known: give the law's `derivatives`")
-        slope = sum(factor * one.slope for factor, one in zip(factors, inputs) if isinstance(one, Dual))
-        return Dual(value, slope)
-
-    def __array_function__(self, function, types, arguments, options):
-        if function is np.where and len(arguments) == 3 and not options:
-            condition, *both = arguments
-            values = [one.value if isinstance(one, Dual) else one for one in both]
-            slopes = [one.slope if isinstance(one, Dual) else 0.0 for one in both]
-            return Dual(np.where(condition, *values), np.where(condition, *slopes))
-        if function is np.clip and len(arguments) == 3 and not options:
-            value, low, high = arguments
-            return np.minimum(np.maximum(value, low), high)
-        if function in (np.stack, np.array, np.vstack) and len(arguments) == 1 and not options:
-            return DualRows(list(arguments[0]))
-        if function in (np.zeros_like, np.ones_like):
-            return function(self.value)
-        raise TypeError(f"no derivative of numpy.{function.__name__} is known: give the law's `derivatives`")
+def _pickling_error(message: str) -> Exception:
+    return importlib.import_module("pickle").PicklingError(message)  # type: ignore[no-any-return]

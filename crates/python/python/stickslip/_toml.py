@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def text(tables: Mapping) -> str:
+def text(tables: Mapping[str, Any]) -> str:
     """The text of a study file with these tables and keys.
 
     >>> print(text({"schema": 1, "parameters": {"Ft": "2 N"}, "mass": [{"name": "a", "mass": 0.1}]}), end="")
@@ -32,7 +33,7 @@ def text(tables: Mapping) -> str:
     return "\n".join([*lines, *below, ""])
 
 
-def _entries(table: Mapping) -> list[str]:
+def _entries(table: Mapping[str, Any]) -> list[str]:
     return [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
 
 
@@ -40,7 +41,7 @@ def _key(key: str) -> str:
     return key if _BARE.fullmatch(key) else _text(key)
 
 
-def _is_list(value) -> bool:
+def _is_list(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str)
 
 
@@ -49,7 +50,7 @@ def _text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _value(value) -> str:
+def _value(value: Any) -> str:
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, Mapping):
