@@ -60,41 +60,6 @@ def test_the_package_holds_the_strictest_types(tmp_path):
     package = shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "stickslip", ignore=shutil.ignore_patterns("*.so", "*.pyd"))
     out, errors, status = api.run(["--strict", "--no-incremental", str(package)])
     assert status == 0, out + errors
-    use = tmp_path / "use.py"
-    use.write_text(USE)
-    out, errors, status = api.run(["--strict", "--no-incremental", str(use)])
-    assert status == 0, out + errors
-
-
-USE = """
-import numpy as np
-import stickslip
-from stickslip.statistics import exceedance, first_order, sobol
-
-model = stickslip.Model()
-model.mass("a", np.float64(1.0), directions=["x", "y"])
-model.spring("a.x", "ground", stiffness=1, damping="1 kg/s")
-model.force("a.x", np.int64(3), harmonic=np.int64(1))
-table: stickslip.Table = model.response([1, np.float32(2.0), "3 Hz"], vary={"a.mass": [1.0, 2.0, 3.0]})["curve"]
-numbers = [float(value) for value in table["frequency_Hz"]]
-names: list[str] = list(table)
-shares = exceedance(numbers, 2.0) + exceedance([1, 2, 3], [2, 3])
-indices: dict[str, np.typing.NDArray[np.float64]] = sobol(lambda p: p[:, 0], [(0, 1)], count=8)
-index: float = first_order([1, 2], np.array([1, 2]))
-
-
-@stickslip.rate_law(states=1, parameters={"limit": "2 N"}, scale="limit")
-def law(u: object, v: object, z: object, limit: float) -> object:
-    return u
-
-
-model.joint("j", "a", "ground", law)
-study = stickslip.Study.from_template("element", Ft=np.float64(2.0))
-done: stickslip.Campaign = stickslip.campaign(study, out="c", processes=np.int64(2), seconds=1, progress=lambda done, total: print(done))
-failed: dict[int, str] = done.failed
-result: stickslip.Result = done.result()
-grid, bands = done.percentiles("a_m", by="b")
-"""
 
 
 def test_the_types_hold(tmp_path):
