@@ -3,10 +3,10 @@
 /// A mode of the linear structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearMode {
-    /// Undamped natural frequency, rad/s.
+    /// Undamped natural frequency, rad/s; where the damping has a gyroscopic part that of free vibration, `Im λ`.
     pub omega: f64,
     /// Damping ratio `φᵀCφ / (2ω φᵀMφ)`: exact where damping does not couple the modes, and to first order where it is
-    /// light.
+    /// light. Where the damping has a gyroscopic part, `-Re λ / |λ|`.
     pub damping: f64,
 }
 

@@ -3,8 +3,8 @@
 
 use super::loose::Groups;
 use super::{LinearMode, Modes};
-use crate::structure::Matrices;
 use crate::structure::reduction::natural;
+use crate::structure::{Matrices, free_vibrations};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use stickslip_numerics::eigen;
 
@@ -21,6 +21,8 @@ pub(super) struct Linear {
     pub(super) modes: Modes,
     /// Shapes of the elastic modes with `φᵀMφ = 1`, one column each; none if some stiffnesses had to count as rigid.
     pub(super) shapes: Option<DMatrix<f64>>,
+    /// Whether the damping has a gyroscopic part: modes are then those of free vibration, and shapes those without it.
+    pub(super) turning: bool,
 }
 
 /// An eigenvalue below this share of the largest has fewer than six digits left; then the stiffest springs count as
@@ -40,14 +42,22 @@ const ZERO: f64 = 1e-12;
 /// 500, with the third power.
 pub(super) const LARGEST: usize = 700;
 
-impl Linear {
-    /// The modes of a structure with springs at joints, and constraints `Σ w x = 0`.
-    pub(super) fn of_matrices(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
+/// A structure in its modes without damping, `q'' + D q' + Λ q`.
+struct Modal {
+    /// Λ, squares of frequencies, rising.
+    squares: Vec<f64>,
+    /// Of which so many are free motions.
+    free: usize,
+    shapes: DMatrix<f64>,
+    damping: DMatrix<f64>,
+}
+
+impl Modal {
+    fn new(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Option<Modal> {
         let n = full.mass.nrows();
         let order: Vec<usize> = (0..n).collect();
         let basis = Basis::new(n, &order, rigid);
-        let r = basis.kept.len();
-        let mut turn = DMatrix::zeros(n, r);
+        let mut turn = DMatrix::zeros(n, basis.kept.len());
         for (row, parts) in basis.rows.iter().enumerate() {
             parts.iter().for_each(|(column, weight)| turn[(row, *column)] += weight);
         }
@@ -57,20 +67,63 @@ impl Linear {
         let mut damping = full.damping.clone();
         links.iter().for_each(|link| add(&mut damping, &link.at, link.damping));
         let (mass, damping, stiffness) = (part(&full.mass), part(&damping), part(&stiffness));
-        let Some((values, shapes)) = natural(&mass, &stiffness) else {
-            return Linear { modes: Modes { lost: r, ..Modes::default() }, shapes: None };
-        };
+        let (mut squares, shapes) = natural(&mass, &stiffness)?;
         // what has no mass follows the rest, and has no mode
-        let finite = values.partition_point(|value| value.is_finite());
-        let usual = values[finite / 2..finite].first().copied().unwrap_or(0.0);
-        let free = values[..finite].partition_point(|value| *value < FREE * usual);
-        let forces = &damping * shapes.columns(free, finite - free);
-        let mode = |k: usize| {
-            let omega = values[k].max(0.0).sqrt();
-            LinearMode { omega, damping: shapes.column(k).dot(&forces.column(k - free)) / (2.0 * omega) }
-        };
-        let modes = Modes { elastic: (free..finite).map(mode).collect(), rigid: free, lost: 0 };
-        Linear { modes, shapes: Some(turn * shapes.columns(free, finite - free)) }
+        squares.truncate(squares.partition_point(|value| value.is_finite()));
+        let usual = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
+        let free = squares.partition_point(|value| *value < FREE * usual);
+        let shapes = shapes.columns(0, squares.len()).into_owned();
+        let damping = shapes.tr_mul(&(damping * &shapes));
+        Some(Modal { squares, free, shapes: turn * shapes, damping })
+    }
+
+    fn elastic_shapes(&self) -> DMatrix<f64> {
+        self.shapes.columns(self.free, self.squares.len() - self.free).into_owned()
+    }
+
+    /// Without what turns velocities.
+    fn mode(&self, k: usize) -> LinearMode {
+        let omega = self.squares[k].max(0.0).sqrt();
+        LinearMode { omega, damping: self.damping[(k, k)] / (2.0 * omega) }
+    }
+
+    fn linear(self) -> Linear {
+        let elastic = (self.free..self.squares.len()).map(|k| self.mode(k)).collect();
+        let modes = Modes { elastic, rigid: self.free, lost: 0 };
+        Linear { modes, shapes: Some(self.elastic_shapes()), turning: false }
+    }
+
+    /// Free vibration where the damping has a gyroscopic part; `None` if it has none. Beyond the 200 lowest modes that part is left out.
+    fn turning(&self) -> Option<Vec<LinearMode>> {
+        let n = self.squares.len().min(200);
+        let found = free_vibrations(&self.squares[..n], &self.damping.view((0, 0), (n, n)).into_owned())?;
+        let found = found.into_iter().map(|one| LinearMode { omega: one.omega, damping: one.damping });
+        let mut elastic: Vec<LinearMode> = found.chain((n..self.squares.len()).map(|k| self.mode(k))).collect();
+        elastic.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        Some(elastic)
+    }
+}
+
+impl Linear {
+    /// The modes of a structure with springs at joints, and constraints `Σ w x = 0`: of one with a gyroscopic matrix those of free vibration.
+    pub(super) fn of_matrices(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
+        let Some(modal) = Modal::new(full, links, rigid) else { return Linear::unknown(full) };
+        match modal.turning() {
+            Some(elastic) => {
+                let modes = Modes { elastic, rigid: modal.free, lost: 0 };
+                Linear { modes, shapes: Some(modal.elastic_shapes()), turning: true }
+            }
+            None => modal.linear(),
+        }
+    }
+
+    /// The same of a structure in a travelling wave, twice its size, without what turns velocities.
+    pub(super) fn of_wave(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
+        Modal::new(full, links, rigid).map_or_else(|| Linear::unknown(full), |modal| modal.linear())
+    }
+
+    fn unknown(full: &Matrices) -> Linear {
+        Linear { modes: Modes { lost: full.mass.nrows(), ..Modes::default() }, shapes: None, turning: false }
     }
 
     /// The modes of masses (zero where a place has none) on links, with constraints `Σ w x = 0`.
@@ -83,7 +136,7 @@ impl Linear {
             let shapes = total.shapes(expected);
             let lowest = elastic.len() - expected; // rounding may give a rigid motion a frequency
             let modes = Modes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, lost: 0 };
-            return Linear { modes, shapes: Some(shapes) };
+            return Linear { modes, shapes: Some(shapes), turning: false };
         }
         // some modes are too far below the stiffest springs: those springs count as rigid for them
         let mut high = elastic;
@@ -118,7 +171,7 @@ impl Linear {
             }
         }
         let lost = expected - high.len();
-        Linear { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None }
+        Linear { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None, turning: false }
     }
 }
 

@@ -60,7 +60,7 @@ impl Model {
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
         if system.dofs() > LARGEST {
             let lost = system.dofs();
-            let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None };
+            let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None, turning: false };
             let (free, stuck) = (unknown(), unknown());
             return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
         }

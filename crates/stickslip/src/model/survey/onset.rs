@@ -98,7 +98,8 @@ impl Survey {
 
     /// The loads of all joints in mode `index` of a modal amplitude of one, as shares of what they stick up to.
     fn mode_shares(&self, index: usize) -> Option<Vec<f64>> {
-        let shapes = self.stuck.shapes.as_ref()?;
+        // shapes of free vibration are others where the structure turns velocities
+        let shapes = self.stuck.shapes.as_ref().filter(|_| !self.stuck.turning)?;
         let omega = self.stuck.modes.elastic.get(index)?.omega;
         let shape = shapes.column(index).into_owned();
         let motion = |joint: &Stuck| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();

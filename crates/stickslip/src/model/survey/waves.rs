@@ -291,8 +291,8 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
         let modes = |links: &[Link], rigid: &[Row]| -> Option<Once> {
             if structure.dofs() <= LARGEST {
                 let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-                let Linear { modes, shapes } =
-                    Linear::of_matrices(structure.full(), &links.iter().collect::<Vec<_>>(), &rigid);
+                let Linear { modes, shapes, .. } =
+                    Linear::of_wave(structure.full(), &links.iter().collect::<Vec<_>>(), &rigid);
                 return Some(turned.once(modes, shapes, lowest, &|x| &structure.full().mass * x));
             }
             if !rigid.is_empty() {
