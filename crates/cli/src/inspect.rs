@@ -106,7 +106,9 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
         match chosen(&square) {
             Ok((stiffness, mass, why)) => {
                 let _ = writeln!(text, "{} as stiffness, {} as mass, {why}", stiffness.name, mass.name);
-                text += &match Pair::new(stiffness, mass, beside.as_deref()) {
+                let of_damping: Vec<&Named> = square.iter().filter(|named| named.role == Some(Role::Damping)).collect();
+                let damping = Some(&of_damping[..]).filter(|all| all.len() == 1).map(|all| all[0]);
+                text += &match Pair::new(stiffness, mass, damping, beside.as_deref()) {
                     Ok(pair) => pair.to_string(),
                     Err(why) => format!("  no frequencies: {why}\n"),
                 };
@@ -212,18 +214,27 @@ struct Pair {
     constrained: usize,
     /// The lowest angular frequencies, or why there are none.
     frequencies: Result<Vec<f64>, String>,
+    /// Those of free vibration, where a damping matrix has a gyroscopic part.
+    turning: Option<Vec<f64>>,
     /// Along every direction that names of rows have: the mass, in its units.
     mass: Vec<(&'static str, f64)>,
 }
 
 impl Pair {
     /// Of rows with names of their own, else those `beside` them. Why they are no pair, otherwise.
-    fn new(stiffness: &Named, mass: &Named, beside: Option<&[String]>) -> Result<Pair, String> {
+    fn new(
+        stiffness: &Named,
+        mass: &Named,
+        damping: Option<&Named>,
+        beside: Option<&[String]>,
+    ) -> Result<Pair, String> {
         let of_mass = match mass.matrix.names() {
             Some(_) => Cow::Owned(aligned(mass.matrix.clone(), &stiffness.matrix).map_err(|error| error.to_string())?),
             None => Cow::Borrowed(&mass.matrix),
         };
         let rows = stiffness.matrix.rows();
+        let of_damping = damping.and_then(|damping| aligned(damping.matrix.clone(), &stiffness.matrix).ok());
+        let of_damping = of_damping.filter(|damping| damping.rows() == rows);
         if of_mass.rows() != rows {
             let (stiffness, mass, other) = (&stiffness.name, &mass.name, of_mass.rows());
             return Err(format!("{stiffness} as stiffness has {rows} rows, and {mass} as mass {other}"));
@@ -239,9 +250,11 @@ impl Pair {
         let (stiffness, mass) = pair.ok_or_else(|| "an entry is not finite".to_owned())?;
         let along = |along| Some((along, mass_along(&names, &mass, along)?));
         let along = DIRECTIONS.into_iter().filter_map(along).collect();
-        let component = Component::new(names, mass, None, stiffness).map_err(|error| error.to_string());
+        let damping = of_damping.and_then(|damping| converted(&damping, &out));
+        let component = Component::new(names, mass, damping, stiffness).map_err(|error| error.to_string());
+        let turning = component.as_ref().ok().and_then(|component| component.free_vibration(LOWEST).ok().flatten());
         let lowest = component.and_then(|component| component.frequencies(LOWEST).map_err(|error| error.to_string()));
-        Ok(Pair { constrained: out.len(), frequencies: lowest, mass: along })
+        Ok(Pair { constrained: out.len(), frequencies: lowest, turning, mass: along })
     }
 }
 
@@ -263,6 +276,10 @@ impl fmt::Display for Pair {
                 }
             }
             Err(error) => writeln!(f, "  no frequencies: {error}")?,
+        }
+        if let Some(turning) = &self.turning {
+            let hertz: Vec<String> = turning.iter().map(|omega| format!("{:.6e}", omega / TAU)).collect();
+            writeln!(f, "  with the gyroscopic part of the damping: {} (times in seconds)", hertz.join(", "))?;
         }
         let Some(&(_, first)) = self.mass.first() else {
             return writeln!(

@@ -6,7 +6,7 @@ use super::reduction::{
     Damping, Deviation, EXTENTS, Free, Lacking, Mixed, NominalRing, Reduce, Reduced, ReducedSector, Reduction,
     ReductionError, ReductionKind, Reference, RingModes, Row, STEPS, Whole,
 };
-use super::{DampedModes, StructureError, symmetric};
+use super::{DampedModes, StructureError, free_vibrations, symmetric};
 use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -234,6 +234,35 @@ impl Component {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
         let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count))?;
         Ok(natural(&modes))
+    }
+
+    /// The lowest frequencies of free vibration, rad/s, rising, where its damping has a gyroscopic part; `None` if it has none. Modes beyond four
+    /// times as many are left out.
+    ///
+    /// # Errors
+    /// [`ReductionError::Modes`].
+    ///
+    /// # Example
+    /// A shaft in two directions: `ω = g/2 ± sqrt(g²/4 + ω₀²)`.
+    /// ```
+    /// use stickslip::structure::Component;
+    /// use stickslip_numerics::sparse::Matrix;
+    /// let diagonal = |value: f64| Matrix::from_triplets(2, [(0, 0, value), (1, 1, value)]);
+    /// let turning = Matrix::from_triplets(2, [(0, 1, 6.0), (1, 0, -6.0)])?;
+    /// let shaft = Component::new(vec![String::new(); 2], diagonal(1.0)?, Some(turning), diagonal(16.0)?)?;
+    /// let found = shaft.free_vibration(2)?.unwrap();
+    /// assert!((found[0] - 2.0).abs() < 1e-12 && (found[1] - 8.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn free_vibration(&self, count: usize) -> Result<Option<Vec<f64>>, ReductionError> {
+        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        let Some(damping) = self.matrices().1.filter(|damping| damping.asymmetry(0.0).is_some()) else {
+            return Ok(None);
+        };
+        let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count.saturating_mul(4)))?;
+        let products = columns::products(self.dofs(), &modes.shapes, &damping.times_columns(&modes.shapes));
+        let found = free_vibrations(&modes.values, &products);
+        Ok(found.map(|found| found.iter().take(count).map(|one| one.omega).collect()))
     }
 
     /// How many natural modes it has below `omega` (rad/s), by one factorisation, which is made once for all that ask the same; `None` if that is
