@@ -70,7 +70,8 @@ fn a_chain_of_three_from_every_file() {
         let checked = checked(&[("K", &content), ("mass.mtx", mass_file)], &text);
         close(&frequencies(&checked), &[2.239861, 6.275950, 9.069011], 3e-7);
         let data = run(&checked);
-        close(&column(&data, "peaks", "frequency_Hz"), &[2.2395889], 1e-7);
+        // a maximum is flat: where it is has half the digits of its height
+        close(&column(&data, "peaks", "frequency_Hz"), &[2.2395889], 1e-6);
         close(&column(&data, "peaks", "amplitude_m"), &[0.1371246], 5e-7);
     }
 }
@@ -131,7 +132,8 @@ fn gyroscopic_coupling_in_the_damping() {
     close(&column(&data, "peaks", "amplitude_m"), &[24.25485e-6], 3e-7);
     let campbell =
         "[study]\nkind = \"campbell\"\nspeed = { from = \"10 Hz\", to = \"20 Hz\", points = 2 }\nmodes = 2\n";
-    let data = run(&checked(&files, &format!("{structure}{campbell}")));
+    let whole = structure.replace("[[place]]", "reduce = false\n[[place]]");
+    let data = run(&checked(&files, &format!("{whole}{campbell}")));
     let mut found = column(&data, "campbell", "frequency_Hz");
     found.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-9);
     assert!(found.iter().any(|f| (f / 66.55715407 - 1.0).abs() < 1e-9), "{found:?}");

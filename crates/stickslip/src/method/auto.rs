@@ -75,6 +75,8 @@ impl Auto {
             balance("one of equal sectors is solved".to_owned())
         } else if massless {
             balance("a place has no mass".to_owned())
+        } else if !system.structure().has_definite_mass() {
+            balance("some motion has no mass".to_owned())
         } else if let Some(events) = events {
             if events > DEAREST || events > harmonic_balance::orbit_work(system) {
                 let sizes = format!("{} degrees of freedom and {joints} joints", system.dofs());

@@ -359,6 +359,14 @@ impl Structure {
         }
     }
 
+    /// Whether every motion has kinetic energy, to rounding: the mass matrix is positive definite.
+    pub fn has_definite_mass(&self) -> bool {
+        match &self.0.form {
+            Form::Full(full) => semidefinite(&full.mass) == Some(self.dofs()),
+            Form::Sparse { mass, .. } => sparse_definite(mass) == Some(true),
+        }
+    }
+
     /// The largest magnitudes in the matrices of mass (kg), damping (kg/s) and stiffness (N/m).
     pub fn largest(&self) -> [f64; 3] {
         self.0.largest
