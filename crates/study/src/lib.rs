@@ -42,6 +42,7 @@ pub mod run;
 mod sample;
 pub mod schema;
 mod sector;
+mod start;
 mod stated;
 mod statement;
 mod stiffened;

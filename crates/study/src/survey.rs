@@ -2,7 +2,8 @@
 
 use crate::error::StudyError;
 use crate::study::{Case, Study};
-use stickslip::model::Survey;
+use stickslip::method::StaticEquilibrium;
+use stickslip::model::{Survey, System};
 
 /// A case and what is known of its model.
 #[derive(Debug)]
@@ -15,7 +16,9 @@ impl Surveyed {
     /// Case `index` of a study.
     pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
         let case = study.case(index)?;
-        let survey = case.model.survey();
+        // faces that a constant load presses are pressed
+        let forces = |system: &System| Some(StaticEquilibrium::under_load(system)?.forces());
+        let survey = case.model.survey_under_load(&forces);
         let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
         Ok(Surveyed { case, survey })
     }

@@ -211,6 +211,7 @@ fn theory_7_free_decay() {
     let motion = TimeHistory {
         displacement: vec![x0],
         velocity: vec![0.0],
+        states: Vec::new(),
         excitation: Excitation::Free,
         duration: 20.0 * half,
         step: half,

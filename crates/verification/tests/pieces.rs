@@ -36,6 +36,7 @@ fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
     let motion = TimeHistory {
         displacement: vec![start],
         velocity: vec![0.0],
+        states: Vec::new(),
         excitation: Excitation::Free,
         duration,
         step,
@@ -486,6 +487,7 @@ fn rigid_contacts_side_by_side_start_as_one() {
                 let motion = TimeHistory {
                     displacement: vec![0.0; 2],
                     velocity: vec![0.0; 2],
+                    states: Vec::new(),
                     excitation: Excitation::Steady(TAU * 6.0),
                     duration: 2.0,
                     step: 0.01371,
@@ -535,6 +537,7 @@ fn creeping_to_a_stop_is_no_chatter() {
                 let motion = TimeHistory {
                     displacement: vec![1.0],
                     velocity: vec![0.0],
+                    states: Vec::new(),
                     excitation: Excitation::Steady(1.0),
                     duration: 2000.0,
                     step: 10.0,

@@ -11,7 +11,9 @@
 //! with an arctangent slider has no limit for its rate as the load goes to zero.
 
 use super::plane;
-use super::{Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Reach, Step, StepLaw, StepSlopes, TANGENTS};
+use super::{
+    Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Reach, SharedLaw, Step, StepLaw, StepSlopes, TANGENTS,
+};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -90,6 +92,9 @@ impl Law for FrictionContact {
     }
     fn normal(&self) -> Option<usize> {
         Some(self.tangents)
+    }
+    fn pressed_by(&self, force: f64) -> Option<SharedLaw> {
+        (self.preload <= 0.0).then(|| Arc::new(FrictionContact { preload: force, ..*self }) as SharedLaw)
     }
     fn closed(&self) -> Option<Vec<f64>> {
         Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())

@@ -4,7 +4,7 @@
 //! The force has a kink where the faces meet, and no more than one value anywhere: no impact law is needed.
 //! Source: den Hartog, "Mechanical Vibrations" (1956), Sec. 8.11; Shaw and Holmes, "A periodically forced piecewise linear oscillator" (1983).
 
-use super::{Contact, Law, LawInfo, Parameter, Piece, Range, Rate, RateLaw, Relative};
+use super::{Contact, Law, LawInfo, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -53,6 +53,9 @@ impl Law for Gap {
     }
     fn normal(&self) -> Option<usize> {
         Some(0)
+    }
+    fn pressed_by(&self, force: f64) -> Option<SharedLaw> {
+        (self.gap >= 0.0).then(|| Arc::new(Gap { gap: -force / self.stiffness, ..*self }) as SharedLaw)
     }
     fn closed(&self) -> Option<Vec<f64>> {
         Some(vec![self.stiffness])

@@ -67,6 +67,11 @@ pub trait Law: Debug + Send + Sync {
     fn normal(&self) -> Option<usize> {
         None
     }
+    /// The same law with its faces pressed on each other by `force` (N) where it has not moved: what it is in small motion
+    /// where a constant load presses faces that have no preload. `None` of a law without faces, and where it has a preload.
+    fn pressed_by(&self, _force: f64) -> Option<SharedLaw> {
+        None
+    }
     /// The stiffness (N/m) along every direction while its faces stay closed and stick, of a law whose faces can part.
     fn closed(&self) -> Option<Vec<f64>> {
         None

@@ -51,7 +51,7 @@ impl StaticEquilibrium {
     }
 
     /// The same; `None` also where no constant force, imposed displacement or preload acts, so that nothing is loaded.
-    pub(crate) fn under_load(system: &System) -> Option<Self> {
+    pub fn under_load(system: &System) -> Option<Self> {
         let constant = system.harmonics_of_excitation(|z| z != Complex64::ZERO).contains(&0);
         let loaded = constant || system.joints().iter().any(|joint| is_preloaded(&**joint.law()));
         if loaded { StaticEquilibrium::of(system) } else { None }

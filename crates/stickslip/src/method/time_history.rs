@@ -42,6 +42,9 @@ pub struct TimeHistory {
     pub displacement: Vec<f64>,
     /// Velocities at the start, length n, m/s.
     pub velocity: Vec<f64>,
+    /// Internal states of the joints at the start, as [`StaticEquilibrium`](super::StaticEquilibrium) has them; empty: joints
+    /// carry nothing there.
+    pub states: Vec<f64>,
     /// What drives it.
     pub excitation: Excitation,
     /// Time to be computed, s.
@@ -125,7 +128,7 @@ impl TimeHistory {
     ///     joints: vec![Joint { name: "j".into(), between: ["m".into(), GROUND.into()], law: Arc::new(Coulomb { limit: 0.01 }) }],
     ///     ..Model::default()
     /// };
-    /// let motion = TimeHistory { displacement: vec![1.0], velocity: vec![0.0], excitation: Excitation::Free,
+    /// let motion = TimeHistory { displacement: vec![1.0], velocity: vec![0.0], states: vec![], excitation: Excitation::Free,
     ///     duration: std::f64::consts::TAU, step: std::f64::consts::TAU, width: None };
     /// let mut last = 0.0;
     /// motion.run(&model.assemble().unwrap(), &mut |_, _, state| { last = state.displacement[0]; true }).unwrap();
@@ -148,6 +151,9 @@ impl TimeHistory {
         let mut flow = TimeHistory::flow(system, self.width)?;
         flow.keep(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
+        if state.len() + self.states.len() == flow.states() {
+            state.extend(&self.states);
+        }
         state.resize(flow.states(), 0.0);
         let mut begin = 0.0;
         let mut next = 0usize; // index of the next sample
@@ -290,6 +296,7 @@ mod tests {
         let motion = TimeHistory {
             displacement: vec![0.0; 2],
             velocity: vec![0.0; 2],
+            states: vec![],
             excitation: Excitation::Free,
             duration: 3.0 * TAU / omega,
             step: TAU / omega / 40.0,
@@ -320,6 +327,7 @@ mod tests {
         let motion = TimeHistory {
             displacement: vec![1.0],
             velocity: vec![0.0],
+            states: vec![],
             excitation: Excitation::Free,
             duration: 3.0 * end,
             step: end / 100.5,
@@ -371,6 +379,7 @@ mod tests {
         let motion = TimeHistory {
             displacement: vec![0.0; 2],
             velocity: vec![0.0; 2],
+            states: vec![],
             excitation: Excitation::Steady(omega),
             duration: 1.0,
             step: TAU / omega / 64.0,
@@ -415,6 +424,7 @@ mod tests {
             let run_up = TimeHistory {
                 displacement: vec![0.0],
                 velocity: vec![0.0],
+                states: vec![],
                 excitation: Excitation::RunUp { from, to, duration },
                 duration,
                 step,

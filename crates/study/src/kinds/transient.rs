@@ -13,9 +13,10 @@ use crate::key::RANGE;
 use crate::key::{Key, Takes, Within, default, optional, required};
 use crate::kind::Kind;
 use crate::names::Names;
-use crate::note::Note;
+use crate::note::{Note, WARNING};
 use crate::point::location_of;
 use crate::rows::Rows;
+use crate::start::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
 use crate::values::{Values, hertz};
 use crate::warnings::moved;
 use crate::words::{display_unit, shown_hertz};
@@ -67,8 +68,14 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "start",
                 Takes::ByName(Dimension::LENGTH),
-                "displacements at the start; zero when absent",
+                "displacements at the start of masses that are pulled there and let go, see `begin`; zero when absent",
                 "{ blade1 = \"1 mm\" }",
+            ),
+            optional(
+                "begin",
+                Takes::Choice(beginnings),
+                "what else is at the start: `equilibrium` where `start` is given, `unloaded` otherwise",
+                "\"unloaded\"",
             ),
             optional(
                 "start_velocity",
@@ -207,18 +214,15 @@ fn compute(work: &Work<'_>) -> Computed {
         Some(frequencies) => frequencies.iter().map(Some).collect(),
         None => vec![None],
     };
-    let initial = |key: &str| -> Vec<f64> {
-        let given = values.by_name(key);
-        // only masses are started, which are degrees of freedom of their own
-        let mut state = vec![0.0; prepared.system.dofs()];
-        for (place, along) in prepared.system.places().iter().zip(prepared.system.seen()) {
-            if let (Some(value), [(row, _)]) = (given.and_then(|given| given.get(place)), along.rows()) {
-                state[*row] = *value;
-            }
-        }
-        state
-    };
     let mut part = Part::default();
+    let pull = values.by_name("start");
+    let begin = values.text("begin").unwrap_or(if pull.is_some() { EQUILIBRIUM } else { UNLOADED });
+    let pulled = if begin == EQUILIBRIUM { pulled(&case.model, &prepared.system, pull) } else { None };
+    if begin == EQUILIBRIUM && pulled.is_none() {
+        let text = "the structure has no static equilibrium where it is pulled: it begins with its joints unloaded, as with begin = \"unloaded\"";
+        part.notes.push(Note::of_case(&case.label(), format!("{WARNING}{text}")));
+    }
+    let start = pulled.unwrap_or_else(|| Start { displacement: given(&prepared.system, pull), states: Vec::new() });
     let (mut rows, mut extremes) = (Rows::default(), Rows::default());
     let (mut decay, mut summary) = (Rows::default(), Rows::default());
     for drive in drives {
@@ -235,8 +239,9 @@ fn compute(work: &Work<'_>) -> Computed {
         let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
         let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
         let transient = TimeHistory {
-            displacement: initial("start"),
-            velocity: initial("start_velocity"),
+            displacement: start.displacement.clone(),
+            velocity: given(&prepared.system, values.by_name("start_velocity")),
+            states: start.states.clone(),
             excitation,
             duration,
             step,

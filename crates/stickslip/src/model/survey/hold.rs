@@ -25,11 +25,10 @@ pub(super) struct Stuck {
 }
 
 impl Stuck {
-    /// One for each axis of a joint.
-    pub(super) fn of_joint((index, joint): (usize, &SystemJoint)) -> Vec<Self> {
+    /// One for each axis of a joint, which is this law in small motion.
+    pub(super) fn of_joint((index, joint): (usize, &SystemJoint), law: &dyn Law) -> Vec<Self> {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
-            let law = &**joint.law();
             let pressed = (law.normal() == Some(axis)).then(|| force_at_rest(law, axis));
             let hold = pressed.map_or_else(|| Hold::of(law, axis), |force| Hold::pressed(law, axis, force));
             let closed = match hold {

@@ -16,7 +16,8 @@ mod waves;
 pub use known::{FirstSlip, LinearMode, Loose, Modes, Onset, Unpressed};
 pub use waves::WaveModes;
 
-use super::{Model, ModelError, System};
+use super::{Model, ModelError, System, SystemJoint};
+use crate::law::{MOST_DIRECTIONS, SharedLaw};
 use hold::{Hold, Stuck};
 use linear::{LARGEST, Linear, Link};
 use std::collections::HashMap;
@@ -53,10 +54,57 @@ impl Model {
     /// assert!((survey.free().elastic[1].omega / TAU - 121.25).abs() < 0.001);
     /// ```
     pub fn survey(&self) -> Result<Survey, ModelError> {
+        self.survey_under_load(&|_| None)
+    }
+
+    /// The same, with the forces (N) of all joints along their directions in static equilibrium: faces without a preload that
+    /// constant loads press on each other are pressed, not apart.
+    ///
+    /// # Errors
+    /// [`ModelError`] as [`Model::assemble`].
+    ///
+    /// # Example
+    /// A block of 1 kg lies on a contact and is pressed by 20 N.
+    /// ```
+    /// use std::sync::Arc;
+    /// use stickslip::law::FrictionContact;
+    /// use stickslip::method::StaticEquilibrium;
+    /// use stickslip::model::{Force, GROUND, Joint, Mass, Model};
+    /// let law = FrictionContact { tangential: 1e6, normal: 2e6, friction: 0.3, preload: 0.0, tangents: 1 };
+    /// let model = Model {
+    ///     masses: vec![Mass::new("m", 1.0).along(&["t", "n"])],
+    ///     joints: vec![Joint { name: "foot".into(), between: ["m".into(), GROUND.into()], law: Arc::new(law) }],
+    ///     forces: vec![Force { on: "m.n".into(), amplitude: 20.0, phase: 0.0, harmonic: 0 }],
+    ///     ..Model::default()
+    /// };
+    /// let survey = model.survey_under_load(&|system| Some(StaticEquilibrium::of(system)?.forces())).unwrap();
+    /// let slip = survey.first_slip();
+    /// assert!((slip[0].limit - 6.0).abs() < 1e-9 && (slip[1].at_rest.unwrap() - 20.0).abs() < 1e-9);
+    /// assert_eq!(model.survey().unwrap().first_slip()[0].limit, 0.0);
+    /// ```
+    pub fn survey_under_load(
+        &self,
+        forces: &dyn Fn(&System) -> Option<Vec<[f64; MOST_DIRECTIONS]>>,
+    ) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
-        let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(Stuck::of_joint).collect();
+        let forces = if system.dofs() > LARGEST { None } else { forces(&system) };
+        // of each joint the force that presses its faces, where it has no preload
+        let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {
+            let force = forces.as_ref()?.get(index)?[joint.law().normal()?];
+            (force > 0.0).then(|| Some((force, joint.law().pressed_by(force)?)))?
+        };
+        let of_joint = |(index, joint): (usize, &SystemJoint)| {
+            let found = pressed(index, joint);
+            Stuck::of_joint((index, joint), found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
+        };
+        let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(of_joint).collect();
         let loose = self.loose(&system, &joints);
-        let at_rest = preload::carried(&system, &joints);
+        let mut at_rest = preload::carried(&system, &joints);
+        for (stuck, carried) in joints.iter().zip(&mut at_rest).filter(|(stuck, _)| stuck.pressed.is_some()) {
+            if let Some((force, _)) = pressed(stuck.joint, &system.joints()[stuck.joint]) {
+                *carried = Some(force);
+            }
+        }
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
         if system.dofs() > LARGEST {
             let lost = system.dofs();

@@ -217,7 +217,8 @@ impl Model {
         };
         let springs = &self.springs[..self.springs.len() / sectors];
         let joints = &system.joints()[..system.joints().len() / sectors];
-        let stuck: Vec<Stuck> = joints.iter().enumerate().flat_map(Stuck::of_joint).collect();
+        let stuck: Vec<Stuck> =
+            joints.iter().enumerate().flat_map(|(i, joint)| Stuck::of_joint((i, joint), &**joint.law())).collect();
         let own: Vec<f64> = (0..n).map(|i| system.structure().own_mass(i)).collect();
         let places = self.sector_axes(&system);
         let wave = |diameter: usize| {
@@ -270,7 +271,8 @@ impl Model {
 fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -> Option<Vec<WaveModes>> {
     let sector = Sector::of(system.structure(), sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
-    let stuck: Vec<Stuck> = joints.iter().enumerate().flat_map(Stuck::of_joint).collect();
+    let stuck: Vec<Stuck> =
+        joints.iter().enumerate().flat_map(|(i, joint)| Stuck::of_joint((i, joint), &**joint.law())).collect();
     let wave = |diameter: usize| {
         let wave = sector.wave(diameter).ok()?;
         let (structure, double) = (wave.structure(), wave.is_double());

@@ -1,0 +1,57 @@
+//! Where a transient begins: in static equilibrium, pulled or not, or put somewhere with its joints unloaded.
+
+use std::collections::BTreeMap;
+use stickslip::method::StaticEquilibrium;
+use stickslip::model::{Model, Motion, System};
+
+/// The words of the key `begin`.
+pub(crate) const EQUILIBRIUM: &str = "equilibrium";
+pub(crate) const UNLOADED: &str = "unloaded";
+
+/// What the words mean.
+pub(crate) fn beginnings() -> Vec<(&'static str, &'static str)> {
+    vec![
+        (
+            EQUILIBRIUM,
+            "the places of `start` are held there and everything else is in static equilibrium under the constant forces; joints carry what they carry then",
+        ),
+        (UNLOADED, "displacements as `start` says, zero elsewhere; joints carry nothing"),
+    ]
+}
+
+/// Displacements of all degrees of freedom, m, and internal states of all joints.
+pub(crate) struct Start {
+    pub displacement: Vec<f64>,
+    pub states: Vec<f64>,
+}
+
+/// The row of each named place, which is a degree of freedom of its own, with its value.
+fn rows(system: &System, given: Option<&BTreeMap<String, f64>>) -> BTreeMap<usize, f64> {
+    let places = system.places().iter().zip(system.seen());
+    let named = places.filter_map(|(place, along)| Some((along.rows(), *given?.get(place)?)));
+    named.filter_map(|(rows, value)| if let [(row, _)] = rows { Some((*row, value)) } else { None }).collect()
+}
+
+/// Displacements or velocities as given, zero elsewhere.
+pub(crate) fn given(system: &System, given: Option<&BTreeMap<String, f64>>) -> Vec<f64> {
+    let mut state = vec![0.0; system.dofs()];
+    rows(system, given).into_iter().for_each(|(row, value)| state[row] = value);
+    state
+}
+
+/// The structure with its places held where `start` says, in static equilibrium; `None` where none is found.
+pub(crate) fn pulled(model: &Model, system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
+    let mut held = model.clone();
+    for (place, value) in start.into_iter().flatten() {
+        held.motions.push(Motion { on: place.clone(), amplitude: *value, phase: 0.0, harmonic: 0 });
+    }
+    let held = held.assemble().ok()?;
+    let fixed = rows(system, start);
+    let equilibrium = StaticEquilibrium::of(&held)?;
+    // the same rows without those that are held
+    let mut free = equilibrium.displacement().iter();
+    let row = |row: usize| fixed.get(&row).copied().or_else(|| free.next().copied());
+    let displacement: Vec<f64> = (0..system.dofs()).map(row).collect::<Option<_>>()?;
+    let complete = held.dofs() + fixed.len() == system.dofs();
+    complete.then(|| Start { displacement, states: equilibrium.joint_states().to_vec() })
+}

@@ -1,0 +1,74 @@
+//! Transients that begin pulled: joints carry what they carry on the way to the place of release.
+
+use stickslip_study::dataset::Dataset;
+use stickslip_study::run::{Context, run};
+use stickslip_study::read_study;
+
+fn dataset(text: &str) -> Dataset {
+    run(&read_study("study.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap()
+}
+
+fn displacement(dataset: &Dataset, place: &str) -> Vec<f64> {
+    let table = dataset.tables.iter().find(|table| table.name == "motion").unwrap();
+    let column = format!("{place}_m");
+    let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
+    table.numbers(&column).unwrap_or_else(|| panic!("{column} in {names:?}")).to_vec()
+}
+
+/// A mass of 10 kg on 20 N/µm that is pulled by 0.2 mm with a joint, without damping.
+fn pulled(law: &str, begin: &str) -> Vec<f64> {
+    let text = format!(
+        "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"10 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"20 N/um\"\n\
+         [[joint]]\nname = \"bolt\"\nbetween = [\"m\", \"ground\"]\nlaw = {law}\n[study]\nkind = \"transient\"\nstart = {{ m = \"0.2 mm\" }}\n\
+         {begin}duration = \"3 ms\"\ntime_step = \"2 us\"\n"
+    );
+    displacement(&dataset(&text), "m")
+}
+
+fn lowest(motion: &[f64]) -> f64 {
+    motion.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// A joint that sticks is a spring relaxed at zero: the motion is symmetric. Relaxed where it is let go it is relaxed at 0.2 mm:
+/// the motion goes about `kt u/(k + kt)`.
+#[test]
+fn a_joint_that_sticks_swings_about_zero() {
+    let law = "{ kind = \"jenkins\", stiffness = \"10 N/um\", limit = \"10 kN\" }";
+    let low = lowest(&pulled(law, ""));
+    assert!((low / -0.2e-3 - 1.0).abs() < 1e-4, "{low}");
+    let low = lowest(&pulled(law, "begin = \"unloaded\"\n"));
+    assert!((low / (2.0 / 3.0 * 0.1e-3 - (0.2e-3 - 2.0 / 3.0 * 0.1e-3)) - 1.0).abs() < 1e-3, "{low}");
+}
+
+/// A joint that has slipped on the way carries its limit: `k (a₀ - a₁)/2 (a₀ + a₁) = W`, with the loss of half a loop.
+#[test]
+fn a_joint_that_slips_on_the_way_carries_its_limit() {
+    let (k, kt, limit, a) = (20e6, 10e6, 200.0, 0.2e-3);
+    let low = lowest(&pulled("{ kind = \"jenkins\", stiffness = \"10 N/um\", limit = \"200 N\" }", ""));
+    // from +limit through the elastic range to -limit, then sliding until the kinetic energy is gone
+    let energy = |x: f64| 0.5 * k * x * x;
+    let elastic = 2.0 * limit / kt;
+    // ½ k a² + work of the joint: + limit to - limit over `elastic` does none on the mean, beyond it - limit times the way
+    let balance = |b: f64| energy(a) - energy(b) - limit * (a + b - elastic);
+    let (mut inside, mut beyond) = (0.0, a);
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + beyond);
+        if balance(middle) > 0.0 { inside = middle } else { beyond = middle }
+    }
+    assert!((low / -inside - 1.0).abs() < 1e-4, "{low} {inside}");
+}
+
+/// What `start` does not name follows: the second of two masses in a row stands where the first one leads it.
+#[test]
+fn what_is_not_pulled_is_in_equilibrium() {
+    let study = |begin: &str| {
+        format!(
+            "schema = 1\n[[mass]]\nname = \"a\"\nmass = \"1 kg\"\n[[mass]]\nname = \"b\"\nmass = \"1 kg\"\n\
+             [[spring]]\nbetween = [\"a\", \"b\"]\nstiffness = \"3 N/mm\"\n[[spring]]\nbetween = [\"b\", \"ground\"]\nstiffness = \"1 N/mm\"\n\
+             [study]\nkind = \"transient\"\nstart = {{ a = \"4 mm\" }}\n{begin}duration = \"0.1 s\"\ntime_step = \"1 ms\"\n"
+        )
+    };
+    let at = |begin: &str| displacement(&dataset(&study(begin)), "b")[0];
+    assert!((at("") - 3e-3).abs() < 1e-12, "{}", at(""));
+    assert_eq!(at("begin = \"unloaded\"\n"), 0.0);
+}
