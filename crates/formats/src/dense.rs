@@ -16,7 +16,12 @@ use crate::text::{Line, Lines, integer, must_end_its_lines, real};
 pub(crate) const FORMAT: Format = Format {
     name: "dense-text",
     summary: "a line of numbers for every row: `numpy.savetxt`, CSV, MATLAB `writematrix`",
-    sniff: |bytes| rows(bytes).next().is_some_and(|line| fields(&line).all(|field| real(field).is_some())),
+    // a column of numbers is a list of names of rows
+    sniff: |bytes| {
+        rows(bytes)
+            .next()
+            .is_some_and(|line| fields(&line).nth(1).is_some() && fields(&line).all(|field| real(field).is_some()))
+    },
     open,
 };
 

@@ -14,12 +14,15 @@ const ROUNDING: f64 = 1e-12;
 /// That one of these is a bare number and another one has a unit in which the number would be another quantity.
 pub(crate) fn mixed<'a>(key: &str, all: impl IntoIterator<Item = &'a Quantity>) -> Option<Problem> {
     let all: Vec<&Quantity> = all.into_iter().collect();
-    let (unit, factor, dimension) = all.iter().find_map(|quantity| with_unit(quantity))?;
     // a bare frequency is in Hz
-    let bare = if matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE) { TAU } else { 1.0 };
-    if (factor / bare - 1.0).abs() <= ROUNDING {
+    let bare = |dimension| if matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE) { TAU } else { 1.0 };
+    let counts_so = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= ROUNDING;
+    // beside one whose unit is the one in which it counts it is meant so
+    if all.iter().filter_map(|q| with_unit(q)).any(|(_, factor, dimension)| counts_so(factor, dimension)) {
         return None;
     }
+    let (unit, _, dimension) = all.iter().find_map(|quantity| with_unit(quantity))?;
+    let bare = bare(dimension);
     let (quantity, number) = all.iter().find_map(|quantity| Some((quantity, bare_number(quantity)?)))?;
     let counts = displayed(number * bare, Some(dimension));
     let text = shown(quantity.text.trim());

@@ -20,7 +20,7 @@ pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
 
 /// Of a kind that looks for resonances in a range of frequencies.
 pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
-    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).chain(undamped(cases)).collect()
+    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
 }
 
 /// Of a kind that takes its frequencies as they are: the same, and whether they lie close enough for the resonances.
@@ -52,8 +52,9 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
     })
 }
 
-/// A resonance within the range that nothing damps but the joints.
-fn undamped(cases: &[Surveyed]) -> Option<String> {
+/// A resonance within the range that nothing damps but the joints. A kind that looks for the best joint compares peaks, and the
+/// undamped structure is the textbook case of it.
+pub(crate) fn undamped(cases: &[Surveyed]) -> Option<String> {
     let found = |one: &Surveyed| {
         let (from, to) = range(&one.case)?;
         one.survey.undamped(from, to).first().copied()

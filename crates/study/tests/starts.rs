@@ -1,8 +1,8 @@
 //! Transients that begin pulled: joints carry what they carry on the way to the place of release.
 
 use stickslip_study::dataset::Dataset;
-use stickslip_study::run::{Context, run};
 use stickslip_study::read_study;
+use stickslip_study::run::{Context, run};
 
 fn dataset(text: &str) -> Dataset {
     run(&read_study("study.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap()

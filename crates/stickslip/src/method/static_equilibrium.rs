@@ -88,16 +88,17 @@ fn is_preloaded(law: &dyn Law) -> bool {
     force != rest || law.pieces().is_some_and(|pieces| pieces.iter().any(pressed))
 }
 
-/// The internal states of all joints at other displacements (m), after a straight and slow way there from static equilibrium
-/// or, without one, from where nothing is loaded. Imposed motions are at the phase zero of a drive. `count`: how many states
-/// the flow that begins there has; where its joints keep others than these all of them are zero.
+/// The internal states of all joints at other displacements (m), after a straight and slow way there from static equilibrium.
+/// Without one nothing is loaded before it vibrates, and joints begin unloaded there. Imposed motions are at the phase zero of a
+/// drive. `count`: how many states the flow that begins there has; where its joints keep others than these all of them are zero.
 pub(crate) fn states_at(
     equilibrium: Option<&StaticEquilibrium>,
     system: &System,
     displacement: &[f64],
     count: usize,
 ) -> Vec<f64> {
-    let known = equilibrium.map_or(&[][..], StaticEquilibrium::joint_states);
+    let Some(equilibrium) = equilibrium else { return vec![0.0; count] };
+    let known = equilibrium.joint_states();
     let mut states = Vec::with_capacity(count);
     for joint in system.joints() {
         let axes = joint.axes();
@@ -109,7 +110,7 @@ pub(crate) fn states_at(
                 axis.along(x) + imposed.sum::<f64>()
             })
         };
-        let from = equilibrium.map_or([0.0; MOST_DIRECTIONS], |known| along(known.displacement(), false));
+        let from = along(equilibrium.displacement(), false);
         let first = states.len();
         let before = known.get(first..first + own).map_or_else(|| vec![0.0; own], <[f64]>::to_vec);
         let to = along(displacement, true);

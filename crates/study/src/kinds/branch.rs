@@ -20,7 +20,7 @@ use crate::point::Summary;
 use crate::rows::Rows;
 use crate::study::{Study, VariedValue, varied_text};
 use crate::values::{Frequencies, Values, hertz};
-use crate::warnings::resonant;
+use crate::warnings::{resonant, undamped};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
@@ -73,7 +73,7 @@ pub(super) const KIND: Kind = Kind {
     // along a parameter the cases of one branch differ in the last one only
     grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
     cost,
-    warnings: resonant,
+    warnings: |cases| resonant(cases).into_iter().chain(undamped(cases)).collect(),
     compute,
     draw,
 };

@@ -25,7 +25,7 @@ use crate::point::{Summary, location_of};
 use crate::rows::Rows;
 use crate::survey::Surveyed;
 use crate::values::{Frequencies, hertz};
-use crate::warnings::sampled;
+use crate::warnings::{sampled, undamped};
 use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use drawn::SINGLE;
 use peaks::{Found, Sought};
@@ -81,7 +81,14 @@ pub(super) const KIND: Kind = Kind {
         false => orbits::grain(study),
     },
     cost,
-    warnings: |cases| sampled(cases).into_iter().chain(amplification::none(cases)).chain(many_peaks(cases)).collect(),
+    warnings: |cases| {
+        sampled(cases)
+            .into_iter()
+            .chain(undamped(cases))
+            .chain(amplification::none(cases))
+            .chain(many_peaks(cases))
+            .collect()
+    },
     compute,
     draw: figure::draw,
 };

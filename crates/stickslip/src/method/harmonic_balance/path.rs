@@ -14,6 +14,7 @@ use std::cell::RefCell;
 use std::convert::Infallible;
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use stickslip_numerics::eigen;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -160,9 +161,12 @@ pub(super) fn orbit(
     let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
     let Judged { derivative, defect } = judge
         .map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start, &path.stuck()));
-    // where contacts part and close again a series with twice the harmonics may be as wrong as the shorter one: the return tells
+    // where contacts part and close again a series with twice the harmonics may be as wrong as the shorter one: the return
+    // tells, unless the orbit is unstable, so that a return multiplies its error
     let opens = measured.joints.iter().any(|joint| joint.open_fraction > 0.0 && joint.open_fraction < 1.0);
-    let truncation = truncation.map(|error| if opens { error.max(defect.unwrap_or(0.0)) } else { error });
+    let repels = derivative.as_ref().is_some_and(|map| eigen::largest_modulus(map).is_none_or(|modulus| modulus > 1.0));
+    let returned = defect.filter(|_| opens && !repels).unwrap_or(0.0);
+    let truncation = truncation.map(|error| error.max(returned));
     Some(Orbit {
         method: super::NAME,
         omega,

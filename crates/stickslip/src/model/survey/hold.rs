@@ -176,9 +176,11 @@ mod tests {
         let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
         assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
         assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
-        // micro-slip from the first movement on is no limit: told is that of all of it
+        // micro-slip from the first movement on is no limit: all of it slips at FS (1 + β)/(KT (β + (χ + 1)/(χ + 2)))
         let iwan = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
-        assert_eq!(Hold::of(&iwan, 0), spring);
+        let Hold::Spring { stiffness, limit, displacement } = Hold::of(&iwan, 0) else { panic!("{iwan:?}") };
+        let macro_slip = 2.0 * 1.3 / (1e4 * (0.3 + 0.5 / 1.5));
+        assert!(stiffness == 1e4 && limit == 2.0 && (displacement / macro_slip - 1.0).abs() < 1e-12, "{displacement}");
         assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
         assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
         // a stop holds once it is pressed, and not where it only touches

@@ -410,7 +410,7 @@ mod tests {
                     let theta = TAU * i as f64 / STEPS as f64;
                     harmonics.iter().zip(&c).map(|(h, c)| (c * Complex64::cis(*h as f64 * theta)).re).sum()
                 };
-                let (mut z, mut before) = (vec![0.0; StepLaw::states(&law)], [c[0].re, 0.0, 0.0]);
+                let (mut z, mut before) = (vec![0.0; StepLaw::states(&law)], [0.0; 3]);
                 let mut sums = vec![ZERO; c.len()];
                 for i in 0..3 * STEPS {
                     let to = [u(i), 0.0, 0.0];
