@@ -897,7 +897,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
         ("input.mtx", &["input.mtx, line 8: the file ends within a line"]),
         ("cut.op4", &["cut.op4, byte", "the file ends after", "not complete"]),
         ("cut.full", &["cut.full, byte", "the file ends after", "not complete"]),
-        ("cut.matrix", &["cut.matrix, line 8", "of them in this line, found"]),
+        ("cut.matrix", &["cut.matrix, line 8", "expected a row of every entry, found nothing"]),
         ("cut73.mat", &["cut73.mat: the HDF5 file cannot be read", "unexpected EOF", "copy it again"]),
         ("complex.pch", &["complex.pch, `KAAX`: a real matrix was expected, this is complex", "real part"]),
         ("complex.rua", &["complex.rua: a real matrix was expected, this is complex"]),

@@ -103,12 +103,12 @@ fn the_example_of_the_design_reads() {
 fn bare_numbers_take_the_unit_of_their_place_also_through_parameters() {
     let text = EXAMPLE.replace("\"182 g\"", "0.182").replace("Ft = \"2 N\"\n", "Ft = 2\nf = 121\n").replace(
         "{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }",
-        "[\"f\", 122, \"f + 2 Hz\", \"760 rad/s\"]",
+        "[\"f\", 122, \"f + 2 Hz\", \"121.5 Hz\", \"760 rad/s\"]",
     );
     let case = read(&text).case(0).unwrap();
     assert_eq!(case.model.masses[0].mass, 0.182 - 0.182 / 100.0 / 2.0);
     let frequencies: Vec<f64> = case.frequencies.unwrap().iter().collect();
-    assert_eq!(frequencies, [121.0 * TAU, 122.0 * TAU, 121.0 * TAU + 2.0 * TAU, 760.0]);
+    assert_eq!(frequencies, [121.0 * TAU, 122.0 * TAU, 121.0 * TAU + 2.0 * TAU, 121.5 * TAU, 760.0]);
 }
 
 #[test]

@@ -10,7 +10,7 @@ fn dataset(text: &str) -> Dataset {
 
 fn displacement(dataset: &Dataset, place: &str) -> Vec<f64> {
     let table = dataset.tables.iter().find(|table| table.name == "motion").unwrap();
-    let column = format!("{place}_m");
+    let column = format!("{place}_displacement_m");
     let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
     table.numbers(&column).unwrap_or_else(|| panic!("{column} in {names:?}")).to_vec()
 }

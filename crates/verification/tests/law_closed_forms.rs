@@ -162,9 +162,13 @@ fn theory_11_4_iwan_is_exact() {
                 + u * (r * (far.powf(chi + 1.0) - u.powf(chi + 1.0)) / (chi + 1.0) + s);
             close("backbone", first(&law, View::Step, &[0.0, u], 1)[1], expected, 1e-12);
             let loss = 4.0 * r * u.powf(chi + 3.0) / ((chi + 2.0) * (chi + 3.0));
-            // what the trapezoidal rule leaves of a kink where the motion turns
-            let found = loop_loss(&law, View::Step, &cycles(u), FINE);
-            assert!((found - loss).abs() < 1e-8 * u, "{chi} {beta} {share}: {found} {loss}");
+            // the trapezoidal rule leaves the square of its step, and of a vertical tangent where the motion turns somewhat more
+            let [coarse, fine] =
+                [FINE, 4 * FINE].map(|samples| loop_loss(&law, View::Step, &cycles(u), samples) - loss);
+            assert!(
+                fine.abs() < 1e-8 * u && fine.abs() < 0.3 * coarse.abs() + 1e-12 * u,
+                "{chi} {beta} {share}: {coarse:e} {fine:e}"
+            );
         }
         let beyond = 2.0 * far;
         let loss = 4.0 * r * far.powf(chi + 3.0) / ((chi + 2.0) * (chi + 3.0)) + 4.0 * (beyond - far);
