@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use stickslip::law::SharedLaw;
 use stickslip::model::{
-    Around, Force, Joint, Mass, Model, Motion, Place, Ring, Spring, Substructure, SubstructureDamping,
+    Around, Body, Force, Joint, Mass, Model, Motion, Place, Ring, Spring, Substructure, SubstructureDamping,
 };
 use stickslip::structure::{Component, Reduction};
 use stickslip_numerics::sparse::Matrix;
@@ -12,11 +12,15 @@ use stickslip_numerics::sparse::Matrix;
 type Arounds = [Vec<Option<Around>>; 2];
 type Entries = Vec<(usize, usize, f64)>;
 
+/// Name, mass, inertia matrix, directions.
+type StoredBody = (String, f64, [[f64; 3]; 3], Vec<String>);
+
 #[derive(Serialize, Deserialize)]
 struct Stored {
     /// Name, mass, directions.
     masses: Vec<(String, f64, Vec<String>)>,
     /// Ends, stiffness, damping.
+    bodies: Vec<StoredBody>,
     springs: Vec<([String; 2], f64, f64)>,
     /// Name, ends.
     joints: Vec<(String, [String; 2])>,
@@ -65,6 +69,7 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
     let structure = model.substructure.as_ref().filter(|_| !of_study);
     let stored = Stored {
         masses: model.masses.iter().map(|mass| (mass.name.clone(), mass.mass, mass.directions.clone())).collect(),
+        bodies: model.bodies.iter().map(|b| (b.name.clone(), b.mass, b.inertia, b.directions.clone())).collect(),
         springs: model
             .springs
             .iter()
@@ -92,6 +97,11 @@ pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), Str
         substructure,
         places: places.unwrap_or_default(),
         masses: stored.masses.into_iter().map(|(name, mass, directions)| Mass { name, mass, directions }).collect(),
+        bodies: stored
+            .bodies
+            .into_iter()
+            .map(|(name, mass, inertia, directions)| Body { name, mass, inertia, directions })
+            .collect(),
         springs: stored
             .springs
             .into_iter()

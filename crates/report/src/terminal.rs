@@ -490,8 +490,8 @@ results/fig02/: loops_summary.csv, figure.svg
             vec![one("n_Hz", 50.0), one("kt_N_per_m", 8e3), one("frequency_Hz", 54.0), one("amplitude_m", 2e-3)];
         let tables = vec![Table { name: "peaks".to_owned(), columns }];
         let mut dataset = Dataset { tables, ..samples::response() };
-        let units = |units: Json| serde_json::json!({ "units": units });
-        dataset.record.study = units(serde_json::json!({ "n_Hz": "rpm", "kt_N_per_m": "N/mm", "frequency_Hz": "rpm" }));
+        let units = serde_json::json!({ "n_Hz": "rpm", "kt_N_per_m": "N/mm", "frequency_Hz": "rpm" });
+        dataset.record.study = serde_json::json!({ "units": units });
         let lines = |dataset: &Dataset| -> Vec<String> {
             let text = Terminal::default().text(dataset, &[]);
             let table = text.lines().skip_while(|line| *line != "peaks").skip(1).take(2);

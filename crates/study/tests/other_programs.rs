@@ -126,7 +126,7 @@ fn gyroscopic_coupling_in_the_damping() {
     close(&frequencies(&checked_response), &[66.55715407, 76.10645066], 1e-9);
     let damping: Vec<f64> = checked_response.summary().free.elastic.iter().map(|mode| mode.damping).collect();
     close(&damping, &[0.0111552656, 0.0111552656], 1e-8);
-    assert_eq!(checked_response.summary().warnings, [String::new(); 0]);
+    assert!(checked_response.summary().warnings.is_empty(), "{:?}", checked_response.summary().warnings);
     let data = run(&checked_response);
     close(&column(&data, "peaks", "frequency_Hz"), &[66.49507], 2e-7);
     close(&column(&data, "peaks", "amplitude_m"), &[24.25485e-6], 3e-7);

@@ -111,7 +111,7 @@ references = true
     let (force, frequency) = (numbers(&found, "references", "F_N"), numbers(&found, "references", "frequency_Hz"));
     for (what, k) in [("free", 10e3), ("stuck", 12e3)] {
         let column = format!("body_{what}_amplitude_m");
-        for (i, amplitude) in numbers(&found, "references", &column).into_iter().enumerate() {
+        for (i, amplitude) in numbers(&found, "references", &column).iter().enumerate() {
             let omega = TAU * frequency[i];
             let expected = force[i] / (k - omega * omega).hypot(2.0 * omega);
             assert!((amplitude / expected - 1.0).abs() < 1e-9, "{what} at {} N: {amplitude} {expected}", force[i]);
