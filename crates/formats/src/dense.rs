@@ -108,7 +108,9 @@ mod tests {
         }
         let skew = read_bytes(b"0.0 300.0\n-300.0 0.0\n", None, None)?;
         assert_eq!((skew.get(0, 1), skew.get(1, 0)), (300.0, -300.0));
-        assert_eq!(read_bytes(b"5\n", None, None)?.get(0, 0), 5.0);
+        // one column could be a list of names: it is read where the format is stated
+        assert!(read_bytes(b"5\n", None, None).is_err());
+        assert_eq!(read_bytes(b"5\n", Some("dense-text"), None)?.get(0, 0), 5.0);
         Ok(())
     }
 
