@@ -241,9 +241,10 @@ fn of_kind(kind: &kinds::Kind, beside: &Key) -> Table {
         study.extend(parsed(&format!("{} = {}", key.name, key.example)));
     }
     study.extend(parsed(match (kind.info.name, beside.name) {
-        ("transient", "frequency" | "duration" | "samples_per_cycle" | "time_step" | "start" | "start_velocity") => {
-            "frequency = \"121 Hz\"\nduration = \"2 s\""
-        }
+        (
+            "transient",
+            "frequency" | "duration" | "samples_per_cycle" | "time_step" | "start" | "start_velocity" | "begin",
+        ) => "frequency = \"121 Hz\"\nduration = \"2 s\"",
         ("transient", "cycles") => "frequency = \"121 Hz\"",
         _ => "",
     }));
