@@ -9,7 +9,7 @@ use super::recent::{RECENT, Recent};
 use super::rest::Rest;
 use super::solve::Lost;
 use super::sparse::{self, Sparse};
-use super::static_equilibrium::{StaticEquilibrium, static_equilibrium};
+use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
 use super::storage::{MEMORY, check_memory, level_memory};
 use super::{coupled, path, work};
 use crate::method::evidence::Judge;
@@ -92,7 +92,7 @@ impl Balance {
         check_memory(bytes, &ports, (harmonics.len(), periods))?;
         let mut static_start = None;
         if kept.has(0)
-            && let Some(StaticEquilibrium { orbit, states }) =
+            && let Some(SolvedEquilibrium { orbit, states }) =
                 static_equilibrium(&system, (&ports, around.as_ref()), &rest)
         {
             ports.begin_at(&states);

@@ -245,8 +245,8 @@ mod tests {
         }
     }
 
-    /// Normal forces of a wedge in static equilibrium under `pull` along z: of the four ways in which its faces may stick or
-    /// slip the one that friction allows. The faces have the axes `face` (tangent, normal) along x and z.
+    /// Normal forces of a wedge in static equilibrium under `pull` along z: of the nine ways in which its faces may stick or
+    /// slip to either side the one that friction allows. The faces have the axes `face` (tangent, normal) along x and z.
     fn pressed_wedge(faces: &[[[f64; 2]; 2]; 2], preloads: [f64; 2], pull: f64) -> [f64; 2] {
         for slips in 0..9 {
             // 0: sticks; 1 and 2: slips with a friction force of this sign
@@ -296,13 +296,15 @@ mod tests {
             let expected = pressed_wedge(&faces, preloads, pull);
             if preloads == balance {
                 assert!(expected.iter().zip(balance).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{expected:?}");
+                assert!(found.joints.iter().all(|joint| joint.stick_fraction == 1.0), "{:?}", found.joints);
             }
+            let allowed = if preloads == balance { 1e-9 } else { 1e-5 };
             for (i, expected) in expected.iter().enumerate() {
                 let samples = 64;
                 let force = |k: usize| found.sample(found.period() * k as f64 / samples as f64).joints[i].force[1];
                 let mean = (0..samples).map(force).sum::<f64>() / samples as f64;
                 // the vibration shifts what slips in static equilibrium by its own size
-                assert!((mean / expected - 1.0).abs() < 1e-5, "{preloads:?}: {mean} {expected}");
+                assert!((mean / expected - 1.0).abs() < allowed, "{preloads:?}: {mean} {expected}");
             }
         }
     }

@@ -49,7 +49,8 @@ impl Balance {
 
     /// The largest change of a place's vibration, relative to the largest vibration of all.
     fn apart(&self, top: usize, one: &[DVector<Complex64>], other: &[DVector<Complex64>]) -> f64 {
-        let moving: Vec<usize> = (0..one.len()).filter(|k| self.kept.up_to(top)[*k] > 0).collect();
+        let harmonics = self.kept.up_to(top);
+        let moving: Vec<usize> = (0..one.len()).filter(|k| harmonics[*k] > 0).collect();
         let vibration = |of: &dyn Fn(usize) -> Complex64| moving.iter().map(|k| of(*k).norm_sqr()).sum::<f64>().sqrt();
         let (mut apart, mut size) = (0.0f64, 0.0f64);
         for axis in self.system.seen() {

@@ -39,7 +39,7 @@ pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
 }
 
 /// The static equilibrium of a system.
-pub(super) struct StaticEquilibrium {
+pub(super) struct SolvedEquilibrium {
     /// As an orbit on which nothing moves.
     pub orbit: Orbit,
     /// Of each port.
@@ -51,7 +51,7 @@ pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, around): (&Ports, Option<&Ports>),
     rest: &Rest,
-) -> Option<StaticEquilibrium> {
+) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
     let omega = scale_of_rates(system);
     let sparse = Sparse::new(system, ports, &harmonics);
@@ -81,7 +81,7 @@ pub(super) fn static_equilibrium(
         judge: None,
     };
     let orbit = path::orbit(setting, &mut level, &solution, x)?;
-    Some(StaticEquilibrium { orbit, states })
+    Some(SolvedEquilibrium { orbit, states })
 }
 
 /// Newton's method from closed contacts, and where that fails proximal points: equilibria of a structure that springs tie to
@@ -155,7 +155,7 @@ mod tests {
         Arc::new(builder.build().unwrap())
     }
 
-    fn equilibrium(system: &Arc<System>) -> Option<StaticEquilibrium> {
+    fn equilibrium(system: &Arc<System>) -> Option<SolvedEquilibrium> {
         let ports = Ports::new(system).unwrap();
         static_equilibrium(system, (&ports, None), &Rest::new(system, &ports))
     }
@@ -165,7 +165,7 @@ mod tests {
     fn a_wedge_sinks_until_its_faces_carry_the_load() {
         let (sine, cosine) = ANGLE.to_radians().sin_cos();
         for (friction, sticks) in [(0.9, true), (0.25, false)] {
-            let StaticEquilibrium { orbit, states } = equilibrium(&wedge(500.0, friction)).unwrap();
+            let SolvedEquilibrium { orbit, states } = equilibrium(&wedge(500.0, friction)).unwrap();
             let by_friction = if sticks { TANGENTIAL * cosine * cosine } else { friction * NORMAL * sine * cosine };
             let z = 500.0 / (NORMAL * sine * sine + by_friction);
             assert!((orbit.places[0].mean / z - 1.0).abs() < 1e-9, "{} {z}", orbit.places[0].mean);
