@@ -61,6 +61,7 @@ fn a_study_runs_and_every_output_is_there() {
         "energy_gap",
         "truncation",
         "iterations",
+        "found_by",
         "status",
     ];
     assert_eq!(header, expected);

@@ -116,7 +116,7 @@ impl PyOrbit {
     }
 
     /// Why the orbit may be trusted: ``residual``, ``energy_gap``, ``truncation``, ``return_defect`` (pure numbers, ``None`` where the method has
-    /// none), ``status``, ``iterations``, ``switches``, and the joints that are ``stuck`` or keep their ``history``.
+    /// none), ``status``, ``found_by``, ``iterations``, ``switches``, and the joints that are ``stuck`` or keep their ``history``.
     #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = &self.orbit.evidence;
@@ -126,6 +126,7 @@ impl PyOrbit {
         evidence.set_item("truncation", found.truncation)?;
         evidence.set_item("return_defect", alone(py, || self.orbit.return_defect())?)?;
         evidence.set_item("status", found.accuracy.status())?;
+        evidence.set_item("found_by", found.found_by)?;
         evidence.set_item("iterations", found.iterations)?;
         evidence.set_item("switches", found.switches)?;
         evidence.set_item("stuck", &found.stuck)?;

@@ -15,6 +15,7 @@ pub struct Row {
     /// Residual, energy gap, truncation, return defect.
     evidence: [f64; 4],
     iterations: u64,
+    found_by: &'static str,
     pub status: &'static str,
     pub failure: Option<String>,
 }
@@ -37,6 +38,7 @@ impl Row {
                     stable: orbit.is_stable(),
                     evidence: [found.residual, found.energy_gap, number(found.truncation), number(found.return_defect)],
                     iterations: found.iterations as u64,
+                    found_by: found.found_by,
                     status: found.accuracy.status(),
                     failure: None,
                 }
@@ -55,6 +57,7 @@ impl Row {
             stable: None,
             evidence: [f64::NAN; 4],
             iterations: 0,
+            found_by: "",
             status: "failed",
             failure: None,
         }
@@ -89,6 +92,7 @@ pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Metho
     }
     let iterations = Values::Integer(rows.iter().map(|row| row.iterations).collect());
     columns.push(Column { name: "iterations".to_owned(), values: iterations });
+    columns.push(Column::texts("found_by", rows.iter().map(|row| row.found_by.to_owned()).collect()));
     columns.push(Column::texts("status", rows.iter().map(|row| row.status.to_owned()).collect()));
     Table { name: name.to_owned(), columns }
 }

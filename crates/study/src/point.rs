@@ -27,6 +27,8 @@ pub(crate) struct Summary {
     pub truncation: f64,
     pub return_defect: f64,
     pub iterations: u64,
+    /// The algorithm that found the orbit; empty where there is none.
+    pub found_by: &'static str,
     pub status: String,
     pub failure: Option<String>,
     pub stuck: bool,
@@ -57,6 +59,7 @@ impl Summary {
             truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
             return_defect: orbit.evidence.return_defect.unwrap_or(f64::NAN),
             iterations: orbit.evidence.iterations as u64,
+            found_by: orbit.evidence.found_by,
             status: orbit.evidence.accuracy.status().to_owned(),
             failure: None,
             stuck: orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod,
@@ -76,6 +79,7 @@ impl Summary {
             truncation: f64::NAN,
             return_defect: f64::NAN,
             iterations: 0,
+            found_by: "",
             status: status.to_owned(),
             failure: None,
             stuck: false,
@@ -108,6 +112,7 @@ impl Summary {
         }
         rows.reduced(system.reduction_evidence());
         rows.integer("iterations", self.iterations);
+        rows.text("found_by", self.found_by);
         rows.text("status", &self.status);
     }
 }

@@ -6,6 +6,7 @@
 
 #![allow(clippy::print_stdout)] // tests say what they measured
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::method::Method;
@@ -42,6 +43,16 @@ struct Counts {
     unjudged: usize,
     /// Reported error above 1 %.
     inaccurate: usize,
+    /// Orbits by the algorithm that found them.
+    found_by: BTreeMap<&'static str, usize>,
+    /// Time of each point, found or not, s.
+    seconds: Vec<f64>,
+}
+
+/// The time that a share of the points stays below, s.
+fn quantile(seconds: &mut [f64], share: f64) -> f64 {
+    seconds.sort_by(f64::total_cmp);
+    seconds.get((share * (seconds.len() as f64 - 1.0)).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
 /// The largest difference of the blades' amplitudes from those of the reference, relative to the largest.
@@ -57,17 +68,21 @@ fn judge(damper: &LooseDamper, name: &str, counts: &mut Counts) {
     let mut solver = HarmonicBalance::default().solver(&system).unwrap();
     for &omega in &damper.frequencies {
         let clock = Instant::now();
-        let orbit = match solver.orbit(omega, None) {
+        let found = solver.orbit(omega, None);
+        let seconds = clock.elapsed().as_secs_f64();
+        counts.seconds.push(seconds);
+        let orbit = match found {
             Ok(orbit) => orbit,
             Err(error) => {
                 let settles = damper.settled(omega, COURSES[0]).is_some();
                 let count = if settles { &mut counts.missed } else { &mut counts.unsettled };
                 *count += 1;
-                println!("{name} at {:.3} Hz: {} (reference settles: {settles})", omega / TAU, error.status());
+                let status = error.status();
+                println!("{name} at {:.3} Hz: {status} in {seconds:.2} s (reference settles: {settles})", omega / TAU);
                 continue;
             }
         };
-        let seconds = clock.elapsed().as_secs_f64();
+        *counts.found_by.entry(orbit.evidence.found_by).or_default() += 1;
         let amplitudes: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
         let error = orbit.evidence.truncation.unwrap_or(f64::INFINITY);
         counts.inaccurate += usize::from(error > 0.01);
@@ -103,7 +118,10 @@ fn random_loose_dampers_vibrate_as_they_do_in_time() {
         let damper = loose_damper(seed);
         judge(&damper, &format!("{} {seed}", damper.kind), &mut counts);
     }
-    println!("{counts:?}");
+    let mut seconds = std::mem::take(&mut counts.seconds);
+    let total: f64 = seconds.iter().sum();
+    let [median, most] = [0.5, 0.95].map(|share| quantile(&mut seconds, share));
+    println!("{counts:?}\n{median:.4} s a point in the median, 95 % below {most:.3} s, {total:.1} s in all");
     let found = counts.agree + counts.within_histories + counts.differ + counts.unjudged;
     assert_eq!(counts.differ, 0, "{counts:?}");
     assert!(counts.missed as f64 <= 0.01 * (found + counts.missed) as f64, "{counts:?}");

@@ -549,6 +549,7 @@ impl<'a> Shooter<'a> {
                 history: history(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
                 history_spread: None,
+                found_by: self.name,
                 instead_of: None,
             },
             places: measured.places,

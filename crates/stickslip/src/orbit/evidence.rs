@@ -55,6 +55,11 @@ pub struct Evidence {
     /// equilibrium and with the opposite ones, relative to the largest amplitude; `None` where amplitudes do not depend on them, or
     /// where it was not measured (methods other than harmonic balance).
     pub history_spread: Option<f64>,
+    /// The algorithm that found the orbit: the method's name, or for harmonic balance the search that succeeded.
+    ///
+    /// `newton`, `interior-points`, `proximal-points`, `slip-limit-homotopy`, or `time-integration` where Newton's method starts
+    /// from a motion that was followed in time. If several searches contributed, the last one that is not `newton` is named.
+    pub found_by: &'static str,
     /// The method that was to find it and did not, where another one did: see [`Auto`](crate::method::auto::Auto).
     pub instead_of: Option<&'static str>,
 }

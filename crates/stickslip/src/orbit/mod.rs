@@ -218,6 +218,7 @@ impl Orbit {
                 history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
                 history_spread: None,
+                found_by: method,
                 instead_of: None,
             },
             places: measured.places,

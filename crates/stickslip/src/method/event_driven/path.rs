@@ -76,6 +76,7 @@ pub(super) fn orbit(
             history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
+            found_by: NAME,
             instead_of: None,
         },
         places: measured.places,

@@ -2,6 +2,7 @@
 
 use super::budget::{self, POINT, Work, is_affordable};
 use super::equations::{self, Level, Solution};
+use super::found_by::FoundBy;
 use super::kept::Kept;
 use super::options::{FIRST, HarmonicBalance, NAME, TOLERANCE};
 use super::ports::Ports;
@@ -297,9 +298,11 @@ impl Balance {
         if found.is_err() && self.ports.has_forces() {
             motion = Solution { iterations: motion.iterations, ..near.clone() };
             found = level.by_interior_points(&self.ports, omega, &mut motion);
+            motion.found_by = FoundBy::InteriorPoints;
             if found.is_err() {
                 motion = Solution { iterations: motion.iterations, ..near.clone() };
                 found = level.by_proximal_points(&self.ports, omega, &mut motion);
+                motion.found_by = FoundBy::ProximalPoints;
             }
         }
         found.map_err(|l| self.lost(l))?;
@@ -363,7 +366,7 @@ impl Balance {
             Some(before) if self.goes_ahead(near.top) => near.towards(before, omega),
             _ => near.motion.clone(),
         };
-        Some((near.top, motion))
+        Some((near.top, Solution { found_by: FoundBy::Newton, ..motion }))
     }
 }
 

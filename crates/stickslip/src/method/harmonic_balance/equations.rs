@@ -25,6 +25,7 @@ mod yardsticks;
 use super::budget::{POINT, Work};
 use super::coupled::{Coupled, Near, by_products, dot};
 use super::ease::Ease;
+use super::found_by::FoundBy;
 use super::kept::weight;
 use super::linear::Linear;
 use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
@@ -138,6 +139,7 @@ pub(super) struct Solution {
     pub force: Vec<Complex64>,
     pub residual: f64,
     pub iterations: usize,
+    pub found_by: FoundBy,
 }
 
 impl Solution {
@@ -150,6 +152,7 @@ impl Solution {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
         (self.residual, self.iterations) = (other.residual, other.iterations);
+        self.found_by = other.found_by;
     }
 }
 

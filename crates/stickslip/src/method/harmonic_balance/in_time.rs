@@ -3,6 +3,7 @@
 use super::NAME;
 use super::balance::Balance;
 use super::equations::Solution;
+use super::found_by::FoundBy;
 use crate::method::OrbitError;
 use crate::method::course::course;
 use crate::method::guess::Guess;
@@ -67,7 +68,7 @@ impl Balance {
     pub(super) fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<Solution> {
         let level = self.levels.get_mut(&top)?;
         let (nh, n) = (level.harmonics().len(), level.alternation.samples());
-        let mut motion = Solution::rest(level.linear.len());
+        let mut motion = Solution { found_by: FoundBy::TimeIntegration, ..Solution::rest(level.linear.len()) };
         let samples: Vec<_> = (0..n).map(|i| path.sample(TAU / omega * i as f64 / n as f64).joints).collect();
         for port in self.ports.iter() {
             for q in port.range() {

@@ -25,6 +25,7 @@ mod coupled;
 mod ease;
 mod equations;
 mod estimate;
+mod found_by;
 mod hold;
 mod in_time;
 mod interior;

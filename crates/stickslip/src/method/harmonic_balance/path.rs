@@ -189,6 +189,7 @@ pub(super) fn orbit(
             history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
+            found_by: motion.found_by.name(),
             instead_of: None,
         },
         places: measured.places,

@@ -5,6 +5,7 @@ use super::budget::{FEWEST, SEARCH, WORK, Work};
 use super::coupled::{FORMED, Near, product_work};
 use super::ease::{Ease, GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
+use super::found_by::FoundBy;
 use super::ports::{Port, Ports};
 use super::sparse::Along;
 use num_complex::Complex64;
@@ -431,17 +432,17 @@ impl Level {
             let iterations = motion.iterations;
             motion = Solution { iterations, ..start.clone() };
             if self.by_interior_points(ports, omega, &mut motion).is_ok() {
-                return Ok(motion);
+                return Ok(Solution { found_by: FoundBy::InteriorPoints, ..motion });
             }
             motion = Solution { iterations: motion.iterations, ..start };
             match self.by_proximal_points(ports, omega, &mut motion) {
-                Ok(()) => return Ok(motion),
+                Ok(()) => return Ok(Solution { found_by: FoundBy::ProximalPoints, ..motion }),
                 Err(lost) => nearest = lost.residual,
             }
         }
         let away = self.is_away(&motion);
         match self.lower_limits(ports, omega, &mut motion) {
-            Ok(()) if !self.is_away(&motion) => Ok(motion),
+            Ok(()) if !self.is_away(&motion) => Ok(Solution { found_by: FoundBy::SlipLimitHomotopy, ..motion }),
             Ok(()) => Err(Lost { away: true, ..Lost::after(motion.iterations, motion.residual) }),
             Err(lost) => Err(Lost { away: away || lost.away, residual: lost.residual.min(nearest), ..lost }),
         }
