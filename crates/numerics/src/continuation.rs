@@ -1,7 +1,8 @@
 //! Continuation of the solutions of `F(x, p) = 0` along the parameter p by arc length:
 //! predictor, corrector, step size control.
 //!
-//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 6.
+//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
+//! (2003), Ch. 6.
 
 use crate::dense;
 
@@ -76,7 +77,7 @@ pub enum End {
 
 /// Maximum number of corrector iterations.
 ///
-/// Newton's method at kinks first has to find the right side of each kink, and then takes more
+/// At kinks, Newton's method first has to find the right side of each kink. It then takes more
 /// than the usual three iterations without a risk of failure.
 const ITERATIONS: usize = 20;
 /// A step with at most this number of corrector iterations makes the next step

@@ -115,8 +115,9 @@ const LARGE: usize = 96;
 /// Returns the matrix with rows and columns scaled to ones on the diagonal, and
 /// the square roots of the diagonal.
 ///
-/// Returns `None` if the matrix is not symmetric, has an entry that is not finite, has a negative
-/// diagonal entry, or has a nonzero entry in the row or column of a zero diagonal entry.
+/// Returns `None` if the matrix is not symmetric, or if an entry is not finite.
+/// Returns `None` also for a negative diagonal entry, and for a nonzero entry
+/// in the row or column of a zero diagonal entry.
 fn scaled(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;

@@ -162,8 +162,9 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex64>> {
     Some(found)
 }
 
-/// Returns the largest modulus of the eigenvalues, zero for an empty matrix, or `None` if an
-/// entry is not finite or the iteration does not converge.
+/// Returns the largest modulus of the eigenvalues, zero for an empty matrix.
+///
+/// Returns `None` if an entry is not finite or the iteration does not converge.
 ///
 /// # Example
 /// ```

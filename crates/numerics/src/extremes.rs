@@ -161,7 +161,7 @@ impl Extremes {
 }
 
 /// Returns the zero of the cubic with these slopes and curvatures as a fraction of the
-/// interval, by one Newton step from the zero of the chord.
+/// interval. It takes one Newton step from the zero of the chord.
 fn first_guess(left: &At, right: &At) -> f64 {
     let h = right.time - left.time;
     let s = left.slope / (left.slope - right.slope);

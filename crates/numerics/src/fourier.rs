@@ -1,4 +1,6 @@
-//! Fourier series of sampled periodic signals: `u(θ) = Re Σ_h U_h e^{jhθ}`, sampled at `θ_i = 2π i / N`.
+//! Fourier series of sampled periodic signals.
+//!
+//! The signal is `u(θ) = Re Σ_h U_h e^{jhθ}`, with samples at `θ_i = 2π i / N`.
 
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};

@@ -87,8 +87,8 @@ impl Analysis {
 
     /// Factors a sum of matrices in complex numbers.
     ///
-    /// A symmetric sum is factored as `L D Lᵀ`. If the sum is not symmetric, or this factor is not
-    /// accurate, an LU factorization with row exchanges is used, which takes a few times as long.
+    /// A symmetric sum is factored as `L D Lᵀ`. A sum that is not symmetric, or whose factor is not
+    /// accurate, gets an LU factorization with row exchanges. This takes a few times as long.
     ///
     /// # Errors
     /// [`Singular`] if the sum is singular to rounding.

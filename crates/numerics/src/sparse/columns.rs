@@ -35,7 +35,7 @@ pub fn products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
 /// Computes `W += factor V S` of columns of length `n`.
 ///
 /// # Panics
-/// If a length is not a multiple of `n`, or if `S` does not have a row for
+/// If a length is not a multiple of `n`. Also if `S` does not have a row for
 /// every column of V and a column for every column of W.
 pub fn add(n: usize, w: &mut [f64], factor: f64, v: &[f64], s: &DMatrix<f64>) {
     let (inner, columns) = (count(n, v), count(n, w));

@@ -286,8 +286,8 @@ impl<'a> Lanczos<'a> {
         for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
             off.iter_mut().zip(shape).for_each(|(off, x)| *off = x - (value - shift) * *off);
         }
-        // K and M are diagonal in the space of the modes, so the rounding of the factor inside
-        // that space is not an error of the modes.
+        // K and M are diagonal in the space of the modes. The rounding of the factor inside
+        // that space is therefore not an error of the modes.
         for modes in [self.found, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
             let inside = columns::products(n, modes, &self.mass.times_columns(&off));
             columns::add(n, &mut off, -1.0, modes, &inside);

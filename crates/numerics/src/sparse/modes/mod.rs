@@ -63,7 +63,7 @@ const CHECKED_SHARE: usize = 8;
 /// first shift, in which eigenvalues can be counted.
 const GAP: f64 = 1e-5;
 /// Distance beyond the last mode found at which eigenvalues are counted and the next run
-/// starts, relative to the distance of that mode from the first shift.
+/// starts. It is relative to the distance of that mode from the first shift.
 ///
 /// It is at least the magnitude of that shift, for structures with many rigid-body modes.
 const BEYOND: f64 = 0.1;
