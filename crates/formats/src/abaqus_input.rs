@@ -1,10 +1,11 @@
 //! Abaqus `FORMAT=MATRIX INPUT` and `LABELS`: lines
 //! `node, dof, node, dof, value`. CalculiX writes substructures like this too.
 //!
-//! The file contains one triangle or both. Rows are sorted by node, then direction, and named
-//! `node.direction`. A constrained row has 1e36 on its diagonal. Negative node numbers are
-//! internal variables of Abaqus. Source: Abaqus Keywords Reference Guide, `*MATRIX INPUT`,
-//! `*MATRIX OUTPUT`; CalculiX manual, `*SUBSTRUCTURE MATRIX OUTPUT`.
+//! The file contains one triangle or both. Rows are sorted by node, then
+//! direction, and named `node.direction`. A constrained row has 1e36 on its
+//! diagonal. Negative node numbers are internal variables of Abaqus.
+//! Source: Abaqus Keywords Reference Guide, `*MATRIX INPUT`, `*MATRIX OUTPUT`;
+//! CalculiX manual, `*SUBSTRUCTURE MATRIX OUTPUT`.
 
 use std::collections::HashMap;
 

@@ -3,8 +3,9 @@
 //!
 //! CalculiX writes the upper triangle, Abaqus both. A file with one triangle only, or with a
 //! diagonal only, is a symmetric matrix. The size is the largest row or column. A first line
-//! with sizes is Matrix Market, see [`FirstLine`]. Source: CalculiX CrunchiX manual,
-//! `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus Analysis User's Guide, Generating matrices.
+//! with sizes is Matrix Market, see [`FirstLine`].
+//! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus
+//! Analysis User's Guide, Generating matrices.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};

@@ -1,9 +1,9 @@
 //! Fortran format descriptions for lines of fixed fields, such as `(8I10)`,
 //! `(1X,8I9)` and `(3(1P,E24.16))`.
 //!
-//! If a format ends before the numbers do, it restarts on the next line at its last group. A
-//! scale factor `kP` holds for all later fields: it multiplies a number without an exponent by
-//! `10^k`. Source: ISO/IEC 1539-1 (Fortran 2018), 13.3 to 13.8.
+//! If a format ends before the numbers do, it restarts on the next line at its last group. A scale
+//! factor `kP` holds for all later fields: it multiplies a number without an exponent by `10^k`.
+//! Source: ISO/IEC 1539-1 (Fortran 2018), 13.3 to 13.8.
 
 use std::str::from_utf8;
 

@@ -7,10 +7,10 @@
 //! RSA                        3             3             4             0
 //! (8I10)          (8I10)          (4E20.12)           (4E20.12)
 //! ```
-//! The columns are compressed, and a symmetric matrix (`RSA`) stores its lower
-//! triangle. Fields may touch, so the formats determine their widths. Source:
-//! Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix
-//! Collection, TR/PA/92/86 (1992); ANSYS Mechanical APDL Command Reference, HBMAT.
+//! The columns are compressed, and a symmetric matrix (`RSA`) stores its lower triangle. Fields
+//! may touch, so the formats determine their widths.
+//! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection,
+//! TR/PA/92/86 (1992); ANSYS Mechanical APDL Command Reference, HBMAT.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};

@@ -3,8 +3,9 @@
 //!
 //! MATLAB stores numbers by columns, so HDF5 shows its matrices transposed; a dataset with the
 //! attribute `MATLAB_class` is transposed back. A sparse matrix is a group with the datasets
-//! `data`, `ir`, `jc` and the number of rows as attribute `MATLAB_sparse`. Source: HDF5 File Format
-//! Specification 3.0 (by the crate `hdf5-pure`); MathWorks documentation of `save`, `-v7.3`.
+//! `data`, `ir`, `jc` and the number of rows as attribute `MATLAB_sparse`.
+//! Source: HDF5 File Format Specification 3.0 (by the crate `hdf5-pure`);
+//! MathWorks documentation of `save`, `-v7.3`.
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};

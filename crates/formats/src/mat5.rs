@@ -1,9 +1,10 @@
 //! MATLAB `.mat` of version 5 to 7: tagged elements, each variable optionally compressed.
 //! MATLAB's `save` without `-v7.3` and SciPy's `savemat` write it.
 //!
-//! The stored type of the numbers may be smaller than their class, for example `uint8` for a
-//! `double` array of integers. A small element is stored in its tag. Matrices in structures
-//! have names such as `model.K`. Source: MathWorks, MAT-File Format (R2023a), chapter 1.
+//! The stored type of the numbers may be smaller than their class, for example
+//! `uint8` for a `double` array of integers. A small element is stored in its
+//! tag. Matrices in structures have names such as `model.K`.
+//! Source: MathWorks, MAT-File Format (R2023a), chapter 1.
 
 use std::borrow::Cow;
 

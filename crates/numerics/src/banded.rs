@@ -1,7 +1,8 @@
 //! Linear equations with a banded matrix, by elimination with row exchanges inside the band.
 //!
-//! Memory grows with the number of unknowns times the bandwidth, and work with the number of
-//! unknowns times its square. Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 4.3.
+//! Memory grows with the number of unknowns times the bandwidth, and work with
+//! the number of unknowns times its square.
+//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 4.3.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};

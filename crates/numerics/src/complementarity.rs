@@ -5,9 +5,9 @@
 //! `min ½ λᵀDλ - bᵀλ` within the bounds. `w` is unique, and so is `λ` if `D` is definite. In a
 //! contact problem `λ` are friction forces and `w` relative accelerations.
 //!
-//! The method is block pivoting. Murty's least-index rule is the safeguard that
-//! makes it finite. Source: Cottle, Pang, Stone, "The Linear Complementarity
-//! Problem" (1992), Ch. 4; Júdice and Pires (1994).
+//! The method is block pivoting. Murty's least-index rule is the safeguard that makes it finite.
+//! Source: Cottle, Pang, Stone, "The Linear Complementarity Problem" (1992),
+//! Ch. 4; Júdice and Pires (1994).
 
 use crate::eigen;
 use nalgebra::{DMatrix, DVector};

@@ -1,8 +1,8 @@
 //! Dual numbers: a value and its partial derivatives. A kernel is written once
 //! and differentiated exactly.
 //!
-//! The arithmetic comes from the crate `num-dual`. Source: Clifford (1873);
-//! Griewank and Walther (2008), Ch. 3.
+//! The arithmetic comes from the crate `num-dual`.
+//! Source: Clifford (1873); Griewank and Walther (2008), Ch. 3.
 
 use num_dual::{Derivative, DualNum, DualSVec64};
 

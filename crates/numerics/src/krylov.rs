@@ -1,9 +1,10 @@
 //! Linear equations known by matrix-vector products only: GMRES with right preconditioning.
 //!
-//! `A P⁻¹ y = b`, `x = P⁻¹ y`. Of all x in the Krylov space of `P⁻¹ b, P⁻¹ A P⁻¹ b, …`, the
-//! method finds the one with the least residual. With right preconditioning this is the
-//! residual of the original equations. Source: Saad and Schultz (1986); Saad, "Iterative
-//! Methods for Sparse Linear Systems" (2003), Sec. 6.5 and 9.3.2.
+//! `A P⁻¹ y = b`, `x = P⁻¹ y`. Of all x in the Krylov space of
+//! `P⁻¹ b, P⁻¹ A P⁻¹ b, …`, the method finds the one with the least residual.
+//! With right preconditioning this is the residual of the original equations.
+//! Source: Saad and Schultz (1986); Saad, "Iterative Methods for Sparse Linear
+//! Systems" (2003), Sec. 6.5 and 9.3.2.
 
 use crate::interrupt;
 

@@ -1,8 +1,8 @@
 //! Maximum of a function in an interval, by golden-section search.
 //!
 //! Every step costs one function value and shrinks the interval to its (√5 - 1)/2. The function
-//! may be smooth or have kinks; a value may be expensive, and may fail. Source: Kiefer,
-//! Sequential minimax search for a maximum, Proc. AMS 4 (1953) 502-506.
+//! may be smooth or have kinks; a value may be expensive, and may fail.
+//! Source: Kiefer, Sequential minimax search for a maximum, Proc. AMS 4 (1953) 502-506.
 
 /// (√5 - 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;

@@ -7,8 +7,9 @@
 //! `q = Re Σ φ η`. A complex pair is kept once, with weight 2.
 //!
 //! A direction without stiffness and damping (`Kφ = Cφ = 0`) is a *free* direction. It keeps
-//! its double zero eigenvalue: `ρ'' = φᵀ g`. Source: Tisseur and Meerbergen, "The quadratic
-//! eigenvalue problem", SIAM Review 43 (2001), Sec. 3.
+//! its double zero eigenvalue: `ρ'' = φᵀ g`.
+//! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM
+//! Review 43 (2001), Sec. 3.
 
 use crate::eigen;
 use crate::null_space::null_space;

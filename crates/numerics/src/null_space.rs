@@ -1,11 +1,11 @@
 //! Approximate null space of a nearly singular matrix: its right singular
 //! vectors with the smallest singular values.
 //!
-//! Small matrices use the singular value decomposition. Large matrices use inverse
-//! iteration with `QᴴQ`: one factorization, and two solutions per step. The iteration
-//! converges faster the closer the matrix is to singular. Two steps are enough if the
-//! matrix is a polynomial matrix at one of its eigenvalues. Source: Golub and Van
-//! Loan, "Matrix Computations" (2013), Sec. 8.2.3 (orthogonal iteration).
+//! Small matrices use the singular value decomposition. Large matrices use
+//! inverse iteration with `QᴴQ`: one factorization, and two solutions per step.
+//! The iteration converges faster the closer the matrix is to singular. Two steps
+//! are enough if the matrix is a polynomial matrix at one of its eigenvalues.
+//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 8.2.3 (orthogonal iteration).
 
 use crate::dense::ComplexLu;
 use crate::eigen;
