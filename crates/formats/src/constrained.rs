@@ -10,8 +10,8 @@ use crate::matrix::Matrix;
 /// Diagonal value of a constrained row in Abaqus. A larger value is not a stiffness either.
 pub(crate) const CLAMPED: f64 = 1e36;
 
-/// Returns `matrix` with the rows of `first`, in their order. If either matrix
-/// has no names, it stays unchanged.
+/// Returns `matrix` with the rows of `first`, in their order. If either has no
+/// names, the function returns `matrix` unchanged.
 ///
 /// ```
 /// use stickslip_formats::{Matrix, Symmetry, aligned};

@@ -28,7 +28,8 @@ pub struct NameFormat {
     pub summary: &'static str,
     /// Returns true if the first line is of this format.
     sniff: fn(&Line) -> bool,
-    /// Returns the name in a line, or `None` for titles. The number is that of the preceding lines.
+    /// Returns the name in a line, or `None` for titles. The second argument is
+    /// the number of preceding lines.
     line: fn(&Line, usize) -> Result<Option<Named>, Error>,
 }
 

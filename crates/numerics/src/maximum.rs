@@ -1,7 +1,7 @@
 //! Maximum of a function in an interval, by golden-section search.
 //!
-//! Every step costs one function value and shrinks the interval to its (√5 - 1)/2. The function
-//! may be smooth or have kinks; a value may be expensive, and may fail.
+//! Every step costs one function value and reduces the interval to (√5 - 1)/2 of its length.
+//! The function may be smooth or have kinks; a value may be expensive, and may fail.
 //! Source: Kiefer, Sequential minimax search for a maximum, Proc. AMS 4 (1953) 502-506.
 
 /// (√5 - 1)/2.
