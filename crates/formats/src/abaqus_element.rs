@@ -1,4 +1,5 @@
-//! Matrices of a linear user element: Abaqus and CalculiX write substructures and element matrices in this way.
+//! Matrices of a linear user element: the form in which Abaqus and CalculiX
+//! write substructures and element matrices.
 //!
 //! ```text
 //! *USER ELEMENT, NODES=2, LINEAR
@@ -11,10 +12,13 @@
 //! 0.5, 2.0,
 //! 0.0, 0.0, 3.0
 //! ```
-//! The first line of data has the degrees of freedom of the first node; a further one the position of a node from which on others
-//! hold, here the second, with degree of freedom 1. Symmetric matrices are written row by row up to the diagonal, others (`UNSYMM`)
-//! column by column. The numbers of the nodes stand in a comment.
-//! Source: Abaqus Keywords Reference Guide, `*USER ELEMENT`, `*MATRIX`, `*SUBSTRUCTURE MATRIX OUTPUT`.
+//! The first data line contains the degrees of freedom of the first node. A later data line
+//! begins with the position of a node from which other degrees of freedom hold: here the second
+//! node, with degree of freedom 1. Symmetric matrices are written row by row up to the
+//! diagonal, others (`UNSYMM`) column by column. A comment contains the node numbers.
+//!
+//! Source: Abaqus Keywords Reference Guide, `*USER ELEMENT`, `*MATRIX`,
+//! `*SUBSTRUCTURE MATRIX OUTPUT`.
 
 use std::rc::Rc;
 
@@ -31,10 +35,10 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Lines before the first keyword, all of them comments.
+/// Maximum number of comment lines before the first keyword.
 const COMMENTS: usize = 1000;
 
-/// Rows of an element: a matrix of more would have terabytes.
+/// Maximum number of rows of an element. A larger matrix would take terabytes.
 const ROWS: usize = 1 << 20;
 
 fn sniff(bytes: &[u8]) -> bool {
@@ -44,7 +48,7 @@ fn sniff(bytes: &[u8]) -> bool {
     keyword.is_some_and(|line| is_keyword(&line, "*USERELEMENT"))
 }
 
-/// A keyword line without blanks, in capitals.
+/// Returns a keyword line in capitals and without spaces, or `None` for other lines.
 fn keyword(line: &Line) -> Option<String> {
     let starts = line.text.starts_with(b"*") && !line.text.starts_with(b"**");
     starts.then(|| String::from_utf8_lossy(line.text).to_uppercase().split_whitespace().collect())
@@ -54,24 +58,24 @@ fn is_keyword(line: &Line, name: &str) -> bool {
     keyword(line).is_some_and(|text| text.split(',').next() == Some(name))
 }
 
-/// The value of `NAME=value` on a keyword line.
+/// Returns the value of `NAME=value` on a keyword line.
 fn parameter<'t>(text: &'t str, name: &str) -> Option<&'t str> {
     text.split(',').find_map(|part| part.strip_prefix(name)?.strip_prefix('='))
 }
 
-/// The fields between commas of a line of data, or of a comment.
+/// Returns the nonempty fields between commas of a data line or comment.
 fn fields(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii).filter(|field| !field.is_empty())
 }
 
-/// An element on its way.
+/// An element whose lines are being read.
 #[derive(Default)]
 struct Element {
     nodes: usize,
     general: bool,
-    /// Numbers of the nodes, from the comment.
+    /// Node numbers, from the comment.
     labels: Vec<i64>,
-    /// Position from which on these degrees of freedom hold.
+    /// Degrees of freedom, each with the first position at which they hold.
     dofs: Vec<(usize, Vec<i64>)>,
 }
 
@@ -83,10 +87,11 @@ impl Element {
         Ok(Self { nodes, general: text.split(',').any(|part| part == "UNSYMM"), ..Self::default() })
     }
 
+    /// Reads a data line of degrees of freedom.
     fn add_dofs(&mut self, line: &Line) -> Result<(), Error> {
         let mut numbers = fields(line.text).map(|field| line.integer(field)).collect::<Result<Vec<_>, _>>()?;
         if self.dofs.is_empty() {
-            // The first line begins with the first node.
+            // The first data line starts at the first node and omits its position.
             numbers.insert(0, 1);
         }
         match numbers.split_first().map(|(&position, dofs)| (usize::try_from(position), dofs)) {
@@ -96,7 +101,8 @@ impl Element {
         Ok(())
     }
 
-    /// Node and degree of freedom of every row; nodes by position from one if their numbers are not known.
+    /// Returns the names of the rows and their number. Without known node
+    /// numbers there are no names.
     fn rows(&self, line: &Line) -> Result<(Vec<String>, usize), Error> {
         let mut changes = self.dofs.clone();
         changes.sort_by_key(|(from, _)| *from);
@@ -118,7 +124,7 @@ impl Element {
     }
 }
 
-/// Where the numbers of a matrix begin, and how they are to be read.
+/// The numbers of a matrix: first line and layout.
 struct Block<'a> {
     lines: Lines<'a>,
     rows: usize,
@@ -134,7 +140,8 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let mut in_matrix = false;
     while let Some(line) = lines.next() {
         if line.text.starts_with(b"**") {
-            // Titles of the comment are no numbers, and what stands behind the matrix is no list of nodes.
+            // Titles in the comment are not numbers, and a comment after the
+            // matrix is not a list of nodes.
             if let Some(element) = element.as_mut().filter(|element| element.dofs.is_empty()) {
                 element.labels.extend(fields(&line.text[2..]).filter_map(integer));
             }
@@ -161,7 +168,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items)
 }
 
-/// `stiffness`, or `stiffness 2` for the second one of a file.
+/// Returns `stiffness`, or `stiffness 2` for the second stiffness of a file.
 fn free_name(line: &Line, items: &[Item]) -> String {
     let text = keyword(line).unwrap_or_default();
     let kind = parameter(&text, "TYPE").unwrap_or("matrix").to_lowercase();

@@ -1,8 +1,11 @@
-//! Abaqus `FORMAT=MATRIX INPUT` and `LABELS`: lines `node, dof, node, dof, value`. CalculiX writes substructures in the same way.
+//! Abaqus `FORMAT=MATRIX INPUT` and `LABELS`: lines
+//! `node, dof, node, dof, value`. CalculiX writes substructures like this too.
 //!
-//! One triangle or both. Rows are sorted by node, then direction, and have the names `node.direction`. A constrained row has 1e36 on
-//! its diagonal. Numbers of nodes below zero are inner variables of Abaqus.
-//! Source: Abaqus Keywords Reference Guide, `*MATRIX INPUT`, `*MATRIX OUTPUT`; CalculiX manual, `*SUBSTRUCTURE MATRIX OUTPUT`.
+//! The file contains one triangle or both. Rows are sorted by node, then
+//! direction, and named `node.direction`. A constrained row has 1e36 on its
+//! diagonal. Negative node numbers are internal variables of Abaqus.
+//! Source: Abaqus Keywords Reference Guide, `*MATRIX INPUT`, `*MATRIX OUTPUT`;
+//! CalculiX manual, `*SUBSTRUCTURE MATRIX OUTPUT`.
 
 use std::collections::HashMap;
 
@@ -19,7 +22,7 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// A node: its number, or its label.
+/// A node, by number or by label.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Node<'a> {
     Number(i64),
@@ -35,7 +38,7 @@ fn fields<'a>(line: &Line<'a>) -> Option<[&'a [u8]; 5]> {
     for field in &mut fields {
         *field = parts.next()?.trim_ascii();
     }
-    // A comma at the end is common.
+    // A trailing comma is common.
     parts.all(|rest| rest.trim_ascii().is_empty()).then_some(fields)
 }
 
@@ -50,7 +53,7 @@ fn sniff(bytes: &[u8]) -> bool {
     })
 }
 
-/// Row, column and value of every line.
+/// Returns row, column and value of every line.
 fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(Row<'_>, Row<'_>, f64, Line<'_>), Error>> {
     let row = |line: &Line, [node, dof]: [&'_ [u8]; 2]| line.integer(dof).map(|dof| (integer(node), dof));
     lines(bytes).map(move |line| {
@@ -88,7 +91,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(vec![Item::new("", size, size, move || read(bytes, &rows, &places, count))])
 }
 
-/// Refuses a second `*MATRIX INPUT`, whose entries would be added to those of the first.
+/// Refuses a second `*MATRIX INPUT`, because its entries would be added to those of the first.
 fn must_be_one(bytes: &[u8]) -> Result<(), Error> {
     let begins = |line: &Line| {
         let keyword: Vec<u8> = line.text.iter().filter(|byte| !byte.is_ascii_whitespace()).take(12).copied().collect();

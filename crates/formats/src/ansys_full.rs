@@ -1,9 +1,13 @@
 //! ANSYS `.full`: the assembled matrices of an analysis, in binary records.
 //!
-//! A record is its length in words of 4 bytes, a word of flags, its data, and a word behind it. The file begins with a standard header
-//! of 100 words and, at word 103, the header of the matrices, which points to their first records. A matrix is two records for
-//! every row: the columns, and the values. Constrained rows are in the file and left out here; the others have names `node.direction`.
-//! Source: ANSYS Mechanical APDL Programmer's Reference, chapter 1: the standard header and the full stiffness-mass file (fdfull).
+//! A record consists of its length in words of 4 bytes, a word of flags, its data, and a
+//! trailing word. The file begins with a standard header of 100 words. At word 103 follows the
+//! header of the matrices, which points to their first records. A matrix has two records for
+//! every row: the columns and the values. The file includes constrained rows, which the reader
+//! removes; the other rows have names `node.direction`.
+//!
+//! Source: ANSYS Mechanical APDL Programmer's Reference, chapter 1: the
+//! standard header and the full stiffness-mass file (fdfull).
 
 use std::rc::Rc;
 
@@ -20,11 +24,11 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Words of the standard header, and its item that says which kind of file this is: 4 for `.full`.
+/// Words of the standard header, and its item for the kind of file: 4 for `.full`.
 const STANDARD: u32 = 100;
 const FULL: u32 = 4;
 
-/// Word at which the header of the matrices begins.
+/// First word of the header of the matrices.
 const HEADER: usize = 103;
 
 /// Flags of a record.
@@ -32,7 +36,7 @@ const INTEGERS: u32 = 1 << 31;
 const SHORT: u32 = 1 << 30;
 const PACKED: u32 = 0x3f << 24;
 
-/// Items of the header of the matrices, from zero.
+/// Items of the header of the matrices, counted from zero.
 mod item {
     pub const ORIGIN: usize = 0;
     pub const EQUATIONS: usize = 1;
@@ -46,6 +50,7 @@ mod item {
     pub const COUNT: usize = 37;
 }
 
+/// Returns the byte order, if the file has a standard header of a full file.
 fn order(bytes: &[u8]) -> Option<Order> {
     [Order::Little, Order::Big].into_iter().find(|&order| {
         let mut words = Bytes::new(bytes, order);
@@ -59,7 +64,7 @@ fn seek(file: &mut Bytes, word: usize) -> Result<(), Error> {
     file.seek(word.saturating_mul(4))
 }
 
-/// The next record: its flags, and its data.
+/// Reads the next record: its flags and its data.
 fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
     let location = file.clone();
     let words = file.u32()? as usize;
@@ -74,7 +79,7 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
     Ok((flags, Bytes::new(data, file.order)))
 }
 
-/// The next record, of whole numbers.
+/// Reads the next record as integers.
 fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
     let location = file.clone();
     let (flags, mut data) = record(file)?;
@@ -87,7 +92,7 @@ fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
     }
 }
 
-/// The next record, of real numbers.
+/// Reads the next record as real numbers.
 fn reals(file: &mut Bytes) -> Result<Vec<f64>, Error> {
     let location = file.clone();
     let (flags, mut data) = record(file)?;
@@ -100,14 +105,14 @@ fn reals(file: &mut Bytes) -> Result<Vec<f64>, Error> {
     }
 }
 
-/// What the matrices of a file have in common.
+/// The data that the matrices of a file share.
 struct System<'a> {
     file: Bytes<'a>,
-    /// Equations in the file, constrained ones among them.
+    /// Number of equations in the file, including the constrained ones.
     equations: usize,
-    /// Equations that are constrained.
+    /// The constrained equations.
     constrained: Vec<usize>,
-    /// Names of all equations; none if the numbers of degrees of freedom do not match.
+    /// Names of all equations, or `None` if the numbers of degrees of freedom do not match.
     names: Option<Vec<String>>,
     lumped: bool,
 }
@@ -160,9 +165,9 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items.collect())
 }
 
-/// Names of all equations, which are those of the first node, then of the second, and so on.
+/// Returns the names of all equations: those of the first node, then of the second, and so on.
 fn names_of(labels: &[i64], nodes: &[i64], counts: &[i64], dofs: &[i64]) -> Option<Vec<String>> {
-    // A degree of freedom is stated by its number, or by its position among those of the analysis.
+    // A degree of freedom is given by its number, or by its position among those of the analysis.
     let label = |dof: i64| {
         let location = usize::try_from(dof - 1).ok();
         if labels.contains(&dof) { Some(dof) } else { labels.get(location?).copied() }
@@ -223,7 +228,7 @@ mod tests {
     use super::*;
     use crate::{list_bytes, read_bytes};
 
-    /// A file written record by record, and where each record began, in words.
+    /// A file written record by record. Each call returns the first word of the record.
     #[derive(Default)]
     struct Writer(Vec<u8>);
 
@@ -246,7 +251,8 @@ mod tests {
         }
     }
 
-    /// Two nodes, 7 and 5, with directions 1 and 6; the first equation is constrained. `change` edits the header.
+    /// Two nodes, 7 and 5, with directions 1 and 6. The first equation is
+    /// constrained. `change` edits the header.
     fn file(change: impl Fn(&mut [i32])) -> Vec<u8> {
         let mut file = Writer::default();
         let mut standard = [0; 100];
@@ -266,7 +272,7 @@ mod tests {
         header[item::MASS] = file.reals(&[1.0, 2.0, 3.0, 4.0]);
         header[item::LUMPED] = 1;
         header[item::DOFS] = file.integers(&[2, 2]);
-        // Stated by position and by number.
+        // Given by position and by number.
         file.integers(&[-1, 2, 1, 6]);
         change(&mut header);
         let at = (HEADER + 2) * 4;

@@ -1,15 +1,15 @@
-//! Binary files: a cursor that never reads beyond the end, in either order of bytes.
+//! Cursor over binary data in either byte order, which never reads beyond the end.
 
 use crate::error::{Error, Kind, Location};
 
-/// Order of the bytes of a number.
+/// Byte order of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
     Little,
     Big,
 }
 
-/// A cursor over bytes.
+/// A cursor over binary data.
 #[derive(Clone)]
 pub(crate) struct Bytes<'a> {
     all: &'a [u8],
@@ -37,6 +37,7 @@ impl<'a> Bytes<'a> {
 
     number! { i8: i8, u8: u8, i16: i16, u16: u16, i32: i32, u32: u32, i64: i64, u64: u64, f32: f32, f64: f64 }
 
+    /// Returns the next `count` bytes.
     pub fn take(&mut self, count: usize) -> Result<&'a [u8], Error> {
         let end = self.at.checked_add(count).filter(|&end| end <= self.all.len());
         let end = end.ok_or_else(|| {
@@ -52,24 +53,25 @@ impl<'a> Bytes<'a> {
         Ok(taken)
     }
 
-    /// Steps over bytes, to the end at most.
+    /// Skips bytes, up to the end.
     pub fn skip(&mut self, count: usize) {
         self.at = self.at.saturating_add(count).min(self.all.len());
     }
 
-    /// A cursor so many bytes ahead, at the end at most.
+    /// Returns a cursor `count` bytes ahead, up to the end.
     pub fn ahead(&self, count: usize) -> Self {
         let mut ahead = self.clone();
         ahead.skip(count);
         ahead
     }
 
-    /// Moves to a byte, from zero.
+    /// Moves to a byte, counted from zero.
     pub fn seek(&mut self, at: usize) -> Result<(), Error> {
         self.at = 0;
         self.take(at).map(|_| ())
     }
 
+    /// Returns the number of bytes not read yet.
     pub fn left(&self) -> usize {
         self.all.len() - self.at
     }
@@ -78,6 +80,7 @@ impl<'a> Bytes<'a> {
         Location::Byte(self.at)
     }
 
+    /// Creates an error for unexpected content at this location.
     pub fn malformed(&self, expected: &str, found: impl std::fmt::Display) -> Error {
         Error::new(
             Kind::Malformed,
@@ -88,7 +91,7 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Kinds of numbers in binary files.
+/// Types of numbers in binary files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Number {
     I8,
@@ -113,7 +116,7 @@ impl Number {
         }
     }
 
-    /// The next number, as a real one: exact up to 2^53.
+    /// Reads the next number as a real number; integers are exact up to 2^53.
     pub fn real(self, bytes: &mut Bytes) -> Result<f64, Error> {
         Ok(match self {
             Self::I8 => bytes.i8()?.into(),
@@ -129,7 +132,7 @@ impl Number {
         })
     }
 
-    /// The next number, as an index or count from zero.
+    /// Reads the next number as an index or count from zero.
     pub fn index(self, bytes: &mut Bytes) -> Result<usize, Error> {
         let before = bytes.clone();
         let value = match self {

@@ -1,15 +1,17 @@
-//! The matrices of one structure, as programs write them: in which rows they agree, and which of those are constrained.
+//! Common rows of the matrices of one structure, and their constrained rows.
 //!
-//! Some programs leave rows without entries out of one matrix and not of the other, so that names of rows count, not their numbers. What is
-//! constrained they keep as a row of zeros (ANSYS) or with [`CLAMPED`] on its diagonal (Abaqus).
+//! Some programs omit rows without entries in one matrix but not in the other.
+//! Such rows are matched by their names. ANSYS writes a constrained row as a
+//! row of zeros, and Abaqus with [`CLAMPED`] on its diagonal.
 
 use crate::error::Error;
 use crate::matrix::Matrix;
 
-/// What Abaqus puts on the diagonal of a constrained row; larger is no stiffness either.
+/// Diagonal value of a constrained row in Abaqus. A larger value is not a stiffness either.
 pub(crate) const CLAMPED: f64 = 1e36;
 
-/// `matrix` with the rows of `first` in their order, where both have names.
+/// Returns `matrix` with the rows of `first`, in their order. If either has no
+/// names, the function returns `matrix` unchanged.
 ///
 /// ```
 /// use stickslip_formats::{Matrix, Symmetry, aligned};
@@ -26,7 +28,7 @@ pub(crate) const CLAMPED: f64 = 1e36;
 /// ```
 ///
 /// # Errors
-/// [`Kind::Names`](crate::Kind::Names): a row of `matrix` is none of `first`.
+/// [`Kind::Names`](crate::Kind::Names) if a row of `matrix` is missing in `first`.
 pub fn aligned(matrix: Matrix, first: &Matrix) -> Result<Matrix, Error> {
     match (first.names(), matrix.names()) {
         (Some(names), Some(own)) if names != own => matrix.in_order_of(names),
@@ -34,7 +36,9 @@ pub fn aligned(matrix: Matrix, first: &Matrix) -> Result<Matrix, Error> {
     }
 }
 
-/// Rows, from zero, that are constrained in `matrices` of so many `rows`: without an entry in any of them, or with 1e36 on a diagonal.
+/// Returns the constrained rows of `matrices` with `rows` rows, counted from zero.
+///
+/// A row is constrained if it has no entry in any matrix, or if it has 1e36 or more on a diagonal.
 ///
 /// ```
 /// use stickslip_formats::{Matrix, Symmetry, constrained};

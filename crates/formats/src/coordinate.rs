@@ -1,8 +1,11 @@
-//! Lines of `row column value`, counted from one, without a header: CalculiX (`.sti`, `.mas`) and Abaqus (`FORMAT=COORDINATE`).
+//! Lines `row column value`, counted from one, without a header: CalculiX
+//! (`.sti`, `.mas`) and Abaqus (`FORMAT=COORDINATE`).
 //!
-//! CalculiX writes the upper triangle, Abaqus both. One triangle alone stands for a symmetric matrix, and so does a diagonal.
-//! The size is the largest row or column there is. A first line of sizes belongs to Matrix Market, see [`FirstLine`].
-//! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus Analysis User's Guide, Generating matrices.
+//! CalculiX writes the upper triangle, Abaqus both. A file with one triangle only, or with a
+//! diagonal only, is a symmetric matrix. The size is the largest row or column. A first line
+//! with sizes is Matrix Market, see [`FirstLine`].
+//! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus
+//! Analysis User's Guide, Generating matrices.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
@@ -24,7 +27,7 @@ fn sniff(bytes: &[u8]) -> bool {
     })
 }
 
-/// Row, column, value of every line.
+/// Returns row, column and value of every line.
 fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(usize, usize, f64, Line<'_>), Error>> {
     Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty()).map(|line| {
         let [row, column, value] = line.exactly("row, column and value")?;
@@ -61,7 +64,8 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
 }
 
-/// Whether the file is three lines that are also the rows of a full symmetric matrix of whole numbers.
+/// Returns true if the file consists of three lines that are also the rows of a
+/// full symmetric matrix of integers.
 fn is_full_of_three(bytes: &[u8]) -> bool {
     let lines = Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty()).take(4);
     let rows: Option<Vec<[i64; 3]>> = lines.map(|line| whole(&line)).collect();
@@ -106,7 +110,7 @@ mod tests {
         check("1 1 1\n2 2 1.2", Kind::Truncated, Location::Line(2));
         check("1 1 inf\n", Kind::NotFinite, Location::Line(1));
         check("1 4000000000 1\n", Kind::TooLarge, Location::File);
-        // a full symmetric matrix is three such lines, too
+        // Three such lines may also be a full symmetric matrix.
         check("2 1 1\n1 2 1\n1 1 2\n", Kind::Malformed, Location::File);
         check("1 1 1\n\n0 1 1\n", Kind::Malformed, Location::Line(3));
     }

@@ -1,12 +1,13 @@
-//! Full matrices as text, a line for every row: `numpy.savetxt`, CSV, MATLAB's `writematrix`.
+//! Full matrices as text, one line per row: `numpy.savetxt`, CSV, MATLAB's `writematrix`.
 //!
 //! ```text
 //! # stiffness
 //! 2000.0, -1000.0
 //! -1000.0, 1000.0
 //! ```
-//! Numbers stand between blanks, commas or semicolons; comments begin with `#` or `%`. The matrix is square: a line of sizes or of column
-//! numbers, or a column of row numbers, makes it rectangular, and is refused.
+//! Spaces, commas or semicolons separate the numbers; comments begin with `#`
+//! or `%`. The matrix must be square. A line of sizes or column numbers, or a
+//! column of row numbers, would make it rectangular and is refused.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
@@ -16,7 +17,7 @@ use crate::text::{Line, Lines, integer, must_end_its_lines, real};
 pub(crate) const FORMAT: Format = Format {
     name: "dense-text",
     summary: "a line of numbers for every row: `numpy.savetxt`, CSV, MATLAB `writematrix`",
-    // a column of numbers is a list of names of rows
+    // A single column of numbers is a list of row names.
     sniff: |bytes| {
         rows(bytes)
             .next()
@@ -25,13 +26,14 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// The lines that are no comments.
+/// Returns the lines without the comments.
 fn rows(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     let is_comment = |line: &Line| matches!(line.text.trim_ascii_start().first(), None | Some(b'#' | b'%'));
     Lines::new(bytes).filter(move |line| !is_comment(line))
 }
 
-/// The fields of a line: between semicolons if there are any, else between commas, else between blanks.
+/// Returns the fields of a line, separated by semicolons if there are any, else
+/// by commas, else by spaces.
 fn fields<'a>(line: &Line<'a>) -> Box<dyn Iterator<Item = &'a [u8]> + 'a> {
     match [b';', b','].into_iter().find(|mark| line.text.contains(mark)) {
         Some(mark) => Box::new(line.text.split(move |byte| *byte == mark).map(<[u8]>::trim_ascii)),
@@ -68,7 +70,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(vec![Item::new("", size, size, move || read(bytes, size))])
 }
 
-/// Whether a line begins with two numbers that may be a row and a column.
+/// Returns true if a line begins with two numbers that may be a row and a column.
 fn has_indices(line: &Line) -> bool {
     fields(line).take(2).all(|field| integer(field).is_some_and(|index| index > 0))
 }
@@ -88,11 +90,11 @@ mod tests {
     use super::*;
     use crate::read_bytes;
 
-    /// The chain of three in the ways in which programs write it.
+    /// A chain of three masses in the notations of several programs.
     #[test]
     fn rows_of_numbers_in_every_dialect() -> Result<(), Error> {
         let files = [
-            // numpy.savetxt with its default format, and with a header
+            // numpy.savetxt with its default format, with a header.
             "# stiffness\n2.000000000000000000e+03 -1.000000000000000000e+03 0.000000000000000000e+00\n\
              -1.000000000000000000e+03 2.000000000000000000e+03 -1.000000000000000000e+03\n\
              0.000000000000000000e+00 -1.000000000000000000e+03 1.000000000000000000e+03\n",
@@ -108,7 +110,7 @@ mod tests {
         }
         let skew = read_bytes(b"0.0 300.0\n-300.0 0.0\n", None, None)?;
         assert_eq!((skew.get(0, 1), skew.get(1, 0)), (300.0, -300.0));
-        // one column could be a list of names: it is read where the format is stated
+        // A single column could be a list of names. It is read only if the format is stated.
         assert!(read_bytes(b"5\n", None, None).is_err());
         assert_eq!(read_bytes(b"5\n", Some("dense-text"), None)?.get(0, 0), 5.0);
         Ok(())
@@ -122,7 +124,7 @@ mod tests {
         };
         check("# nothing\n", Kind::Truncated, Location::File);
         check("2 1\n1 2\n3 4\n", Kind::NotSquare, Location::File);
-        // sizes, column numbers, row numbers
+        // With sizes, column numbers or row numbers.
         check("2 2\n2.5 1\n1 2\n", Kind::NotSquare, Location::File);
         check("3\n1 2 3\n2 4 5\n3 5 6\n", Kind::Malformed, Location::Line(2));
         check("0,1\n2,1\n1,2\n", Kind::NotSquare, Location::File);
@@ -132,7 +134,7 @@ mod tests {
         check("1,5;2,5\n2,5;1,5\n", Kind::Malformed, Location::Line(1));
         check("1 2\n3 nan\n", Kind::NotFinite, Location::Line(2));
         check("1 2\n3 4.2", Kind::Truncated, Location::Line(2));
-        // entries of Octave's sparse text, or rows
+        // Entries of Octave's sparse text, or rows.
         check("# type: sparse matrix\n1 1 2\n2 2 3\n3 3 4\n", Kind::Malformed, Location::File);
         check("1,1,2\n2,2,3\n3,3,4\n", Kind::Malformed, Location::File);
     }

@@ -1,37 +1,37 @@
-//! What is wrong with a file: where, what was expected, what to do.
+//! Errors of files: location, problem and remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// A file that could not be read or written.
+/// A failure to read or write a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}{problem}; {remedy}", Prefix(.path.as_deref(), .location))]
 pub struct Error {
-    /// What kind of fault it is.
+    /// The kind of the failure.
     pub kind: Kind,
-    /// The file, where it is known.
+    /// The file, if it is known.
     pub path: Option<PathBuf>,
-    /// Where in the file.
+    /// The location in the file.
     pub location: Location,
-    /// What is there, and what was expected.
+    /// The problem: the actual and the expected content.
     pub problem: String,
-    /// What to do about it.
+    /// The remedy for the user.
     pub remedy: String,
 }
 
 impl Error {
-    /// An error that does not know its file yet.
+    /// Creates an error without a path.
     pub(crate) fn new(kind: Kind, location: Location, problem: String, remedy: impl Into<String>) -> Self {
         Self { kind, path: None, location, problem, remedy: remedy.into() }
     }
 
-    /// The same error, of the file at `path`.
+    /// Returns the error with a path, if it has none yet.
     pub(crate) fn of(mut self, path: &Path) -> Self {
         self.path.get_or_insert_with(|| path.to_path_buf());
         self
     }
 
-    /// The same error at another location, where it knows none yet.
+    /// Returns the error with a location, if it has none yet.
     pub(crate) fn at(mut self, location: Location) -> Self {
         if self.location == Location::File {
             self.location = location;
@@ -40,58 +40,58 @@ impl Error {
     }
 }
 
-/// Kinds of faults.
+/// Kinds of failures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
     /// The system could not read or write the file.
     Io,
-    /// No format of the table reads this, or there is none of the given name.
+    /// No format recognizes the content, or no format has the given name.
     Format,
     /// The file ends too early.
     Truncated,
-    /// A line, number or header that is not as the format says.
+    /// A line, number or header violates the format.
     Malformed,
-    /// More or fewer entries than the header says, or entries beyond its size.
+    /// The number of entries differs from the header, or an entry lies outside the size.
     Count,
-    /// Complex numbers.
+    /// The numbers are complex.
     Complex,
-    /// NaN or infinity.
+    /// A number is NaN or infinite.
     NotFinite,
-    /// Sizes beyond what any file of this length can hold, or beyond 32 bits.
+    /// A size exceeds the capacity of a file of this length, or 32 bits.
     TooLarge,
-    /// The format has this, but it is not read.
+    /// The content is valid in the format, but the reader does not support it.
     Unsupported,
-    /// No matrix of that name, or several and no name.
+    /// No matrix has the given name, or the name of one of several matrices is missing.
     Choice,
-    /// Names of rows that do not match the matrix.
+    /// Row names do not match the matrix.
     Names,
-    /// A matrix with another number of rows than columns where a square one is needed.
+    /// A square matrix is required.
     NotSquare,
-    /// Two triangles that differ.
+    /// The two triangles of a symmetric matrix differ.
     NotSymmetric,
 }
 
-/// Where in a file.
+/// A location in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Location {
     /// The file as a whole.
     File,
-    /// A line, from one.
+    /// A line, counted from one.
     Line(usize),
-    /// A byte, from zero.
+    /// A byte, counted from zero.
     Byte(usize),
-    /// One matrix or member of the file, by its name.
+    /// A matrix or member of the file, by its name.
     Variable(String),
 }
 
-/// `path, line 3: ` of an error message.
+/// The beginning of an error message: `path, line 3: `.
 struct Prefix<'a>(Option<&'a Path>, &'a Location);
 
 impl fmt::Display for Prefix<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(path, location) = self;
-        // the root of a file has no name of its own
+        // The root of a file has an empty name.
         let location = match location {
             Location::Variable(name) if name.is_empty() => &Location::File,
             other => other,

@@ -1,4 +1,4 @@
-//! Files into memory, and what the system says if that fails.
+//! Loads files into memory.
 
 use std::fs::File;
 use std::io::Read;
@@ -6,10 +6,10 @@ use std::path::Path;
 
 use crate::error::{Error, Kind, Location};
 
-/// Bytes of a file at most, 16 GiB: a sparse matrix of some 400 million entries as text.
+/// Maximum size of a file in bytes, 16 GiB: a sparse matrix of about 400 million entries as text.
 pub const LARGEST_FILE: u64 = 16 << 30;
 
-/// A whole file. Devices and pipes, of which nothing tells where they end or whether they begin, are refused.
+/// Loads a whole file. Refuses devices and pipes, which have no known size.
 pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |error: std::io::Error| io(path, &error);
     let found = std::fs::metadata(path).map_err(failed)?;
@@ -25,7 +25,7 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     if found.len() <= LARGEST_FILE {
         bytes.try_reserve_exact(found.len() as usize).map_err(|error| failed(error.into()))?;
-        // a file may grow while it is read
+        // The file may grow while it is read.
         File::open(path).and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)).map_err(failed)?;
     }
     let size = found.len().max(bytes.len() as u64);
@@ -37,6 +37,7 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     Err(Error::new(Kind::TooLarge, Location::File, problem, remedy).of(path))
 }
 
+/// Converts an error of the operating system.
 pub(crate) fn io(path: &Path, error: &std::io::Error) -> Error {
     Error::new(Kind::Io, Location::File, error.to_string(), "check the path and its permissions").of(path)
 }
@@ -53,7 +54,7 @@ mod tests {
     fn only_files_of_a_known_size_are_read() -> std::io::Result<()> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("huge.mtx");
-        // takes no room on the disk
+        // A sparse file: it takes no space on the disk.
         File::create(&path)?.set_len(LARGEST_FILE + 1)?;
         assert_eq!(refused(&path), Kind::TooLarge);
         assert_eq!(refused(folder.path()), Kind::Io);
@@ -69,7 +70,7 @@ mod tests {
         assert_eq!(refused(Path::new("/dev/zero")), Kind::TooLarge);
         let pipe = tempfile::tempdir()?;
         let pipe = pipe.path().join("pipe");
-        // nobody writes to it: to open it would take for ever
+        // The pipe has no writer, so opening it would block forever.
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status()?.success());
         assert_eq!(refused(&pipe), Kind::TooLarge);
         Ok(())

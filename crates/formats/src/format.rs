@@ -1,26 +1,26 @@
-//! What a format of the table is, and what it finds in a file.
+//! Description of a file format, and of the variables in a file.
 
 use std::fmt;
 
 use crate::error::{Error, Kind, Location};
 use crate::matrix::Matrix;
 
-/// A format of files that hold matrices.
+/// A file format for matrices.
 pub struct Format {
-    /// What `format = "…"` calls it.
+    /// Name of the format, as in `format = "…"`.
     pub name: &'static str,
-    /// What it is, and which programs write it.
+    /// Short description, with the programs that write the format.
     pub summary: &'static str,
-    /// Whether a file looks like it, by its content.
+    /// Returns true if the content looks like this format.
     pub(crate) sniff: fn(&[u8]) -> bool,
-    /// The matrices in a file, not yet read.
+    /// Returns the variables of a file. Their numbers are not read yet.
     pub(crate) open: for<'a> fn(&'a [u8]) -> Result<Vec<Item<'a>>, Error>,
 }
 
-/// What a matrix of complex numbers is noted as.
+/// The note of a complex matrix.
 pub(crate) const COMPLEX: &str = "complex";
 
-/// A matrix that waits in a file.
+/// A variable of a file, with the function that reads it.
 pub(crate) struct Item<'a> {
     pub variable: Variable,
     pub read: Box<dyn Fn() -> Result<Matrix, Error> + 'a>,
@@ -36,7 +36,7 @@ impl<'a> Item<'a> {
         Self { variable: Variable { name: name.into(), rows, columns, note: None }, read: Box::new(read) }
     }
 
-    /// Something that is no real matrix: `note` says what it is instead.
+    /// Creates an item that is not a real matrix. `note` describes it.
     pub fn other(name: impl Into<String>, note: impl Into<String>) -> Self {
         let (name, note) = (name.into(), note.into());
         let (kind, remedy) = match note == COMPLEX {
@@ -50,16 +50,16 @@ impl<'a> Item<'a> {
     }
 }
 
-/// What a file holds under one name.
+/// A variable of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variable {
-    /// Its name; empty in formats that hold one matrix without a name.
+    /// Name of the variable; empty if the format has no names.
     pub name: String,
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
     pub columns: usize,
-    /// What it is, if it is no real matrix.
+    /// Description of a variable that is not a real matrix.
     pub note: Option<String>,
 }
 

@@ -1,7 +1,8 @@
-//! Formats of Fortran for lines of fixed fields, such as `(8I10)`, `(1X,8I9)` and `(3(1P,E24.16))`.
+//! Fortran format descriptions for lines of fixed fields, such as `(8I10)`,
+//! `(1X,8I9)` and `(3(1P,E24.16))`.
 //!
-//! Where a format ends before the numbers do, the next line begins at its last group. A scale factor `kP` holds for all later fields: a number
-//! without an exponent is then `10^k` times what it stands for.
+//! If a format ends before the numbers do, it restarts on the next line at its last group. A scale
+//! factor `kP` holds for all later fields: it multiplies a number without an exponent by `10^k`.
 //! Source: ISO/IEC 1539-1 (Fortran 2018), 13.3 to 13.8.
 
 use std::str::from_utf8;
@@ -9,26 +10,27 @@ use std::str::from_utf8;
 use crate::error::Error;
 use crate::text::{Line, Lines, shown};
 
-/// What a format says, one thing after the other, its repetitions written out.
+/// An edit descriptor, with repetitions expanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Edit {
-    /// The next so many characters are a number; digits behind its point, where a real number shows none.
+    /// A number in the next `width` characters. `decimals` is the number of
+    /// digits after an implied decimal point.
     Field { width: usize, decimals: usize },
-    /// So many characters are skipped, backwards if negative.
+    /// Skips characters, backwards if negative.
     Skip(isize),
-    /// The next character is this one, from zero.
+    /// Moves to a character of the line, counted from zero.
     Column(usize),
-    /// Numbers without an exponent are `10^k` times as large as they are.
+    /// Numbers without an exponent are multiplied by `10^k` in the file.
     Scale(i32),
-    /// The rest is on the next line.
+    /// Continues on the next line.
     Line,
 }
 
-/// A format.
+/// A format description.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Fixed {
     edits: Vec<Edit>,
-    /// Where it begins anew.
+    /// Index of the edit at which the format restarts.
     again: usize,
 }
 
@@ -40,11 +42,11 @@ pub(crate) struct Field<'a> {
     scale: i32,
 }
 
-/// Columns, repetitions and fields beyond these are no format of Fortran.
+/// Maximum value of columns, repetitions and fields. Larger values indicate another format.
 const MOST: usize = 10_000;
 
 impl Fixed {
-    /// `None` if the text is not a format of numbers.
+    /// Parses a format. Returns `None` if the text is not a format of numbers.
     pub fn new(text: &str) -> Option<Self> {
         let text: Vec<u8> = text.to_uppercase().bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
         let mut parser = Parser { rest: text.strip_prefix(b"(")?, again: 0 };
@@ -55,7 +57,7 @@ impl Fixed {
         (parser.rest.is_empty() && has_field).then_some(Self { edits, again })
     }
 
-    /// Reads `count` fields from as many lines as they take.
+    /// Reads `count` fields from the necessary number of lines.
     pub fn read<'a, T>(
         &self,
         lines: &mut Lines<'a>,
@@ -63,7 +65,7 @@ impl Fixed {
         what: &str,
         mut read: impl FnMut(Field<'a>) -> Result<T, Error>,
     ) -> Result<Vec<T>, Error> {
-        // A field has a digit and something that parts it from the next one, or a line its end.
+        // A field has at least a digit and a separator or line end.
         let mut found = Vec::with_capacity(count.min(lines.left() / 2 + 1));
         let (mut line, mut column, mut scale, mut next) = (None, 0_usize, 0, 0);
         while found.len() < count {
@@ -100,11 +102,11 @@ impl Fixed {
 }
 
 impl Field<'_> {
-    /// A real number.
+    /// Returns the field as a real number.
     pub fn real(&self) -> Result<f64, Error> {
         let value = self.line.real(self.text)?;
         if self.decimals > 0 && value != 0.0 && value.is_finite() && !self.text.contains(&b'.') {
-            // Fortran puts the point before the last digits, all other programs behind them.
+            // Fortran places the decimal point before the last digits, other programs after them.
             return Err(self.line.malformed("a number with a decimal point", &shown(self.text)));
         }
         let is_exponent = |(at, byte): (usize, &u8)| byte.is_ascii_alphabetic() || (at > 0 && b"+-".contains(byte));
@@ -115,15 +117,15 @@ impl Field<'_> {
     }
 }
 
-/// A format on its way.
+/// The state of the parser.
 struct Parser<'t> {
     rest: &'t [u8],
-    /// Where the last group outside of all others begins.
+    /// Start of the last top-level group.
     again: usize,
 }
 
 impl Parser<'_> {
-    /// Everything up to the closing parenthesis.
+    /// Parses a list up to its closing parenthesis.
     fn list(&mut self, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
         loop {
             match self.letter()? {
@@ -138,7 +140,7 @@ impl Parser<'_> {
         }
     }
 
-    /// One item, which begins with this character.
+    /// Parses an item with the given first character.
     fn item(&mut self, first: u8, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
         let negative = first == b'-';
         let (count, letter) = match first {
@@ -167,7 +169,7 @@ impl Parser<'_> {
                 b'R' => Edit::Skip(self.number_behind()? as isize),
                 _ => Edit::Column(self.number()?.checked_sub(1)?),
             }),
-            // signs and blanks, which numbers show by themselves
+            // Control of signs and blanks, which does not change the reading of numbers.
             b'S' | b'B' => self.skip(b"PSNZ"),
             b'I' | b'E' | b'D' | b'F' | b'G' => {
                 let field = self.field(letter)?;
@@ -178,6 +180,7 @@ impl Parser<'_> {
         Some(())
     }
 
+    /// Parses a group and repeats it `count` times.
     fn group(&mut self, count: usize, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
         let start = edits.len();
         if depth == 0 {
@@ -192,7 +195,7 @@ impl Parser<'_> {
         Some(())
     }
 
-    /// `w`, `w.d` or `w.dEe` behind the letter of a field.
+    /// Parses `w`, `w.d` or `w.dEe` after the letter of a field.
     fn field(&mut self, letter: u8) -> Option<Edit> {
         if letter == b'E' {
             self.skip(b"SNX");
@@ -227,13 +230,13 @@ impl Parser<'_> {
         from_utf8(number).ok()?.parse().ok().filter(|number| *number <= MOST)
     }
 
-    /// The number behind one more character.
+    /// Skips one character and parses a number.
     fn number_behind(&mut self) -> Option<usize> {
         self.letter()?;
         self.number()
     }
 
-    /// The number of which this is the first digit.
+    /// Parses a number with the given first digit.
     fn number_after(&mut self, first: u8) -> Option<usize> {
         let digits = self.rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
         let (others, rest) = self.rest.split_at(digits);
@@ -284,7 +287,7 @@ mod tests {
         }
     }
 
-    /// What gfortran 13 writes with these formats reads back.
+    /// Output of gfortran 13 in these formats reads back.
     #[test]
     fn lines_of_every_kind_of_format() -> Result<(), Error> {
         assert_eq!(reals("(1X,3I4)", "    1   2   3\n    4\n", 4)?, [1.0, 2.0, 3.0, 4.0]);
@@ -292,7 +295,7 @@ mod tests {
         assert_eq!(reals("(I3,2(1X,I3))", "  1   2   3\n   4   5\n", 5)?, [1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(reals("(I3/I4)", "  1\n   2\n  3\n", 3)?, [1.0, 2.0, 3.0]);
         assert_eq!(reals("(T5,I2,TR1,I2,T1,I4)", "1234 5  6\n", 3)?, [5.0, 6.0, 1234.0]);
-        // a scale factor counts where no exponent stands, from there on
+        // A scale factor affects numbers without an exponent, from its position on.
         assert_eq!(reals("(F7.3,1P,2F7.3)", "  1.500 15.000  1.5E1\n", 3)?, [1.5, 1.5, 15.0]);
         assert_eq!(reals("(1P,E13.5)", "  1.50000E+01\n", 1)?, [15.0]);
         assert!(reals("(F7.3)", "   1500\n", 1).is_err(), "Fortran reads 1.5, others 1500");

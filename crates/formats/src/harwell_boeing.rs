@@ -1,4 +1,5 @@
-//! Harwell-Boeing: a header of four or five lines, then pointers, rows and values in fixed Fortran formats. ANSYS writes it by `HBMAT`.
+//! Harwell-Boeing: a header of four or five lines, then pointers, rows and values in fixed
+//! Fortran formats. ANSYS writes it by `HBMAT`.
 //!
 //! ```text
 //! title                                                                   key
@@ -6,9 +7,10 @@
 //! RSA                        3             3             4             0
 //! (8I10)          (8I10)          (4E20.12)           (4E20.12)
 //! ```
-//! Columns are compressed, and a symmetric matrix (`RSA`) has its lower triangle. Fields may touch, so their widths come from the formats.
-//! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection, TR/PA/92/86 (1992); ANSYS Mechanical APDL
-//! Command Reference, HBMAT.
+//! The columns are compressed, and a symmetric matrix (`RSA`) stores its lower triangle. Fields
+//! may touch, so the formats determine their widths.
+//! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection,
+//! TR/PA/92/86 (1992); ANSYS Mechanical APDL Command Reference, HBMAT.
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{COMPLEX, Format, Item};
@@ -34,14 +36,14 @@ fn sniff(bytes: &[u8]) -> bool {
         && formats.text.trim_ascii_start().starts_with(b"(")
 }
 
-/// The three letters of a type: of the values, of the symmetry, of the assembly.
+/// Returns the three letters of a type: values, symmetry and assembly.
 fn type_of(word: &[u8]) -> Option<[u8; 3]> {
     let [values, symmetry, assembly] = *word.to_ascii_uppercase().first_chunk()?;
     let known = b"RCPI".contains(&values) && b"SUHZR".contains(&symmetry) && b"AE".contains(&assembly);
     (known && word.len() == 3).then_some([values, symmetry, assembly])
 }
 
-/// The header, with the lines behind it.
+/// The header, with the lines after it.
 struct Header<'a> {
     rows: usize,
     columns: usize,
@@ -57,7 +59,7 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     let mut lines = Lines::new(bytes);
     lines.expect("a title")?;
     let cards = lines.expect("the numbers of lines")?;
-    // The last one, lines of right-hand sides, may be missing.
+    // The last number, lines of right-hand sides, may be missing.
     let right_sides = cards.words().nth(4).map_or(Ok(0), |word| cards.count(word))?;
     let sizes = lines.expect("type and size")?;
     let words: Vec<_> = sizes.words().collect();
@@ -111,7 +113,7 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
         _ => values.read(&mut lines, entries, "a value of every entry", |field| field.real())?,
     };
     let symmetry = match kind[1] {
-        // What is real and Hermitian is symmetric.
+        // A real Hermitian matrix is symmetric.
         b'S' | b'H' => Symmetry::Symmetric,
         b'Z' => Symmetry::Skew,
         _ => Symmetry::General,

@@ -1,8 +1,11 @@
-//! MATLAB `.mat` of version 7.3, which is HDF5, and plain HDF5 of h5py: full matrices as datasets, sparse ones as groups.
+//! HDF5: MATLAB `.mat` of version 7.3 and files of h5py. Full matrices are
+//! datasets, sparse matrices are groups.
 //!
-//! MATLAB stores columns first, so that HDF5 sees its matrices transposed; what has the attribute `MATLAB_class` is turned back.
-//! A sparse matrix is a group with the parts `data`, `ir`, `jc` and the number of its rows as attribute `MATLAB_sparse`.
-//! Source: HDF5 File Format Specification 3.0 (by the crate `hdf5-pure`); MathWorks documentation of `save`, `-v7.3`.
+//! MATLAB stores numbers by columns, so HDF5 shows its matrices transposed; a dataset with the
+//! attribute `MATLAB_class` is transposed back. A sparse matrix is a group with the datasets
+//! `data`, `ir`, `jc` and the number of rows as attribute `MATLAB_sparse`.
+//! Source: HDF5 File Format Specification 3.0 (by the crate `hdf5-pure`);
+//! MathWorks documentation of `save`, `-v7.3`.
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,26 +21,28 @@ use crate::matrix::{Along, Symmetry, Triplets, compressed, dense};
 pub(crate) const FORMAT: Format = Format {
     name: "hdf5",
     summary: "MATLAB (.mat) of version 7.3, `save -v7.3`, and datasets of h5py (.h5)",
-    // The superblock stands at the beginning or, behind a block of the user such as MATLAB's, at 512, 1024, 2048.
+    // The superblock is at the beginning or, after a user block such as
+    // MATLAB's, at 512, 1024 or 2048.
     sniff: |bytes| [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC))),
     open,
 };
 
 const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Groups within groups that are followed.
+/// Maximum depth of nested groups.
 const DEPTH: usize = 8;
 
-/// Numbers that any dataset may have, stored or not, and any chunk: those of h5py have at most this many.
+/// Count of numbers that any dataset may have, stored or not, and any chunk.
+/// Chunks of h5py are not larger.
 const FEW: u64 = 1 << 17;
 
-/// Bytes that deflate can pack into one.
+/// Maximum number of bytes that deflate packs into one.
 const DEFLATE: u64 = 1032;
 
-/// Members of a file that are listed.
+/// Maximum number of listed members of a file.
 const MEMBERS: usize = 10_000;
 
-/// Groups that are looked into: links may go in circles.
+/// Maximum number of groups visited, because links may form cycles.
 const GROUPS: usize = 1000;
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
@@ -48,9 +53,11 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items)
 }
 
-/// What the crate `hdf5-pure` answers. It adds up numbers of damaged files without a check (0.47, positions of chunks), and may panic.
+/// Calls the crate `hdf5-pure`, and converts its errors and panics. For damaged files it adds
+/// numbers without a check (0.47, positions of chunks) and may panic.
 fn guarded<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
-    // What it was working on is dropped with the error: nobody sees a half-made state.
+    // The data it was working on is dropped with the error, so no inconsistent
+    // state remains visible.
     let answer = catch_unwind(AssertUnwindSafe(ask));
     let problem = match answer {
         Ok(Ok(answer)) => return Ok(answer),
@@ -62,20 +69,20 @@ fn guarded<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Err
     Err(Error::new(Kind::Malformed, location, problem, remedy))
 }
 
-/// A walk through the groups of a file.
+/// A traversal of the groups of a file.
 struct Walk<'w, 'a> {
     limit: Limit,
-    /// Groups looked into so far.
+    /// Number of groups visited so far.
     groups: usize,
     items: &'w mut Vec<Item<'a>>,
 }
 
 impl Walk<'_, '_> {
-    /// Adds what a group and the groups in it hold.
+    /// Adds the contents of a group and of its subgroups.
     fn through(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
         self.groups += 1;
         let here = || Location::Variable(path.to_string());
-        // MATLAB keeps the parts of cells and objects in groups of its own, `#refs#` and `#subsystem#`.
+        // MATLAB stores the parts of cells and objects in the groups `#refs#` and `#subsystem#`.
         let own = |name: &String| !name.starts_with('#');
         let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
         for name in guarded(here(), || group.datasets())?.into_iter().filter(own) {
@@ -93,7 +100,7 @@ impl Walk<'_, '_> {
             let inner = Rc::new(guarded(location(), || group.group(&name))?);
             let attributes = guarded(location(), || inner.attrs())?;
             if attributes.contains_key("OCTAVE_NEW_FORMAT") {
-                // Its matrices are transposed, and nothing at them says so.
+                // Octave transposes its matrices without marking them.
                 self.items.push(Item::other(full(&name), "in the form of Octave's `save -hdf5` (`save -v7` is read)"));
             } else if let Some(rows) = attributes.get("MATLAB_sparse") {
                 let rows = whole(rows).ok_or_else(|| {
@@ -109,7 +116,7 @@ impl Walk<'_, '_> {
     }
 }
 
-/// A count in an attribute.
+/// Returns a count from an attribute.
 fn whole(value: &AttrValue) -> Option<usize> {
     match value {
         AttrValue::U64(value) => usize::try_from(*value).ok(),
@@ -157,7 +164,7 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
     }))
 }
 
-/// What MATLAB says that a dataset of numbers is, if that is no matrix.
+/// Returns MATLAB's description of a dataset that is not a matrix.
 fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
     if attributes.contains_key("MATLAB_empty") {
         return Some("empty");
@@ -179,7 +186,7 @@ fn too_large(location: Location) -> Error {
     Error::new(Kind::TooLarge, location, problem, "save the file again, without compression if it is right")
 }
 
-/// All numbers of a dataset.
+/// Reads all numbers of a dataset.
 fn numbers<T>(
     dataset: &Dataset,
     limit: Limit,
@@ -187,11 +194,11 @@ fn numbers<T>(
     read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
 ) -> Result<Vec<T>, Error> {
     let location = Location::Variable(name.to_string());
-    // A chunk is unpacked as a whole, even where the dataset ends within it.
+    // A chunk is decompressed as a whole, even if the dataset ends within it.
     let chunk = guarded(location.clone(), || dataset.chunk_shape())?.unwrap_or_default();
     let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
     let shape = guarded(location.clone(), || dataset.shape())?;
-    // Of a dataset in chunks, what is in the file; the index of some kinds of chunks cannot be asked.
+    // The stored size of a dataset in chunks. The index of some kinds of chunks cannot be queried.
     let stored = match chunk[..] {
         [] => None,
         _ => guarded(location.clone(), || dataset.chunks())

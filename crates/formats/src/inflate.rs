@@ -1,4 +1,4 @@
-//! Compressed parts of files, unpacked up to a bound.
+//! Decompresses parts of files, up to a limit.
 
 use std::io::Read;
 
@@ -6,41 +6,42 @@ use flate2::read::{DeflateDecoder, ZlibDecoder};
 
 use crate::error::{Error, Kind, Location};
 
-/// How many times as large as its file what is unpacked may become, beyond [`UNPACKED_ALWAYS`].
+/// Maximum ratio of decompressed size to file size, beyond [`UNPACKED_ALWAYS`].
 ///
-/// Deflate can pack 1030 bytes into one, which makes bombs possible. A sparse stiffness of a regular mesh, whose values repeat, is packed
-/// to a 25th; parts of files, such as the equal values of a mass, and full matrices of mostly zeros to a 900th.
+/// Deflate compresses up to 1030 bytes into one, which makes decompression bombs possible. A sparse
+/// stiffness matrix of a regular mesh, with repeated values, shrinks to a 25th. Parts of files,
+/// such as the equal values of a mass matrix, and full matrices of mostly zeros shrink to a 900th.
 pub const EXPANSION: usize = 100;
 
-/// Bytes that may always be unpacked: a full matrix of 5800 rows.
+/// Decompressed size in bytes that is always accepted: a full matrix of 5800 rows.
 pub const UNPACKED_ALWAYS: usize = 256 << 20;
 
-/// How many bytes may be unpacked from a file.
+/// Limit on the decompressed bytes of a file.
 #[derive(Clone, Copy)]
 pub(crate) struct Limit(usize);
 
 impl Limit {
-    /// Of a file of so many bytes.
+    /// Returns the limit for a file of `file` bytes.
     pub fn of(file: usize) -> Self {
         Self(UNPACKED_ALWAYS.max(file.saturating_mul(EXPANSION)))
     }
 
-    /// In numbers of 8 bytes.
+    /// Returns the limit in numbers of 8 bytes.
     pub fn numbers(self) -> u64 {
         (self.0 / size_of::<f64>()) as u64
     }
 }
 
-/// The two wrappings of deflate.
+/// The two containers of deflate.
 #[derive(Clone, Copy)]
 pub(crate) enum Wrapping {
     /// With header and checksum, in MATLAB files.
     Zlib,
-    /// Bare, in zip files.
+    /// Without header, in zip files.
     Bare,
 }
 
-/// Unpacks all of `packed`.
+/// Decompresses all of `packed`.
 pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location: &Location) -> Result<Vec<u8>, Error> {
     let most = limit.0;
     let (bytes, damage) = up_to(packed, wrapping, most + 1);
@@ -58,7 +59,7 @@ pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location:
     }
 }
 
-/// The first `count` bytes of what is packed, fewer where it ends or is damaged.
+/// Returns the first `count` decompressed bytes, fewer if the data ends or is damaged.
 pub(crate) fn beginning(packed: &[u8], wrapping: Wrapping, count: usize) -> Vec<u8> {
     up_to(packed, wrapping, count).0
 }

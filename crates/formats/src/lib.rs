@@ -1,4 +1,5 @@
-//! Matrices from and to files: what finite-element programs, MATLAB and Python write becomes one [`Matrix`] type.
+//! Reads and writes matrices: files of finite-element programs, MATLAB and
+//! Python become one [`Matrix`] type.
 //!
 //! ```
 //! use stickslip_formats::{Matrix, Symmetry, list, read, write};
@@ -7,7 +8,7 @@
 //! let stiffness = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5), (1, 1, 1e5)])?;
 //! write(&path, &stiffness)?;
 //!
-//! // The format is found by content; a name is needed where a file holds several matrices.
+//! // The content determines the format; a file with several matrices needs a name.
 //! let back = read(&path, None, None)?;
 //! assert_eq!(back.entries(), stiffness.entries());
 //! assert_eq!(back.origin().format, "matrix-market");
@@ -15,8 +16,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Formats are rows of [`TABLE`]; names of rows have a table of their own, [`names::TABLE`]. What a header says of sizes is not
-//! believed: memory follows what is really in the file, see [`EXPANSION`] for compressed ones.
+//! [`TABLE`] lists the formats, and [`names::TABLE`] the formats of row names.
+//!
+//! The reader does not trust sizes stated in a header: memory is bounded by the length of the
+//! file, see [`EXPANSION`] for compressed files.
 
 mod abaqus_element;
 mod abaqus_input;
@@ -57,7 +60,7 @@ pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
 pub use report::Report;
 
-/// All formats. The first whose sniff is right reads a file.
+/// All formats. The first format that recognizes the content reads the file.
 pub const TABLE: &[Format] = &[
     matrix_market::FORMAT,
     hdf5::FORMAT,
@@ -70,27 +73,28 @@ pub const TABLE: &[Format] = &[
     ansys_full::FORMAT,
     harwell_boeing::FORMAT,
     coordinate::FORMAT,
-    // Rows of numbers begin as many other files do.
+    // Other formats begin with rows of numbers too, so this one comes late.
     dense::FORMAT,
-    // Its cards may stand anywhere in a file, so that it looks through all of it.
+    // The cards may be anywhere in a file, so this format searches all of it.
     nastran_dmig::FORMAT,
 ];
 
 /// Reads one matrix.
 ///
-/// `format` is a name of [`TABLE`]; without it the content decides. `name` is needed where the file holds several matrices.
+/// `format` is a name from [`TABLE`]; without it the content determines the format. `name` is
+/// required if the file contains several matrices.
 ///
 /// # Errors
-/// With file, location, what was expected, and what to do, see [`Kind`].
+/// [`Error`] with file, location, problem and remedy; see [`Kind`].
 pub fn read(path: impl AsRef<Path>, format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
     let path = path.as_ref();
     read_bytes(&load(path)?, format, name).map_err(|error| error.of(path))
 }
 
-/// As [`read`], from a file in memory.
+/// Reads one matrix from a file in memory, like [`read`].
 ///
 /// # Errors
-/// As [`read`], without the name of a file.
+/// Like [`read`], without the path.
 pub fn read_bytes(bytes: &[u8], format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
     let bytes = unmarked(bytes);
     let format = find(bytes, format)?;
@@ -106,31 +110,33 @@ pub fn read_bytes(bytes: &[u8], format: Option<&str>, name: Option<&str>) -> Res
     Ok(matrix)
 }
 
-/// What a file holds, in its order.
+/// Lists the contents of a file, in file order.
 ///
 /// # Errors
-/// As [`read`].
+/// Like [`read`].
 pub fn list(path: impl AsRef<Path>, format: Option<&str>) -> Result<Vec<Variable>, Error> {
     let path = path.as_ref();
     list_bytes(&load(path)?, format).map_err(|error| error.of(path))
 }
 
-/// As [`list`], of a file in memory.
+/// Lists the contents of a file in memory, like [`list`].
 ///
 /// # Errors
-/// As [`list`], without the name of a file.
+/// Like [`list`], without the path.
 pub fn list_bytes(bytes: &[u8], format: Option<&str>) -> Result<Vec<Variable>, Error> {
     let bytes = unmarked(bytes);
     let items = (find(bytes, format)?.open)(bytes)?;
     Ok(items.into_iter().map(|item| item.variable).collect())
 }
 
-/// Writes a matrix as Matrix Market (`.mtx`) or for SciPy (`.npz`), by the ending of the path.
+/// Writes a matrix as Matrix Market (`.mtx`) or for SciPy (`.npz`), according
+/// to the file extension.
 ///
-/// Every number reads back to its last bit. Names of rows go into a file of their own, see [`names::write`].
+/// Every number reads back to its last bit. [`names::write`] writes the row
+/// names to a separate file.
 ///
 /// # Errors
-/// [`Kind::Format`] for another ending, [`Kind::Io`].
+/// [`Kind::Format`] for another extension, [`Kind::Io`].
 pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
@@ -146,12 +152,12 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     std::fs::write(path, bytes).map_err(|error| io(path, &error))
 }
 
-/// Without the mark that some editors put before text in UTF-8.
+/// Returns the content without the UTF-8 byte order mark that some editors write.
 fn unmarked(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
-/// The format of that name, or the one that the content is of.
+/// Returns the format with the given name, or the one that recognizes the content.
 fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let names = || TABLE.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
     let fault = |problem, remedy| Error::new(Kind::Format, Location::File, problem, remedy);
@@ -186,7 +192,7 @@ fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     })
 }
 
-/// The matrix of that name, or the only one.
+/// Returns the matrix with the given name, or the only one.
 fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> Result<&'i Item<'a>, Error> {
     let fault = |problem: String, remedy: &str| Err(Error::new(Kind::Choice, Location::File, problem, remedy));
     let there = || match items {
@@ -205,7 +211,7 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
             None => fault(format!("nothing is called `{name}`, the file holds {}", there()), "take one of these names"),
         },
         (None, [one]) => Ok(one),
-        // Its own error says more than that there is no matrix.
+        // The error of the item says more than that there is no matrix.
         (None, []) if items.len() == 1 => Ok(&items[0]),
         (None, []) if items.is_empty() => fault("the file holds nothing".into(), "export the matrix again"),
         (None, []) => fault(format!("the file holds no real matrix, but {}", there()), "export the matrix again"),
@@ -217,14 +223,18 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
     }
 }
 
-/// Rows and columns beyond this many, and beyond [`ROWS_PER_BYTE`], are no size of this file but a damaged number.
+/// Number of rows or columns that is always accepted. Larger numbers must
+/// satisfy [`ROWS_PER_BYTE`].
 const ROWS_ALWAYS: usize = 1 << 20;
 
-/// Rows and columns for every byte of a file. A row with an entry takes a line of text, and that of a diagonal some two bytes where its numbers are
-/// compressed; so many rows without any stand in small files only.
+/// Maximum number of rows or columns per byte of a file.
+///
+/// A row with an entry takes a line of text, or about two bytes if it belongs to a compressed
+/// diagonal. Only small files have this many empty rows.
 const ROWS_PER_BYTE: usize = 1;
 
-/// Refuses sizes that a file of this length cannot fill: whoever holds one number a row shall not run out of memory.
+/// Rejects sizes that a file of this length cannot fill, because users allocate
+/// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
     let most = ROWS_ALWAYS.max(length.saturating_mul(ROWS_PER_BYTE));
     if rows.max(columns) <= most {

@@ -1,7 +1,9 @@
-//! MATLAB `.mat` of version 5 to 7: tagged elements, each variable perhaps compressed. MATLAB's `save` without `-v7.3`, SciPy's `savemat`.
+//! MATLAB `.mat` of version 5 to 7: tagged elements, each variable optionally compressed.
+//! MATLAB's `save` without `-v7.3` and SciPy's `savemat` write it.
 //!
-//! Numbers may be stored in a smaller type than their class has (a `double` of whole numbers as `uint8`), and small elements within
-//! their tag. Matrices in structures have names such as `model.K`.
+//! The stored type of the numbers may be smaller than their class, for example
+//! `uint8` for a `double` array of integers. A small element is stored in its
+//! tag. Matrices in structures have names such as `model.K`.
 //! Source: MathWorks, MAT-File Format (R2023a), chapter 1.
 
 use std::borrow::Cow;
@@ -19,13 +21,13 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Bytes before the first element: a text, an offset, a version, the order of bytes.
+/// Size of the file header in bytes: a text, an offset, a version and the byte order.
 const HEADER: usize = 128;
 
-/// Bytes of a compressed variable that surely hold its class, size and name.
+/// Number of bytes of a compressed variable that certainly contain its class, size and name.
 const BEGINNING: usize = 4096;
 
-/// Structures within structures that are followed.
+/// Maximum depth of nested structures.
 const DEPTH: usize = 8;
 
 /// Types of elements.
@@ -36,6 +38,7 @@ const COMPRESSED: u32 = 15;
 const STRUCTURE: u8 = 2;
 const SPARSE: u8 = 5;
 
+/// Returns the byte order, if the file has a header of version 5.
 fn order(bytes: &[u8]) -> Option<Order> {
     let [major_or_minor @ .., a, b] = bytes.get(HEADER - 4..HEADER)? else { return None };
     match (major_or_minor, [*a, *b]) {
@@ -45,13 +48,15 @@ fn order(bytes: &[u8]) -> Option<Order> {
     }
 }
 
-/// Whether it begins as a file of version 4 does, which is another format: a type in decimal digits, sizes, and a name that ends with a zero.
+/// Returns true if the file begins like version 4, which is another format: a type in decimal
+/// digits, sizes, and a name that ends with a zero byte.
 pub(crate) fn is_version_4(bytes: &[u8]) -> bool {
     let number = |at: usize, read: fn([u8; 4]) -> u32| Some(read(bytes.get(at..at + 4)?.try_into().ok()?));
     [u32::from_le_bytes, u32::from_be_bytes].into_iter().any(|read| {
         let numbers: Option<Vec<u32>> = (0..5).map(|k| number(4 * k, read)).collect();
         let Some([kind, rows, columns, complex, name]) = numbers.as_deref() else { return false };
-        // thousands: the order of bytes; hundreds: none; tens: the type of numbers; ones: full, text, sparse
+        // Digits of the type: thousands are the byte order, hundreds are zero, tens are the
+        // number type, ones are full, text or sparse.
         let known = *kind < 5000 && kind / 100 % 10 == 0 && kind / 10 % 10 <= 5 && kind % 10 <= 2;
         let named = bytes.get(20..20 + (*name).min(64) as usize).and_then(<[u8]>::split_last);
         let named =
@@ -67,11 +72,12 @@ struct Element<'a> {
     location: Location,
 }
 
-/// The next element, within `bytes`, and the cursor behind it.
+/// Reads the next element and moves the cursor after it.
 fn element<'a>(bytes: &mut Bytes<'a>) -> Result<Element<'a>, Error> {
     let location = bytes.location();
     let kind = bytes.u32()?;
-    // A small element has its length in the upper half of its type, and its data in place of the length.
+    // A small element stores its length in the upper half of its type, and its
+    // data in place of the length.
     if kind >> 16 != 0 {
         let length = (kind >> 16) as usize;
         let data = bytes.take(4)?;
@@ -108,7 +114,8 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items)
 }
 
-/// Where a variable stands: its bytes, or the beginning of its bytes and the packed whole.
+/// The bytes of a variable. For a compressed variable, `data` is the beginning
+/// and `packed` the whole.
 #[derive(Clone)]
 struct Source<'a> {
     data: Cow<'a, [u8]>,
@@ -118,17 +125,17 @@ struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// All of its bytes, from its first part on.
+    /// Returns all bytes of the variable, after the tag.
     fn whole(&self) -> Result<Cow<'_, [u8]>, Error> {
         let Some((packed, limit)) = self.packed else { return Ok(Cow::Borrowed(&self.data)) };
         let mut all = inflate(packed, Wrapping::Zlib, limit, &self.location)?;
-        // Past the tag of the matrix within.
+        // Drop the tag of the inner matrix element.
         all.drain(..all.len().min(8));
         Ok(Cow::Owned(all))
     }
 }
 
-/// What every variable begins with.
+/// The header of a variable.
 struct Head {
     class: u8,
     complex: bool,
@@ -156,7 +163,7 @@ fn head(parts: &mut Bytes) -> Result<Head, Error> {
     Ok(Head { class, complex: bits & 8 != 0, rows, columns, dimensions: sizes.len(), name })
 }
 
-/// What a class that is no matrix is called.
+/// Returns the description of a class that is not a matrix.
 fn class_name(class: u8) -> Option<&'static str> {
     match class {
         SPARSE..=15 => None,
@@ -169,7 +176,7 @@ fn class_name(class: u8) -> Option<&'static str> {
     }
 }
 
-/// The items of one variable: itself, or the matrices of a structure.
+/// Returns the items of one variable: itself, or the matrices of a structure.
 fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
     if source.packed.is_some() {
         let mut inside = Bytes::new(&source.data, source.order);
@@ -192,7 +199,8 @@ fn damaged(location: &Location) -> Error {
     Error::new(Kind::Malformed, location.clone(), problem, "save or copy the file again")
 }
 
-/// An error whose byte counts from the beginning of a variable, at the location of the variable in the file.
+/// Replaces the location of an error, relative to a variable, by the location
+/// of the variable in the file.
 fn error_in(error: Error, source: &Source) -> Error {
     Error { location: source.location.clone(), ..error }
 }
@@ -217,7 +225,7 @@ fn item(source: Source, head: Head) -> Item {
     })
 }
 
-/// The matrices of a structure of one element, as `name.field`.
+/// Returns the matrices of a structure of one element, as `name.field`.
 fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<Item<'a>>, Error> {
     let whole = source.whole()?;
     let mut parts = Bytes::new(&whole, source.order);
@@ -246,7 +254,7 @@ fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<It
             items.push(Item::other(name, "empty"));
             continue;
         }
-        // The bytes of a compressed structure were unpacked here and go with the item.
+        // The item owns the decompressed bytes of its structure.
         let inner = Source {
             data: found.data.to_vec().into(),
             packed: None,
@@ -263,7 +271,7 @@ fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<It
     Ok(items)
 }
 
-/// The type of numbers that an element of this type stores.
+/// Returns the number type of an element.
 fn number(kind: u32) -> Option<Number> {
     Some(match kind {
         1 => Number::I8,
@@ -280,7 +288,7 @@ fn number(kind: u32) -> Option<Number> {
     })
 }
 
-/// All numbers of the next element.
+/// Reads all numbers of the next element.
 fn numbers<T>(parts: &mut Bytes, read: impl Fn(Number, &mut Bytes) -> Result<T, Error>) -> Result<Vec<T>, Error> {
     let Element { kind, data, .. } = element(parts)?;
     let number = number(kind).ok_or_else(|| parts.malformed("numbers", format!("an element of type {kind}")))?;
@@ -329,7 +337,7 @@ mod tests {
         values.iter().flat_map(|value| value.to_le_bytes()).collect()
     }
 
-    /// A variable: class and flags, sizes, name, then its own parts.
+    /// A variable: class and flags, sizes, name, and its parts.
     fn variable(class: i32, sizes: &[i32], name: &str, parts: &[Vec<u8>]) -> Vec<u8> {
         let head = [tagged(6, &words(&[class, 0])), tagged(5, &words(sizes)), tagged(1, name.as_bytes())];
         tagged(MATRIX, &[head.concat(), parts.concat()].concat())
@@ -344,7 +352,7 @@ mod tests {
 
     #[test]
     fn doubles_stored_as_bytes_and_small_elements() -> Result<(), Error> {
-        // 4 numbers of type uint8 within the tag: type 2, length 4.
+        // Four numbers of type uint8 within the tag: type 2, length 4.
         let small = [[2, 0, 4, 0], [1, 2, 3, 4]].concat();
         let bytes = file(&[variable(6, &[2, 2], "K", &[small])]);
         let matrix = read_bytes(&bytes, None, None)?;

@@ -1,42 +1,43 @@
-//! One matrix, whatever file it came from: sorted entries, summed and checked.
+//! A matrix from any file format: sorted entries, summed and checked.
 //!
-//! An entry stands once, is finite and is not zero; a symmetric matrix keeps its lower triangle only. So two files of the same
-//! matrix in two formats give equal matrices.
+//! Every position has at most one entry, which is finite and not zero. A symmetric matrix stores
+//! its lower triangle only. Two files of one matrix in two formats therefore give equal matrices.
 
 use crate::error::{Error, Kind, Location};
 
-/// A number of a matrix and where it stands, rows and columns counted from zero.
+/// A number of a matrix with its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// Row, from zero.
+    /// Row, counted from zero.
     pub row: u32,
-    /// Column, from zero.
+    /// Column, counted from zero.
     pub column: u32,
     /// Value, in the unit of the file.
     pub value: f64,
 }
 
-/// What the entries of a file stand for.
+/// The meaning of the entries of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Symmetry {
-    /// Every entry that is not zero is in the file.
+    /// The file contains all nonzero entries.
     General,
-    /// One triangle is in the file, no matter which, or both, which must then be equal.
+    /// The file contains one triangle in any arrangement, or both. Both must be equal.
     Symmetric,
-    /// One triangle is in the file, the other one is its negative.
+    /// The file contains one triangle; the other one is its negative.
     Skew,
-    /// The file does not say: one triangle if no entry stands beside its mirror image, both otherwise.
+    /// The file does not state it: one triangle if no off-diagonal entry has
+    /// its mirrored entry, else both.
     Unsaid,
 }
 
-/// Where a matrix came from.
+/// The origin of a matrix.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// Name of the format, of the list of formats.
+    /// Name of the format, from the table of formats.
     pub format: &'static str,
-    /// Name of the matrix in its file; empty where the format has none.
+    /// Name of the matrix in its file; empty if the format has no names.
     pub variable: String,
-    /// Entries that the file states although they are zero, and that are left out here.
+    /// Number of explicit zeros in the file, which are not stored here.
     pub zeros: usize,
 }
 
@@ -63,10 +64,12 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// A matrix of `(row, column, value)` from zero; what stands twice is summed, zeros are left out.
+    /// Builds a matrix from entries `(row, column, value)`, counted from zero.
+    /// Repeated entries are summed, and zeros are dropped.
     ///
     /// # Errors
-    /// An entry beyond the size, a value that is not finite, or triangles that contradict [`Symmetry::Symmetric`].
+    /// [`Error`] if an entry lies outside the size, a value is not finite, or
+    /// the triangles contradict [`Symmetry::Symmetric`].
     pub fn new(
         rows: usize,
         columns: usize,
@@ -80,44 +83,48 @@ impl Matrix {
         triplets.finish(symmetry)
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// The entries, sorted by column, then row; of a symmetric matrix those with `row >= column`.
+    /// Returns the entries, sorted by column, then row. For a symmetric matrix
+    /// these are the entries with `row >= column`.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// Whether the matrix equals its transpose to the last bit; then only its lower triangle is kept.
+    /// Returns true if the matrix equals its transpose to the last bit. Only
+    /// its lower triangle is then stored.
     pub fn is_symmetric(&self) -> bool {
         self.symmetric
     }
 
-    /// Names of the rows, such as `1353.y`, if the file or a second one has them; an empty one where a row has no name.
+    /// Returns the names of the rows, such as `1353.y`, if a file has them. A
+    /// row without a name has an empty one.
     pub fn names(&self) -> Option<&[String]> {
         self.names.as_deref()
     }
 
-    /// Where the matrix came from.
+    /// Returns the origin of the matrix.
     pub fn origin(&self) -> &Origin {
         &self.origin
     }
 
-    /// One value, zero where the matrix has no entry, or none of that row or column.
+    /// Returns one value, or zero if there is no such entry, row or column.
     pub fn get(&self, row: usize, column: usize) -> f64 {
         let (row, column) = if self.symmetric { (row.max(column), row.min(column)) } else { (row, column) };
         let found = self.entries.binary_search_by_key(&(column, row), |e| (e.column as usize, e.row as usize));
         found.map_or(0.0, |at| self.entries[at].value)
     }
 
-    /// The entries of both triangles: of a symmetric matrix each beside its mirror image.
+    /// Returns the entries of both triangles: each entry of a symmetric matrix
+    /// with its mirrored entry.
     pub fn both_triangles(&self) -> impl Iterator<Item = Entry> + '_ {
         self.entries.iter().flat_map(|&e| {
             let mirror =
@@ -126,7 +133,8 @@ impl Matrix {
         })
     }
 
-    /// Largest `|a_ij - a_ji|`, in the unit of the matrix; infinite unless the matrix is square.
+    /// Returns the largest `|a_ij - a_ji|`, in the unit of the matrix, or
+    /// infinity if the matrix is not square.
     pub fn asymmetry(&self) -> f64 {
         if self.symmetric {
             return 0.0;
@@ -138,15 +146,15 @@ impl Matrix {
         self.entries.iter().map(gap).fold(0.0, f64::max)
     }
 
-    /// Largest absolute value; zero without entries.
+    /// Returns the largest absolute value, or zero without entries.
     pub fn largest(&self) -> f64 {
         self.entries.iter().map(|e| e.value.abs()).fold(0.0, f64::max)
     }
 
-    /// The same matrix as a symmetric one, with the mean of both triangles.
+    /// Returns the matrix as a symmetric one, with the mean of both triangles.
     ///
-    /// `tolerance` is the largest `|a_ij - a_ji|` allowed, relative to the largest value: zero where both triangles come from the same
-    /// numbers, 1e-9 for files of ten digits.
+    /// `tolerance` is the largest allowed `|a_ij - a_ji|`, relative to the largest value. Use
+    /// zero if both triangles come from the same numbers, and 1e-9 for files of ten digits.
     ///
     /// # Errors
     /// [`Kind::NotSquare`] and [`Kind::NotSymmetric`].
@@ -166,10 +174,11 @@ impl Matrix {
         if self.symmetric {
             return Ok(self);
         }
-        // An entry that only one triangle has counts by half, as if the other one stated its zero.
+        // The missing counterpart of an entry in one triangle counts as zero,
+        // so the mean is half of the entry.
         let mean = |e: &Entry| {
             let other = self.get(e.column as usize, e.row as usize);
-            // Halves of both, each exact: the sum of two large ones may not be finite.
+            // Each half is exact, but the sum of two large values may overflow.
             (e.row.max(e.column), e.row.min(e.column), 0.5 * e.value + 0.5 * other, other != 0.0)
         };
         let mut entries = Vec::with_capacity(self.entries.len() / 2 + 1);
@@ -184,7 +193,7 @@ impl Matrix {
         Ok(Self { entries, symmetric: true, ..self })
     }
 
-    /// Refuses what is not square.
+    /// Refuses a matrix that is not square.
     ///
     /// # Errors
     /// [`Kind::NotSquare`].
@@ -200,22 +209,25 @@ impl Matrix {
         ))
     }
 
-    /// The matrix with names for its rows (and columns, where it is square).
+    /// Returns the matrix with names for its rows, and for its columns if it is square.
     ///
     /// # Errors
-    /// [`Kind::Names`] if there are not as many names as rows, or one stands twice.
+    /// [`Kind::Names`] if the number of names differs from the number of rows,
+    /// or if a name occurs twice.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self, Error> {
         check_names(&names, self.rows)?;
         self.names = Some(names);
         Ok(self)
     }
 
-    /// The same square matrix with its rows in the order of `names`; those it does not have become empty.
+    /// Returns a square matrix with its rows in the order of `names`. Missing rows become empty.
     ///
-    /// Formats that name rows write a row only where it has an entry, so that a mass matrix may lack the rotations that its stiffness has.
+    /// Formats with row names write a row only if it has an entry. A mass matrix may therefore
+    /// lack the rotations of its stiffness matrix.
     ///
     /// # Errors
-    /// [`Kind::Names`] if the matrix has no names, has one that is not in `names`, or `names` has one twice.
+    /// [`Kind::Names`] if the matrix has no names, if one of its names is
+    /// missing in `names`, or if `names` contains a name twice.
     ///
     /// # Example
     /// ```
@@ -265,7 +277,8 @@ impl Matrix {
         Ok(matrix)
     }
 
-    /// The matrix without some of its rows and the columns of the same numbers: constrained ones, say.
+    /// Returns the matrix without some of its rows and the corresponding
+    /// columns, such as constrained ones.
     ///
     /// # Errors
     /// [`Kind::NotSquare`].
@@ -297,12 +310,13 @@ impl Matrix {
         Ok(self)
     }
 
-    /// Whether both triangles are there and equal to the last bit.
+    /// Returns true if both triangles are present and equal to the last bit.
     fn equals_its_transpose(&self) -> bool {
         if self.rows != self.columns {
             return false;
         }
-        // Entries above the diagonal of column i are met in the order in which those of row i are, left of it.
+        // Entries above the diagonal of column i have the order of the entries
+        // of row i left of the diagonal.
         let mut above: Vec<usize> = Vec::with_capacity(self.columns);
         let mut at = 0;
         for column in 0..self.columns {
@@ -320,14 +334,14 @@ impl Matrix {
                 }
                 *location += 1;
             } else if e.row < e.column && at >= above[e.column as usize] {
-                // Met before its mirror image, which stands in an earlier column: there is none.
+                // The mirrored entry would be in an earlier column, but it was not found there.
                 return false;
             }
         }
         true
     }
 
-    /// Whether any entry off the diagonal stands beside its mirror image.
+    /// Returns true if any off-diagonal entry has its mirrored entry.
     fn has_mirror_images(&self) -> bool {
         let mirror = |e: &Entry| self.entries.binary_search_by_key(&(e.row, e.column), |e| (e.column, e.row)).is_ok();
         self.entries.iter().any(|e| e.row != e.column && mirror(e))
@@ -339,7 +353,7 @@ impl Matrix {
     }
 }
 
-/// Refuses names that stand twice, and a number of them other than `rows`; empty ones may repeat, they name nothing.
+/// Refuses repeated names, and a number of names other than `rows`. Empty names may repeat.
 fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
     let fault = |problem| {
         Err(Error::new(Kind::Names, Location::File, problem, "give the file of names that was written with the matrix"))
@@ -355,7 +369,7 @@ fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
     }
 }
 
-/// Entries on their way from a file into a matrix.
+/// Entries of a file that become a matrix.
 pub(crate) struct Triplets {
     rows: usize,
     columns: usize,
@@ -364,7 +378,8 @@ pub(crate) struct Triplets {
 }
 
 impl Triplets {
-    /// Room for `expected` entries, which must be bounded by the size of the file, not by what its header says.
+    /// Creates a list with room for `expected` entries. The size of the file
+    /// must bound this number, not its header.
     pub fn new(rows: usize, columns: usize, expected: usize, location: Location) -> Result<Self, Error> {
         if rows.max(columns) > u32::MAX as usize {
             return Err(Error::new(
@@ -377,7 +392,7 @@ impl Triplets {
         Ok(Self { rows, columns, entries: Vec::with_capacity(expected), zeros: 0 })
     }
 
-    /// Adds one entry, from zero.
+    /// Adds one entry, counted from zero.
     pub fn push(&mut self, row: usize, column: usize, value: f64, location: Location) -> Result<(), Error> {
         if row >= self.rows || column >= self.columns {
             return Err(Error::new(
@@ -404,13 +419,13 @@ impl Triplets {
         if value == 0.0 {
             self.zeros += 1;
         } else {
-            // Both are below the size, which `new` holds to 32 bits.
+            // Both are below the size, which `new` limits to 32 bits.
             self.entries.push(Entry { row: row as u32, column: column as u32, value });
         }
         Ok(())
     }
 
-    /// Sorts, sums and checks.
+    /// Sorts, sums and checks the entries.
     pub fn finish(mut self, symmetry: Symmetry) -> Result<Matrix, Error> {
         let square = matches!(symmetry, Symmetry::Symmetric | Symmetry::Skew);
         if square && self.rows != self.columns {
@@ -443,7 +458,7 @@ impl Triplets {
             matrix.entries.retain(|e| e.row >= e.column);
             matrix.symmetric = true;
         } else if symmetry == Symmetry::Symmetric {
-            // Both triangles in a file of one: they say the same, or one of them is wrong.
+            // Both triangles in a file that should contain one: they must agree.
             matrix = matrix.into_symmetric(0.0)?;
         }
         matrix.entries.shrink_to_fit();
@@ -474,14 +489,14 @@ impl Triplets {
     }
 }
 
-/// How the numbers of a full matrix follow each other.
+/// Storage order of a full matrix.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Along {
     Rows,
     Columns,
 }
 
-/// A full matrix whose numbers, as many as its size says, `value` gives by their position in the file.
+/// Builds a matrix from a full one. `value` returns a number by its position in the file.
 pub(crate) fn dense(
     (rows, columns): (usize, usize),
     along: Along,
@@ -489,10 +504,10 @@ pub(crate) fn dense(
     value: impl Fn(usize) -> Result<f64, Error>,
 ) -> Result<Matrix, Error> {
     let count = rows.saturating_mul(columns);
-    // Memory for what is not zero: full matrices of structures are mostly zeros.
+    // Allocate for the nonzero values only: full matrices of structures are mostly zeros.
     let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
     let mut triplets = Triplets::new(rows, columns, filled, location.clone())?;
-    // In the order of a matrix, so that nothing is left to sort.
+    // In the storage order of a matrix, so that the entries are sorted already.
     for column in 0..columns {
         for row in 0..rows {
             let at = match along {
@@ -505,7 +520,8 @@ pub(crate) fn dense(
     triplets.finish(Symmetry::General)
 }
 
-/// The entries of a matrix stored by columns (or rows): `pointers` say where each one begins.
+/// Calls `push` for the entries of a matrix in compressed column (or row)
+/// storage. `pointers` are the starts of the columns (rows).
 pub(crate) fn compressed(
     pointers: &[usize],
     inner: &[usize],
@@ -534,7 +550,7 @@ pub(crate) fn compressed(
     Ok(())
 }
 
-/// Sorts entries and sums those of one position, in the order of the file.
+/// Sorts the entries and sums those at one position, in file order.
 fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
     let key = |e: &Entry| (e.column, e.row);
     if !entries.is_sorted_by_key(key) {
@@ -630,7 +646,7 @@ mod tests {
 
     #[test]
     fn one_triangle_in_any_order_is_symmetric() -> Result<(), Error> {
-        // As a file lists it that orders its nodes otherwise: (0, 1) and (2, 1), but never a mirror image.
+        // In a file with another node order: (0, 1) and (2, 1), but no mirrored entry.
         let entries = [(0, 1, 2.0), (2, 1, 3.0), (0, 0, 1.0)];
         for symmetry in [Symmetry::Symmetric, Symmetry::Unsaid] {
             let matrix = Matrix::new(3, 3, symmetry, entries)?;

@@ -1,4 +1,5 @@
-//! Matrix Market: a banner, comments, a line of sizes, then a line for every entry, or all numbers column by column.
+//! Matrix Market: a banner, comments and a line of sizes, then one line per
+//! entry, or all numbers by columns.
 //!
 //! ```text
 //! %%MatrixMarket matrix coordinate real symmetric
@@ -6,9 +7,11 @@
 //! 1 1 2.5
 //! 3 1 -1.0
 //! ```
-//! Symmetric and skew-symmetric matrices store their lower triangle. Coordinates without a banner are read too, see [`FirstLine`]; one triangle
-//! alone then stands for a symmetric matrix.
-//! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats: Initial Design, NISTIR 5935 (1996).
+//! Symmetric and skew-symmetric matrices store their lower triangle. Coordinates without a
+//! banner are read too, see [`FirstLine`]; a single triangle is then a symmetric matrix.
+//!
+//! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats:
+//! Initial Design, NISTIR 5935 (1996).
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
@@ -23,7 +26,7 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// What the banner says.
+/// The contents of the banner.
 struct Layout {
     coordinate: bool,
     pattern: bool,
@@ -35,17 +38,17 @@ struct Header {
     layout: Layout,
     rows: usize,
     columns: usize,
-    /// Entries in the file.
+    /// Number of entries in the file.
     entries: usize,
 }
 
-/// The banner, among the comments that a file begins with.
+/// Returns the banner, one of the comments at the beginning of a file.
 fn banner(bytes: &[u8]) -> Option<Line<'_>> {
     let filled = Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty());
     filled.take_while(is_comment).find(|line| words(line).first().is_some_and(|word| word == "matrixmarket"))
 }
 
-/// The words of a comment in small letters, without its `%`.
+/// Returns the words of a comment in lower case, without its `%`.
 fn words(line: &Line) -> Vec<String> {
     let text = String::from_utf8_lossy(line.text).to_lowercase();
     text.trim_start_matches(|c: char| c == '%' || c.is_whitespace()).split_whitespace().map(str::to_string).collect()
@@ -119,7 +122,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
     };
     let symmetry = match symmetry {
         "general" => Symmetry::General,
-        // What is real and Hermitian is symmetric.
+        // A real Hermitian matrix is symmetric.
         "symmetric" | "hermitian" => Symmetry::Symmetric,
         "skew-symmetric" => Symmetry::Skew,
         other => return Err(banner.malformed("general, symmetric or skew-symmetric", &format!("`{other}`"))),
@@ -127,7 +130,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
     Ok(Layout { coordinate, pattern, symmetry })
 }
 
-/// Numbers that an array of this size stores.
+/// Returns the number of values that an array of this size stores.
 fn stored(rows: usize, columns: usize, symmetry: Symmetry, line: &Line) -> Result<usize, Error> {
     let all = rows.checked_mul(columns).ok_or_else(|| line.malformed("a size that a file can hold", "a larger one"))?;
     Ok(match symmetry {
@@ -140,7 +143,7 @@ fn stored(rows: usize, columns: usize, symmetry: Symmetry, line: &Line) -> Resul
 fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     let mut lines = Lines::new(bytes);
     let header = header(&mut lines)?;
-    // The shortest line of an entry is `1 1` and its end, of a number `0` and its end.
+    // The shortest line of an entry is `1 1` with a line end, that of a number `0` with a line end.
     let shortest = if header.layout.coordinate { 4 } else { 2 };
     let room = header.entries.min(lines.left() / shortest + 1);
     let mut triplets = Triplets::new(header.rows, header.columns, room, lines.location())?;
@@ -187,7 +190,7 @@ fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<
             if count > header.entries {
                 return Err(too_many(line.location(), header.entries));
             }
-            // The last column of a skew-symmetric matrix has nothing below its diagonal.
+            // The last column of a skew-symmetric matrix has no entries below its diagonal.
             while row >= header.rows {
                 column += 1;
                 row = first(column);
@@ -213,13 +216,13 @@ fn too_few(location: Location, found: usize, expected: usize) -> Error {
     Error { kind: Kind::Truncated, ..error }
 }
 
-/// The file of a matrix, in coordinates.
+/// Returns a matrix as a file of coordinates.
 pub(crate) fn write(matrix: &Matrix) -> Vec<u8> {
     let symmetry = if matrix.is_symmetric() { "symmetric" } else { "general" };
     let (rows, columns, count) = (matrix.rows(), matrix.columns(), matrix.entries().len());
     let mut text = format!("%%MatrixMarket matrix coordinate real {symmetry}\n{rows} {columns} {count}\n");
     for e in matrix.entries() {
-        // `{:e}` writes as many digits as the last bit needs.
+        // `{:e}` writes the digits that the last bit needs.
         text.push_str(&format!("{} {} {:e}\n", e.row + 1, e.column + 1, e.value));
     }
     text.into_bytes()
@@ -247,7 +250,8 @@ mod tests {
     #[test]
     fn coordinates_of_every_field_and_symmetry() -> Result<(), Error> {
         let full = [(0, 0, 2.0), (1, 0, -1.0), (0, 1, -1.0)];
-        // Blanks at the end of the banner, upper case, comments and blank lines between: all met in real files.
+        // Trailing spaces in the banner, upper case, comments and blank lines:
+        // all occur in real files.
         let text =
             "%%MatrixMarket MATRIX coordinate Real symmetric  \r\n% a comment\n\n2 2 3\n1 1 2\n\n2 1 -1.0e0\n2 2 0\n";
         let matrix = check(text, &full)?;
@@ -276,7 +280,7 @@ mod tests {
         Ok(())
     }
 
-    /// The chain of three, `[2 -1 0; -1 2 -1; 0 -1 1]` kN/m.
+    /// A chain of three masses, `[2 -1 0; -1 2 -1; 0 -1 1]` kN/m.
     const CHAIN: &str = "1 1 2000\n2 1 -1000\n2 2 2000\n3 2 -1000\n3 3 1000\n";
 
     #[test]
@@ -304,7 +308,7 @@ mod tests {
         check("1 1 1\n1 1 5\n", &[(0, 0, 5.0)])?;
         let wide = check("2 3 2\n1 1 4\n2 1 5\n", &[(0, 0, 4.0), (1, 0, 5.0)])?;
         assert_eq!((wide.rows(), wide.columns(), wide.get(0, 1)), (2, 3, 0.0));
-        // an entry alone, and one that is no count
+        // A single entry, and first lines that are not sizes.
         for (text, value) in [("3 3 50\n", 50.0), ("3 3 50.\n1 1 1\n", 50.0), ("3 3 -5\n1 1 1\n", -5.0)] {
             let matrix = read(text)?;
             assert_eq!((matrix.origin().format, matrix.get(2, 2)), ("coordinate", value), "{text}");
@@ -343,7 +347,7 @@ mod tests {
         check("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n", Kind::Complex, Location::Line(1));
         check("%%MatrixMarket vector coordinate real general\n1 1 1\n", Kind::Malformed, Location::Line(1));
         check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", Kind::Malformed, Location::Line(2));
-        // A header that asks for more memory than there is.
+        // A header that claims more memory than there is.
         check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), Kind::Truncated, Location::Line(3));
         let array = "%%MatrixMarket matrix array real general\n";
         check(&format!("{array}4000000000 4000000000\n1\n"), Kind::TooLarge, Location::File);

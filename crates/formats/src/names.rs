@@ -1,13 +1,14 @@
-//! Names of the rows of a matrix: a second file, since most formats of matrices have none.
+//! Names of the rows of a matrix, in a separate file, because most matrix formats have no names.
 //!
-//! A name is `node.direction`, such as `1353.y`; directions are `x y z rx ry rz`, others keep their number.
+//! A name is `node.direction`, such as `1353.y`. The directions are
+//! `x y z rx ry rz`; other degrees of freedom keep their number.
 //!
 //! ```
 //! use stickslip_formats::names;
 //!
 //! let csv = "row,name\n1,root\n2,tip.x\n";
 //! assert_eq!(names::read_bytes(csv.as_bytes(), 2)?, ["root", "tip.x"]);
-//! // CalculiX: node 10, direction 1, which no floating-point number can tell from 10.10.
+//! // CalculiX: node 10, direction 1. As a floating-point number it would equal 10.10.
 //! assert_eq!(names::read_bytes(b"10.1\n10.2\n", 2)?, ["10.x", "10.y"]);
 //! # Ok::<(), stickslip_formats::Error>(())
 //! ```
@@ -19,22 +20,23 @@ use crate::file::{io, load};
 use crate::matrix::Matrix;
 use crate::text::{Line, Lines, integer, shown};
 
-/// A format of files that name rows.
+/// A file format for row names.
 pub struct NameFormat {
-    /// What it is called.
+    /// Name of the format.
     pub name: &'static str,
-    /// What it is, and which programs write it.
+    /// Short description, with the programs that write the format.
     pub summary: &'static str,
-    /// Whether a file is of it, by its first line.
+    /// Returns true if the first line is of this format.
     sniff: fn(&Line) -> bool,
-    /// The name in a line, of which this many came before; `None` for titles.
+    /// Returns the name in a line, or `None` for titles. The second argument is
+    /// the number of preceding lines.
     line: fn(&Line, usize) -> Result<Option<Named>, Error>,
 }
 
-/// A row, from zero, and its name.
+/// A row, counted from zero, and its name.
 type Named = (usize, String);
 
-/// All formats of names.
+/// All formats of row names.
 pub const TABLE: &[NameFormat] = &[
     NameFormat {
         name: "csv",
@@ -56,19 +58,20 @@ pub const TABLE: &[NameFormat] = &[
     },
 ];
 
-/// The names of `rows` rows, empty where a row has none.
+/// Reads the names of `rows` rows. A row without a name gets an empty one.
 ///
 /// # Errors
-/// [`Kind::Names`] if they do not match the rows, [`Kind::Format`] if the file is of no format of [`TABLE`].
+/// [`Kind::Names`] if the names do not match the rows, [`Kind::Format`] if no
+/// format of [`TABLE`] recognizes the file.
 pub fn read(path: impl AsRef<Path>, rows: usize) -> Result<Vec<String>, Error> {
     let path = path.as_ref();
     read_bytes(&load(path)?, rows).map_err(|error| error.of(path))
 }
 
-/// As [`read`], from a file in memory.
+/// Reads names from a file in memory, like [`read`].
 ///
 /// # Errors
-/// As [`read`], without the name of a file.
+/// Like [`read`], without the path.
 pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     let mut lines = Lines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let first = lines.expect_filled("names of rows")?;
@@ -87,10 +90,10 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     names.finish(format.name == "csv")
 }
 
-/// Writes the names of a matrix as CSV `row,name`.
+/// Writes the row names of a matrix as CSV `row,name`.
 ///
 /// # Errors
-/// [`Kind::Names`] if it has none, [`Kind::Io`].
+/// [`Kind::Names`] if the matrix has no names, [`Kind::Io`].
 pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let names = matrix.names().ok_or_else(|| {
@@ -104,11 +107,12 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     std::fs::write(path, text).map_err(|error| io(path, &error))
 }
 
+/// Returns a name as a CSV field, in quotes if necessary.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.into() }
 }
 
-/// The name of a degree of freedom by its number: 1 to 6 are `x y z rx ry rz`.
+/// Returns the name of a degree of freedom: 1 to 6 are `x y z rx ry rz`, others keep their number.
 pub(crate) fn direction(number: i64) -> String {
     match number {
         1..=6 => ["x", "y", "z", "rx", "ry", "rz"][number as usize - 1].into(),
@@ -116,7 +120,7 @@ pub(crate) fn direction(number: i64) -> String {
     }
 }
 
-/// Names on their way into a list.
+/// The names read so far.
 struct Names {
     names: Vec<String>,
     rows: usize,
@@ -179,7 +183,7 @@ fn csv_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
     Ok(Some((line.index(row.trim().as_bytes())?, name)))
 }
 
-/// Node and direction of `10.1`.
+/// Returns node and direction of a text such as `10.1`.
 fn dof(text: &[u8]) -> Option<(i64, i64)> {
     let dot = text.iter().position(|&byte| byte == b'.')?;
     Some((integer(&text[..dot])?, integer(&text[dot + 1..])?))
@@ -191,11 +195,11 @@ fn dof_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
     Ok(Some((at, format!("{node}.{}", direction(number)))))
 }
 
-/// Equation, node and label of a line of HBMAT's mapping.
+/// Returns equation, node and label of a line of HBMAT's mapping file.
 fn mapping(line: &Line) -> Option<(usize, i64, String)> {
     let [equation, node, label] = line.exactly("").ok()?;
     let equation = usize::try_from(integer(equation)?.checked_sub(1)?).ok()?;
-    // else a matrix by its entries is such a line, too
+    // The label must begin with a letter, because a matrix entry is also a line of three fields.
     let label = std::str::from_utf8(label).ok().filter(|label| label.starts_with(char::is_alphabetic))?.to_uppercase();
     let label = match label.strip_prefix("ROT") {
         Some(axis) => format!("r{}", axis.to_lowercase()),
@@ -210,7 +214,7 @@ fn mapping(line: &Line) -> Option<(usize, i64, String)> {
 fn mapping_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
     match mapping(line) {
         Some((equation, node, label)) => Ok(Some((equation, format!("{node}.{label}")))),
-        // The titles of the columns.
+        // The column titles.
         None if at == 0 => Ok(None),
         None => Err(line.malformed("`equation node label`", &shown(line.text))),
     }

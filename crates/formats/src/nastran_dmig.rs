@@ -1,4 +1,5 @@
-//! Nastran DMIG cards: matrices at grid points, in punch files (`.pch`) or bulk data, one field of 8 or 16 characters after the other.
+//! Nastran DMIG cards: matrices at grid points in fields of 8 or 16 characters,
+//! in punch files (`.pch`) or bulk data.
 //!
 //! ```text
 //! DMIG    KAAX           0       6       2       0                       6
@@ -6,9 +7,13 @@
 //! *                      7               1 1.000000000D+03
 //! *                      9               1-5.000000000D+02
 //! ```
-//! The first card of a name says the form (6 symmetric, one triangle; 1 square; 2 and 9 rectangular) and the type (1 and 2 real, 3 and 4
-//! complex); every other one is a column: its grid point and component, then grid point, component and value of each entry. Rows are
-//! sorted by grid point and component; component 0 is a scalar point. Numbers have ten digits, which moves rigid modes by up to 1 Hz.
+//! The first card of a name states the form and the type. The forms are 6
+//! (symmetric, one triangle), 1 (square), 2 and 9 (rectangular). The types are
+//! 1 and 2 (real), 3 and 4 (complex). Every other card is a column: its grid
+//! point and component, then grid point, component and value of each entry.
+//!
+//! Rows are sorted by grid point and component; component 0 is a scalar point.
+//! The numbers have ten digits, which moves rigid-body modes by up to 1 Hz.
 //! Source: MSC Nastran Quick Reference Guide, DMIG; input formats of bulk data.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,11 +36,12 @@ fn is_dmig(line: &Line) -> bool {
     named && matches!(line.text.get(4), None | Some(b' ' | b'*' | b',' | b'\t'))
 }
 
-/// The fields of one line of bulk data behind its first one: 4 of 16 characters, 8 of 8, or those between commas.
+/// Returns the fields of a line of bulk data after the first: 4 of 16
+/// characters, 8 of 8, or those between commas.
 fn fields<'a>(line: &Line<'a>) -> Vec<&'a [u8]> {
     if line.text.contains(&b',') {
         let mut fields: Vec<_> = line.text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii).skip(1).collect();
-        // The ninth is the mark of a continuation.
+        // The ninth field marks a continuation.
         fields.truncate(if is_large(line) { 4 } else { 8 });
         fields.resize(if is_large(line) { 4 } else { 8 }, &[]);
         return fields;
@@ -56,15 +62,16 @@ fn is_continuation(line: &Line) -> bool {
 /// Grid point and component.
 type Row = (i64, i64);
 
-/// What is known of the matrices of one name.
+/// The properties of the matrix of one name.
 #[derive(Default)]
 struct Found {
     form: i64,
     complex: bool,
-    /// Columns of a rectangular matrix, by its first card; zero if that does not say.
+    /// Number of columns of a rectangular matrix by its first card, or zero if
+    /// the card does not state it.
     columns: usize,
     rows: BTreeSet<Row>,
-    /// Columns that are no rows: those of rectangular matrices.
+    /// Columns of a rectangular matrix, which are not rows.
     others: BTreeSet<Row>,
     entries: usize,
 }
@@ -85,13 +92,13 @@ impl Found {
     }
 }
 
-/// One thing that the cards say.
+/// A header or an entry from the cards.
 enum Said<'a> {
     Header { name: String, form: i64, complex: bool, columns: usize },
     Entry { name: &'a str, column: Row, row: Row, value: f64, imaginary: bool },
 }
 
-/// Goes through all cards of DMIG.
+/// Calls `tell` for every header and entry of all DMIG cards.
 fn scan(bytes: &[u8], mut tell: impl FnMut(Said, &Line) -> Result<(), Error>) -> Result<(), Error> {
     let mut column: Option<(String, Row)> = None;
     for line in Lines::new(bytes).filter(|line| !line.text.starts_with(b"$")) {
@@ -122,7 +129,7 @@ fn scan(bytes: &[u8], mut tell: impl FnMut(Said, &Line) -> Result<(), Error>) ->
     Ok(())
 }
 
-/// The entries of one line: grid point, component, real part, imaginary part.
+/// Reads the entries of one line: grid point, component, real part, imaginary part.
 fn entries(
     fields: &[&[u8]],
     name: &str,
@@ -207,7 +214,7 @@ fn read(bytes: &[u8], wanted: &str, matrix: &Found) -> Result<Matrix, Error> {
         if imaginary {
             return Err(complex(name, line.location()));
         }
-        // Columns of a rectangular matrix are numbered, and what is not a number from one is refused by the size.
+        // The columns of a rectangular matrix are numbers from one. The size check refuses others.
         let column = match matrix.rectangular() {
             true => {
                 usize::try_from(column.0 - 1).map_err(|_| line.malformed("a column from 1", &column.0.to_string()))?

@@ -1,8 +1,12 @@
-//! Nastran OUTPUT4 (`.op4`), as text or binary: matrices by columns, dense or as strings of numbers that follow each other.
+//! Nastran OUTPUT4 (`.op4`), as text or binary: matrices by columns, dense or
+//! as strings of consecutive numbers.
 //!
-//! The header has columns, rows (negative: BIGMAT), form, type (1 and 2 real, 3 and 4 complex) and name. A column has its number, its
-//! first row and its words. A first row of zero means strings: `IS = row + 65536 (words + 1)` in front of each, or with BIGMAT the two
-//! numbers `words + 1` and `row`. A number of double precision has two words. The column behind the last one ends the matrix.
+//! The header contains columns, rows (negative: BIGMAT), form, type (1 and 2 real, 3 and 4
+//! complex) and name. A column begins with its number, its first row and its number of words. A
+//! first row of zero means strings. In front of each string is `IS = row + 65536 (words + 1)`,
+//! or with BIGMAT the two numbers `words + 1` and `row`. A number of double precision has two
+//! words. A column beyond the last one ends the matrix.
+//!
 //! Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4, and Utility Guide.
 
 use crate::bytes::{Bytes, Order};
@@ -18,14 +22,14 @@ pub(crate) const FORMAT: Format = Format {
     open: |bytes| if binary(bytes).is_some() { open_binary(bytes) } else { open_text(bytes) },
 };
 
-/// Header of a matrix, common to text and binary.
+/// The header of a matrix, common to text and binary files.
 #[derive(Clone)]
 struct Header {
     name: String,
     rows: usize,
     columns: usize,
     kind: i64,
-    /// BIGMAT: the row of a string is a number of its own.
+    /// BIGMAT: the row of a string is a separate number.
     big: bool,
 }
 
@@ -46,7 +50,7 @@ impl Header {
         self.kind > 2
     }
 
-    /// The item of the matrix, read by `read`.
+    /// Returns the matrix as an item that `read` reads.
     fn item<'a>(self, read: impl Fn(&Self) -> Result<Matrix, Error> + 'a) -> Item<'a> {
         if self.is_complex() {
             return Item::other(self.name, COMPLEX);
@@ -55,10 +59,10 @@ impl Header {
     }
 }
 
-/// A matrix as text: its header and the shape of its numbers.
+/// A matrix as text: its header and the width of its numbers.
 struct Text {
     header: Header,
-    /// Characters of a number.
+    /// Number of characters of a number.
     width: usize,
 }
 
@@ -66,7 +70,7 @@ impl Text {
     fn new(line: &Line) -> Result<Self, Error> {
         let wrong =
             || line.malformed("the header of a matrix: columns, rows, form, type, name, format", &shown(line.text));
-        // Sizes beyond seven digits are written in 16 characters, which the end of the line tells.
+        // Sizes beyond seven digits have 16 characters, which the end of the line indicates.
         let text = line.text.trim_ascii_end();
         let wide = text.ends_with(b"|I16");
         let widths = if wide { [0, 16, 32, 40, 48, 56] } else { [0, 8, 16, 24, 32, 40] };
@@ -77,11 +81,11 @@ impl Text {
         }
         let header = Header::new(numbers, field(4)).ok_or_else(wrong)?;
         let format = String::from_utf8_lossy(line.columns(widths[5], text.len())).to_uppercase().replace("|I16", "");
-        // a row of whole numbers has neither a name nor a format
+        // A row of integers has neither a name nor a format.
         if format.is_empty() && !header.name.starts_with(|c: char| c.is_ascii_alphabetic()) {
             return Err(wrong());
         }
-        // `1P,3E23.16` or `5E16.9`, which is what holds where none is given.
+        // `1P,3E23.16` or `5E16.9`. The latter holds if no format is given.
         let width = match format.rsplit_once(['E', 'D']) {
             None if format.is_empty() => 16,
             Some((_, rest)) => rest.split('.').next().and_then(|width| width.parse().ok()).ok_or_else(wrong)?,
@@ -91,7 +95,7 @@ impl Text {
     }
 }
 
-/// Whether a line has numbers with a decimal point: those of a matrix, not the counts in front of them.
+/// Returns true if a line contains numbers with a decimal point: values of a matrix, not counts.
 fn has_values(line: &Line) -> bool {
     line.text.contains(&b'.')
 }
@@ -111,7 +115,8 @@ fn open_text(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items)
 }
 
-/// Column, first row and words of a line in front of a column; `None` for one in front of a string.
+/// Returns column, first row and words of the line before a column, or `None`
+/// for a line before a string.
 fn column_of(line: &Line) -> Result<Option<[usize; 3]>, Error> {
     let words: Vec<_> = line.words().collect();
     match words[..] {
@@ -121,7 +126,7 @@ fn column_of(line: &Line) -> Result<Option<[usize; 3]>, Error> {
     }
 }
 
-/// Goes to the line behind a matrix: behind the one number of the column that is one too many.
+/// Moves to the line after a matrix: after the one number of the extra column.
 fn skip_text(lines: &mut Lines, columns: usize) -> Result<(), Error> {
     loop {
         let line = lines.expect("a column of the matrix")?;
@@ -175,7 +180,7 @@ fn wrong_count(line: &Line, words: usize, found: usize) -> Error {
     Error::new(Kind::Count, line.location(), problem, "the file is damaged: export it again")
 }
 
-/// First row, from zero, and words of a string.
+/// Returns the first row, counted from zero, and the number of words of a string.
 fn string(line: &Line) -> Result<(usize, usize), Error> {
     let words: Vec<_> = line.words().collect();
     let (row, count) = match words[..] {
@@ -189,13 +194,15 @@ fn string(line: &Line) -> Result<(usize, usize), Error> {
     }
 }
 
-/// First row, from zero, and words in the one number of a string without BIGMAT.
+/// Returns the first row, counted from zero, and the number of words from the
+/// single number of a string without BIGMAT.
 fn split(both: i64) -> (i64, i64) {
     let count = (both >> 16) - 1;
     (both - ((count + 1) << 16) - 1, count)
 }
 
-/// Reads numbers down a column, from `line` up to a line that has none, which stays in `line`. Gives how many there were.
+/// Reads the numbers of a column from `line` on. Stops at a line without numbers, which stays
+/// in `line`. Returns the number of values read.
 fn values<'a>(
     lines: &mut Lines<'a>,
     line: &mut Line<'a>,
@@ -217,7 +224,8 @@ fn values<'a>(
     Ok(found)
 }
 
-/// Order of the bytes and bytes of a whole number, if the file begins with the header of a binary matrix.
+/// Returns the byte order and the size of an integer, if the file begins with
+/// the header of a binary matrix.
 fn binary(bytes: &[u8]) -> Option<(Order, usize)> {
     let orders = [Order::Little, Order::Big];
     orders.into_iter().find_map(|order| {
@@ -231,7 +239,7 @@ fn binary(bytes: &[u8]) -> Option<(Order, usize)> {
     })
 }
 
-/// The bytes of a record of Fortran: its length stands before and behind it.
+/// Returns the bytes of a Fortran record, whose length stands before and after it.
 fn record<'a>(file: &mut Bytes<'a>) -> Result<&'a [u8], Error> {
     let length = file.u32()? as usize;
     let data = file.take(length)?;
@@ -243,7 +251,7 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<&'a [u8], Error> {
     }
 }
 
-/// A whole number of 4 or 8 bytes.
+/// Reads an integer of 4 or 8 bytes.
 fn whole_number(bytes: &mut Bytes, size: usize) -> Result<i64, Error> {
     if size == 8 { bytes.i64() } else { bytes.i32().map(i64::from) }
 }
@@ -279,7 +287,7 @@ fn open_binary(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 
 fn read_binary(mut file: Bytes, header: &Header, whole: usize) -> Result<Matrix, Error> {
     let order = file.order;
-    // With whole numbers of 8 bytes, so are words, and all numbers have one.
+    // If integers have 8 bytes, words do too, and each number is one word.
     let double = header.kind == 2 || whole == 8;
     let words = if header.kind == 2 && whole == 4 { 2 } else { 1 };
     let mut triplets = Triplets::new(header.rows, header.columns, 0, Location::File)?;
@@ -346,7 +354,8 @@ mod tests {
 
     #[test]
     fn single_precision_and_a_matrix_without_entries() -> Result<(), Error> {
-        // As MSC Nastran writes them: a number of single precision has one word; a null matrix only the column that ends it.
+        // In the form of MSC Nastran: a number of single precision has one word, and a null
+        // matrix has only the column that ends it.
         let text = "       3      -3       6       2NULL    1P,3E22.15\n       4       1       1\n 1.000000000000000E+00\n       \
             2      -9       2       1STRINGS 1P,3E22.15\n       1       0      10\n       4       3\n \
             1.000000000000000E+00 2.000000000000000E+00 3.000000000000000E+00\n       4       7\n \
@@ -371,7 +380,7 @@ mod tests {
         assert_eq!(read_bytes(two.as_bytes(), None, Some("K"))?.get(1, 0), 1.5);
         let error = read_bytes(two.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.remedy));
         assert!(error.is_err_and(|(kind, remedy)| kind == Kind::Choice && remedy.contains("export")));
-        // a row of a full matrix
+        // A row of a full matrix.
         let rows: String = ["2 1 1 2", "1 2 1 1", "1 1 2 1", "2 1 1 2"]
             .map(|row| row.split(' ').map(|word| format!("{word:>8}")).collect::<String>() + "\n")
             .concat();

@@ -1,4 +1,4 @@
-//! NumPy `.npy`: a header in Python's own notation, then the numbers.
+//! NumPy `.npy`: a header in Python notation, then the numbers.
 //!
 //! ```text
 //! \x93NUMPY 1 0 <length> {'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }
@@ -20,21 +20,22 @@ pub(crate) const FORMAT: Format = Format {
 
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// A longer header is damaged: ours have one type and few dimensions.
+/// Maximum length of a header. A longer one is damaged, because a plain array
+/// has one type and few dimensions.
 const LONGEST_HEADER: usize = 4096;
 
-/// What the elements of an array are.
+/// The type of the elements of an array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Element {
     Number(Number),
     Complex,
-    /// Bytes of text, so many each.
+    /// Text of the given number of bytes.
     Text(usize),
-    /// Anything else, by NumPy's name for it.
+    /// Any other type, by NumPy's name.
     Other(String),
 }
 
-/// An array with its header read and its numbers not.
+/// An array whose header is read, and whose numbers are not read yet.
 pub(crate) struct Array<'a> {
     pub element: Element,
     pub shape: Vec<usize>,
@@ -80,7 +81,7 @@ impl<'a> Array<'a> {
         Ok(Self { element, shape, fortran, data })
     }
 
-    /// Rows and columns, or why it is no matrix.
+    /// Returns rows and columns, or a description of an array that is not a matrix.
     pub fn size(&self) -> Result<(usize, usize), String> {
         match &self.element {
             Element::Number(_) => {}
@@ -96,7 +97,7 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// The numbers one by one, in the order of the file.
+    /// Reads the numbers in file order.
     pub fn numbers<T>(mut self, read: impl Fn(Number, &mut Bytes) -> Result<T, Error>) -> Result<Vec<T>, Error> {
         let Element::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
@@ -105,7 +106,7 @@ impl<'a> Array<'a> {
         (0..count).map(|_| read(number, &mut self.data)).collect()
     }
 
-    /// The bytes of an array of one text.
+    /// Returns the bytes of an array of one text.
     pub fn text(mut self) -> Result<&'a [u8], Error> {
         match self.element {
             Element::Text(length) => self.data.take(length),
@@ -113,7 +114,7 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// How many numbers there are; never more than the file has bytes for.
+    /// Returns the number of elements. Fails if the file does not have enough bytes.
     fn count(&self, number: Number) -> Result<usize, Error> {
         let count = self.shape.iter().try_fold(1_usize, |product, &size| product.checked_mul(size));
         let room = self.data.left() / number.size();
@@ -138,14 +139,14 @@ impl<'a> Array<'a> {
         let Element::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
         };
-        // Every number is there, so that no position is beyond the end.
+        // All numbers are in the file, so no position lies beyond the end.
         self.count(number)?;
         let along = if self.fortran { Along::Columns } else { Along::Rows };
         dense(size, along, &self.data.location(), |at| number.real(&mut self.data.ahead(at * number.size())))
     }
 }
 
-/// What follows a key of the header.
+/// Returns the text after a key of the header.
 fn value<'t>(header: &'t str, key: &str) -> Option<&'t str> {
     let (_, rest) = header.split_once(&format!("'{key}'"))?;
     Some(rest.trim_start().strip_prefix(':')?.trim_start())
@@ -153,12 +154,12 @@ fn value<'t>(header: &'t str, key: &str) -> Option<&'t str> {
 
 fn shape(header: &str) -> Option<Vec<usize>> {
     let (inside, _) = value(header, "shape")?.strip_prefix('(')?.split_once(')')?;
-    // Python 2 wrote its long integers with an L.
+    // Python 2 wrote long integers with an L.
     let sizes = inside.split(',').map(|size| size.trim().trim_end_matches('L')).filter(|size| !size.is_empty());
     sizes.map(|size| size.parse().ok()).collect()
 }
 
-/// The type behind a descr such as `'<f8'`, and its order of bytes.
+/// Returns the type and the byte order of a descr such as `'<f8'`.
 fn element_of(descr: &str) -> (Element, Order) {
     let other = |name: &str| (Element::Other(name.chars().take(20).collect()), Order::Little);
     let Some(name) = descr.strip_prefix('\'').and_then(|rest| rest.split_once('\'')).map(|(name, _)| name) else {
@@ -179,7 +180,7 @@ fn element_of(descr: &str) -> (Element, Order) {
         "c8" | "c16" | "c32" => Element::Complex,
         text => match (text.strip_prefix('S'), text.strip_prefix('U')) {
             (Some(length), _) if length.parse::<usize>().is_ok() => Element::Text(length.parse().unwrap_or(0)),
-            // Four bytes a character.
+            // Four bytes per character.
             (_, Some(length)) if length.parse::<u32>().is_ok() => {
                 Element::Text(length.parse::<u32>().map_or(0, |length| length as usize * 4))
             }
@@ -189,10 +190,11 @@ fn element_of(descr: &str) -> (Element, Order) {
     (element, order)
 }
 
-/// The file of an array: `descr` and `shape` in NumPy's notation.
+/// Returns an array as a file. `descr` and `shape` are in NumPy's notation.
 pub(crate) fn write(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
-    // Magic, version and length take 10 bytes; the data begins at a multiple of 64, after a line break.
+    // Magic, version and length take 10 bytes. The data begins at a multiple of
+    // 64, after a line break.
     let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
     header.push_str(&" ".repeat(length - header.len() - 1));
     header.push('\n');

@@ -1,6 +1,8 @@
-//! NumPy `.npz`: a zip of `.npy` files. One that SciPy's `save_npz` wrote holds the parts of one sparse matrix.
+//! NumPy `.npz`: a zip of `.npy` files. A file of SciPy's `save_npz` contains
+//! the parts of one sparse matrix.
 //!
-//! Source: APPNOTE.TXT - .ZIP File Format Specification (PKWARE); SciPy reference, `scipy.sparse.save_npz`.
+//! Source: APPNOTE.TXT - .ZIP File Format Specification (PKWARE); SciPy reference,
+//! `scipy.sparse.save_npz`.
 
 use std::borrow::Cow;
 
@@ -19,10 +21,10 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Bytes of a member that surely hold the header of an array.
+/// Number of bytes of a member that certainly contain the header of an array.
 const HEADER: usize = 8192;
 
-/// Layouts of SciPy that are read.
+/// The supported layouts of SciPy.
 const LAYOUTS: &str = "csc, csr or coo";
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
@@ -40,7 +42,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     members.into_iter().map(item).collect()
 }
 
-/// A member as an item: an array, or something else.
+/// Returns a member as an item: an array, or something else.
 fn item(member: Member) -> Result<Item, Error> {
     let start = member.beginning();
     if !start.starts_with(npy::MAGIC) {
@@ -66,6 +68,7 @@ fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>,
     })
 }
 
+/// Reads the sparse matrix that SciPy stored as several members.
 fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix, Error> {
     let part = |name: &str| -> Result<Cow<[u8]>, Error> { find(members, name)?.contents() };
     let indices = |name: &str| -> Result<Vec<usize>, Error> {
@@ -126,7 +129,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
 
 /// A file in a zip.
 struct Member<'a> {
-    /// Without `.npy`.
+    /// Name without the extension `.npy`.
     name: String,
     deflated: bool,
     packed: &'a [u8],
@@ -161,16 +164,17 @@ impl<'a> Member<'a> {
     }
 }
 
-/// Marks of the records of a zip.
+/// Signatures of the records of a zip.
 const LOCAL: u32 = 0x0403_4b50;
 const CENTRAL: u32 = 0x0201_4b50;
 const END: u32 = 0x0605_4b50;
 const END_64: u32 = 0x0606_4b50;
 const LOCATOR_64: u32 = 0x0706_4b50;
 
-/// What stands in a field of 32 bits whose value needs 64.
+/// Value of a 32-bit field if the number is in the 64-bit extra field.
 const IN_EXTRA: usize = u32::MAX as usize;
 
+/// Returns the members of a zip, by its central directory.
 fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
     let mut zip = Bytes::new(bytes, Order::Little);
     zip.seek(directory(bytes)?)?;
@@ -225,9 +229,9 @@ fn sizes_64<const N: usize>(extra: &[u8], mut sizes: [usize; N]) -> Result<[usiz
     Ok(sizes)
 }
 
-/// Where the central directory of a zip begins.
+/// Returns the start of the central directory of a zip.
 fn directory(bytes: &[u8]) -> Result<usize, Error> {
-    // The end record has 22 bytes and a comment of at most 65535 behind it.
+    // The end record has 22 bytes, followed by a comment of at most 65535 bytes.
     let from = bytes.len().saturating_sub(22 + 65535);
     let mark = END.to_le_bytes();
     let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
@@ -254,7 +258,8 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
     Number::U64.index(&mut zip)
 }
 
-/// The file of a matrix as SciPy's `load_npz` reads it: compressed columns, both triangles, not packed.
+/// Returns a matrix as a file for SciPy's `load_npz`: compressed columns, both
+/// triangles, not compressed by deflate.
 pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
     let mut entries: Vec<Entry> = matrix.both_triangles().collect();
     entries.sort_by_key(|e| (e.column, e.row));
@@ -283,7 +288,7 @@ pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
     zip(&parts)
 }
 
-/// A zip of members that are not packed.
+/// Returns a zip with members that are not compressed.
 fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     let small = |size: usize| {
@@ -296,7 +301,7 @@ fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
         let mut crc = flate2::Crc::new();
         crc.update(contents);
         let size = small(contents.len())?.to_le_bytes();
-        // Version 2.0, no flags, not packed, at the first moment a zip knows: 1 January 1980.
+        // Version 2.0, no flags, not compressed, with the earliest date of a zip: 1 January 1980.
         let mut common = vec![20, 0, 0, 0, 0, 0, 0, 0, 0x21, 0];
         common.extend([crc.sum().to_le_bytes(), size, size].concat());
         common.extend([name.len() as u8, 0, 0, 0]);

@@ -1,11 +1,11 @@
-//! What a matrix is like, for a person to read before it is used.
+//! Statistics of a matrix, for inspection by a user.
 
 use std::fmt;
 
 use crate::constrained::CLAMPED;
 use crate::matrix::Matrix;
 
-/// Names that a report shows.
+/// Number of rows and names that a report shows.
 const SHOWN: usize = 6;
 
 /// Statistics of one matrix.
@@ -25,32 +25,35 @@ pub struct Report {
     pub rows: usize,
     /// Number of columns.
     pub columns: usize,
-    /// Entries that are kept: of a symmetric matrix those of one triangle.
+    /// Number of stored entries: one triangle for a symmetric matrix.
     pub entries: usize,
-    /// Zeros that the file states.
+    /// Number of explicit zeros in the file.
     pub zeros: usize,
     /// Largest absolute value.
     pub largest: f64,
-    /// Smallest absolute value that is not zero; infinite without entries.
+    /// Smallest nonzero absolute value; infinite without entries.
     pub smallest: f64,
-    /// Largest `|a_ij - a_ji|` over the largest absolute value; infinite unless the matrix is square.
+    /// Largest `|a_ij - a_ji|` divided by the largest absolute value; infinite
+    /// unless the matrix is square.
     pub asymmetry: f64,
-    /// Rows whose diagonal is zero, from zero: massless ones in a mass matrix, unattached ones in a stiffness matrix.
+    /// Rows with a zero diagonal, counted from zero: massless in a mass matrix,
+    /// unconnected in a stiffness matrix.
     pub zero_diagonal: Vec<usize>,
-    /// Rows whose diagonal is negative, from zero: no matrix with one is positive semidefinite.
+    /// Rows with a negative diagonal, counted from zero. A matrix with such a
+    /// row is not positive semidefinite.
     pub negative_diagonal: Vec<usize>,
-    /// Rows without any entry, from zero.
+    /// Rows without any entry, counted from zero.
     pub empty: Vec<usize>,
-    /// Rows with 1e36 on their diagonal, from zero: constrained ones of Abaqus.
+    /// Rows with 1e36 or more on their diagonal, counted from zero: constrained rows of Abaqus.
     pub clamped: Vec<usize>,
-    /// The first names of rows, and how many there are.
+    /// The first names of rows, and the number of names.
     pub names: Option<(Vec<String>, usize)>,
     /// Format and variable.
     pub origin: String,
 }
 
 impl Report {
-    /// Looks through a matrix once.
+    /// Computes the statistics of a matrix.
     pub fn new(matrix: &Matrix) -> Self {
         let mut diagonal = vec![0.0; matrix.rows()];
         let mut filled = vec![false; matrix.rows()];
@@ -60,7 +63,7 @@ impl Report {
                 diagonal[e.row as usize] = e.value;
             }
         }
-        // Only a square matrix has a diagonal that means anything.
+        // Only the diagonal of a square matrix is meaningful.
         let rows = if matrix.rows() == matrix.columns() { matrix.rows() } else { 0 };
         let where_is = |test: fn(f64) -> bool| (0..rows).filter(|&row| test(diagonal[row])).collect();
         let largest = matrix.largest();

@@ -1,28 +1,29 @@
-//! The first line of a list of entries: is it an entry, or does it state sizes, as in Matrix Market without its banner?
+//! Decides whether the first line of a list of entries is an entry, or states
+//! sizes as in Matrix Market without a banner.
 //!
 //! ```text
 //! 3 3 2
 //! 1 1 2.5
 //! 3 1 -1.0
 //! ```
-//! Sizes are whole numbers that no later index exceeds, followed by as many lines as they say. Taken for an entry, such a line would change
-//! the matrix without a word.
+//! Sizes are integers that no later index exceeds, and the stated number of lines follows them.
+//! Reading sizes as an entry would silently change the matrix.
 
 use crate::error::{Error, Kind};
 use crate::text::{Line, Lines, integer, shown};
 
-/// What the first line is.
+/// The meaning of the first line.
 pub(crate) enum FirstLine<'a> {
-    /// An entry, or nothing that has three fields.
+    /// An entry, or a line without three integers.
     Entry,
     /// Rows, columns and number of entries.
     Sizes,
-    /// Sizes with another number of lines behind them, or an entry.
+    /// An entry, or sizes followed by another number of lines.
     Unclear(Line<'a>),
 }
 
 impl<'a> FirstLine<'a> {
-    /// Of a file of lines with three fields, with comments behind `%`.
+    /// Classifies the first line of a file of lines with three fields. Comments begin with `%`.
     pub fn of(bytes: &'a [u8]) -> Self {
         let mut lines = Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty() && !is_comment(line));
         let Some((first, [rows, columns, entries])) = lines.next().and_then(|line| Some((line, whole(&line)?))) else {
@@ -38,25 +39,25 @@ impl<'a> FirstLine<'a> {
         }
         match count {
             _ if count == entries => FirstLine::Sizes,
-            // one line alone is an entry
+            // A single line is an entry.
             0 => FirstLine::Entry,
             _ => FirstLine::Unclear(first),
         }
     }
 }
 
-/// Three whole numbers, none of them negative.
+/// Returns three nonnegative integers, if the line contains exactly these.
 pub(crate) fn whole(line: &Line) -> Option<[i64; 3]> {
     let [rows, columns, entries] = line.exactly::<3>("").ok()?.map(|field| integer(field).filter(|value| *value >= 0));
     Some([rows?, columns?, entries?])
 }
 
-/// Whether a line is a comment of Matrix Market, indented or not.
+/// Returns true if a line is a Matrix Market comment, indented or not.
 pub(crate) fn is_comment(line: &Line) -> bool {
     line.text.trim_ascii_start().starts_with(b"%")
 }
 
-/// Of a first line that may be sizes or an entry.
+/// Creates the error for a first line that may be sizes or an entry.
 pub(crate) fn unclear(line: &Line) -> Error {
     Error::new(
         Kind::Malformed,

@@ -1,8 +1,8 @@
-//! Text files: lines with their numbers, fields, and numbers as Fortran writes them.
+//! Text files: numbered lines, fields, and numbers in Fortran notation.
 
 use crate::error::{Error, Kind, Location};
 
-/// Characters of a wrong field that a message shows.
+/// Number of characters of a wrong field that a message shows.
 const SHOWN: usize = 40;
 
 /// The lines of a file, counted from one.
@@ -17,13 +17,13 @@ impl<'a> Lines<'a> {
         Self { rest: bytes, number: 0 }
     }
 
-    /// The next line without its end, or what an early end of the file is called.
+    /// Returns the next line. `what` describes the expected content in the error.
     pub fn expect(&mut self, what: &str) -> Result<Line<'a>, Error> {
         let location = Location::Line(self.number + 1);
         self.next().ok_or_else(|| truncated(location, what))
     }
 
-    /// The next line that is not blank.
+    /// Returns the next line that is not blank.
     pub fn expect_filled(&mut self, what: &str) -> Result<Line<'a>, Error> {
         loop {
             let line = self.expect(what)?;
@@ -33,17 +33,17 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// What is not yet read.
+    /// Returns the bytes not read yet.
     pub fn rest(&self) -> &'a [u8] {
         self.rest
     }
 
-    /// Bytes not yet read.
+    /// Returns the number of bytes not read yet.
     pub fn left(&self) -> usize {
         self.rest.len()
     }
 
-    /// The location of the line read last.
+    /// Returns the location of the last line read.
     pub fn location(&self) -> Location {
         Location::Line(self.number)
     }
@@ -64,7 +64,7 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// One line of a file.
+/// A line of a file.
 #[derive(Clone, Copy)]
 pub(crate) struct Line<'a> {
     pub text: &'a [u8],
@@ -76,12 +76,12 @@ impl<'a> Line<'a> {
         Location::Line(self.number)
     }
 
-    /// What stands between blanks.
+    /// Returns the fields between spaces.
     pub fn words(&self) -> impl Iterator<Item = &'a [u8]> + use<'a> {
         self.text.split(|byte| byte.is_ascii_whitespace()).filter(|word| !word.is_empty())
     }
 
-    /// Exactly `N` fields between blanks.
+    /// Returns exactly `N` fields between spaces.
     pub fn exactly<const N: usize>(&self, what: &str) -> Result<[&'a [u8]; N], Error> {
         let mut fields = [&[][..]; N];
         let mut count = 0;
@@ -94,7 +94,8 @@ impl<'a> Line<'a> {
         if count == N { Ok(fields) } else { Err(self.malformed(what, &format!("{count} fields"))) }
     }
 
-    /// The part from one column to another, from zero, shorter or empty where the line ends earlier.
+    /// Returns the text between two columns, counted from zero; it is shorter
+    /// or empty if the line ends earlier.
     pub fn columns(&self, from: usize, to: usize) -> &'a [u8] {
         let to = to.min(self.text.len());
         self.text[from.min(to)..to].trim_ascii()
@@ -108,13 +109,13 @@ impl<'a> Line<'a> {
         integer(field).ok_or_else(|| self.malformed("a whole number", &shown(field)))
     }
 
-    /// A count or size, not negative.
+    /// Reads a count or size, which is not negative.
     pub fn count(&self, field: &[u8]) -> Result<usize, Error> {
         let count = integer(field).and_then(|value| usize::try_from(value).ok());
         count.ok_or_else(|| self.malformed("a count", &shown(field)))
     }
 
-    /// A row or column, counted from one in the file and from zero here.
+    /// Reads a row or column, counted from one in the file and from zero in the result.
     pub fn index(&self, field: &[u8]) -> Result<usize, Error> {
         match integer(field).map(|value| usize::try_from(value - 1)) {
             Some(Ok(index)) => Ok(index),
@@ -122,6 +123,7 @@ impl<'a> Line<'a> {
         }
     }
 
+    /// Creates an error for unexpected content in this line.
     pub fn malformed(&self, expected: &str, found: &str) -> Error {
         Error::new(
             Kind::Malformed,
@@ -132,7 +134,8 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Refuses a file of lines, whose number it does not state, that ends within one: its last number may lack digits.
+/// Refuses a file that ends within a line, if it does not state its number of
+/// lines: the last number may lack digits.
 pub(crate) fn must_end_its_lines(bytes: &[u8]) -> Result<(), Error> {
     if bytes.last().is_none_or(|last| *last == b'\n') {
         return Ok(());
@@ -142,7 +145,7 @@ pub(crate) fn must_end_its_lines(bytes: &[u8]) -> Result<(), Error> {
     Err(Error::new(Kind::Truncated, location, "the file ends within a line".into(), remedy))
 }
 
-/// A file that ends before `what`.
+/// Creates the error for a file that ends before `what`.
 pub(crate) fn truncated(location: Location, what: &str) -> Error {
     Error::new(
         Kind::Truncated,
@@ -152,7 +155,7 @@ pub(crate) fn truncated(location: Location, what: &str) -> Error {
     )
 }
 
-/// A field as a message shows it.
+/// Returns a field in the notation of a message.
 pub(crate) fn shown(field: &[u8]) -> String {
     let text = String::from_utf8_lossy(field);
     let mut short: String = text.chars().take(SHOWN).collect();
@@ -162,20 +165,21 @@ pub(crate) fn shown(field: &[u8]) -> String {
     format!("`{}`", short.escape_debug())
 }
 
+/// Reads an integer below 2^62 in magnitude.
 pub(crate) fn integer(field: &[u8]) -> Option<i64> {
     let text = std::str::from_utf8(field).ok()?;
     let value: i64 = text.strip_prefix('+').unwrap_or(text).parse().ok()?;
-    // So that a difference of two never overflows.
+    // The difference of two such integers does not overflow.
     (value.unsigned_abs() < 1 << 62).then_some(value)
 }
 
-/// A number as C or Fortran writes it: `1.5`, `1.`, `.5`, `1e3`, `1.5D+03`, `1.0-5`.
+/// Reads a number in C or Fortran notation: `1.5`, `1.`, `.5`, `1e3`, `1.5D+03`, `1.0-5`.
 pub(crate) fn real(field: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(field).ok()?;
     if let Ok(value) = text.parse() {
         return Some(value);
     }
-    // Longer than any number is written: what follows is a copy.
+    // A limit on the length, because the following steps copy the text.
     if text.len() > 400 || !text.bytes().all(|byte| byte.is_ascii_digit() || b"+-.dDeE".contains(&byte)) {
         return None;
     }
@@ -183,7 +187,7 @@ pub(crate) fn real(field: &[u8]) -> Option<f64> {
     let mut before = None;
     for c in text.chars() {
         let letter = matches!(c, 'd' | 'D' | 'e' | 'E');
-        // Fortran leaves the letter out where the exponent has three digits, Nastran wherever it can.
+        // Fortran omits the letter if the exponent has three digits, Nastran often.
         if matches!(c, '+' | '-') && before.is_some_and(|b: char| b.is_ascii_digit() || b == '.') {
             plain.push('e');
         }

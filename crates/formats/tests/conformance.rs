@@ -1,16 +1,17 @@
-//! What every format of the table must do, on every file of `data`: be found, list, read, refuse what is cut off, survive what is not its own.
+//! Conformance of every format, on every file of `data`: recognized, listed, read, refused if
+//! truncated, and no panic on files of other formats.
 
 use std::path::{Path, PathBuf};
 
 use stickslip_formats::{Error, Kind, TABLE, list_bytes, read_bytes};
 
-/// Files of matrices in `data`, by name.
+/// Returns the files of matrices in `data`, with their names.
 fn files() -> Vec<(String, Vec<u8>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     let mut paths: Vec<PathBuf> =
         std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
-    // Expected values, names of rows, and the script that makes all of them.
+    // Without expected values, row names, and the script that creates all of them.
     paths.retain(|path| {
         !["bits", "dof", "mapping", "py"].iter().any(|ending| path.extension().is_some_and(|found| found == *ending))
     });
@@ -18,12 +19,12 @@ fn files() -> Vec<(String, Vec<u8>)> {
     paths.iter().map(|path| (name(path), std::fs::read(path).expect("a file"))).collect()
 }
 
-/// The name by which to ask for a variable.
+/// Returns the name to request for a variable.
 fn asked(name: &str) -> Option<&str> {
     Some(name).filter(|name| !name.is_empty())
 }
 
-/// Format and number of matrices of a file.
+/// Reads all matrices of a file. Returns the format and the number of matrices.
 fn read_all(bytes: &[u8], format: Option<&str>) -> Result<(&'static str, usize), Error> {
     let mut found = ("", 0);
     for variable in list_bytes(bytes, format)?.iter().filter(|variable| variable.note.is_none()) {
@@ -63,7 +64,8 @@ fn every_format_stands_in_the_book() {
 fn a_file_cut_anywhere_is_refused_or_read_without_panic() {
     for (name, bytes) in files() {
         let (format, _) = read_all(&bytes, None).unwrap_or_else(|error| panic!("{name}: {error}"));
-        // Of the last number nothing tells how many digits it had, and a right-hand side behind a matrix is not read.
+        // The reader cannot know the number of digits of the last number, and
+        // it does not read a right-hand side after a matrix.
         let last = 60.min(bytes.len() / 2);
         let mut refused = 0;
         let step = bytes.len().div_ceil(300);
@@ -71,7 +73,8 @@ fn a_file_cut_anywhere_is_refused_or_read_without_panic() {
         for length in (0..(bytes.len() - last)).step_by(step) {
             refused += usize::from(read_all(&bytes[..length], Some(format)).is_err());
         }
-        // Lines without a header, and cards, may end after any line; all others say how much there is.
+        // Files of lines without a header, and of cards, may end after any
+        // line. All other files state their length.
         let open_end =
             ["coordinate", "abaqus-matrix-input", "nastran-dmig", "nastran-op4", "matlab", "hdf5", "abaqus-element"];
         let most = (bytes.len() - last).div_ceil(step);
@@ -86,7 +89,8 @@ fn a_file_of_another_format_is_refused_without_panic() {
         let (own, _) = read_all(&bytes, None).unwrap_or_else(|error| panic!("{name}: {error}"));
         for format in TABLE.iter().filter(|format| format.name != own) {
             let found = read_all(&bytes, Some(format.name));
-            // Only lines that the other format has too are taken for it, and never for a matrix.
+            // Only lines that are valid in the other format too are accepted,
+            // and they never form a matrix.
             assert!(found.is_err() || found == Ok(("", 0)), "{name} as {}: {found:?}", format.name);
         }
     }

@@ -8,7 +8,7 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
-/// Size and entries of `NAME.bits`: of the whole matrix, both triangles.
+/// Returns size and entries of `NAME.bits`: the whole matrix with both triangles.
 fn expected(name: &str) -> (usize, usize, Vec<(u32, u32, u64)>) {
     let text = std::fs::read_to_string(data(&format!("{name}.bits"))).expect("a file of expected bits");
     let mut lines = text.lines().map(|line| line.split(' ').collect::<Vec<_>>());
@@ -26,7 +26,7 @@ fn bits(matrix: &Matrix) -> Vec<(u32, u32, u64)> {
     entries
 }
 
-/// The matrix `name` of a file has the bits of `expect`, and is found to be of `format`.
+/// The matrix `name` of a file has the bits of `expect`, and the file is recognized as `format`.
 fn check(file: &str, name: Option<&str>, format: &str, expect: &str) -> Matrix {
     let matrix = read(data(file), None, name).unwrap_or_else(|error| panic!("{error}"));
     let (rows, columns, entries) = expected(expect);
@@ -60,7 +60,7 @@ fn rows_of_numbers_as_text() {
     }
 }
 
-/// `1000 [2 -1 0; -1 2 -1; 0 -1 1]`, by files that vary within their format.
+/// `1000 [2 -1 0; -1 2 -1; 0 -1 1]`, from files with variations of their format.
 #[test]
 fn a_chain_of_three_in_every_variant() {
     for file in ["chain_no_banner.mtx", "chain_indented_banner.mtx", "chain_indented_comment.mtx"] {
@@ -150,7 +150,7 @@ fn matlab_files_of_octave() {
 fn calculix_matrices_and_names() {
     let stiffness = check("bricks.sti", None, "coordinate", "bricks.sti");
     let mass = check("bricks.mas", None, "coordinate", "bricks.mas");
-    // Two thirds of the mass are zeros that the file states: no mass couples two directions.
+    // The file states many zeros: the mass does not couple different directions.
     assert!(mass.origin().zeros * 2 > mass.entries().len());
     let found = names::read(data("bricks.dof"), stiffness.rows()).expect("names");
     assert_eq!((found[0].as_str(), found.len()), ("2.x", 30));
@@ -158,7 +158,8 @@ fn calculix_matrices_and_names() {
     let report = Report::new(&stiffness.with_names(found).expect("as many names as rows"));
     assert!(report.zero_diagonal.is_empty() && report.negative_diagonal.is_empty());
     let total: f64 = mass.both_triangles().map(|e| e.value).sum();
-    // Ten nodes or parts of them are free: less than three times the mass, 7.8e-9 (1 + 0.9666…), as directions do not couple.
+    // Ten nodes are at least partly free. The sum is less than three times the mass, 7.8e-9 (1
+    // + 0.9666…), because directions do not couple.
     assert!(total > 1e-8 && total < 3.0 * 7.8e-9 * 2.0, "{total}");
 }
 
@@ -187,7 +188,7 @@ fn nastran_cards_of_pyyeti() {
     let file = "pyyeti.pch";
     assert_eq!(check(file, Some("KAAX"), "nastran-dmig", "punch").names(), Some(&nodes[..]));
     assert_eq!(check(file, Some("BAAX"), "nastran-dmig", "punch_tilted").names(), Some(&nodes[..]));
-    // a row of zeros has no card
+    // A row of zeros has no card.
     let left = ["7.x", "7.y", "10.z", "100.x", "100.rz"].map(String::from);
     assert_eq!(check(file, Some("MAAX"), "nastran-dmig", "punch_mass").names(), Some(&left[..]));
     let left = ["7.x", "7.y", "10.z"].map(String::from);
@@ -230,7 +231,8 @@ fn what_is_written_reads_back_to_the_last_bit() {
     assert_eq!(names::read(&path, 6).expect("names"), named.names().expect("names"));
 }
 
-/// A mark before the text is no part of it; what is nearly known is called by its name, with what to do.
+/// A byte order mark is not part of the text. The error for a nearly supported
+/// format names the format and the remedy.
 #[test]
 fn what_is_nearly_known_is_called_by_its_name() {
     let text = std::fs::read(data("stiffness.mtx")).expect("a file");
@@ -239,7 +241,7 @@ fn what_is_nearly_known_is_called_by_its_name() {
     let wide: Vec<u8> = [0xff, 0xfe].into_iter().chain(text.iter().flat_map(|byte| [*byte, 0])).collect();
     let error = read_bytes(&wide, None, None).expect_err("UTF-16").to_string();
     assert!(error.contains("UTF-16") && error.contains("UTF-8"), "{error}");
-    // a 1 x 1 matrix K of doubles
+    // A 1 x 1 matrix K of doubles.
     let head = [0u32, 1, 1, 0, 2].into_iter().flat_map(u32::to_le_bytes);
     let old: Vec<u8> = head.chain(*b"K\0").chain(2.5f64.to_le_bytes()).collect();
     let error = read_bytes(&old, None, None).expect_err("version 4").to_string();

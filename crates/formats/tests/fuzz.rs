@@ -1,4 +1,4 @@
-//! Damaged files of every format: no panic, no long search, and memory bounded by the file.
+//! Damaged files of every format: no panic, bounded time, and memory bounded by the file.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -10,20 +10,23 @@ use stickslip_formats::{Matrix, Report, Symmetry, TABLE, list_bytes, names, read
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Peaks of memory are those of the whole process: one test at a time.
+/// Memory peaks are those of the whole process, so one test runs at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Bytes that reading may take beyond a multiple of the file: a damaged size may state a million rows without entries, for each of
-/// which the matrix and its report keep some numbers.
+/// Bytes of memory that reading may take beyond a multiple of the file.
+///
+/// A damaged size may state a million rows without entries. The matrix and its
+/// report store some numbers for each row.
 const ALWAYS: usize = 64 << 20;
 
 /// Bytes of memory for every byte of a damaged file.
 const TIMES: usize = 100;
 
-/// Time for one damaged file of some kilobytes; a run takes milliseconds, the rest is what other programs take.
+/// Time limit for one damaged file of some kilobytes. A run takes milliseconds;
+/// the rest allows for other processes.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Random numbers that are the same in every run (Marsaglia's xorshift).
+/// Random numbers with the same sequence in every run (Marsaglia's xorshift).
 struct Random(u64);
 
 impl Random {
@@ -43,7 +46,7 @@ impl Random {
     }
 }
 
-/// What replaces a number in a text.
+/// Replacements for a number in a text.
 const WORDS: [&[u8]; 14] = [
     b"0",
     b"-1",
@@ -61,11 +64,11 @@ const WORDS: [&[u8]; 14] = [
     b"x",
 ];
 
-/// What replaces a whole number in binary.
+/// Replacements for an integer in binary data.
 const NUMBERS: [u64; 10] =
     [0, 1, 2, 0x7f, 0x7fff_ffff, 0xffff_ffff, 0x8000_0000, 0x7fff_ffff_ffff_ffff, u64::MAX, 0x1_0000];
 
-/// One damage.
+/// Applies one random damage.
 fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     let at = random.below(bytes.len());
     let Some(&byte) = bytes.get(at) else { return };
@@ -73,7 +76,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
         0 => bytes[at] = random.next() as u8,
         1 => bytes[at] = byte ^ (1 << random.below(8)),
         2 => {
-            // The word at this position becomes another one.
+            // Replaces the word at this position.
             let inside = |byte: &u8| byte.is_ascii_alphanumeric() || b"+-.".contains(byte);
             let start = bytes[..at].iter().rposition(|byte| !inside(byte)).map_or(0, |before| before + 1);
             let end = bytes[at..].iter().position(|byte| !inside(byte)).map_or(bytes.len(), |length| at + length);
@@ -82,7 +85,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
         3 | 4 => {
             let value = NUMBERS[random.below(NUMBERS.len())];
             let order = if random.below(2) == 0 { value.to_le_bytes() } else { value.to_be_bytes() };
-            // Most whole numbers in files are aligned.
+            // Most integers in files are aligned.
             let at = at & !3;
             let end = bytes.len().min(at + [4, 8][random.below(2)]);
             let length = end - at;
@@ -102,7 +105,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
-/// Reads all that is in a file, and gives the number of its matrices.
+/// Reads all matrices of a file and returns their number.
 fn read_all(bytes: &[u8], format: &str) -> usize {
     let Ok(variables) = list_bytes(bytes, Some(format)) else { return 0 };
     let found = variables.iter().take(20).filter_map(|variable| {
@@ -115,7 +118,8 @@ fn read_all(bytes: &[u8], format: &str) -> usize {
     found.count()
 }
 
-/// Damages the files of one format, `count` times each or until `end`.
+/// Damages the files of one format, `count` times each or until `end`. Returns
+/// the numbers of runs and of matrices read.
 fn fuzz(format: &str, seed: u64, count: usize, end: Instant) -> (usize, usize) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     let mut paths: Vec<_> =
@@ -156,14 +160,17 @@ fn damaged_files_of_every_format() {
     for format in TABLE {
         let end = Instant::now() + Duration::from_secs(60);
         let (runs, matrices) = fuzz(format.name, 0x9e37_79b9_7f4a_7c15, 400, end);
-        // Most damages are in numbers, which stay numbers: a reader that refused all would not be tested.
+        // Most damaged numbers are still numbers. A reader that refuses all
+        // damaged files would not be tested.
         assert!(matrices > 0 && runs >= 400, "{}: {matrices} matrices in {runs} runs", format.name);
     }
 }
 
-/// Ten minutes for every format: `cargo test -p stickslip-formats --test fuzz -- --ignored --nocapture`.
+/// Runs for ten minutes per format: `cargo test -p stickslip-formats --test
+/// fuzz -- --ignored --nocapture`.
 ///
-/// `STICKSLIP_FUZZ_SECONDS` and `STICKSLIP_FUZZ_SEED` set another time and another start, `STICKSLIP_FUZZ_FORMAT` one format.
+/// `STICKSLIP_FUZZ_SECONDS` and `STICKSLIP_FUZZ_SEED` set the time and the seed,
+/// `STICKSLIP_FUZZ_FORMAT` selects one format.
 #[test]
 #[ignore = "ten minutes for every format"]
 fn damaged_files_of_every_format_for_ten_minutes() {
@@ -198,13 +205,14 @@ fn damaged_names_of_rows() {
     }
 }
 
-/// Rows of a chain of masses: a million bytes and more in every format of sparse matrices; and of full ones.
+/// Rows of a chain of masses, and of full matrices. They give at least a
+/// million bytes in every format.
 const CHAIN: usize = 100_000;
 const FULL: usize = 1000;
 
-/// A large file of a format, by its documentation, as it packs numbers most tightly where there are several ways.
+/// Returns a large file of a format, by its documentation, in its most compact notation.
 fn large(format: &str) -> Vec<u8> {
-    // row, column from 1, value, of the lower triangle, column by column
+    // Row and column from 1, and value, of the lower triangle, column by column.
     let chain = || {
         let columns = 1..=CHAIN as u32;
         columns.flat_map(|i| [(i, i, 2.0 + 1e-3 * f64::from(i)), (i + 1, i, -1.0)]).take(2 * CHAIN - 1)
@@ -224,7 +232,7 @@ fn large(format: &str) -> Vec<u8> {
         "matrix-market" => written("mtx"),
         "npz" => written("npz"),
         "npy" => {
-            // numbers of one byte are the worst case: 16 bytes for each
+            // Numbers of one byte are the worst case: 16 bytes of memory for each.
             let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
             let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (1000, 1000), }";
             bytes.extend(format!("{header:117}\n").into_bytes());
@@ -297,14 +305,15 @@ fn large(format: &str) -> Vec<u8> {
     }
 }
 
-/// A number as Fortran writes it: two digits of the exponent, with its sign.
+/// Returns a number in Fortran notation: an exponent of two digits with a sign.
 fn fortran(value: f64) -> String {
     let text = format!("{value:.16E}");
     let (digits, exponent) = text.split_once('E').expect("an exponent");
     format!("{digits}E{:+03}", exponent.parse::<i32>().expect("a number"))
 }
 
-/// MAT-file of version 5 with a sparse matrix: flags, sizes, name, rows, first entries of columns, values.
+/// Returns a MAT-file of version 5 with a sparse matrix: flags, sizes, name,
+/// rows, first entries of columns, values.
 fn matlab() -> Vec<u8> {
     let part = |kind: u32, data: Vec<u8>| -> Vec<u8> {
         let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
@@ -314,7 +323,7 @@ fn matlab() -> Vec<u8> {
     };
     let whole = |kind: u32, values: Vec<u32>| part(kind, values.into_iter().flat_map(u32::to_le_bytes).collect());
     let (n, count) = (CHAIN as u32, 2 * CHAIN as u32 - 1);
-    // the lower triangle alone: both would be as many numbers for each entry
+    // The lower triangle only: both would take equally many numbers for each entry.
     let rows = (0..n).flat_map(|i| [i, i + 1]).take(count as usize).collect();
     let values = (0..count).flat_map(|at| (1.0 + f64::from(at)).to_le_bytes()).collect();
     let (sparse, int8, int32, uint32, double) = (5, 1, 5, 6, 9);
@@ -332,7 +341,8 @@ fn matlab() -> Vec<u8> {
     bytes
 }
 
-/// Records of ANSYS: the standard header, that of the matrices, the stiffness by two records a row.
+/// Returns a file of ANSYS: the standard header, the header of the matrices,
+/// and the stiffness by two records per row.
 fn ansys_full() -> Vec<u8> {
     fn record(words: &mut Vec<u32>, flags: u32, data: &[u32]) -> u32 {
         let start = words.len() as u32;
@@ -352,7 +362,7 @@ fn ansys_full() -> Vec<u8> {
     let mut first = None;
     for row in 1..=n {
         let last = row == n;
-        // the columns from the diagonal on, the diagonal last
+        // The columns from the diagonal on, the diagonal last.
         let columns = if last { vec![row] } else { vec![row + 1, row] };
         let start = record(&mut words, integers, &columns);
         first.get_or_insert(start);
@@ -369,7 +379,7 @@ fn ansys_full() -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
-/// Memory is at most ten times the file, whatever the format: of every one that there is.
+/// Memory is at most ten times the file, for every format.
 #[test]
 fn memory_follows_the_file() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -386,7 +396,7 @@ fn memory_follows_the_file() {
     }
 }
 
-/// One damaged index far beyond all others is no row of a structure.
+/// One damaged index far beyond all others does not create rows.
 #[test]
 fn a_damaged_index_makes_no_rows() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);

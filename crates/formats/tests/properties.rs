@@ -1,11 +1,12 @@
-//! Matrices of random size and entries: written and read, in any order of lines, with rows taken out and put elsewhere.
+//! Properties of random matrices: writing and reading, any order of lines,
+//! removed and permuted rows.
 
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 use stickslip_formats::{Matrix, Symmetry, read_bytes, write};
 
-/// Numbers of all sizes; zeros among them, which no matrix keeps.
+/// Numbers of all magnitudes, including zeros, which a matrix does not store.
 fn value() -> impl Strategy<Value = f64> {
     prop_oneof![8 => any::<f64>().prop_filter("finite", |value| value.is_finite()), 2 => -10.0..10.0, 1 => Just(0.0)]
 }
@@ -17,7 +18,8 @@ fn entries(most: usize) -> impl Strategy<Value = (usize, usize, BTreeMap<(usize,
     })
 }
 
-/// A square matrix of one triangle, each position at most once, with a last row and column that are not empty.
+/// One triangle of a square matrix, each position at most once, with an entry
+/// in the last diagonal position.
 fn triangle() -> impl Strategy<Value = (usize, Vec<(usize, usize, f64)>)> {
     (1..12_usize).prop_flat_map(|size| {
         let places = prop::collection::btree_map((0..size, 0..size), value(), 0..40);
@@ -59,7 +61,7 @@ proptest! {
         }
     }
 
-    /// One triangle or the other or both, in any order: the same matrix, from every format of lines.
+    /// One triangle, the other, or both, in any order: every format of lines gives the same matrix.
     #[test]
     fn formats_of_lines_agree(
         (size, lower) in triangle(),
@@ -88,7 +90,7 @@ proptest! {
         ];
         for (at, file) in files.iter().enumerate() {
             let found = read_bytes(file, None, None).expect("a matrix");
-            // Formats that name their rows leave out those without a line.
+            // Formats with row names omit rows without a line.
             let found = match found.names() {
                 Some(_) => found.in_order_of(&(1..=size).map(|row| format!("{row}.x")).collect::<Vec<_>>()).expect("rows"),
                 None => found,

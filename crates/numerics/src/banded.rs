@@ -1,20 +1,23 @@
-//! Linear equations whose matrix has entries near its diagonal only: elimination with row exchanges inside the band.
+//! Linear equations with a banded matrix, by elimination with row exchanges inside the band.
 //!
-//! Memory and work grow with the number of unknowns times the band, and its square. Source: Golub and Van Loan, "Matrix
-//! Computations" (2013), Sec. 4.3.
+//! Memory grows with the number of unknowns times the bandwidth, and work with
+//! the number of unknowns times its square.
+//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 4.3.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use std::ops::Range;
 
-/// Band from which elimination in blocks is the faster one, and the columns of a block. Measured: a ninth of the time with full bands of 255 and 511, a
-/// fifth with 96.
+/// Half bandwidth from which elimination in blocks is faster.
+///
+/// Measured: a ninth of the time with full bands of 255 and 511, a fifth with 96.
 const WIDE: usize = 64;
+/// Columns of a block.
 const BLOCK: usize = 16;
-/// Zeros between two runs that are taken along.
+/// Runs of nonzero rows or columns are merged across gaps of at most this length.
 const GAP: usize = 8;
 
-/// A square matrix with `band` diagonals on either side of the main one.
+/// A square matrix with `band` diagonals on either side of the main diagonal.
 ///
 /// # Example
 /// ```
@@ -32,23 +35,26 @@ const GAP: usize = 8;
 pub struct Banded {
     n: usize,
     band: usize,
-    /// Columns that are factored before the rest follows.
+    /// Columns factored before the trailing matrix is updated.
     block: usize,
-    /// Entries of a row: columns i - band - block + 1 to i + 2 band + block - 1 of row i. Row exchanges fill the upper band up to twice its width; a block
-    /// ends where its last row does, and factors that row exchanges take with them stand below the lower band.
+    /// Stored entries of a row: columns i - band - block + 1 to i + 2 band + block - 1 of row i.
+    ///
+    /// Row exchanges widen the upper band to twice its width. All rows of a
+    /// block extend to the last column of the longest one. Row exchanges inside
+    /// a block move multipliers below the lower band.
     width: usize,
     rows: Vec<f64>,
     pivots: Vec<usize>,
     /// Last column of each factored row.
     ends: Vec<usize>,
-    /// Factors of a block, row by row.
+    /// Multipliers of a block, row by row.
     left: Vec<f64>,
-    /// Rows below it that it reaches, and columns beside it.
+    /// Runs of nonzero rows below a block, and of nonzero columns to its right.
     runs: [Vec<Range<usize>>; 2],
 }
 
 impl Banded {
-    /// The zero matrix.
+    /// Creates a zero matrix of `n` rows.
     pub fn new(n: usize, band: usize) -> Self {
         let block = Banded::block(band);
         let width = 3 * band + 2 * block - 1;
@@ -66,12 +72,12 @@ impl Banded {
         }
     }
 
-    /// How many columns are factored at a time.
+    /// Returns the number of columns factored at a time.
     fn block(band: usize) -> usize {
         if band < WIDE { 1 } else { BLOCK }
     }
 
-    /// Memory of such a matrix of `n` rows, bytes.
+    /// Returns the memory of a matrix of `n` rows, bytes.
     pub fn bytes(n: usize, band: usize) -> f64 {
         8.0 * n as f64 * (3 * band + 2 * Banded::block(band) + 1) as f64
     }
@@ -81,10 +87,10 @@ impl Banded {
         self.rows.fill(0.0);
     }
 
-    /// Adds to the entry (i, j).
+    /// Adds `value` to the entry (i, j).
     ///
     /// # Panics
-    /// If the entry lies outside of the band.
+    /// If the entry lies outside the band.
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         assert!(i.abs_diff(j) <= self.band, "({i}, {j}) lies outside of the band {}", self.band);
@@ -92,11 +98,11 @@ impl Banded {
         self.rows[at] += value;
     }
 
-    /// Factors the matrix in place. False if it is singular.
+    /// Factors the matrix in place. Returns false if it is singular.
     pub fn factor(&mut self) -> bool {
         let (n, b) = (self.n, self.band);
         let place = self.place();
-        // the last column of every row that is not zero: beyond it only row exchanges fill
+        // The last nonzero column of every row before row exchanges.
         self.ends.iter_mut().enumerate().for_each(|(i, end)| *end = (i + b).min(n - 1));
         let mut first = 0;
         while first < n {
@@ -113,13 +119,14 @@ impl Banded {
         true
     }
 
-    /// Where entry (i, j) stands.
+    /// Returns the function that maps entry (i, j) to its index in `rows`.
     fn place(&self) -> impl Fn(usize, usize) -> usize + Copy + use<> {
         let (width, below) = (self.width, self.band + self.block - 1);
         move |i: usize, j: usize| i * width + j + below - i
     }
 
-    /// Factors the columns `first..next`, in all rows that they reach; rows are exchanged whole, as far as these columns begin.
+    /// Factors the columns `first..next` in all rows that they reach. Row
+    /// exchanges begin at column `first`.
     fn factor_panel(&mut self, first: usize, next: usize) -> bool {
         let (n, b, place) = (self.n, self.band, self.place());
         for k in first..next {
@@ -158,7 +165,7 @@ impl Banded {
         true
     }
 
-    /// Takes the columns `next..end` of the panel's rows through its elimination, and what they add to the rows below off these.
+    /// Updates the columns `next..end`: first in the rows of the panel, then in the rows below it.
     fn eliminate(&mut self, first: usize, next: usize, end: usize, place: impl Fn(usize, usize) -> usize) {
         for k in first..next {
             for i in k + 1..next {
@@ -185,7 +192,7 @@ impl Banded {
             }
             return;
         }
-        // what stands in a row and in the next one has this distance
+        // Distance in memory between two entries of one column in consecutive rows.
         let stride = self.width - 1;
         self.left.clear();
         for i in next..last {
@@ -198,7 +205,8 @@ impl Banded {
         runs(columns, |j| (0..inner).any(|k| right[k * stride + j] != 0.0), &mut self.runs[1]);
         let [below, beside] = &self.runs;
         for (i, j) in below.iter().flat_map(|i| beside.iter().map(move |j| (i, j))) {
-            // row after row, the memory holds what is the transpose to who reads it column by column
+            // The storage is row-major and `matmul` reads columns, so all three
+            // matrices are transposed.
             let left = MatRef::from_column_major_slice(&self.left[i.start * inner..i.end * inner], inner, i.len());
             let right = &right[j.start..(inner - 1) * stride + j.end];
             let right = MatRef::from_column_major_slice_with_stride(right, j.len(), inner, stride);
@@ -208,14 +216,14 @@ impl Banded {
         }
     }
 
-    /// Solves with the factors; `right` becomes the solution.
+    /// Solves with the factors. Replaces `right` by the solution.
     pub fn solve(&self, right: &mut [f64]) {
         let (n, b, place) = (self.n, self.band, self.place());
         for first in (0..n).step_by(self.block) {
             let next = (first + self.block).min(n);
             (first..next).for_each(|k| right.swap(k, self.pivots[k]));
             for k in first..next {
-                // rows that were exchanged with the panel's stand farther below than the band
+                // Row exchanges inside a panel move multipliers below the band.
                 let last = if self.block == 1 { k + b } else { next - 1 + b };
                 for i in k + 1..=last.min(n - 1) {
                     right[i] -= self.rows[place(i, k)] * right[k];
@@ -231,7 +239,7 @@ impl Banded {
     }
 }
 
-/// The numbers below `count` that are `taken`, as runs into `out`.
+/// Collects the numbers below `count` that are `taken` as runs in `out`.
 fn runs(count: usize, taken: impl Fn(usize) -> bool, out: &mut Vec<Range<usize>>) {
     out.clear();
     for i in (0..count).filter(|i| taken(*i)) {
@@ -242,8 +250,9 @@ fn runs(count: usize, taken: impl Fn(usize) -> bool, out: &mut Vec<Range<usize>>
     }
 }
 
-/// An order of the nodes of a graph in which neighbours stand close together: `order[node]` is the node's position. `links` lists the
-/// pairs that are connected.
+/// Returns an order of the nodes of a graph that places connected nodes close together.
+///
+/// `order[node]` is the position of a node. `links` lists the connected pairs.
 ///
 /// Source: Cuthill and McKee (1969).
 pub fn order(nodes: usize, links: &[(usize, usize)]) -> Vec<usize> {
@@ -286,7 +295,8 @@ mod tests {
     use crate::dense;
     use crate::random::Stream;
 
-    /// Diagonals that vanish, so that rows are exchanged as far as the band reaches; the solution is that of the full matrix.
+    /// The diagonal is zero, so rows are exchanged as far as the band permits.
+    /// The solution agrees with that of the full matrix.
     #[test]
     fn blocks_solve_what_the_full_matrix_does() {
         for (n, band) in [(40, 7), (300, WIDE), (331, WIDE + 45), (150, 149), (97, 96)] {

@@ -1,15 +1,18 @@
-//! Linear complementarity in a box: find `λ` with `low ≤ λ ≤ high` and `w = b - D λ` such that
-//! `w = 0` where `λ` is inside, `w ≥ 0` at `high`, `w ≤ 0` at `low`.
+//! Linear complementarity with bounds: find `λ` with `low ≤ λ ≤ high` and `w = b - D λ` such
+//! that `w = 0` where `low < λ < high`, `w ≥ 0` where `λ = high`, and `w ≤ 0` where `λ = low`.
 //!
-//! With `D` symmetric positive semidefinite this is the optimality of `min ½ λᵀDλ - bᵀλ` over the box; `w` is unique, and so is `λ`
-//! if `D` is definite. Contact decisions are of this form: `λ` friction forces, `w` relative accelerations.
-//! Solved by block pivoting with Murty's least-index rule as the safeguard that makes it finite.
-//! Source: Cottle, Pang, Stone, "The Linear Complementarity Problem" (1992), Ch. 4; Júdice and Pires (1994).
+//! With `D` symmetric positive semidefinite these are the optimality conditions of
+//! `min ½ λᵀDλ - bᵀλ` within the bounds. `w` is unique, and so is `λ` if `D` is definite. In a
+//! contact problem `λ` are friction forces and `w` relative accelerations.
+//!
+//! The method is block pivoting. Murty's least-index rule is the safeguard that makes it finite.
+//! Source: Cottle, Pang, Stone, "The Linear Complementarity Problem" (1992),
+//! Ch. 4; Júdice and Pires (1994).
 
 use crate::eigen;
 use nalgebra::{DMatrix, DVector};
 
-/// Where a component of the solution stands in its box.
+/// The position of a component of the solution between its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Side {
     Inside,
@@ -17,20 +20,22 @@ enum Side {
     High,
 }
 
-/// Block pivots that may pass without fewer infeasible components before single pivots take over.
+/// Block pivots without a decrease of the number of infeasible components,
+/// after which single pivots take over.
 const PATIENCE: usize = 3;
-/// A component counts as infeasible beyond this fraction of the problem's scale: rounding of a small dense solve.
+/// A component is infeasible if it violates its condition by more than this fraction of the
+/// problem's scale. The value is the rounding of a small dense solve.
 const FEASIBLE: f64 = 1e-13;
 /// Singular values of `D` below this fraction of the largest count as zero: redundant contacts.
 const RANK: f64 = 1e-12;
 
-/// Solves the problem; `None` if it cycles, which an indefinite `D` can cause.
+/// Solves the problem. Returns `None` if the pivoting cycles, which an indefinite `D` can cause.
 ///
 /// # Example
 /// ```
 /// use nalgebra::{dmatrix, dvector};
 /// use stickslip_numerics::complementarity::solve;
-/// // pushed with 3, held by at most 2: moves with 1
+/// // the load is 3 and the limit 2: the contact slips with acceleration 1
 /// let λ = solve(&dmatrix![1.0], &dvector![3.0], &dvector![-2.0], &dvector![2.0]).unwrap();
 /// assert_eq!(λ[0], 2.0);
 /// ```
@@ -39,7 +44,8 @@ pub fn solve(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVec
     solve_into(d, b, low, high, &mut lambda).then_some(lambda)
 }
 
-/// As [`solve`], into `lambda`; returns false where it returns `None`. One component takes no memory.
+/// Solves the problem like [`solve`], into `lambda`. Returns false if [`solve`] returns `None`.
+/// A problem of one component allocates no memory.
 pub fn solve_into(
     d: &DMatrix<f64>,
     b: &DVector<f64>,
@@ -54,7 +60,7 @@ pub fn solve_into(
     solution.is_some()
 }
 
-/// Block pivoting.
+/// Solves the problem by block pivoting.
 fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
     let n = b.len();
     let mut side = vec![Side::Inside; n];
@@ -94,7 +100,7 @@ fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<
     None
 }
 
-/// One component: inside if it can be, else at the side that it is beyond.
+/// Solves a problem of one component: inside if that is feasible, else at the violated bound.
 fn solve_one(d: f64, b: f64, low: f64, high: f64) -> Option<f64> {
     let lambda = if d > 0.0 { b / d } else { 0.0 };
     let beyond = if lambda > high { high } else { low };
@@ -128,7 +134,7 @@ fn solve_inside(
         lambda[i] = if d[(i, i)] > 0.0 { rest[i] / d[(i, i)] } else { 0.0 };
         return lambda;
     }
-    // redundant contacts carry loads in proportion to their limits: that is the minimum of Σ λ²/high
+    // Redundant contacts share the load in proportion to their limits, which minimizes Σ λ²/high.
     let share = |i: usize| if high[i].is_finite() && high[i] > 0.0 { high[i].sqrt() } else { 1.0 };
     let scaled = DMatrix::from_fn(inside.len(), inside.len(), |i, j| {
         share(inside[i]) * d[(inside[i], inside[j])] * share(inside[j])
@@ -156,7 +162,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The conditions hold on random definite problems, whatever the pivoting did.
+        /// The conditions hold on random definite problems, whichever pivots were taken.
         #[test]
         fn solution_satisfies_the_conditions(
             entries in prop::collection::vec(-1.0..1.0f64, 36),
@@ -177,7 +183,7 @@ mod tests {
         }
     }
 
-    /// Two contacts side by side carry the load in proportion to their limits.
+    /// Two parallel contacts share the load in proportion to their limits.
     #[test]
     fn parallel_contacts_share_by_limit() {
         let d = DMatrix::from_element(2, 2, 1.0);

@@ -1,43 +1,52 @@
-//! Following the solutions of `F(x, p) = 0` along the parameter p by arc length: tangent, corrector, step control.
+//! Continuation of the solutions of `F(x, p) = 0` along the parameter p by arc length:
+//! predictor, corrector, step size control.
 //!
-//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 6.
+//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
+//! (2003), Ch. 6.
 
 use crate::dense;
 
-/// Equations with a parameter. Unknowns should be of the order of one, and so should the range of the parameter: arc length adds them.
+/// Equations with a parameter.
+///
+/// The unknowns and the range of the parameter should be of the order of one,
+/// because the arc length adds them.
 pub trait Equations {
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     fn size(&self) -> usize;
-    /// `F`, its derivative with respect to x (row-major, size²) and to p. False if it cannot be evaluated.
+    /// Evaluates `F` and its derivatives with respect to x (row-major, size²)
+    /// and to p. Returns false if this fails.
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool;
-    /// Size of F at which a point counts as solved.
+    /// Returns the norm of F at which a point counts as solved.
     fn tolerance(&self) -> f64;
-    /// A point at p by other means than from its neighbour: called where short steps fail, at kinks that the corrector cannot pass.
-    /// False if there is none.
+    /// Finds a solution at p by other means than the corrector, from the last point in `x`.
+    ///
+    /// It is called if short steps fail, at kinks that the corrector cannot
+    /// pass. Returns false if it finds no solution.
     fn leap(&mut self, _x: &mut [f64], _p: f64) -> bool {
         false
     }
 }
 
-/// Where to go, and how fast.
+/// Range, direction and step sizes of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steps {
     /// Least and largest value of the parameter.
     pub range: (f64, f64),
-    /// +1 to begin with a rising parameter, -1 with a falling one.
+    /// +1 to start with a rising parameter, -1 with a falling one.
     pub direction: f64,
     /// Unit of the parameter in the arc length.
     pub unit: f64,
-    /// Longest and shortest step of the arc, in this unit. Where the unknowns are larger than one the longest is in proportion to them.
+    /// Largest step size, as arc length. It grows with the norm of the unknowns above one.
     pub longest: f64,
-    /// See `longest`.
+    /// Smallest step size, as arc length.
     pub shortest: f64,
-    /// Points at most.
+    /// Maximum number of points.
     pub points: usize,
 }
 
 impl Steps {
-    /// From one value to another, with steps of at most `step` along the parameter.
+    /// Returns the steps from one value to another, with a step of at most
+    /// `step` along the parameter.
     pub fn between(from: f64, to: f64, step: f64) -> Self {
         Steps {
             range: (from.min(to), from.max(to)),
@@ -50,31 +59,36 @@ impl Steps {
     }
 }
 
-/// Why a branch ends.
+/// The reason why a branch ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum End {
-    /// The parameter has left its range: the last point is on its border.
+    /// The parameter has reached the border of its range: the last point is on it.
     Border,
-    /// All points are used up.
+    /// The maximum number of points is reached.
     Points,
-    /// No shorter step converged.
+    /// The corrector failed at the smallest step size.
     Stalled {
         /// Parameter at the last point.
         at: f64,
     },
-    /// The visitor ended it.
+    /// The visitor ended the continuation.
     Stopped,
 }
 
-/// Corrector iterations. A step that took at most [`FEW`] of them is lengthened: where equations have kinks, Newton's method first has to
-/// find on which side of each it is, and takes more than the usual three without being in danger.
+/// Maximum number of corrector iterations.
+///
+/// At kinks, Newton's method first has to find the right side of each kink. It then takes more
+/// than the usual three iterations without a risk of failure.
 const ITERATIONS: usize = 20;
-/// See [`ITERATIONS`].
+/// A step with at most this number of corrector iterations makes the next step
+/// longer. See [`ITERATIONS`].
 const FEW: usize = 10;
-/// A step below this fraction of the longest asks for a leap.
+/// A step below the largest step size divided by this number calls [`Equations::leap`].
 const LEAP: f64 = 32.0;
 
-/// Follows the branch from `(x, p)`, which solves the equations. `visit` sees every point and says whether to go on.
+/// Follows the branch from `(x, p)`, which solves the equations.
+///
+/// `visit` receives every point and returns true to continue.
 ///
 /// # Example
 /// A circle, past its turning points:
@@ -114,7 +128,7 @@ pub fn trace<E: Equations>(
     let mut fresh = true;
     let mut ahead = steps.direction;
     for _ in 1..steps.points {
-        // far out steps are as long as the way is far, so that one that leads to infinity is not followed for ever
+        // The largest step size grows with the norm of x, so a branch to infinity takes few steps.
         let longest = steps.longest * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
         length = length.min(longest);
         if fresh {
@@ -124,7 +138,7 @@ pub fn trace<E: Equations>(
         let (low, high) = steps.range;
         let mut next: Vec<f64> = x.iter().zip(&tangent).map(|(x, t)| x + length * t).collect();
         let mut q = p + length * tangent[n] * steps.unit;
-        // a step that leaves the range ends on its border, with the parameter held
+        // A step that leaves the range ends on the border, with the parameter fixed.
         let border = if q > high {
             Some(high)
         } else if q < low {
@@ -145,7 +159,7 @@ pub fn trace<E: Equations>(
             }
         };
         let inside = q >= low && q <= high;
-        // a corrector that runs away has found another branch
+        // A corrector that moves too far has converged to another branch.
         let moved: f64 = next.iter().zip(&x).map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
             + ((q - p) / steps.unit) * ((q - p) / steps.unit);
         let near = moved.sqrt() <= 2.0 * length + 1e-12;
@@ -156,7 +170,7 @@ pub fn trace<E: Equations>(
         let Some(iterations) = accepted else {
             length *= 0.5;
             if length < longest / LEAP {
-                // over the kink, by the step that was meant, if the equations know how
+                // Let the equations jump over the kink, by a fraction of the largest step size.
                 let q = (p + (4.0 / LEAP) * steps.longest * steps.unit * ahead).clamp(low, high);
                 next.copy_from_slice(&x);
                 if q != p && equations.leap(&mut next, q) {
@@ -193,7 +207,7 @@ pub fn trace<E: Equations>(
     End::Points
 }
 
-/// A predicted point.
+/// A predicted point: unknowns and parameter.
 type Predicted = (Vec<f64>, f64);
 
 struct Work {
@@ -217,7 +231,7 @@ impl Work {
         }
     }
 
-    /// The equations' derivative bordered by `row`, in units of the arc.
+    /// Fills the Jacobian bordered by `row`, with the parameter in units of the arc length.
     fn border(&mut self, unit: f64, row: &[f64]) {
         let n = self.n;
         for i in 0..n {
@@ -227,7 +241,8 @@ impl Work {
         self.bordered[n * (n + 1)..].copy_from_slice(row);
     }
 
-    /// The unit tangent that continues `tangent`; unchanged if the point is singular.
+    /// Computes the unit tangent in the direction of `tangent`. Leaves it
+    /// unchanged if the point is singular.
     fn tangent<E: Equations>(&mut self, equations: &mut E, x: &[f64], p: f64, unit: f64, tangent: &mut [f64]) {
         let n = self.n;
         if !equations.evaluate(x, p, &mut self.f, &mut self.by_x, &mut self.by_p) {
@@ -244,7 +259,8 @@ impl Work {
         }
     }
 
-    /// Newton's method across the arc, or with the parameter held. Returns the iterations it took.
+    /// Corrects by Newton's method on the plane orthogonal to `across`, or with the parameter
+    /// fixed. Returns the number of iterations, or `None` if it fails.
     fn correct<E: Equations>(
         &mut self,
         equations: &mut E,
@@ -295,7 +311,7 @@ impl Work {
 mod tests {
     use super::*;
 
-    /// `x (1 - p) = 1`, a resonance without damping.
+    /// `x (1 - p) = 1`: a resonance without damping.
     struct Pole;
 
     impl Equations for Pole {
@@ -314,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Steps of a tenth of the way out: 193 of them to a hundred million, and not a thousand million.
+    /// Each step is at most a tenth of the distance covered, so 193 steps reach a hundred million.
     #[test]
     fn what_leads_to_infinity_takes_few_steps() {
         let (mut visited, mut farthest) = (0, 0.0f64);

@@ -1,9 +1,14 @@
-//! Whether a symmetric matrix is positive semidefinite, and of which rank: Cholesky's factorisation with pivots from the diagonal; of large ones in
-//! blocks first, which suffices for all that are definite.
+//! Definiteness and rank of symmetric matrices, by Cholesky factorization with diagonal pivoting.
 //!
-//! Rounding is told in two ways, and one of them suffices. Rows are scaled to ones on the diagonal, so that a small negative entry counts
-//! beside large ones. A matrix that was summed up from others, `Tᵀ M T` of a rigid link or a superelement, has rounding of its largest entries everywhere:
-//! eigenvalues that far below zero are zero.
+//! Large matrices are first factored in blocks without pivoting, which is
+//! enough if they are definite.
+//!
+//! A matrix is positive semidefinite if it passes one of two tests, each with its own rounding:
+//! - With the diagonal scaled to ones. A small negative entry counts even if
+//!   other entries are large.
+//! - With the largest entry scaled to one. A matrix assembled from others, such as `Tᵀ M T` of
+//!   a rigid link or a superelement, has the rounding of its largest entries everywhere.
+//!   Negative eigenvalues of that size count as zero.
 //!
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
@@ -14,11 +19,14 @@ use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky
 use faer::{MatMut, Par, Spec};
 use nalgebra::DMatrix;
 
-/// Rounding of a row per entry, relative to its diagonal: sums of springs cancel to this, and so does the elimination.
+/// Rounding per row, relative to the diagonal: sums of springs cancel to this,
+/// and so does the elimination.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The rank of a symmetric positive semidefinite matrix; `None` if the matrix is not symmetric, has an entry that is not finite, or has a
-/// negative eigenvalue beyond rounding.
+/// Returns the rank of a symmetric positive semidefinite matrix.
+///
+/// Returns `None` if the matrix is not symmetric, has an entry that is not
+/// finite, or has a negative eigenvalue beyond rounding.
 ///
 /// # Example
 /// ```
@@ -36,7 +44,8 @@ pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
     })
 }
 
-/// The largest magnitude of a matrix that is symmetric to the rounding of that; `None` of others and of zeros.
+/// Returns the largest magnitude of an entry, or `None` if the matrix is zero, not finite, or
+/// not symmetric to the rounding of that magnitude.
 fn largest(matrix: &DMatrix<f64>) -> Option<f64> {
     let n = matrix.nrows();
     let size = matrix.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
@@ -45,12 +54,13 @@ fn largest(matrix: &DMatrix<f64>) -> Option<f64> {
     (size > 0.0 && matrix.iter().all(|value| value.is_finite()) && symmetric()).then_some(size)
 }
 
-/// The rank with rows scaled to ones on the diagonal.
+/// Returns the rank by the test with ones on the diagonal.
 fn by_rows(matrix: &DMatrix<f64>) -> Option<usize> {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
     let (mut rest, scale) = scaled(matrix)?;
-    // no pivot of a matrix is below its least eigenvalue
+    // Every pivot is at least the smallest eigenvalue, so the rank is full if
+    // all eigenvalues exceed `zero`.
     if n >= LARGE && positive(&rest, -zero) {
         return Some(n);
     }
@@ -74,11 +84,14 @@ fn by_rows(matrix: &DMatrix<f64>) -> Option<usize> {
             }
         }
     }
-    // what is left has no pivot above rounding: it is zero, or it has a negative eigenvalue
+    // The remaining matrix has no pivot above rounding: it is zero, or it has a
+    // negative eigenvalue.
     left.iter().all(|&i| left.iter().all(|&k| rest[(i, k)].abs() <= zero)).then_some(rank)
 }
 
-/// Whether a symmetric matrix is positive semidefinite, as [`semidefinite`] says; without its rank, large ones are told in blocks all the same.
+/// Returns true if a symmetric matrix is positive semidefinite, by the tests of [`semidefinite`].
+///
+/// It does not compute the rank, so semidefinite large matrices are factored in blocks too.
 ///
 /// # Example
 /// ```
@@ -96,11 +109,15 @@ pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
         || largest(matrix).is_some_and(|size| positive(&(matrix / size), zero))
 }
 
-/// Size from which factors in blocks are the faster ones, as in [`dense`](crate::dense).
+/// Size from which factors in blocks are faster, as in [`dense`](crate::dense).
 const LARGE: usize = 96;
 
-/// Rows and columns scaled to ones on the diagonal, and the roots of the diagonal; `None` if the matrix is not symmetric, has an entry that is not
-/// finite, a negative one on its diagonal, or one beside a zero there.
+/// Returns the matrix with rows and columns scaled to ones on the diagonal, and
+/// the square roots of the diagonal.
+///
+/// Returns `None` if the matrix is not symmetric, or if an entry is not finite.
+/// Returns `None` also for a negative diagonal entry, and for a nonzero entry
+/// in the row or column of a zero diagonal entry.
 fn scaled(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
@@ -113,7 +130,7 @@ fn scaled(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
         for k in 0..n {
             let value = matrix[(i, k)];
             if !value.is_finite() || (value != 0.0 && (scale[i] == 0.0 || scale[k] == 0.0)) {
-                return None; // beside a zero on the diagonal everything is zero
+                return None; // a zero diagonal entry requires a zero row and column
             }
             rest[(i, k)] = if value == 0.0 { 0.0 } else { value / scale[i] / scale[k] };
         }
@@ -124,7 +141,7 @@ fn scaled(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
     Some((rest, scale))
 }
 
-/// Whether a symmetric matrix with `shift` more on its diagonal has positive pivots only.
+/// Returns true if a symmetric matrix with `shift` added to its diagonal is positive definite.
 fn positive(matrix: &DMatrix<f64>, shift: f64) -> bool {
     let n = matrix.nrows();
     let mut shifted = matrix.clone();
@@ -135,8 +152,11 @@ fn positive(matrix: &DMatrix<f64>, shift: f64) -> bool {
     cholesky_in_place(whole, Default::default(), Par::Seq, MemStack::new(&mut memory), params).is_ok()
 }
 
-/// Whether a sparse symmetric matrix is positive definite, or if not, at least semidefinite; `None` if it is neither, or not symmetric. The
-/// signs of the pivots tell, with the diagonal moved by rounding to either side.
+/// Tests a sparse symmetric matrix by the signs of the pivots, with the
+/// diagonal shifted by rounding to either side.
+///
+/// Returns `Some(true)` if it is positive definite, `Some(false)` if it is positive
+/// semidefinite only, and `None` if it is neither, or not symmetric.
 ///
 /// # Example
 /// ```
@@ -149,17 +169,20 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
     definite(matrix, Analysis::new)
 }
 
-/// The same with the rows eliminated in an order that is known already, of matrices that have entries wherever this one has.
+/// Tests a matrix like [`sparse_definite`], in the known elimination order of `of`.
+///
+/// Any order gives the same result. The order of an analysis whose matrices have entries
+/// wherever this one has keeps the fill-in small.
 ///
 /// # Panics
-/// If the matrix has not the size of those analysed.
+/// If the matrix does not have the size of the matrices analysed.
 pub fn sparse_definite_in_order(matrix: &Matrix, of: &Analysis) -> Option<bool> {
     definite(matrix, |matrices| of.in_order(matrices))
 }
 
 fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> Analysis) -> Option<bool> {
     let n = matrix.n();
-    // above what a factor takes for rounding of a pivot
+    // Larger than the threshold at which a sparse factor treats a pivot as rounding.
     let rounding = ROUNDING * n.max(16) as f64;
     let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
     let analysis = analysis(&[matrix, &one]);
@@ -179,8 +202,11 @@ fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> Analysis) -> Optio
     (whole.asymmetry(rounding).is_none() && positive(&whole, rounding)).then_some(false)
 }
 
-/// Rows and columns scaled to ones on the diagonal; rows of zeros, which have no part in the signs, get a one. `None` if an entry of the diagonal is
-/// negative, or one beside a zero there.
+/// Returns the matrix with rows and columns scaled to ones on the diagonal.
+/// Zero rows get a one, which does not change the signs.
+///
+/// Returns `None` if a diagonal entry is negative, or if a nonzero entry lies
+/// in the row or column of a zero diagonal entry.
 fn sparse_scaled(matrix: &Matrix) -> Option<Matrix> {
     let n = matrix.n();
     let diagonal: Vec<f64> = (0..n).map(|i| matrix.get(i, i)).collect();
@@ -188,7 +214,7 @@ fn sparse_scaled(matrix: &Matrix) -> Option<Matrix> {
     if diagonal.iter().any(|d| *d < 0.0) || matrix.entries().any(beside_zero) {
         return None;
     }
-    // rows of ones on the diagonal, so that a small negative entry counts beside large ones
+    // Ones on the diagonal: a small negative entry counts even if other entries are large.
     let scale: Vec<f64> = diagonal.iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
     let scaled = matrix.entries().map(|(i, k, value)| (i, k, value / scale[i] / scale[k]));
     let empty = (0..n).filter(|i| diagonal[*i] == 0.0).map(|i| (i, i, 1.0));
@@ -200,7 +226,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Springs from each to the next and, at the ends, to the ground.
+    /// Springs between consecutive masses and, at the ends, to the ground.
     fn chain(n: usize, between: f64, ends: [f64; 2]) -> DMatrix<f64> {
         let mut k = DMatrix::zeros(n, n);
         for i in 1..n {
@@ -226,7 +252,8 @@ mod tests {
                 let all = (0..n * n).map(|at| (at / n, at % n, full[(at / n, at % n)]));
                 let matrix = Matrix::from_triplets(n, all).unwrap();
                 let alone = sparse_definite(&matrix);
-                // no order changes the answer, not even that of a matrix with other entries
+                // The elimination order does not change the result, even if it
+                // is that of a matrix with other entries.
                 let [wide, none] = [9, 0].map(|far| (0..far.min(n - 1)).map(|i| (i, n - 1 - i, 1.0)));
                 for other in [wide, none] {
                     let order = Analysis::new(&[&Matrix::from_triplets(n, other).unwrap()]);
@@ -236,11 +263,12 @@ mod tests {
             };
             assert_eq!([sparse([0.7, 0.0]), sparse([0.0, 0.0]), sparse([0.7, -0.7])], [Some(true), Some(false), None]);
         }
-        // softer than rounding beside a stiff neighbour
+        // The ground spring is softer than the rounding of the stiff spring.
         assert_eq!(semidefinite(&chain(2, 1e9, [1e-3, -2e-3])), None);
     }
 
-    /// Masses of some rows only, in the order of a structure that links all of them: rows of zeros have no part in the answer.
+    /// Masses at some rows only, in the elimination order of a structure that connects all
+    /// rows. Zero rows do not affect the result.
     #[test]
     fn places_without_mass_in_the_order_of_the_structure() {
         let n = 60;
@@ -257,14 +285,15 @@ mod tests {
         }
     }
 
-    /// `v vᵀ` of a rigid link whose far end hardly moves, with the rounding of its largest entry where it is small; and what is no rounding.
+    /// `v vᵀ` of a rigid link whose far end hardly moves: small entries have the rounding of
+    /// the largest entry. Larger deviations are not rounding.
     #[test]
     fn rounding_of_the_largest_entry_is_no_negative_mass() {
         let link = 1e-6;
         let cases = [([link, link * link - 2e-16], Some(1)), ([0.0, -1e-16], Some(1)), ([link, 0.0], None)];
         for ([beside, own], expected) in cases.into_iter().chain([([0.0, -1e-12], None)]) {
             for size in [2, 2 * LARGE] {
-                // the same link again and again
+                // The 2 × 2 block of the link, repeated.
                 let mut mass = DMatrix::zeros(size, size);
                 for i in (0..size).step_by(2) {
                     (mass[(i, i)], mass[(i + 1, i + 1)]) = (3.0, 3.0 * own);
@@ -293,7 +322,8 @@ mod tests {
     }
 
     proptest! {
-        /// `A Aᵀ` has the rank of `A`; less a little of the identity it has a negative eigenvalue.
+        /// `A Aᵀ` has the rank of `A`. After subtraction of a multiple of the
+        /// identity it has a negative eigenvalue.
         #[test]
         fn products(entries in proptest::collection::vec(-1.0f64..1.0, 18), shift in 1e-6f64..1.0) {
             let a = DMatrix::from_vec(6, 3, entries);
@@ -305,7 +335,7 @@ mod tests {
         }
     }
 
-    /// Large matrices have the ranks of small ones, and are told by the same bounds.
+    /// Large matrices have the ranks of small ones, with the same bounds.
     #[test]
     fn large_matrices_are_told_as_small_ones() {
         let n = 3 * LARGE;

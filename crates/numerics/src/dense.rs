@@ -1,4 +1,4 @@
-//! Dense linear equations in memory that the caller owns.
+//! Dense linear algebra in memory that the caller owns.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
@@ -15,11 +15,13 @@ use faer::traits::math_utils::one;
 use faer::{Accum, Conj, MatMut, MatRef, Par, Spec};
 use num_complex::Complex64;
 
-/// Size from which elimination in blocks is the faster one.
+/// Size from which elimination in blocks is faster.
 const LARGE: usize = 96;
 
-/// Solves `A x = b` by elimination with row exchanges: `matrix` is A, row-major, `n × n`, and is destroyed; `right` is b and
-/// becomes x. Returns false if a pivot vanishes or is not finite.
+/// Solves `A x = b` by elimination with row exchanges. Returns false if a pivot
+/// is zero or not finite.
+///
+/// `matrix` is A, row-major, `n × n`; it is overwritten. `right` is b and becomes x.
 ///
 /// Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 3.4; in blocks, Sec. 3.2.11.
 ///
@@ -33,7 +35,8 @@ pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
     solve_signed(matrix, n, right).is_some()
 }
 
-/// As [`solve`], with the sign of the determinant of A, ±1; `None` where it returns false.
+/// Solves `A x = b` like [`solve`]. Returns the sign ±1 of the determinant of
+/// A, or `None` if [`solve`] returns false.
 pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     if n >= LARGE {
         return in_blocks(&mut matrix[..n * n], n, &mut right[..n]);
@@ -49,7 +52,7 @@ pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f
     right[..n].iter().all(|x| x.is_finite()).then_some(sign)
 }
 
-/// Eliminates all columns. Rows are exchanged whole; returns how often.
+/// Eliminates all columns with exchanges of whole rows. Returns the number of exchanges.
 fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
     let mut exchanges = 0;
     for k in 0..n {
@@ -86,8 +89,10 @@ fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
     Some(exchanges)
 }
 
-/// The same as [`solve_signed`] in blocks that stay in the cache. Row after row, the memory holds what is the transpose to who reads it
-/// column by column: that is factored, and the transposed equations solved.
+/// Solves like [`solve_signed`], in blocks that stay in the cache.
+///
+/// `faer` reads the row-major memory by columns and therefore factors the transpose. The
+/// solution uses the transpose of these factors.
 fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     let params = Spec::<PartialPivLuParams, f64>::default();
     let mut memory = MemBuffer::new(StackReq::any_of(&[
@@ -112,11 +117,13 @@ fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     right.iter().all(|x| x.is_finite()).then_some(sign)
 }
 
-/// Rows and columns of a product that are summed side by side, in registers.
+/// Rows and columns of a tile of a product, whose sums are kept in registers.
 const TILE: usize = 4;
 
-/// `C = A B` of column-major matrices: A is `rows × inner`, B `inner × columns`. Every entry is summed in rising order of the inner index, without
-/// fused operations: the same bits on every processor, which `gemm` of nalgebra does not promise from some size upward.
+/// Computes `C = A B` of column-major matrices: A is `rows × inner`, B `inner × columns`.
+///
+/// Every entry is summed in rising order of the inner index, without fused operations. The result
+/// has the same bits on every processor; `gemm` of nalgebra does not promise this above some size.
 ///
 /// # Example
 /// ```
@@ -158,8 +165,11 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
     }
 }
 
-/// `C = A B`, or `A Bᵀ` if `transposed`, of large real or complex column-major matrices in blocks that stay in the cache: A is `rows × inner`, B `inner × columns` or
-/// `columns × inner`. The same bits every time, but maybe others on another processor.
+/// Computes `C = A B`, or `A Bᵀ` if `transposed`, of large real or complex column-major
+/// matrices, in blocks that stay in the cache.
+///
+/// A is `rows × inner`. B is `inner × columns`, or `columns × inner` if `transposed`. The
+/// result has the same bits on every run, but may differ between processors.
 ///
 /// # Example
 /// ```
@@ -187,8 +197,11 @@ pub fn multiply_in_blocks<T: Number>(
     matmul(c, Accum::Replace, a, b, one(), Par::Seq);
 }
 
-/// `A = L Lᵀ` of a symmetric column-major matrix `n × n`, whose lower triangle is read and becomes L, in blocks that stay in the cache. Returns false if it
-/// is not positive definite, or not finite.
+/// Computes `A = L Lᵀ` of a symmetric column-major matrix `n × n`, in blocks
+/// that stay in the cache.
+///
+/// Reads the lower triangle and replaces it by L. Returns false if the matrix
+/// is not positive definite or not finite.
 ///
 /// # Example
 /// ```
@@ -205,8 +218,10 @@ pub fn cholesky_in_blocks(matrix: &mut [f64], n: usize) -> bool {
         && (0..n).all(|k| matrix[k * n + k].is_finite())
 }
 
-/// Solves `L X = B`, or `Lᵀ X = B` if `transposed`, with the lower triangle L of a column-major matrix `n × n`, in place for columns of length n one after the
-/// other, in blocks that stay in the cache.
+/// Solves `L X = B`, or `Lᵀ X = B` if `transposed`, in place and in blocks that stay in the cache.
+///
+/// L is the lower triangle of a column-major matrix `n × n`. `right` holds the
+/// columns of B, each of length n, and becomes X.
 ///
 /// # Example
 /// ```
@@ -226,9 +241,9 @@ pub fn solve_lower_in_blocks(lower: &[f64], n: usize, right: &mut [f64], transpo
     }
 }
 
-/// Numbers that matrices here are of: real and complex ones.
+/// The numbers of a matrix: real or complex.
 pub trait Number: ComplexField + Copy {
-    /// Whether it is a number at all, and not zero.
+    /// Returns true if the number is finite and not zero.
     fn is_pivot(self) -> bool;
 }
 
@@ -244,7 +259,8 @@ impl Number for Complex64 {
     }
 }
 
-/// `P A = L U` of a real or complex matrix, in blocks that stay in the cache, for many right sides.
+/// The factorization `P A = L U` of a real or complex matrix in blocks that
+/// stay in the cache, for many right sides.
 ///
 /// # Example
 /// ```
@@ -265,19 +281,19 @@ pub struct Lu<T> {
     inverse: Vec<u32>,
 }
 
-/// Of a complex matrix.
+/// The factorization of a complex matrix.
 pub type ComplexLu = Lu<Complex64>;
 
 impl<T: Number> Lu<T> {
-    /// Memory of its numbers, bytes.
+    /// Returns the memory of the factors, bytes.
     pub fn bytes(&self) -> usize {
         size_of::<T>() * self.factors.len()
     }
 
-    /// Of a matrix column after column, n × n.
+    /// Factors a column-major matrix, n × n.
     ///
     /// # Errors
-    /// The column in which no pivot is left.
+    /// The first column without a usable pivot.
     pub fn new(mut matrix: Vec<T>, n: usize) -> Result<Self, usize> {
         let params = Spec::<PartialPivLuParams, T>::default();
         let mut memory = MemBuffer::new(lu_in_place_scratch::<u32, T>(n, n, Par::Seq, params));
@@ -288,20 +304,20 @@ impl<T: Number> Lu<T> {
         weak.map_or(Ok(Lu { n, factors: matrix, order, inverse }), Err)
     }
 
-    /// Solves in place for right sides of length n, one after the other.
+    /// Solves in place for right sides of length n, stored consecutively.
     ///
     /// # Panics
-    /// If the length of `right` is no multiple of n.
+    /// If the length of `right` is not a multiple of n.
     pub fn solve(&self, right: &mut [T]) {
         self.apply(right, solve_in_place_scratch::<u32, T>, |factors, exchanges, right, stack| {
             solve_in_place(factors, factors, exchanges, right, Par::Seq, stack);
         });
     }
 
-    /// The same with the conjugate transpose of the matrix.
+    /// Solves with the conjugate transpose of the matrix, like [`Lu::solve`].
     ///
     /// # Panics
-    /// If the length of `right` is no multiple of n.
+    /// If the length of `right` is not a multiple of n.
     pub fn solve_adjoint(&self, right: &mut [T]) {
         self.apply(right, solve_transpose_in_place_scratch::<u32, T>, |factors, exchanges, right, stack| {
             solve_transpose_in_place_with_conj(factors, factors, exchanges, Conj::Yes, right, Par::Seq, stack);
@@ -332,7 +348,7 @@ impl<T: Number> Lu<T> {
 mod tests {
     use super::*;
 
-    /// The product in tiles has the bits of the plain sums, at every size beside the tile's.
+    /// The product in tiles has the bits of the plain sums, at sizes around the tile size.
     #[test]
     fn products_have_the_bits_of_plain_sums() {
         let entry = |at: usize| ((at * 7919 + 13) as f64).sin();
@@ -350,11 +366,11 @@ mod tests {
         }
     }
 
-    /// In blocks or not, the solution is the one that the matrix was multiplied with.
+    /// With and without blocks, the solution is the vector that the matrix was multiplied with.
     #[test]
     fn large_systems_are_solved_in_blocks() {
         for n in [1, 7, LARGE - 1, LARGE, 2 * LARGE + 5] {
-            // entries without a pattern between -1 and 1; the zero on the diagonal asks for row exchanges
+            // Entries without a pattern between -1 and 1. The zero diagonal forces row exchanges.
             let entry =
                 |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
             let mut matrix: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
@@ -365,7 +381,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-8 * n as f64, "{n}: {a} instead of {b}");
             }
         }
-        // a cyclic exchange of n rows has the sign (-1)^(n - 1), and every other entry is negative
+        // A cyclic permutation of n rows has the sign (-1)^(n - 1). Every second entry is negative.
         for n in [1, 2, 3, 4, 2 * LARGE + 5, 2 * LARGE + 6, 2 * LARGE + 7] {
             let mut matrix = vec![0.0; n * n];
             for i in 0..n {
@@ -378,7 +394,7 @@ mod tests {
         assert!(!solve(&mut singular, 2, &mut [1.0, 2.0]));
     }
 
-    /// The product of the matrix and what was solved for is the right side, in every column.
+    /// The product of the matrix and the solution is the right side, in every column.
     #[test]
     fn complex_systems_with_many_right_sides() {
         for n in [1, 5, 130] {

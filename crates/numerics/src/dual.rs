@@ -1,11 +1,15 @@
-//! Dual numbers: a value and its partial derivatives, for kernels that are written once and differentiated exactly.
+//! Dual numbers: a value and its partial derivatives. A kernel is written once
+//! and differentiated exactly.
 //!
-//! The arithmetic is that of the crate `num-dual`. Source: Clifford (1873); Griewank and Walther (2008), Ch. 3.
+//! The arithmetic comes from the crate `num-dual`.
+//! Source: Clifford (1873); Griewank and Walther (2008), Ch. 3.
 
 use num_dual::{Derivative, DualNum, DualSVec64};
 
-/// What a law's kernel may compute with: plain numbers, or numbers with derivatives. Constants are made by `S::from(1.0)`, the value is
-/// `.re()`, and the elementary functions are methods.
+/// The numbers of a law's kernel: plain, or with derivatives.
+///
+/// `S::from(1.0)` makes a constant, `.re()` returns the value, and the
+/// elementary functions are methods.
 pub trait Real: DualNum<Primitive = f64> + Copy {}
 
 impl<T: DualNum<Primitive = f64> + Copy> Real for T {}
@@ -21,7 +25,7 @@ impl<T: DualNum<Primitive = f64> + Copy> Real for T {}
 /// ```
 pub type Dual<const N: usize> = DualSVec64<N>;
 
-/// The variable number `index`: its derivative by itself is one.
+/// Returns the independent variable number `index`: its derivative with respect to itself is one.
 ///
 /// # Panics
 /// If `index` is not less than `N`.
@@ -30,7 +34,7 @@ pub fn variable<const N: usize>(value: f64, index: usize) -> Dual<N> {
     Dual::from_re(value).derivative(index)
 }
 
-/// The partial derivatives.
+/// Returns the partial derivatives.
 #[inline]
 pub fn partials<const N: usize>(dual: &Dual<N>) -> [f64; N] {
     match &dual.eps {
@@ -43,7 +47,7 @@ pub fn partials<const N: usize>(dual: &Dual<N>) -> [f64; N] {
 mod tests {
     use super::*;
 
-    /// A kernel with every kind of operation that laws use.
+    /// A kernel with every kind of operation that the laws use.
     fn kernel<S: Real>(x: S, y: S) -> S {
         (x * y - y / (x + 3.0)).atan() + (x * 0.5).sinh() * y.cosh() - (y.powi(2) + 1.0).sqrt() * (-x).exp()
     }

@@ -1,12 +1,16 @@
-//! Eigenvalues by iterations that always end.
+//! Eigenvalues and singular values by iterations with a bounded number of steps.
 //!
-//! - [`symmetric`] and [`singular`]: nalgebra's decompositions with a bound on their iterations;
-//! - [`eigenvalues`]: all of a general matrix: exact zeros deflated, balanced, and the QR iteration of its Hessenberg form with Wilkinson's
-//!   shift. An entry below the diagonal counts as zero relative to the *whole* matrix. Relative to its neighbours on the diagonal, as it is
-//!   often done, the test never passes where these vanish: return maps in which contacts stick have large nilpotent parts;
-//! - [`largest_modulus`]: of a large matrix the largest only, from an Arnoldi process that grows until they have settled.
+//! - [`symmetric`] and [`singular`]: nalgebra's decompositions with a bound on their iterations.
+//! - [`eigenvalues`]: all eigenvalues of a general matrix, by deflation of exact
+//!   zeros, balancing, and QR iteration of the Hessenberg form with Wilkinson's
+//!   shift. A subdiagonal entry counts as zero relative to the *whole* matrix. The
+//!   usual test compares it with its diagonal neighbours, and never passes where
+//!   these vanish: return maps of sticking contacts have large nilpotent parts.
+//! - [`largest_modulus`]: only the largest modulus of a large matrix, by an Arnoldi process
+//!   that grows until the eigenvalue has converged.
 //!
-//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and 10.5; Parlett and Reinsch (1969) for the balance.
+//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and
+//! 10.5; Parlett and Reinsch (1969) for balancing.
 
 use crate::dense::{cholesky_in_blocks, solve_lower_in_blocks};
 use crate::interrupt;
@@ -18,26 +22,33 @@ use num_complex::Complex64;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// QR steps per eigenvalue at most; 2 to 4 are usual.
+/// Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
 const STEPS: usize = 40;
-/// Every so many steps without an eigenvalue an exceptional shift breaks a cycle.
+/// After this number of steps without an eigenvalue, an exceptional shift breaks a cycle.
 const EXCEPTIONAL: usize = 10;
-/// Sweeps of the balance; 3 or 4 are usual.
+/// Maximum number of balancing sweeps; 3 or 4 are usual.
 const SWEEPS: usize = 20;
-/// Size from which symmetric matrices are taken apart in blocks. Three of them were most of the 7.5 s in which a structure with 900 ports was reduced;
-/// all of it takes 1.8 s so.
+/// Size from which symmetric matrices are decomposed in blocks.
+///
+/// Measured: reducing a structure with 900 ports took 7.5 s, mostly in three such
+/// decompositions. With blocks it takes 1.8 s.
 const IN_BLOCKS: usize = 256;
-/// Size from which the largest eigenvalues are cheaper than all.
+/// Size from which computing the largest eigenvalue alone is cheaper than computing all.
 const LARGE: usize = 64;
 /// First dimension of the Arnoldi process; it doubles from there.
 const FIRST: usize = 24;
-/// Residual, relative to the eigenvalue, at which one of the Arnoldi process has settled: its error is then far below what decides about
-/// stability (1e-6), also where eigenvectors are a hundred times worse conditioned than orthogonal ones.
+/// Residual, relative to the eigenvalue, at which an eigenvalue of the Arnoldi
+/// process has converged.
+///
+/// Its error is then far below the threshold of stability decisions (1e-6), even if the
+/// eigenvectors are a hundred times worse conditioned than orthogonal ones.
 const SETTLED: f64 = 1e-9;
-/// Eigenvalues of the Arnoldi process whose modulus is above this share of the largest have to settle too: one of them may pass it yet.
+/// Eigenvalues with a modulus above this fraction of the largest must converge
+/// too, because one of them may still exceed it.
 const RIVAL: f64 = 0.9;
 
-/// Eigenvalues and eigenvectors of a symmetric matrix; `None` if an entry is not finite or the iteration does not end in time.
+/// Returns the eigenvalues and eigenvectors of a symmetric matrix, or `None` if an entry is not
+/// finite or the iteration does not converge.
 pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     if matrix.nrows() >= IN_BLOCKS {
         let (values, eigenvectors) = symmetric_in_blocks(&matrix)?;
@@ -45,7 +56,8 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     }
     let steps = STEPS * (matrix.nrows() + 1);
     let found = finite(&matrix).then(|| SymmetricEigen::try_new(matrix.clone(), f64::EPSILON, steps))?;
-    // of a matrix with many rows of zeros nalgebra may answer NaN, beside which a comparison passes over without a word
+    // For a matrix with many zero rows nalgebra may return NaN, which later
+    // comparisons would not notice.
     if found.as_ref().is_some_and(|found| found.eigenvalues.iter().chain(&found.eigenvectors).all(|x| x.is_finite())) {
         return found;
     }
@@ -53,8 +65,11 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     Some(SymmetricEigen { eigenvalues: DVector::from_vec(values), eigenvectors })
 }
 
-/// Eigenvalues, rising, and eigenvectors of a large symmetric matrix, whose lower triangle is read, in blocks that stay in the cache; `None` if an entry is
-/// not finite or the iteration does not end in time.
+/// Returns the eigenvalues, rising, and the eigenvectors of a large symmetric
+/// matrix, in blocks that stay in the cache.
+///
+/// Reads the lower triangle. Returns `None` if an entry is not finite or the
+/// iteration does not converge.
 ///
 /// # Example
 /// ```
@@ -78,8 +93,11 @@ pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f
     Some((values, vectors))
 }
 
-/// Eigenvalues θ of `A x = θ H x`, rising, and vectors X with `Xᵀ H X = 1`, `Xᵀ A X = θ`, of symmetric matrices in coordinates of any units. `None` if H is
-/// not positive definite, an entry is not finite or the iteration does not end in time.
+/// Solves the symmetric generalized eigenvalue problem `A x = θ H x`. Returns θ, rising, and
+/// vectors X with `Xᵀ H X = 1`, `Xᵀ A X = θ`.
+///
+/// The coordinates may have any units. Returns `None` if H is not positive definite, an entry
+/// is not finite or the iteration does not converge.
 ///
 /// # Example
 /// ```
@@ -93,7 +111,7 @@ pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, D
     if n == 0 {
         return Some((Vec::new(), DMatrix::zeros(0, 0)));
     }
-    // ones on the diagonal, so that coordinates of any unit count alike
+    // Scale to a unit diagonal, so that the units of the coordinates do not matter.
     let unit = h.diagonal().map(|v| 1.0 / v.sqrt());
     let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
     let mut lower = scaled(h);
@@ -112,7 +130,8 @@ pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, D
     Some((values, vectors))
 }
 
-/// Singular values and vectors; `None` if the matrix is empty, an entry is not finite or the iteration does not end in time.
+/// Returns the singular value decomposition, or `None` if the matrix is empty, an entry is not
+/// finite or the iteration does not converge.
 pub fn singular<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
     let steps = STEPS * (matrix.nrows().max(matrix.ncols()) + 1);
     let usable = !matrix.is_empty() && matrix.iter().all(|z| z.clone().modulus().is_finite());
@@ -120,7 +139,8 @@ pub fn singular<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<
     found.filter(|found| found.singular_values.iter().all(|value| value.is_finite()))
 }
 
-/// All eigenvalues of a square matrix, in no particular order; `None` if an entry is not finite or the iteration does not end in time.
+/// Returns all eigenvalues of a square matrix, in no particular order, or `None` if an entry is
+/// not finite or the iteration does not converge.
 ///
 /// # Example
 /// ```
@@ -142,7 +162,9 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex64>> {
     Some(found)
 }
 
-/// The largest modulus of an eigenvalue, zero for an empty matrix; `None` if an entry is not finite or the iteration does not end in time.
+/// Returns the largest modulus of the eigenvalues, zero for an empty matrix.
+///
+/// Returns `None` if an entry is not finite or the iteration does not converge.
 ///
 /// # Example
 /// ```
@@ -167,7 +189,8 @@ fn finite(matrix: &DMatrix<f64>) -> bool {
     matrix.iter().all(|x| x.is_finite())
 }
 
-/// The matrix without the rows and columns that are zero, again and again until none is, and how many eigenvalues zero went with them.
+/// Removes zero rows and columns repeatedly until none is left. Returns the remaining matrix
+/// and the number of zero eigenvalues removed.
 fn deflated(matrix: &DMatrix<f64>) -> (DMatrix<f64>, usize) {
     let mut kept: Vec<usize> = (0..matrix.nrows()).collect();
     loop {
@@ -182,8 +205,11 @@ fn deflated(matrix: &DMatrix<f64>) -> (DMatrix<f64>, usize) {
     }
 }
 
-/// A similar matrix whose rows are as long as its columns, to a factor of two: states of different units then count alike. Powers of two
-/// only, so that nothing is rounded.
+/// Returns a similar matrix in which the largest entries of row i and column i
+/// agree to a factor of two.
+///
+/// This removes the effect of different units of the states. The factors are
+/// powers of two, so nothing is rounded.
 fn balanced(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     for _ in 0..SWEEPS {
@@ -192,7 +218,8 @@ fn balanced(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
             let off = |k: usize| k != i;
             let row = (0..n).filter(|&k| off(k)).map(|k| matrix[(i, k)].abs()).fold(0.0, f64::max);
             let column = (0..n).filter(|&k| off(k)).map(|k| matrix[(k, i)].abs()).fold(0.0, f64::max);
-            // the square root of either may be out of range, but not that of the exponent's difference
+            // The square root of either may be out of range, but not the
+            // difference of the exponents.
             let power = if row > 0.0 && column > 0.0 { (0.5 * (row.log2() - column.log2())).round() } else { 0.0 };
             if power != 0.0 && power.abs() < 500.0 {
                 let factor = power.exp2();
@@ -208,7 +235,7 @@ fn balanced(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     matrix
 }
 
-/// Eigenvalues of an upper Hessenberg matrix.
+/// Returns the eigenvalues of an upper Hessenberg matrix.
 fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     let n = h.nrows();
     let small = f64::EPSILON * h.norm();
@@ -219,7 +246,7 @@ fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     let (mut end, mut steps) = (n, 0);
     while end > 0 {
         interrupt::check();
-        // the part that hangs together, from below
+        // The last unreduced block.
         let mut start = end - 1;
         while start > 0 && h[(start, start - 1)].norm() > small {
             start -= 1;
@@ -243,18 +270,19 @@ fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     Some(found)
 }
 
-/// The eigenvalue of the last two by two block that is nearer to its corner.
+/// Returns the eigenvalue of the last 2 × 2 block that is closer to its corner entry.
 fn wilkinson(h: &DMatrix<Complex64>, end: usize) -> Complex64 {
     let (a, b) = (h[(end - 2, end - 2)], h[(end - 2, end - 1)]);
     let (c, d) = (h[(end - 1, end - 2)], h[(end - 1, end - 1)]);
     let half = (a - d) * 0.5;
     let root = (half * half + b * c).sqrt();
-    // d - bc / (half ± root), with the sign that does not cancel
+    // d - bc / (half ± root), with the sign that avoids cancellation.
     let sum = if (half + root).norm() >= (half - root).norm() { half + root } else { half - root };
     if sum == ZERO { d } else { d - b * c / sum }
 }
 
-/// `H - μ = Q R`, `H := R Q + μ` within rows and columns `start..end`, by plane rotations.
+/// Performs one QR step, `H - μ = Q R`, `H := R Q + μ`, within rows and columns
+/// `start..end`, by plane rotations.
 fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex64) {
     for i in start..end {
         h[(i, i)] -= shift;
@@ -283,14 +311,17 @@ fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex6
     }
 }
 
-/// The largest modulus by an Arnoldi process whose dimension doubles until the eigenvalues that compete have settled; `None` if they have
-/// not when half of all dimensions are used: then all of them cost no more.
+/// Returns the largest modulus by an Arnoldi process whose dimension doubles
+/// until the leading eigenvalues have converged.
+///
+/// Returns `None` if they have not at half of the full dimension: computing all
+/// eigenvalues then costs no more.
 fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
     let n = matrix.nrows();
     let most = n / 2;
     let mut basis = DMatrix::zeros(n, most + 1);
     let mut h = DMatrix::zeros(most + 1, most);
-    // any direction will do that has a part along every eigenvector; golden-ratio steps repeat nowhere
+    // The start vector needs a component along every eigenvector. Golden-ratio steps never repeat.
     let first = DVector::from_fn(n, |i, _| 0.5 + (i as f64 * 0.618_033_988_749_894_9).fract());
     basis.set_column(0, &first.normalize());
     let mut check = FIRST.min(most);
@@ -298,7 +329,7 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
         interrupt::check();
         let mut next = matrix * basis.column(k);
         let before = next.norm();
-        // twice, for the digits that the first time cancels
+        // Orthogonalize twice, to recover the digits that cancel the first time.
         for _ in 0..2 {
             let part = basis.columns(0, k + 1).tr_mul(&next);
             next -= basis.columns(0, k + 1) * &part;
@@ -307,7 +338,7 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
         }
         let length = next.norm();
         if length <= f64::EPSILON * before {
-            return None; // a closed subspace tells nothing of the rest
+            return None; // an invariant subspace says nothing about the other eigenvalues
         }
         h[(k + 1, k)] = length;
         basis.set_column(k + 1, &(next / length));
@@ -325,10 +356,11 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
     None
 }
 
-/// Residual of an eigenvalue of the Arnoldi process: its eigenvector's last entry times the next length.
+/// Returns the residual of an eigenvalue of the Arnoldi process: the last entry of its
+/// eigenvector times the next subdiagonal entry.
 fn residual(square: &DMatrix<f64>, value: Complex64, next: f64) -> f64 {
     let n = square.nrows();
-    // inverse iteration; the value is off by a rounding so that there is a solution
+    // Inverse iteration. The offset by rounding keeps the shifted matrix regular.
     let offset = f64::EPSILON * square.norm();
     let shifted = square.map(|x| Complex64::new(x, 0.0)) - DMatrix::from_diagonal_element(n, n, value + offset);
     let factor = shifted.lu();
@@ -354,7 +386,7 @@ mod tests {
         (i as f64 * 0.618_033_988_749_894_9 + 0.37).fract() - 0.5
     }
 
-    /// `S D S⁻¹` with a lower triangular `S` of ones on the diagonal.
+    /// Returns `S D S⁻¹` with a unit lower triangular `S`.
     fn with_eigenvalues(block: &DMatrix<f64>) -> DMatrix<f64> {
         let n = block.nrows();
         let s = DMatrix::from_fn(n, n, |i, k| {
@@ -369,7 +401,8 @@ mod tests {
         &s * block * s.clone().try_inverse().unwrap()
     }
 
-    /// Pairs `r e^{±jφ}` and real ones, mixed by a similarity.
+    /// Returns a matrix with known eigenvalues `r e^{±jφ}`, the last one real
+    /// for odd n, and their moduli.
     fn planted(n: usize, top: f64) -> (DMatrix<f64>, Vec<f64>) {
         let mut block = DMatrix::zeros(n, n);
         let mut moduli = Vec::new();
@@ -387,7 +420,8 @@ mod tests {
         (with_eigenvalues(&block), moduli)
     }
 
-    /// Products of five directions among thirty, for two of whose eigenvalues nalgebra answers NaN: those of blocks of one, two and three rows.
+    /// Products of five directions among thirty: nalgebra returns NaN for two of their
+    /// eigenvalues, in blocks of one, two and three rows.
     #[test]
     fn rows_of_zeros_leave_numbers() {
         let entries = [
@@ -432,7 +466,8 @@ mod tests {
         }
     }
 
-    /// What hung: shifts of many states into one another (a Jordan block of zeros), in and out of a similarity.
+    /// Nilpotent parts, which made an unbounded iteration hang: a Jordan block
+    /// of zeros, plain and under a similarity.
     #[test]
     fn nilpotent_parts_end() {
         for n in [2, 10, 40, 150] {
@@ -443,29 +478,30 @@ mod tests {
             assert!(eigenvalues(&shift).unwrap().iter().all(|z| *z == ZERO));
             shift[(0, 0)] = 0.5;
             let largest = largest_modulus(&with_eigenvalues(&shift)).unwrap();
-            // the rounding of n zeros in a chain is the n-th root of that of the matrix: at most one, for a long chain
+            // The n-th root of the rounding of the matrix perturbs a chain of n
+            // zeros: up to one for a long chain.
             assert!(n > 10 || (largest - 0.5).abs() < 0.1, "{n}: {largest}");
-            // rank one, as contacts that swallow what they get
+            // Rank one, like contacts that absorb their input.
             let rank_one = DMatrix::from_fn(n, n, |i, k| noise(i) * (1.0 + noise(k + 7)));
             let trace = rank_one.trace().abs();
             assert!((largest_modulus(&rank_one).unwrap() - trace).abs() < 1e-9 * n as f64, "{n}");
         }
     }
 
-    /// The Arnoldi process finds what was planted, in far fewer dimensions than there are.
+    /// The Arnoldi process finds the known largest modulus.
     #[test]
     fn the_largest_of_many() {
         for (n, top) in [(80, 1.0 + 1e-5), (200, 0.7), (300, 1.3)] {
             let (matrix, _) = planted(n, top);
             assert!((largest_modulus(&matrix).unwrap() - top).abs() < 1e-9, "{n}");
         }
-        // one that is far away from the others, at any place
+        // One eigenvalue far away from the others, in the middle of the matrix.
         let mut single = DMatrix::from_diagonal_element(150, 150, 0.2);
         single[(97, 97)] = -1.01;
         assert!((largest_modulus(&single).unwrap() - 1.01).abs() < 1e-12);
     }
 
-    /// Units change nothing: a similarity by a diagonal of thirty decades.
+    /// Units do not matter: a similarity by a diagonal of thirty decades.
     #[test]
     fn units_do_not_matter() {
         let (matrix, _) = planted(30, 1.05);
@@ -486,7 +522,7 @@ mod tests {
     }
 
     proptest! {
-        /// Trace and determinant are sum and product.
+        /// The trace and the determinant are the sum and the product of the eigenvalues.
         #[test]
         fn trace_and_determinant(entries in proptest::collection::vec(-1.0f64..1.0, 25)) {
             let matrix = DMatrix::from_vec(5, 5, entries);

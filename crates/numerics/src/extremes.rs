@@ -1,40 +1,47 @@
-//! Least and largest value of a signal over a stretch of time, proved by bounds.
+//! Minimum and maximum of a signal over an interval, proved by bounds.
 //!
-//! Between two times at which value `g`, slope `g'` and curvature `g''` are known, the curvature is within `(g''₁ + g''₂ ± max|g'''| h) / 2` and
-//! `± max|g''|`, and by that the signal below two parabolas that begin at the ends. What cannot leave the range that is known already is left
-//! out; where the curvature has one sign there is one turning point at most, which Newton's method finds; the rest is halved.
+//! Values `g`, slopes `g'` and curvatures `g''` are known at both ends of a subinterval of length
+//! h. The curvature in between lies within `(g''₁ + g''₂ ± max|g'''| h) / 2` and `± max|g''|`. The
+//! signal therefore lies below two parabolas that start at the ends, and likewise above two.
+//! Subintervals that cannot extend the known range are skipped. If the curvature has one sign,
+//! Newton's method finds the single turning point. All other subintervals are halved.
 
 use crate::signal::{Basis, bounded_by, real_dot, size_of};
 use num_complex::Complex64;
 
-/// A mode whose part of a signal is below this fraction of it is rounding: it moves no extreme, but turns millions of times where it is very fast.
+/// A mode below this fraction of a signal is rounding. It does not change an
+/// extreme, but a very fast one turns millions of times.
 const NEGLIGIBLE: f64 = 64.0 * f64::EPSILON;
-/// An extreme is sought up to this fraction of the sizes that a signal is the sum of: the rounding of its values.
+/// Accuracy of an extreme, relative to the sum of the sizes of the terms of the
+/// signal: the rounding of its values.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// Times at which one signal is looked at before it counts as too fast. A turning point takes some three of them: a mode that rings undamped at a
-/// hundred times the drive frequency turns two hundred times in a period.
+/// Maximum number of subdivisions of one signal, after which it counts as too fast.
+///
+/// A turning point takes about three. A mode that vibrates undamped at a hundred times the
+/// excitation frequency has two hundred turning points in a period.
 const MOST_TIMES: usize = 20_000;
-/// Steps towards one turning point; they converge cubically in value, and the last of these would be a bisection.
+/// Maximum number of steps towards one turning point. They converge cubically
+/// in value; bisection is the fallback.
 const STEPS: usize = 60;
 
-/// The range of values that signals are known to take.
+/// The range of the values that signals are known to take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     /// Least value.
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// Whether every value stands for its opposite too.
+    /// If true, every value also adds its negative.
     mirrored: bool,
 }
 
 impl Range {
-    /// Nothing yet; if `mirrored`, every value stands for its opposite too.
+    /// Creates an empty range. If `mirrored`, every value also adds its negative.
     pub fn new(mirrored: bool) -> Self {
         Range { low: f64::INFINITY, high: f64::NEG_INFINITY, mirrored }
     }
 
-    /// Takes a value in.
+    /// Extends the range by a value.
     #[inline]
     pub fn take(&mut self, value: f64) {
         (self.low, self.high) = (self.low.min(value), self.high.max(value));
@@ -45,31 +52,33 @@ impl Range {
     }
 }
 
-/// The signal turns too often to be followed.
+/// Error: the signal has too many turning points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooFast;
 
-/// Memory of [`Basis::extend`], kept between calls.
+/// Scratch memory of [`Basis::extend`], reused between calls.
 #[derive(Debug, Clone, Default)]
 pub struct Extremes {
     values: Vec<Complex64>,
-    /// The signal without what is rounding of it, and its derivatives.
+    /// The signal without negligible modes, and its first two derivatives.
     slopes: [Vec<Complex64>; 3],
-    /// Sizes of the basis functions, of the exponents, of the coefficients of the second derivative, and bounds on those of the third.
+    /// Bounds on the basis functions.
     magnitudes: Vec<f64>,
+    /// Magnitudes of the exponents.
     speeds: Vec<f64>,
+    /// Magnitudes of the coefficients of the second derivative, and bounds on those of the third.
     sizes: [Vec<f64>; 2],
     open: Vec<[At; 2]>,
 }
 
-/// A signal at one time.
+/// A signal and its derivatives at one time.
 #[derive(Debug, Clone, Copy)]
 struct At {
     time: f64,
     value: f64,
     slope: f64,
     curvature: f64,
-    /// Bounds on the second and third derivative from then on.
+    /// Bounds on the second and third derivative from this time on.
     second: f64,
     third: f64,
 }
@@ -85,7 +94,8 @@ impl Extremes {
         self.open.clear();
     }
 
-    /// Derivatives of the signal without what is rounding of it, and bounds; returns the size of its terms.
+    /// Computes the derivatives of the signal without negligible modes, and their bounds.
+    /// Returns the size of the signal's terms.
     fn differentiate(&mut self, basis: &Basis, signal: &[Complex64], length: f64) -> f64 {
         self.prepare(basis.len());
         let Extremes { slopes: [kept, first, second], magnitudes, speeds, sizes: [weights, third], .. } = self;
@@ -110,7 +120,7 @@ impl Extremes {
         let Extremes { values, slopes: [_, first, second], magnitudes, sizes: [weights, third], .. } = self;
         basis.evaluate_and(time, values, |b, size| {
             if basis.exponents[b].re < 0.0 {
-                magnitudes[b] = size; // from then on it is smaller
+                magnitudes[b] = size; // it decays from then on
             }
         });
         At {
@@ -123,7 +133,8 @@ impl Extremes {
         }
     }
 
-    /// Where the slope vanishes between two times at which it has opposite signs, and between which the curvature has one.
+    /// Returns the extreme value between two times with slopes of opposite sign
+    /// and a curvature of one sign.
     fn turning(&mut self, basis: &Basis, signal: &[Complex64], [left, right]: [At; 2], rounding: f64) -> f64 {
         let (mut from, mut to) = (left.time, right.time);
         let mut time = from + (to - from) * first_guess(&left, &right);
@@ -149,11 +160,12 @@ impl Extremes {
     }
 }
 
-/// Where the cubic of these slopes and curvatures vanishes, by one step from where the chord does, as a share of the interval.
+/// Returns the zero of the cubic with these slopes and curvatures as a fraction of the
+/// interval. It takes one Newton step from the zero of the chord.
 fn first_guess(left: &At, right: &At) -> f64 {
     let h = right.time - left.time;
     let s = left.slope / (left.slope - right.slope);
-    // of the chord the cubic deviates by s (1 - s) (p (1 - s) - q s)
+    // The cubic deviates from the chord by s (1 - s) (p (1 - s) - q s).
     let rise = right.slope - left.slope;
     let (p, q) = (left.curvature * h - rise, right.curvature * h - rise);
     let value = s * (1.0 - s) * (p * (1.0 - s) - q * s);
@@ -162,7 +174,10 @@ fn first_guess(left: &At, right: &At) -> f64 {
     if 0.0 < better && better < 1.0 { better } else { s }
 }
 
-/// Upper bound of a signal between two times, where its curvature is at most `most`: below the parabolas that begin at the ends.
+/// Returns an upper bound of a signal over an interval of length `h`.
+///
+/// `left` and `right` are value and slope at the ends. The curvature is at most `most`, so the
+/// signal lies below the parabolas that start at the ends.
 fn highest(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
     let curvature = most.max(0.0);
     let opening = left.1 - right.1 + curvature * h;
@@ -175,10 +190,11 @@ fn highest(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
 }
 
 impl Basis {
-    /// Extends a range by the values of a signal over `[0, length]`; `at_end` are the basis functions at `length`.
+    /// Extends a range by the values of a signal over `[0, length]`. `at_end`
+    /// contains the basis functions at `length`.
     ///
     /// # Errors
-    /// [`TooFast`] if the signal turns too often.
+    /// [`TooFast`] if the signal has too many turning points.
     pub fn extend(
         &self,
         range: &mut Range,
@@ -218,13 +234,13 @@ impl Basis {
                 }
                 continue;
             }
-            // the slope does not come back to zero in so short a time
+            // The slope cannot reach zero within the interval.
             if !turned && left.slope.abs() + right.slope.abs() > h * most.max(-least) {
                 continue;
             }
             let time = 0.5 * (left.time + right.time);
             if time <= left.time || time >= right.time {
-                continue; // time has no room for more digits
+                continue; // no number lies in between
             }
             times += 1;
             if times > MOST_TIMES {
@@ -244,7 +260,8 @@ mod tests {
     use super::*;
     use crate::random::Stream;
 
-    /// Random signals: no sample lies outside their range, and near its ends there is one.
+    /// Random signals: no sample lies outside the range, and some sample is
+    /// close to either end of it.
     #[test]
     fn ranges_hold_all_values_and_no_more() {
         let c = Complex64::new;
@@ -274,14 +291,15 @@ mod tests {
             basis.evaluate(length, &mut values);
             let mut range = Range::new(case % 2 == 0);
             basis.extend(&mut range, (&signal, &values), length, &mut memory).unwrap();
-            // at the nearest sample the signal is lower by its curvature
+            // At the nearest sample the signal is lower than its maximum by its curvature.
             let (digits, missed) = (1e-14, 10.0 * (length / SAMPLES as f64).powi(2));
             assert!(range.high >= seen.high - digits && range.high <= seen.high + missed, "{case}: {range:?} {seen:?}");
             assert!(range.low <= seen.low + digits && range.low >= seen.low - missed, "{case}: {range:?} {seen:?}");
         }
     }
 
-    /// cos τ over many periods, beside a mode that is far too fast but rounding; and a mode that is too fast.
+    /// cos τ over many periods, with a very fast mode that is negligible; then
+    /// with a fast mode that is not.
     #[test]
     fn fast_modes_are_followed_only_where_they_count() {
         let basis = Basis { exponents: vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, 1e9)], ..Basis::default() };

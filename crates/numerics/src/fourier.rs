@@ -1,11 +1,13 @@
-//! Fourier series of sampled periodic signals: `u(θ) = Re Σ_h U_h e^{jhθ}`, sampled at `θ_i = 2π i / N`.
+//! Fourier series of sampled periodic signals.
+//!
+//! The signal is `u(θ) = Re Σ_h U_h e^{jhθ}`, with samples at `θ_i = 2π i / N`.
 
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::fmt;
 use std::sync::Arc;
 
-/// A plan for signals of one length, with its memory: transforms allocate nothing.
+/// A plan for signals of one length, with its scratch memory. Transforms allocate nothing.
 ///
 /// # Example
 /// ```
@@ -34,7 +36,7 @@ impl fmt::Debug for Fourier {
 }
 
 impl Fourier {
-    /// A plan for `samples` (even, at least 2) points per period.
+    /// Makes a plan for `samples` points per period (even, at least 2).
     pub fn new(samples: usize) -> Self {
         let mut planner = RealFftPlanner::<f64>::new();
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
@@ -48,23 +50,25 @@ impl Fourier {
         }
     }
 
-    /// Points per period.
+    /// Returns the number of points per period.
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// Samples of `Re Σ U_h e^{jhθ}` from pairs (h, U_h), `h < N/2`, into `out`, length N.
+    /// Writes the samples of `Re Σ U_h e^{jhθ}` into `out` (length N), from
+    /// pairs (h, U_h) with `h < N/2`.
     pub fn synthesise(&mut self, harmonics: &[(usize, Complex64)], out: &mut [f64]) {
         self.spectrum.fill(Complex64::default());
         for &(h, c) in harmonics {
-            // the inverse transform adds the conjugate half, which doubles all but the mean
+            // The inverse transform adds the conjugate half, which doubles all
+            // harmonics except the mean.
             self.spectrum[h] += if h == 0 { Complex64::new(c.re, 0.0) } else { c * 0.5 };
         }
         let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
         self.inverse.process_with_scratch(&mut self.spectrum, out, scratch).expect("lengths are those of the plan");
     }
 
-    /// `Σ_i u_i e^{-jhθ_i}` for h = 0..=N/2. The samples are overwritten.
+    /// Returns `Σ_i u_i e^{-jhθ_i}` for h = 0..=N/2. Overwrites the samples.
     pub fn sums(&mut self, samples: &mut [f64]) -> &[Complex64] {
         let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
         self.forward.process_with_scratch(samples, &mut self.spectrum, scratch).expect("lengths are those of the plan");

@@ -1,8 +1,9 @@
-//! Interruption of long computations: a caller that may want them to end lends its thread a
-//! [`Stop`], loops [`check`] it between their steps, and the stack unwinds when it is set.
+//! Interruption of long computations.
 //!
-//! Threads without a [`Stop`], which is all of them unless a caller asks, never unwind. What was
-//! being computed is lost: whoever keeps state across an interruption drops it.
+//! A caller gives its thread a [`Stop`]. Loops call [`check`] between their
+//! steps, and the stack unwinds once the flag is set. A thread without a
+//! [`Stop`], which is the default, never unwinds. The unwinding discards the
+//! unfinished result, so callers must drop state that spans an interruption.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -11,7 +12,7 @@ use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What the stack unwinds with when a computation is interrupted.
+/// The payload of the unwinding when a computation is interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -26,7 +27,7 @@ pub struct Interrupted;
 /// stop.set();
 /// let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| check()))).unwrap_err();
 /// assert_eq!(ended.downcast_ref(), Some(&Interrupted));
-/// check(); // nobody watches any more
+/// check(); // the thread has no flag any more
 /// ```
 #[derive(Clone, Default)]
 pub struct Stop(Arc<Inner>);
@@ -34,7 +35,7 @@ pub struct Stop(Arc<Inner>);
 #[derive(Default)]
 struct Inner {
     set: AtomicBool,
-    /// Asked at every check besides the flag.
+    /// A function called at every check in addition to the flag.
     ask: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
@@ -43,32 +44,33 @@ thread_local! {
 }
 
 impl Stop {
-    /// A flag that is not set.
+    /// Creates a flag that is not set.
     pub fn new() -> Stop {
         Stop::default()
     }
 
-    /// A flag that is also set once `ask` says so; it is asked at every check, on the thread that
-    /// computes.
+    /// Creates a flag that is also set once `ask` returns true.
+    ///
+    /// Every check calls `ask`, on the thread that computes.
     pub fn asking(ask: impl Fn() -> bool + Send + Sync + 'static) -> Stop {
         Stop(Arc::new(Inner { set: AtomicBool::new(false), ask: Some(Box::new(ask)) }))
     }
 
-    /// Ends what is watched at its next check.
+    /// Sets the flag: the watched computations end at their next check.
     pub fn set(&self) {
         self.0.set.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was set.
+    /// Returns true if the flag is set.
     pub fn is_set(&self) -> bool {
         self.0.set.load(Ordering::Relaxed)
     }
 
-    /// Does `work`, which this flag ends.
+    /// Runs `work`, which this flag can end.
     ///
     /// # Panics
-    /// Unwinds with [`Interrupted`] at the first [`check`] after the flag was set, and with what
-    /// [`throw`] was given.
+    /// Unwinds with [`Interrupted`] at the first [`check`] after the flag is
+    /// set, or with the reason given to [`throw`].
     pub fn watch<T>(&self, work: impl FnOnce() -> T) -> T {
         let _lent = Lent(WATCHED.replace(Some(self.clone())));
         work()
@@ -81,13 +83,13 @@ impl fmt::Debug for Stop {
     }
 }
 
-/// Lends this thread a flag until it is lent another one or none: for threads that others give work
-/// to.
+/// Sets or removes the flag of this thread, for threads that receive work from
+/// others. The flag stays until the next call.
 pub fn lend(stop: Option<Stop>) {
     WATCHED.set(stop);
 }
 
-/// Gives the thread back what it was watched by before.
+/// Restores the thread's former flag when dropped.
 struct Lent(Option<Stop>);
 
 impl Drop for Lent {
@@ -96,10 +98,10 @@ impl Drop for Lent {
     }
 }
 
-/// Unwinds if the computation of this thread is to end.
+/// Unwinds if the flag of this thread is set.
 #[inline]
 pub fn check() {
-    // not borrowed while it asks: the answer may come from a computation that is watched itself
+    // Cloned, not borrowed: `ask` may run a computation that has a flag too.
     if let Some(stop) = WATCHED.with_borrow(Clone::clone)
         && (stop.is_set() || stop.0.ask.as_ref().is_some_and(|ask| ask()))
     {
@@ -108,8 +110,9 @@ pub fn check() {
     }
 }
 
-/// Ends the computation of this thread, and of all that share its flag, with a reason. Returns
-/// where nobody watches.
+/// Ends the computation of this thread, and of all threads that share its flag, with a reason.
+///
+/// Returns normally if the thread has no flag.
 pub fn throw(reason: Box<dyn Any + Send>) {
     let watched = WATCHED.with_borrow(Clone::clone);
     if let Some(stop) = watched {
@@ -141,7 +144,7 @@ mod tests {
         let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| (0..9).for_each(|_| check()))));
         assert!(ended.is_err() && stop.is_set());
         assert_eq!(asked.load(Ordering::Relaxed), 3);
-        // the flag outside counts again behind the one inside
+        // After the inner flag ends, the outer flag counts again.
         let (outer, inner) = (Stop::new(), Stop::new());
         outer.watch(|| {
             inner.watch(|| ());

@@ -1,37 +1,42 @@
-//! Linear equations of which only products are known: generalised minimal residuals, preconditioned from the right.
+//! Linear equations known by matrix-vector products only: GMRES with right preconditioning.
 //!
-//! `A P⁻¹ y = b`, `x = P⁻¹ y`: of all x in the space of `P⁻¹ b, P⁻¹ A P⁻¹ b, …` the one with the least residual, which is that of the equations themselves.
-//! Source: Saad and Schultz (1986); Saad, "Iterative Methods for Sparse Linear Systems" (2003), Sec. 6.5 and 9.3.2.
+//! `A P⁻¹ y = b`, `x = P⁻¹ y`. Of all x in the Krylov space of
+//! `P⁻¹ b, P⁻¹ A P⁻¹ b, …`, the method finds the one with the least residual.
+//! With right preconditioning this is the residual of the original equations.
+//! Source: Saad and Schultz (1986); Saad, "Iterative Methods for Sparse Linear
+//! Systems" (2003), Sec. 6.5 and 9.3.2.
 
 use crate::interrupt;
 
-/// What a solution may take.
+/// Tolerance and work limits of one solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Residual relative to the right side at which the equations count as solved.
     pub tolerance: f64,
-    /// Vectors that are kept; after as many products the search begins anew from what it has.
+    /// Number of basis vectors. After this number of products the iteration
+    /// restarts from its current solution.
     pub vectors: usize,
-    /// Products in all.
+    /// Maximum number of products. A final check of the residual may add one.
     pub products: usize,
 }
 
-/// How a search ended.
+/// The result of a solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// Products with the matrix.
+    /// Number of products with the matrix.
     pub products: usize,
-    /// Residual relative to the right side, of the last solution that was computed from its own product.
+    /// Residual relative to the right side: recomputed by a product, or from
+    /// the recurrence if the tolerance is 1e-4 or larger.
     pub residual: f64,
-    /// Whether it is within the tolerance.
+    /// True if the residual is within the tolerance.
     pub solved: bool,
 }
 
-/// The memory of searches.
+/// The GMRES solver with its memory.
 #[derive(Debug, Clone, Default)]
 pub struct Gmres {
     basis: Vec<f64>,
-    /// Columns of the triangular factor, one after the other, of `vectors + 1` entries.
+    /// Columns of the triangular factor, each of `vectors + 1` entries.
     triangle: Vec<f64>,
     turns: Vec<(f64, f64)>,
     rest: Vec<f64>,
@@ -39,12 +44,16 @@ pub struct Gmres {
     product: Vec<f64>,
 }
 
-/// A new vector shorter than this share of the product that it is left of is rounding: the space is whole.
+/// A new vector shorter than this fraction of the product it comes from is
+/// rounding: the Krylov space is exhausted.
 const EXHAUSTED: f64 = 1e-14;
 
 impl Gmres {
-    /// Solves `A x = b`: `multiply(v, out)` makes A v, `precondition(v)` replaces v by P⁻¹ v; `x` is b before and the solution after. If it is not
-    /// solved `x` is the nearest that was found.
+    /// Solves `A x = b`.
+    ///
+    /// `multiply(v, out)` computes A v, and `precondition(v)` replaces v by P⁻¹
+    /// v. `x` contains b on entry and the solution on return. If the equations
+    /// are not solved, `x` is the last iterate.
     ///
     /// # Example
     /// ```
@@ -83,7 +92,7 @@ impl Gmres {
                 &mut precondition,
             );
             outcome.products += columns.len();
-            // what the search did not find changes nothing
+            // A cycle without finite weights leaves the solution unchanged.
             if columns.iter().any(|c| !c.is_finite()) {
                 outcome.solved = false;
                 outcome.residual = left / size;
@@ -107,7 +116,8 @@ impl Gmres {
             let before = left;
             left = norm(&residual);
             outcome.residual = left / size;
-            // a product that rounds more than the recurrence says is no reason to go on
+            // SLACK: rounding of the product may make the true residual larger
+            // than that of the recurrence.
             outcome.solved = left <= SLACK * limits.tolerance * size;
             if outcome.solved || outcome.products >= limits.products || left.is_nan() || left >= before {
                 return outcome;
@@ -115,7 +125,7 @@ impl Gmres {
         }
     }
 
-    /// One search from a residual: the weights of its vectors.
+    /// Runs one cycle from a residual. Returns the weights of its basis vectors.
     fn cycle(
         &mut self,
         residual: &[f64],
@@ -144,7 +154,7 @@ impl Gmres {
             let whole = norm(&self.product);
             let start = count * tall;
             self.triangle.resize(start + tall, 0.0);
-            // twice: what rounding leaves of the first projection
+            // Orthogonalize twice, to remove the rounding of the first projection.
             for _ in 0..2 {
                 for (i, v) in self.basis.chunks_exact(n).enumerate() {
                     let share = dot(v, &self.product);
@@ -159,7 +169,7 @@ impl Gmres {
             }
             let length = column[count].hypot(next);
             if !(length > 0.0 && length.is_finite()) {
-                break; // a product without a new direction
+                break; // the product has no new direction
             }
             let (c, s) = (column[count] / length, next / length);
             column[count] = length;
@@ -182,13 +192,15 @@ impl Gmres {
     }
 }
 
-/// Tolerance from which on the recurrence is believed: of so few vectors it is off by rounding alone.
+/// Tolerance from which the residual of the recurrence is trusted. With few
+/// vectors it differs from the true residual by rounding only.
 const UNCHECKED: f64 = 1e-4;
-/// Share of the tolerance by which the residual of the solution may pass that of the recurrence: rounding of products.
+/// Factor on the tolerance by which the true residual may exceed that of the
+/// recurrence, because of rounding in the products.
 const SLACK: f64 = 2.0;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // four sums side by side, always the same four
+    // Four partial sums, always in the same order.
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
     let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
@@ -208,7 +220,7 @@ fn norm(a: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Entries without a pattern, with a diagonal that rises.
+    /// Entries without a pattern, and a rising diagonal.
     fn entry(i: usize, k: usize, n: usize) -> f64 {
         let noise = ((i * 7919 + k * 104_729 + 1) as f64).sin() / (n as f64).sqrt();
         if i == k { 1.0 + i as f64 / n as f64 + noise } else { noise }
@@ -231,7 +243,8 @@ mod tests {
         (outcome, x.iter().zip(&wanted).map(|(x, w)| (x - w).abs()).fold(0.0, f64::max))
     }
 
-    /// The solution is the one that the matrix was multiplied with: in one search, in several, with a preconditioner in fewer products.
+    /// The solution is the vector that the matrix was multiplied with: in one
+    /// cycle, in several, and with a preconditioner.
     #[test]
     fn the_solution_is_found() {
         for n in [1, 5, 80] {
@@ -246,7 +259,7 @@ mod tests {
         assert!(restarted.solved && error < 1e-7, "{restarted:?} {error:.1e}");
     }
 
-    /// Where there is no solution, or too few products, that is said.
+    /// Without a solution, or with too few products, the outcome is not solved.
     #[test]
     fn what_is_not_solved_is_told() {
         let limits = Limits { tolerance: 1e-12, vectors: 10, products: 4 };

@@ -1,10 +1,16 @@
-//! Which of several sizes leads, whatever rounding says: what is equal by symmetry comes out of a computation in any order.
+//! Index of the largest of several sizes, independent of rounding.
+//!
+//! Symmetric problems have sizes that are equal except for rounding; of these,
+//! the first is returned.
 
-/// Sizes that differ by less than this share are equal: far above the rounding and the residuals of orbits and modes, and below what a figure
-/// or a table of six digits shows.
+/// Sizes that differ by less than this fraction are equal.
+///
+/// It is far above the rounding and the residuals of orbits and modes. It is below the
+/// resolution of a figure or of a table of six digits.
 pub const EQUAL: f64 = 1e-6;
 
-/// The first of the largest sizes, those equal to it but for [`EQUAL`]; `None` where none is positive and finite.
+/// Returns the index of the first size within [`EQUAL`] of the largest, or
+/// `None` if no size is positive and finite.
 ///
 /// # Example
 /// ```
@@ -22,7 +28,8 @@ pub fn leading(sizes: impl Iterator<Item = f64> + Clone) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// What is smaller by half of the share is equal, by twice of it not; a size that is no finite number never leads.
+    /// A size smaller by half of the tolerance is equal, by twice the tolerance it is not. A
+    /// size that is not finite is never the largest.
     #[test]
     fn of_equal_sizes_the_first_leads() {
         for (first, expected) in [(1.0 - 0.5 * EQUAL, 1), (1.0 - 2.0 * EQUAL, 2)] {

@@ -1,4 +1,4 @@
-//! Mathematics that knows no mechanics.
+//! Numerical methods without any mechanics.
 
 pub mod banded;
 pub mod complementarity;

@@ -1,6 +1,6 @@
-//! A factor of a small dense matrix, in memory that is kept from one matrix to the next.
+//! LU factors of a small dense matrix, in memory that is reused from one matrix to the next.
 
-/// `P A = L U` with row exchanges.
+/// The factorization `P A = L U` with row exchanges.
 ///
 /// Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 3.4.
 ///
@@ -18,12 +18,12 @@
 pub struct Lu {
     n: usize,
     entries: Vec<f64>,
-    /// The row that came to this place when it was eliminated.
+    /// The row exchanged with row k when column k was eliminated.
     exchanged: Vec<usize>,
 }
 
 impl Lu {
-    /// The matrix, row after row, all zero, to be filled before [`Lu::factorise`].
+    /// Returns a zero matrix, row-major, for the caller to fill before [`Lu::factorise`].
     pub fn zeros(&mut self, n: usize) -> &mut [f64] {
         self.n = n;
         self.entries.clear();
@@ -31,14 +31,14 @@ impl Lu {
         &mut self.entries
     }
 
-    /// The matrix as it was filled so far.
+    /// Returns the entries, row-major.
     pub fn entries(&mut self) -> &mut [f64] {
         &mut self.entries
     }
 
-    /// Factorises what the matrix was filled with; false if a pivot vanishes or is not finite.
+    /// Factors the matrix in place. Returns false if a pivot is zero or not finite.
     pub fn factorise(&mut self) -> bool {
-        // lengths that the compiler knows: five stages of one axis, and of one with a state
+        // Lengths known to the compiler: five stages of one axis, and of one axis with a state.
         match self.n {
             5 => self.eliminate(5),
             10 => self.eliminate(10),
@@ -96,7 +96,8 @@ impl Lu {
         }
     }
 
-    /// Replaces several right sides by their solutions: row after row, each with one entry of every right side.
+    /// Replaces several right sides by their solutions. `right` is row-major,
+    /// with one column for each right side.
     pub fn solve_rows(&self, right: &mut [f64], columns: usize) {
         let n = self.n;
         for k in 0..n {
@@ -119,7 +120,7 @@ impl Lu {
     }
 }
 
-/// `row -= Σ factor · other row`.
+/// Subtracts the rows of `others` from `row`: `row -= Σ factor · other row`.
 fn subtract(factors: &[f64], others: &[f64], row: &mut [f64]) {
     for (factor, other) in factors.iter().zip(others.chunks_exact(row.len().max(1))) {
         row.iter_mut().zip(other).for_each(|(x, o)| *x -= factor * o);
@@ -130,7 +131,8 @@ fn subtract(factors: &[f64], others: &[f64], row: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// The solution is the one that the matrix was multiplied with, for one matrix after the other in the same memory.
+    /// The solution is the vector that the matrix was multiplied with, for
+    /// several matrices in the same memory.
     #[test]
     fn solutions_come_back() {
         let mut lu = Lu::default();
@@ -145,7 +147,7 @@ mod tests {
             for (i, x) in right.iter().enumerate() {
                 assert!((x - 1.0 - i as f64).abs() < 1e-10, "{n}: {x}");
             }
-            // the same right side, and twice it
+            // Two right sides: the one above, and twice of it.
             let entry_sum = |i: usize| (0..n).map(|k| entry(i, k) * (1.0 + k as f64)).sum::<f64>();
             let mut rows: Vec<f64> = (0..n).flat_map(|i| [entry_sum(i), 2.0 * entry_sum(i)]).collect();
             lu.solve_rows(&mut rows, 2);

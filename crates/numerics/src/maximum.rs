@@ -1,19 +1,24 @@
-//! The maximum of a function between two ends, by golden-section search.
+//! Maximum of a function in an interval, by golden-section search.
 //!
-//! Every step costs one value and keeps the share (√5 - 1)/2 of the interval, smooth function or kinked; a value may be expensive, and may fail.
+//! Every step costs one function value and reduces the interval to (√5 - 1)/2 of its length.
+//! The function may be smooth or have kinks; a value may be expensive, and may fail.
 //! Source: Kiefer, Sequential minimax search for a maximum, Proc. AMS 4 (1953) 502-506.
 
-/// (√5 - 1)/2
+/// (√5 - 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// The largest of the values that the search meets, and where: inside `ends`, which may stand in either order, until `close` says that the
-/// two ends that are left are near enough, or until there is no number left between them to try: a `close` that asks for less than the rounding of
-/// the ends is met by that. Of equal values the first that was met counts. Where there is no value, give negative infinity.
+/// Returns the place and the value of the largest function value that the search evaluates.
 ///
-/// Of a function with one maximum between the ends it is that one; of another a local one.
+/// The search takes place between `ends`, in either order. It stops when `close`
+/// accepts the two ends of the remaining interval, or when rounding leaves no
+/// number between them. Of equal values the first one evaluated counts. A
+/// function without a value at some place returns negative infinity there.
+///
+/// A function with one maximum between the ends gives this maximum; another
+/// function gives a local maximum.
 ///
 /// # Errors
-/// That of `value`, at once.
+/// The error of `value`, at once.
 ///
 /// # Example
 /// ```
@@ -57,7 +62,8 @@ pub fn maximum<E>(
 mod tests {
     use super::*;
 
-    /// Where the values of a smooth maximum differ by rounding only: the square root of it.
+    /// Places whose values differ by rounding only around a smooth maximum: the
+    /// square root of rounding.
     const FLAT: f64 = 1e-7;
 
     fn found(ends: (f64, f64), f: impl Fn(f64) -> f64) -> (f64, f64) {
@@ -106,7 +112,7 @@ mod tests {
             places.push(x);
             Ok::<_, ()>(-x * x)
         };
-        // 1/φ^20 = 6.6e-5, 1/φ^21 = 4.1e-5 of the interval
+        // 1/φ^20 = 6.6e-5 and 1/φ^21 = 4.1e-5 of the interval.
         maximum((-1.0, 1.0), |a, b| b - a < 2.0 * 5e-5, value).unwrap();
         assert_eq!(places.len(), 2 + 21);
         assert!((places[1] - (5f64.sqrt() - 2.0)).abs() < 1e-15 && places[0] == -places[1], "{places:?}");

@@ -1,9 +1,15 @@
-//! Modes of `q'' + C q' + K q = g(t)` with symmetric `K`: the decoupling that makes its motion a closed form.
+//! Modes of `q'' + C q' + K q = g(t)` with symmetric `K`. They decouple the
+//! equations and give the motion in closed form.
 //!
-//! Every mode `(λ, φ)` solves `(λ² + λ C + K) φ = 0`, and `ψᵀ (λ² + λ C + K) = 0`; where `C` is symmetric too, `ψ` is `φ`. With
-//! `θ = ψᵀ(2λ + C)φ` the modal coordinate `η = [ψᵀ(λ + C) q + ψᵀ q'] / θ` obeys `η' = λ η + ψᵀg/θ`, and `q = Re Σ φ η` (complex pairs are kept
-//! once, with weight 2). A direction that neither springs nor dampers hold (`Kφ = Cφ = 0`) is a *free* one and keeps its double zero: `ρ'' = φᵀ g`.
-//! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001), Sec. 3.
+//! Every mode `(λ, φ)` solves `(λ² + λ C + K) φ = 0` and `ψᵀ (λ² + λ C + K) = 0`.
+//! If `C` is symmetric too, `ψ = φ`. With `θ = ψᵀ(2λ + C)φ` the modal coordinate
+//! `η = [ψᵀ(λ + C) q + ψᵀ q'] / θ` satisfies `η' = λ η + ψᵀg/θ`, and
+//! `q = Re Σ φ η`. A complex pair is kept once, with weight 2.
+//!
+//! A direction without stiffness and damping (`Kφ = Cφ = 0`) is a *free* direction. It keeps
+//! its double zero eigenvalue: `ρ'' = φᵀ g`.
+//! Source: Tisseur and Meerbergen, "The quadratic eigenvalue problem", SIAM
+//! Review 43 (2001), Sec. 3.
 
 use crate::eigen;
 use crate::null_space::null_space;
@@ -17,42 +23,48 @@ pub struct Modes {
     pub lambda: Vec<Complex64>,
     /// Columns φ times their weight (2 for a complex pair, 1 for a real mode), m × modes.
     pub shape: DMatrix<Complex64>,
-    /// Rows ψᵀ(λ + C)/θ: the part of η that comes from `q`, modes × m.
+    /// Rows ψᵀ(λ + C)/θ: the contribution of `q` to η, modes × m.
     pub from_displacement: DMatrix<Complex64>,
-    /// Rows ψᵀ/θ: the part of η that comes from `q'`, and the modal force of a unit force, modes × m.
+    /// Rows ψᵀ/θ: the contribution of `q'` to η, and the modal force of a unit force, modes × m.
     pub from_velocity: DMatrix<Complex64>,
     /// Orthonormal free directions, m × r.
     pub free: DMatrix<f64>,
 }
 
-/// The matrix has no full set of modes: two of them fall together, as at critical damping; or numbers out of range have none, and `lambda` is
-/// not finite.
+/// Error: the system has no full set of modes.
+///
+/// Two modes coincide, as at critical damping. If the numbers are out of range,
+/// `lambda` is not finite.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("two modes fall together at {lambda:.6} rad/s (critical damping); change a damper by a part in a million")]
 pub struct Defective {
-    /// Where.
+    /// Eigenvalue at which two modes coincide, rad/s.
     pub lambda: Complex64,
 }
 
-/// Eigenvalues of `K` below this fraction of the largest are zero: rounding of the symmetric eigenvalue problem.
+/// Eigenvalues of `K` below this fraction of the largest are zero: rounding of
+/// the symmetric eigenvalue problem.
 const RIGID: f64 = 1e-13;
-/// Modal damping couples two undamped modes when it exceeds this fraction of the largest.
+/// Damping couples two undamped modes if its entry exceeds this fraction of the largest.
 const COUPLED: f64 = 1e-14;
-/// Eigenvalues closer than this fraction of the largest belong together: the square root of the rounding error of a
-/// non-symmetric eigenvalue, which a nearly defective pair shows.
+/// Eigenvalues closer than this fraction of the largest form a cluster. It is the square root
+/// of the rounding error of a non-symmetric eigenvalue, the error of a nearly defective pair.
 const CLUSTER: f64 = 1e-7;
-/// `|θ|` relative to `2|λ| + |C|` below which a mode counts as defective: half of the digits are lost then.
+/// A mode is defective if `|θ|` is below this fraction of `2|λ| + |C|`: half of
+/// the digits are then lost.
 const DEFECTIVE: f64 = 1e-7;
-/// Entries of a damping matrix across the diagonal that differ by more than this share of the largest are no rounding: it is not symmetric.
+/// A damping matrix is not symmetric if mirrored entries differ by more than
+/// this fraction of the largest entry.
 const SKEW: f64 = 1e-12;
-/// Steps of the QR iteration per eigenvalue; 2 to 4 are usual.
+/// Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
 const SCHUR_STEPS: usize = 40;
 
 impl Modes {
-    /// Computes the modes of `q'' + C q' + K q`, both m × m; K is symmetric, C may have a gyroscopic part.
+    /// Computes the modes of `q'' + C q' + K q`. Both matrices are m × m; K is
+    /// symmetric, C may have a gyroscopic part.
     ///
     /// # Errors
-    /// [`Defective`] at (nearly) critical damping.
+    /// [`Defective`] at (nearly) critical damping, or if the numbers are out of range.
     ///
     /// # Example
     /// ```
@@ -87,7 +99,7 @@ impl Modes {
         Ok(modes)
     }
 
-    /// Modes of a coupled group of coordinates, the columns of `part`.
+    /// Adds the modes of a coupled group of coordinates. The columns of `part` span the group.
     fn add_component(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
         let r = c.nrows();
         let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
@@ -100,7 +112,8 @@ impl Modes {
         let cc = c.map(|x| Complex64::new(x, 0.0));
         let skew = is_skew(c);
         for i in 0..eigenvalues.len() {
-            // of every pair the one above the real axis; a value within rounding of the axis is real
+            // Keep the eigenvalue above the real axis of each pair. An
+            // eigenvalue within rounding of the axis is real.
             let real = eigenvalues[i].im.abs() <= CLUSTER * scale;
             if done[i] || (!real && eigenvalues[i].im < 0.0) {
                 continue;
@@ -113,11 +126,11 @@ impl Modes {
             if real {
                 lambda.im = 0.0;
             }
-            // no more vectors belong to one value than there are coordinates
+            // A value has at most as many eigenvectors as there are coordinates.
             if members.len() > r {
                 return Err(Defective { lambda });
             }
-            // φ and ψ
+            // φ and ψ.
             let vectors = |lambda: Complex64| {
                 let matrix = quadratic(&cc, k, lambda);
                 let phi = null_space(&matrix, members.len())?;
@@ -128,7 +141,8 @@ impl Modes {
             let two_lambda_c = |lambda: Complex64| DMatrix::from_diagonal_element(r, r, 2.0 * lambda) + &cc;
             let mut theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             if members.len() == 1 && theta[0].norm() > DEFECTIVE * scale {
-                // one Newton step on ψᵀQ(λ)φ = 0 removes the rounding of the unsymmetric eigenvalue problem
+                // One Newton step on ψᵀQ(λ)φ = 0 removes the rounding of the
+                // unsymmetric eigenvalue problem.
                 let correction = (psi.transpose() * quadratic(&cc, k, lambda) * &phi)[0] / theta[0];
                 lambda -= if real { Complex64::new(correction.re, 0.0) } else { correction };
                 (phi, psi) = vectors(lambda).ok_or(out_of_range)?;
@@ -170,7 +184,8 @@ impl Modes {
     }
 }
 
-/// Free directions into `free`; returns an orthonormal basis of the rest, undamped modes where possible.
+/// Stores the free directions in `free`. Returns an orthonormal basis of the other directions,
+/// which consists of undamped modes if possible.
 fn split_free(
     damping: &DMatrix<f64>,
     undamped: &SymmetricEigen<f64, Dyn>,
@@ -183,7 +198,8 @@ fn split_free(
         (0..m).filter(|i| !soft.contains(i)).map(|i| undamped.eigenvectors.column(i).into_owned()).collect();
     if !soft.is_empty() {
         let null = undamped.eigenvectors.select_columns(&soft);
-        // of a gyroscopic matrix the energy says nothing: what it does to a direction, and what is done to that, is asked
+        // The quadratic form of a gyroscopic matrix vanishes. Instead, the test uses the
+        // products of the direction with the matrix and its transpose.
         let (resists, threshold) = if is_skew(damping) {
             (damping.transpose() * damping + damping * damping.transpose(), (RIGID * damping.amax()).powi(2))
         } else {
@@ -202,12 +218,12 @@ fn split_free(
     Some(if columns.is_empty() { DMatrix::zeros(m, 0) } else { DMatrix::from_columns(&columns) })
 }
 
-/// Whether a damping matrix is not symmetric.
+/// Returns true if a damping matrix is not symmetric.
 fn is_skew(damping: &DMatrix<f64>) -> bool {
     (damping - damping.transpose()).amax() > SKEW * damping.amax()
 }
 
-/// Groups of coordinates that damping or stiffness couples.
+/// Returns the groups of coordinates that damping or stiffness couples.
 fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let r = c.nrows();
     let (c_scale, k_scale) = (COUPLED * c.amax(), 10.0 * RIGID * k.amax());
@@ -231,7 +247,7 @@ fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Roots of λ² + cλ + k without cancellation.
+/// Returns the roots of λ² + cλ + k without cancellation.
 fn single(c: f64, k: f64) -> Vec<Complex64> {
     let discriminant = 0.25 * c * c - k;
     if discriminant < 0.0 {
@@ -243,6 +259,7 @@ fn single(c: f64, k: f64) -> Vec<Complex64> {
     vec![Complex64::new(large, 0.0), Complex64::new(small, 0.0)]
 }
 
+/// Returns the eigenvalues of the companion matrix, scaled by a frequency.
 fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Option<Vec<Complex64>> {
     let r = c.nrows();
     let omega = k.amax().sqrt().max(c.amax()).max(f64::MIN_POSITIVE);
@@ -257,10 +274,11 @@ fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Option<Vec<Compl
     let steps = SCHUR_STEPS * (2 * r + 1);
     let finite = companion.iter().all(|x| x.is_finite());
     let schur = finite.then(|| Schur::try_new(companion.clone(), f64::EPSILON, steps))?;
-    // the real iteration gives exact pairs; where it does not end, the complex one does
+    // The real iteration gives exact pairs. If it does not converge, the complex iteration does.
     schur.map(|schur| schur.complex_eigenvalues().iter().copied().collect()).or_else(|| eigen::eigenvalues(&companion))
 }
 
+/// Returns `λ² + λ C + K`.
 fn quadratic(c: &DMatrix<Complex64>, k: &DMatrix<f64>, lambda: Complex64) -> DMatrix<Complex64> {
     DMatrix::from_fn(k.nrows(), k.ncols(), |i, j| {
         let diagonal = if i == j { lambda * lambda } else { Complex64::new(0.0, 0.0) };
@@ -268,7 +286,7 @@ fn quadratic(c: &DMatrix<Complex64>, k: &DMatrix<f64>, lambda: Complex64) -> DMa
     })
 }
 
-/// A real basis of the space that the columns span, which is known to have one.
+/// Returns a real basis of the span of the columns. A real basis must exist.
 fn real_basis(columns: &DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
     let (r, count) = columns.shape();
     let parts =
@@ -285,7 +303,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// `q` and `q'` are recovered from the modal coordinates, and the modal equation is that of the system.
+    /// The modal coordinates recover `q` and `q'` and satisfy the equation of the system.
     fn check(c: &DMatrix<f64>, k: &DMatrix<f64>, tolerance: f64) {
         let m = c.nrows();
         let modes = Modes::new(c, k).unwrap();
@@ -308,26 +326,27 @@ mod tests {
     #[test]
     fn repeated_free_and_overdamped_modes() {
         use nalgebra::dmatrix;
-        check(&DMatrix::zeros(3, 3), &DMatrix::identity(3, 3), 1e-13); // threefold
+        check(&DMatrix::zeros(3, 3), &DMatrix::identity(3, 3), 1e-13); // threefold eigenvalue
         check(&(DMatrix::identity(3, 3) * 0.2), &DMatrix::identity(3, 3), 1e-13);
         check(&DMatrix::zeros(2, 2), &dmatrix![1.0, -1.0; -1.0, 1.0], 1e-13); // free together
         check(&dmatrix![0.5, 0.0; 0.0, 0.0], &dmatrix![1.0, -1.0; -1.0, 1.0], 1e-12);
         check(&dmatrix![5.0], &dmatrix![1.0], 1e-13); // overdamped
-        check(&dmatrix![0.1], &dmatrix![0.0], 1e-13); // damped but not held
+        check(&dmatrix![0.1], &dmatrix![0.0], 1e-13); // damped, without stiffness
         check(&dmatrix![0.0], &dmatrix![0.0], 1e-13);
-        // two equal pairs of masses that damping couples within each pair
+        // Two equal pairs of masses, with damping that couples the masses of each pair.
         let (c, k) = (dmatrix![0.3, 0.0; 0.0, 0.0], dmatrix![2.0, -1.0; -1.0, 1.5]);
         let twice =
             |a: &DMatrix<f64>| DMatrix::from_fn(4, 4, |i, j| if i / 2 == j / 2 { a[(i % 2, j % 2)] } else { 0.0 });
         check(&twice(&c), &twice(&k), 1e-10);
-        // and mixed by a rotation, so that the pairs cannot be told apart by their zeros
+        // Mixed by a rotation, which hides the two groups.
         let h = 0.5f64.sqrt();
         let turn = dmatrix![h, 0.0, h, 0.0; 0.0, h, 0.0, h; -h, 0.0, h, 0.0; 0.0, -h, 0.0, h];
         check(&(&turn * twice(&c) * turn.transpose()), &(&turn * twice(&k) * turn.transpose()), 1e-10);
         assert!(Modes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
     }
 
-    /// A chain of many masses with dampers that couple all of its modes, and two such chains side by side, whose modes are pairs.
+    /// A chain of many masses with dampers that couple all of its modes; then two such chains
+    /// in parallel, with pairs of equal modes.
     #[test]
     fn chains_with_dampers_of_their_own() {
         let n = 24;
@@ -350,10 +369,11 @@ mod tests {
         use nalgebra::dmatrix;
         let k = dmatrix![12e3, -3e3; -3e3, 15e3];
         check(&dmatrix![2.0, 50.0; -50.0, 2.0], &k, 1e-12);
-        check(&dmatrix![2.0, 50.0; 0.0, 2.0], &k, 1e-12); // one way alone
+        check(&dmatrix![2.0, 50.0; 0.0, 2.0], &k, 1e-12); // in one direction only
         check(&dmatrix![0.0, 50.0; -50.0, 0.0], &k, 1e-12);
         check(&dmatrix![0.1, 0.3; 0.0, 0.2], &dmatrix![1.0, 0.0; 0.0, 4.0], 1e-12);
-        // a charge in a field: two motions circle, and two stand still where they were left
+        // A charge in a magnetic field: two motions circle, and one body stays
+        // at rest in its position.
         check(
             &dmatrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0],
             &dmatrix![1.0, 0.0, 0.0; 0.0, 2.0, 0.0; 0.0, 0.0, 0.0],

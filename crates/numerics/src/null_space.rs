@@ -1,25 +1,33 @@
-//! The directions that a nearly singular matrix maps closest to zero: its right singular vectors of the least singular values.
+//! Approximate null space of a nearly singular matrix: its right singular
+//! vectors with the smallest singular values.
 //!
-//! Of few rows they come from the whole decomposition. Of many they are the limit of inverse iteration with `QᴴQ`, one factorisation and
-//! two solutions a step: the nearer to singular the matrix is, the faster, and where it is the value of a polynomial matrix at an eigenvalue two
-//! steps are enough. Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 8.2.3 (orthogonal iteration).
+//! Small matrices use the singular value decomposition. Large matrices use
+//! inverse iteration with `QᴴQ`: one factorization, and two solutions per step.
+//! The iteration converges faster the closer the matrix is to singular. Two steps
+//! are enough if the matrix is a polynomial matrix at one of its eigenvalues.
+//! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 8.2.3 (orthogonal iteration).
 
 use crate::dense::ComplexLu;
 use crate::eigen;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Rows from which iteration takes less time than the whole decomposition.
+/// Rows from which the iteration takes less time than the singular value decomposition.
 const MANY: usize = 8;
-/// Steps at most: each divides the error by the square of the ratio of the singular values, which is at least 10⁶ where it is of use at all.
+/// Maximum number of steps. Each step divides the error by the square of the ratio of the
+/// singular values, which is at least 10⁶ where the iteration is useful.
 const STEPS: usize = 6;
-/// The directions are found when a step turns them by less than this: some times the rounding of a solution.
+/// The iteration stops when a step changes the directions by less than this: a
+/// few times the rounding of a solution.
 const TURNED: f64 = 1e-13;
-/// A matrix without a pivot is factored with this share of its largest entry more on the diagonal, which is within its own rounding.
+/// If the factorization finds no pivot, this fraction of the largest entry is added to the
+/// diagonal. It is within the rounding of the matrix.
 const NUDGE: f64 = f64::EPSILON;
 
-/// Orthonormal basis of the `dimension` directions that a square matrix maps closest to zero, one per column; `None` if an entry is not finite or the
-/// decomposition does not end.
+/// Returns an orthonormal basis, by columns, of the `dimension` directions with
+/// the smallest singular values.
+///
+/// Returns `None` if an entry is not finite or the decomposition does not converge.
 pub(crate) fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
     if r == 1 {
@@ -29,6 +37,7 @@ pub(crate) fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Optio
     iterated.or_else(|| decomposed(matrix, dimension))
 }
 
+/// Computes the basis by the singular value decomposition.
 fn decomposed(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
     let svd = eigen::singular(matrix.clone())?;
@@ -38,7 +47,8 @@ fn decomposed(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<C
     Some(DMatrix::from_fn(r, dimension.min(r), |i, j| v_t[(order[j], i)].conj()))
 }
 
-/// By inverse iteration; `None` where it does not settle, since the next singular value is not much larger.
+/// Computes the basis by inverse iteration. Returns `None` if it does not
+/// converge because the next singular value is not much larger.
 fn iterated(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
     let factor = ComplexLu::new(matrix.as_slice().to_vec(), r).or_else(|_| {
@@ -47,7 +57,8 @@ fn iterated(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Com
         ComplexLu::new(nudged.as_slice().to_vec(), r)
     });
     let factor = factor.ok()?;
-    // columns without a pattern: none is across what is looked for but by chance, which the decomposition then mends
+    // Start columns without a pattern. If they are orthogonal to the null space by chance, the
+    // iteration fails and the decomposition takes over.
     let mut found = DMatrix::from_fn(r, dimension, |i, j| {
         let at = (i * dimension + j) as f64;
         Complex64::new((1.0 + 7.0 * at).sin(), (2.0 + 11.0 * at).sin())
@@ -68,9 +79,9 @@ fn iterated(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Com
     None
 }
 
-/// Orthonormal columns of the same span; `None` if an entry is not finite.
+/// Returns orthonormal columns with the same span, or `None` if an entry is not finite.
 fn orthonormal(mut columns: DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
-    // of the size of one first: what a nearly singular matrix answers may be too large to be squared
+    // Scale the columns first: the solution of a nearly singular matrix may overflow when squared.
     for mut column in columns.column_iter_mut() {
         let size = column.iter().map(|z| z.re.abs().max(z.im.abs())).fold(0.0, f64::max);
         let finite = column.iter().all(|z| z.is_finite());
@@ -86,7 +97,7 @@ fn orthonormal(mut columns: DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
 mod tests {
     use super::*;
 
-    /// Matrices `U Σ Vᴴ` of random directions and chosen singular values.
+    /// Returns `U Σ Vᴴ` with random directions and the given singular values, and V.
     fn made(values: &[f64], seed: f64) -> (DMatrix<Complex64>, DMatrix<Complex64>) {
         let r = values.len();
         let random = |first: f64| {
@@ -101,7 +112,8 @@ mod tests {
         (u * sigma * v.adjoint(), v)
     }
 
-    /// Both ways find the directions that the matrix was made with, one or several of them, singular to rounding or not.
+    /// Both methods find the directions that the matrix was made with: one or
+    /// several, singular to rounding or not.
     #[test]
     fn both_ways_find_the_directions() {
         for least in [0.0, 1e-16, 1e-9] {
@@ -121,7 +133,8 @@ mod tests {
         }
     }
 
-    /// Where the next direction is as close, iteration says that it does not settle, and the decomposition answers.
+    /// If the next singular value is as small, the iteration does not converge
+    /// and the decomposition answers.
     #[test]
     fn directions_that_are_not_apart_are_left_to_the_decomposition() {
         let values: Vec<f64> = (0..MANY + 2).map(|i| 1.0 + 0.01 * i as f64).collect();
@@ -131,7 +144,7 @@ mod tests {
         assert!(((&matrix * &found).norm() - 1.0).abs() < 1e-13);
     }
 
-    /// Numbers that are none have no directions.
+    /// A matrix with an entry that is not finite has no null space.
     #[test]
     fn what_is_not_finite_is_refused() {
         let mut matrix = DMatrix::from_element(MANY, MANY, Complex64::ONE);

@@ -1,35 +1,36 @@
-//! Products of a complex matrix with one vector, in real numbers.
+//! Products of a complex matrix with one vector, in real arithmetic.
 //!
-//! With the columns of the matrix as pairs of real and imaginary parts, `A Re(v)` and `A Im(v)` are a real matrix times two vectors, and `A v` the one and `j` times
-//! the other. That takes half of what a product in complex numbers does, whose parts have to change places.
+//! Each column of the matrix is stored as pairs of real and imaginary parts. Then `A Re(v)` and
+//! `A Im(v)` are one real matrix times two vectors, and `A v = A Re(v) + j A Im(v)`. This takes
+//! half the time of a product in complex numbers.
 
 use crate::dense::multiply_in_blocks;
 use num_complex::Complex64;
 
-/// A square complex matrix.
+/// A square complex matrix, stored for products with one vector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pairs {
     n: usize,
-    /// Column after column, `2 n × n`.
+    /// Column-major, `2 n × n`: pairs of real and imaginary parts.
     parts: Vec<f64>,
 }
 
 impl Pairs {
-    /// Of a matrix column after column, `n × n`.
+    /// Stores a column-major matrix, `n × n`.
     ///
     /// # Panics
-    /// If `matrix` has other than n² entries.
+    /// If `matrix` does not have n² entries.
     pub fn new(matrix: &[Complex64], n: usize) -> Self {
         assert_eq!(matrix.len(), n * n, "a square matrix");
         Pairs { n, parts: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
     }
 
-    /// Memory of its numbers, bytes.
+    /// Returns the memory of the entries, bytes.
     pub fn bytes(&self) -> usize {
         size_of::<f64>() * self.parts.len()
     }
 
-    /// `A v`, in the place of `v`.
+    /// Replaces `v` by `A v`. `memory` is scratch memory.
     ///
     /// # Example
     /// ```

@@ -1,22 +1,22 @@
-//! Gauss-Legendre rules on `[-1, 1]`: with n nodes exact for polynomials of degree 2n - 1.
+//! Gauss-Legendre rules on `[-1, 1]`. A rule of n nodes is exact for polynomials of degree 2n - 1.
 //!
 //! Source: Abramowitz and Stegun, Handbook of Mathematical Functions (1964), Table 25.4.
 
-/// Nodes and weights of three points, rising.
+/// Nodes and weights of three points, nodes rising.
 pub const THREE: [(f64, f64); 3] = mirrored([(0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)]);
-/// Nodes and weights of five points, rising.
+/// Nodes and weights of five points, nodes rising.
 pub const FIVE: [(f64, f64); 5] = mirrored([
     (0.0, 0.568_888_888_888_888_9),
     (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ]);
-/// Nodes and weights of six points, rising.
+/// Nodes and weights of six points, nodes rising.
 pub const SIX: [(f64, f64); 6] = mirrored([
     (0.238_619_186_083_196_9, 0.467_913_934_572_691),
     (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
     (0.932_469_514_203_152, 0.171_324_492_379_170_35),
 ]);
-/// Nodes and weights of eight points, rising.
+/// Nodes and weights of eight points, nodes rising.
 pub const EIGHT: [(f64, f64); 8] = mirrored([
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -24,7 +24,7 @@ pub const EIGHT: [(f64, f64); 8] = mirrored([
     (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
 ]);
 
-/// The whole rule from its half: a node in the middle counts once.
+/// Returns the whole rule from its half with nodes ≥ 0. A node in the middle counts once.
 const fn mirrored<const HALF: usize, const N: usize>(half: [(f64, f64); HALF]) -> [(f64, f64); N] {
     let mut all = [(0.0, 0.0); N];
     let mut k = 0;
@@ -37,7 +37,9 @@ const fn mirrored<const HALF: usize, const N: usize>(half: [(f64, f64); HALF]) -
     all
 }
 
-/// The same nodes from the middle outwards, each beside its mirror image: sums of what is even and odd then keep their small parts.
+/// Returns the nodes of a rule from the middle outwards, each next to its mirror image.
+///
+/// In this order sums over even or odd functions keep their small parts.
 pub const fn outwards<const N: usize>(rule: [(f64, f64); N]) -> [(f64, f64); N] {
     let mut all = rule;
     let middle = N % 2;
@@ -57,7 +59,8 @@ pub const fn outwards<const N: usize>(rule: [(f64, f64); N]) -> [(f64, f64); N] 
 mod tests {
     use super::*;
 
-    /// Powers up to the degree of a rule, and not the next even one; in either order.
+    /// In either order, a rule is exact for powers up to its degree, and not
+    /// for the next even power.
     fn check<const N: usize>(rule: [(f64, f64); N]) {
         let out = outwards(rule);
         assert!(rule.windows(2).all(|pair| pair[0].0 < pair[1].0));

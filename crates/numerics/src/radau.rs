@@ -1,16 +1,18 @@
-//! Radau IIA of order 9: the coefficients of the stiff integrator, and interpolation between its steps.
+//! Radau IIA of order 9: coefficients of the stiff integrator, and interpolation within a step.
 //!
-//! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5 and IV.8; with five stages Hairer and Wanner,
-//! "Stiff differential equations solved by Radau methods", J. Comput. Appl. Math. 111 (1999) 93-111.
+//! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5
+//! and IV.8; for five stages Hairer and Wanner, "Stiff differential equations solved by Radau
+//! methods", J. Comput. Appl. Math. 111 (1999) 93-111.
 
 /// Number of stages.
 pub const STAGES: usize = 5;
 
-/// Nodes within a step, the zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`; the last is the step's end.
+/// Nodes within a step: the zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`. The last is the end of the step.
 pub const C: [f64; STAGES] =
     [0.057_104_196_114_517_68, 0.276_843_013_638_123_8, 0.583_590_432_368_916_8, 0.860_240_135_656_219_5, 1.0];
 
-/// Matrix of the method, `∫₀^cᵢ ℓⱼ` of the Lagrange polynomials of the nodes; its last row is also the quadrature of order 9 over the step.
+/// Matrix of the method, `∫₀^cᵢ ℓⱼ` with the Lagrange polynomials ℓ of the nodes. Its last row
+/// is the quadrature of order 9 over the step.
 pub const A: [[f64; STAGES]; STAGES] = [
     [
         0.072_998_864_317_903_33,
@@ -43,17 +45,18 @@ pub const A: [[f64; STAGES]; STAGES] = [
     [0.143_713_560_791_225_94, 0.281_356_015_149_462_07, 0.311_826_522_975_741_26, 0.223_103_901_083_570_75, 0.04],
 ];
 
-/// Weights of the stage increments in the embedded error estimate of order 5: of a polynomial of degree 5 they give minus its slope at the start.
+/// Weights of the stage increments in the embedded error estimate of order 5. For a polynomial
+/// of degree 5 the weighted sum is minus its slope at the start.
 pub const ERROR: [f64; STAGES] =
     [-27.780_933_944_064_64, 3.641_478_498_049_213, -1.252_547_721_169_118_7, 0.592_003_167_184_542_8, -0.2];
 
-/// Order of what the embedded estimate leaves of a step's length: it vanishes as `h⁶`.
+/// Order of the embedded estimate in the step size h: the estimate vanishes like `h⁶`.
 pub const ESTIMATE: i32 = STAGES as i32 + 1;
 
-/// The real eigenvalue of the inverse of [`A`]; the error estimate is filtered by `(REAL/h - J)⁻¹`.
+/// The real eigenvalue of the inverse of [`A`]. The error estimate is filtered by `(REAL/h - J)⁻¹`.
 pub const REAL: f64 = 6.286_704_751_729_276_5;
 
-/// `A²`, for displacements from accelerations.
+/// Returns `A²`, which gives displacements from accelerations.
 pub fn squared() -> [[f64; STAGES]; STAGES] {
     let mut out = [[0.0; STAGES]; STAGES];
     for i in 0..STAGES {
@@ -64,13 +67,16 @@ pub fn squared() -> [[f64; STAGES]; STAGES] {
     out
 }
 
-/// Value, first and second derivative at `s` in [0, 1] of the quintic with given value, slope and curvature at both ends of a
-/// step of length `h`. Its error is of order `h⁶`.
+/// Interpolates by the quintic with given value, slope and curvature at both
+/// ends of a step of length `h`.
+///
+/// Returns its value, first and second derivative at `s` in [0, 1]. The
+/// interpolation error is of order `h⁶`.
 ///
 /// # Example
 /// ```
 /// let (x, v, _) = stickslip_numerics::radau::quintic(0.5, 2.0, [0.0, 1.0, 0.0], [2.0, 1.0, 0.0]);
-/// assert!((x - 1.0).abs() < 1e-15 && (v - 1.0).abs() < 1e-15);   // a straight line
+/// assert!((x - 1.0).abs() < 1e-15 && (v - 1.0).abs() < 1e-15); // a straight line
 /// ```
 pub fn quintic(s: f64, h: f64, start: [f64; 3], end: [f64; 3]) -> (f64, f64, f64) {
     let (v0, a0) = (start[1] * h, start[2] * h * h);
@@ -90,7 +96,8 @@ pub fn quintic(s: f64, h: f64, start: [f64; 3], end: [f64; 3]) -> (f64, f64, f64
 mod tests {
     use super::*;
 
-    /// The nodes are zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`, that is of `126 x⁵ - 350 x⁴ + 350 x³ - 150 x² + 25 x - 1`.
+    /// The nodes are the zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`, which is proportional to
+    /// `126 x⁵ - 350 x⁴ + 350 x³ - 150 x² + 25 x - 1`.
     #[test]
     fn nodes_are_those_of_radau() {
         for x in C {
@@ -99,7 +106,8 @@ mod tests {
         }
     }
 
-    /// Collocation: `Σ_j a_ij c_j^(k-1) = c_i^k / k` for k up to the number of stages, and the quadrature is exact to degree 8.
+    /// Collocation: `Σ_j a_ij c_j^(k-1) = c_i^k / k` for k up to the number of
+    /// stages. The quadrature is exact up to degree 8.
     #[test]
     fn coefficients_satisfy_the_order_conditions() {
         for i in 0..STAGES {
@@ -114,7 +122,7 @@ mod tests {
         }
     }
 
-    /// Of increments of polynomials up to degree 5 the estimate is nothing but minus the slope at the start.
+    /// For increments of polynomials up to degree 5 the estimate is minus the slope at the start.
     #[test]
     fn the_estimate_vanishes_to_order_five() {
         for k in 1..=STAGES as i32 {
@@ -123,7 +131,8 @@ mod tests {
         }
     }
 
-    /// The denominator of the stability function, the (4,5) Padé approximation of the exponential, vanishes at the real eigenvalue.
+    /// The denominator of the stability function, the (4,5) Padé approximation of the
+    /// exponential, vanishes at the real eigenvalue.
     #[test]
     fn the_real_eigenvalue_is_a_pole() {
         let mut term = 1.0;

@@ -1,9 +1,11 @@
-//! Random numbers that are the same everywhere: each is a function of a seed and its own number, made of exact operations.
+//! Reproducible random numbers: each is a function of a seed and an index, computed by exact
+//! operations, with the same bits on every machine.
 //!
-//! Sources: Steele, Lea, Flood (2014), "Fast splittable pseudorandom number generators" (the mixing of SplitMix64); Wichura (1988),
-//! "Algorithm AS 241: the percentage points of the normal distribution", accurate to about 1e-16.
+//! Sources: Steele, Lea, Flood (2014), "Fast splittable pseudorandom number generators" (the
+//! mixing of SplitMix64); Wichura (1988), "Algorithm AS 241: the percentage points of the
+//! normal distribution", accurate to about 1e-16.
 
-/// Random numbers of one seed.
+/// The random numbers of one seed.
 ///
 /// # Example
 /// ```
@@ -12,14 +14,14 @@
 /// let many: Vec<f64> = (0..10_000).map(|i| stream.normal(i)).collect();
 /// let mean = many.iter().sum::<f64>() / 1e4;
 /// assert!(mean.abs() < 0.03);
-/// assert_eq!(stream.normal(3), many[3]);   // in whatever order they are asked for
+/// assert_eq!(stream.normal(3), many[3]); // in any order of the indices
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream {
     seed: u64,
 }
 
-/// The golden ratio's fraction, by which SplitMix64 steps.
+/// Increment of SplitMix64: the fractional part of the golden ratio.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 fn mixed(mut z: u64) -> u64 {
@@ -29,25 +31,26 @@ fn mixed(mut z: u64) -> u64 {
 }
 
 impl Stream {
-    /// The stream of a seed; neighbouring seeds have nothing in common.
+    /// Creates the stream of a seed. Streams of consecutive seeds are not correlated.
     pub fn new(seed: u64) -> Self {
         Stream { seed: mixed(seed.wrapping_add(STEP)) }
     }
 
-    /// Number `index`, uniform between 0 and 1, never either.
+    /// Returns number `index`, uniform in the open interval (0, 1).
     pub fn uniform(self, index: u64) -> f64 {
         let bits = mixed(self.seed.wrapping_add(index.wrapping_add(1).wrapping_mul(STEP)));
-        // the middle of one of 2⁵³ intervals
+        // The middle of one of 2⁵³ intervals.
         ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
-    /// Number `index` of the normal distribution with mean 0 and standard deviation 1.
+    /// Returns number `index` of the normal distribution with mean 0 and standard deviation 1.
     pub fn normal(self, index: u64) -> f64 {
         normal_quantile(self.uniform(index))
     }
 }
 
-/// Natural logarithm of a normal number above zero, by operations whose rounding is prescribed: those of the system differ in last digits.
+/// Returns the natural logarithm of a positive normal number by operations with prescribed
+/// rounding. The logarithms of operating systems differ in their last digits.
 fn logarithm(x: f64) -> f64 {
     let bits = x.to_bits();
     let mut exponent = ((bits >> 52) & 0x7ff) as i64 - 1023;
@@ -56,14 +59,14 @@ fn logarithm(x: f64) -> f64 {
         mantissa *= 0.5;
         exponent += 1;
     }
-    // ln m = 2 artanh((m - 1)/(m + 1)), whose argument is below 0.172: 11 terms leave 1e-18
+    // ln m = 2 artanh((m - 1)/(m + 1)). The argument is below 0.172, so 11 terms leave 1e-18.
     let z = (mantissa - 1.0) / (mantissa + 1.0);
     let square = z * z;
     let sum = (0..11).rev().fold(0.0, |sum, k| sum * square + 1.0 / f64::from(2 * k + 1));
     exponent as f64 * std::f64::consts::LN_2 + 2.0 * z * sum
 }
 
-/// The value that a normal number is below with probability `p`, between 0 and 1.
+/// Returns the quantile of the standard normal distribution at probability `p`, 0 < p < 1.
 pub fn normal_quantile(p: f64) -> f64 {
     let ratio = |x: f64, up: [f64; 8], down: [f64; 7]| {
         let top = up.iter().rev().fold(0.0, |sum, c| sum * x + c);
@@ -154,7 +157,7 @@ const FAR: Ratio = (
 mod tests {
     use super::*;
 
-    /// `statistics.NormalDist().inv_cdf` of Python.
+    /// Reference: `statistics.NormalDist().inv_cdf` of Python.
     #[test]
     fn quantiles_are_those_of_python() {
         for (p, expected) in [
@@ -181,7 +184,7 @@ mod tests {
     /// The first numbers of SplitMix64's mixing are fixed: studies with seeds must not change.
     #[test]
     fn a_seed_stays_what_it_is() {
-        // Stafford's variant 13, by hand: mixed(1) of the published code
+        // Stafford's variant 13: mixed(1) computed by hand from the published code.
         assert_eq!(mixed(1), 0x5692_161d_100b_05e5);
         let stream = Stream::new(7);
         let mut numbers: Vec<u64> = (0..1000).map(|i| stream.uniform(i).to_bits()).collect();
@@ -190,7 +193,8 @@ mod tests {
         assert_eq!(numbers.len(), 1000);
     }
 
-    /// Mean, variance, kurtosis and the neighbours' correlation, within five standard errors.
+    /// Mean, variance, kurtosis and the correlation of consecutive numbers,
+    /// within five standard errors.
     #[test]
     fn normal_numbers_are_normal() {
         let n = 200_000u64;

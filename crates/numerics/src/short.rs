@@ -1,6 +1,8 @@
-//! Products with matrices of a few rows: where a loop over two to six numbers costs more than they do, its length is one that the compiler knows.
+//! Products with matrices of a few rows, with loop lengths that the compiler knows.
+//!
+//! For two to six numbers the overhead of a loop costs more than the arithmetic.
 
-/// Adds `matrix x` to `out`; `matrix` column after column, each as long as `out`.
+/// Adds `matrix x` to `out`. `matrix` is column-major, with columns as long as `out`.
 ///
 /// # Example
 /// ```
@@ -22,13 +24,14 @@ pub fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Adds `matrix x` to the first rows of `out`: `matrix` column after column, each of so many `rows`, but `x` and `out` row after row, each of so many
-/// `columns`.
+/// Adds `matrix x` to the first `rows` rows of `out`.
+///
+/// `matrix` is column-major with `rows` rows. `x` and `out` are row-major with `columns` columns.
 ///
 /// # Example
 /// ```
 /// let mut out = [0.0; 4];
-/// // twice the unit matrix, and rows of two columns
+/// // twice the identity matrix, and rows of two columns
 /// stickslip_numerics::short::add_product_of_rows(&[2.0, 0.0, 0.0, 2.0], 2, &[1.0, 2.0, 3.0, 4.0], &mut out, 2);
 /// assert_eq!(out, [2.0, 4.0, 6.0, 8.0]);
 /// ```
@@ -48,7 +51,7 @@ pub fn add_product_of_rows(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f6
     }
 }
 
-/// Adds a multiple of one row to another.
+/// Adds `factor` times `row` to `out`.
 pub fn add(factor: f64, row: &[f64], out: &mut [f64]) {
     out.iter_mut().zip(row).for_each(|(out, entry)| *out += factor * entry);
 }

@@ -1,20 +1,23 @@
-//! Real signals that are sums of complex exponentials, and what can be known of them exactly.
+//! Real signals that are sums of complex exponentials: values, derivatives,
+//! integrals, bounds and first zeros.
 //!
-//! The motion of a linear system under harmonic forces is
-//! `g(τ) = Re Σ_b c_b B_b(τ)`, where the basis functions `B_b` are
-//! - `e^{s τ}` for the modes of the system and for the harmonics of the drive,
-//! - `(e^{(s+δ) τ} - e^{s τ}) / δ` for a mode `s` that the drive `s + δ` hits (nearly) exactly,
-//! - `1` for constant forces, and `τ, τ²/2` where bodies are free to move.
+//! The response of a linear system to harmonic forces is
+//! `g(τ) = Re Σ_b c_b B_b(τ)`. The basis functions `B_b` are
+//! - `e^{s τ}` for the modes of the system and for the harmonics of the excitation,
+//! - `(e^{(s+δ) τ} - e^{s τ}) / δ` for a mode `s` in (near) resonance with the excitation `s + δ`,
+//! - `1` for constant forces, and `τ, τ²/2` for bodies that are free to move.
 //!
-//! Values, derivatives, integrals and bounds of such a signal are closed forms. The bound on the second derivative gives a step
-//! over which the signal provably has no zero: [`Basis::first_zero`] marches with such steps and therefore misses none.
+//! Values, derivatives, integrals and bounds of such a signal have closed forms. A bound on the
+//! second derivative gives a step without any zero of the signal. [`Basis::first_zero`]
+//! advances by such steps and therefore misses no zero.
 
 use crate::quadrature;
 use num_complex::Complex64;
 
-/// The functions `B_b(τ)` that the signals of one stretch of time share.
+/// The basis functions `B_b(τ)` that all signals of one time interval share.
 ///
-/// Coefficients are ordered: exponentials, resonant pairs, the constant, `τ, τ²/2` if it drifts.
+/// The order of the coefficients is: exponentials, resonant pairs, the
+/// constant, and `τ, τ²/2` if `drifts` is set.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Basis {
     /// Exponents `s`, rad/s.
@@ -23,20 +26,21 @@ pub struct Basis {
     pub resonant: Vec<(Complex64, Complex64)>,
     /// Index into `exponents` of `s + δ` for every resonant pair.
     pub driven_by: Vec<usize>,
-    /// Whether `τ, τ²/2` are among the functions.
+    /// If true, `τ, τ²/2` are among the functions.
     pub drifts: bool,
 }
 
-/// Below this `|δ τ|` the quotient `(e^{δτ} - 1)/δ` loses digits, and its series (to the 4th power) is exact to rounding.
+/// Below this `|δ τ|` the quotient `(e^{δτ} - 1)/δ` loses digits. Its series up
+/// to the 4th power is then exact to rounding.
 const SERIES_BELOW: f64 = 1e-3;
 
-/// `(e^z - 1) / z`, accurate for every `z`.
+/// Returns `(e^z - 1) / z`, accurate for every `z`.
 #[inline]
 fn phi1(z: Complex64) -> Complex64 {
     if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW { phi1_series(z) } else { (z.exp() - 1.0) / z }
 }
 
-/// [`phi1`] where `e^z` is known.
+/// Returns [`phi1`] for a known `e^z`.
 #[inline]
 fn phi1_of(z: Complex64, exp: Complex64) -> Complex64 {
     if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW { phi1_series(z) } else { (exp - 1.0) / z }
@@ -46,63 +50,65 @@ fn phi1_series(z: Complex64) -> Complex64 {
     Complex64::new(1.0, 0.0) + z * (0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0)))
 }
 
-/// Where a march for the first zero ended.
+/// The result of a search for the first zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FirstZero {
-    /// None of the signals vanishes up to the end.
+    /// No signal vanishes before the end.
     None,
     /// Signal `index` reaches zero at `time`.
     At {
-        /// Which signal.
+        /// Index of the signal.
         index: usize,
-        /// When, s.
+        /// Time of the zero, s.
         time: f64,
     },
-    /// The march did not reach the end within the allowed steps: the signals oscillate too fast for the interval.
+    /// The search did not reach the end within the work limit: the signals
+    /// oscillate too fast for the interval.
     TooManySteps,
 }
 
-/// How a monitored signal begins.
+/// The state of a monitored signal at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Begin {
-    /// It is positive at the start.
+    /// The signal is positive.
     Positive,
-    /// It starts from zero and is expected to rise: its first non-vanishing derivative decides.
+    /// The signal is zero and expected to rise. Its first nonzero derivative decides.
     Zero,
 }
 
-/// Steps after which a march gives up. A period of an orbit takes 10 to 100.
+/// Maximum number of steps of a search. A period of an orbit takes 10 to 100.
 const MARCH_STEPS: usize = 100_000;
 
-/// A step is never shorter than this fraction of the interval: about the rounding error of time itself.
+/// Shortest step as a fraction of the interval: about the rounding of the time.
 const TIME_RESOLUTION: f64 = 4e-16;
 
-/// A derivative counts as zero at the start of a signal when it is below this fraction of its own bound; the solution that
-/// leads to it carries rounding errors of about 1e-13.
+/// A derivative of a signal counts as zero at the start if it is below this fraction of its
+/// bound. The solution that leads to it has rounding errors of about 1e-13.
 const VANISHES: f64 = 1e-9;
 
 impl Basis {
-    /// Number of coefficients of a signal.
+    /// Returns the number of coefficients of a signal.
     pub fn len(&self) -> usize {
         self.constant() + if self.drifts { 3 } else { 1 }
     }
-    /// A basis is never empty: it has at least the constant.
+    /// Returns false: every basis contains at least the constant.
     pub fn is_empty(&self) -> bool {
         false
     }
-    /// Index of the constant among the coefficients.
+    /// Returns the index of the constant among the coefficients.
     #[inline]
     pub fn constant(&self) -> usize {
         self.exponents.len() + self.resonant.len()
     }
 
-    /// The basis functions at `time`, into `out` (length [`Basis::len`]).
+    /// Computes the basis functions at `time` into `out` (length [`Basis::len`]).
     #[inline]
     pub fn evaluate(&self, time: f64, out: &mut [Complex64]) {
         self.evaluate_and(time, out, |_, _| {});
     }
 
-    /// As [`Basis::evaluate`]; `size` gets the magnitude of every exponential that decays or grows.
+    /// Computes the basis functions like [`Basis::evaluate`]. `size` receives
+    /// the magnitude of every exponential that decays or grows.
     #[inline]
     pub(crate) fn evaluate_and(&self, time: f64, out: &mut [Complex64], mut size: impl FnMut(usize, f64)) {
         let e = self.exponents.len();
@@ -133,12 +139,13 @@ impl Basis {
         }
     }
 
-    /// The value of a signal at `τ = 0`: exponentials contribute their coefficient, polynomials the constant, resonant pairs nothing.
+    /// Returns the value of a signal at `τ = 0`: the coefficients of the exponentials and of
+    /// the constant. Resonant pairs contribute nothing.
     pub fn beginning(&self, coefficients: &[Complex64]) -> f64 {
         coefficients[..self.exponents.len()].iter().map(|c| c.re).sum::<f64>() + coefficients[self.constant()].re
     }
 
-    /// Coefficients of the derivative of a signal, into `out`.
+    /// Computes the coefficients of the derivative of a signal into `out`.
     #[inline]
     pub fn differentiate(&self, coefficients: &[Complex64], out: &mut [Complex64]) {
         let e = self.exponents.len();
@@ -157,7 +164,8 @@ impl Basis {
         }
     }
 
-    /// Coefficients of `factor · g(time + τ)` as a signal of τ, into `out`; `values` are the basis functions at `time`.
+    /// Computes the coefficients of `factor · g(time + τ)` as a signal of τ into `out`.
+    /// `values` are the basis functions at `time`.
     pub fn shift(
         &self,
         coefficients: &[Complex64],
@@ -185,13 +193,14 @@ impl Basis {
         }
     }
 
-    /// The sizes of the exponents, into `out`.
+    /// Computes the magnitudes of the exponents into `out`.
     pub(crate) fn speeds(&self, out: &mut [f64]) {
         let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
         out.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
     }
 
-    /// Bounds on the sizes of the coefficients of a derivative from those of the signal, into `out`; `speeds` are the sizes of the exponents.
+    /// Computes bounds on the magnitudes of the coefficients of a derivative into `out`.
+    /// `sizes` are those of the signal, and `speeds` are the magnitudes of the exponents.
     #[inline]
     pub(crate) fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
         let (e, c) = (self.exponents.len(), self.constant());
@@ -207,7 +216,7 @@ impl Basis {
         }
     }
 
-    /// Bounds `max |B_b|` over `[0, end]`, into `out`.
+    /// Computes the bounds `max |B_b|` over `[0, end]` into `out`.
     pub(crate) fn magnitudes(&self, end: f64, out: &mut [f64]) {
         let e = self.exponents.len();
         for (value, s) in out[..e].iter_mut().zip(&self.exponents) {
@@ -224,12 +233,13 @@ impl Basis {
         }
     }
 
-    /// The first time in `(0, end]` at which one of the `signals` vanishes.
+    /// Returns the first time in `(0, end]` at which one of the `signals` vanishes.
     ///
-    /// `signals` holds the coefficients one after the other, `begins` says of each how it starts. Every signal is positive until
-    /// then. The march steps over `h` with `g + g' h - max|g''| h²/2 > 0`, so no zero is missed. Where the second derivative is known
-    /// to be milder over such a stretch, from its value and the bound on the third, the step is the longer one that this allows: close to
-    /// a simple zero it converges cubically, from the left. Scratch memory comes from the caller.
+    /// `signals` contains the coefficients of all signals, and `begins` the state of each at
+    /// the start. All signals are positive before the first zero. A step h satisfies
+    /// `g + g' h - max|g''| h²/2 > 0`, so no zero is missed. The value of the second derivative
+    /// and a bound on the third may permit a longer step. Close to a simple zero the steps
+    /// converge cubically, from the left. `scratch` is scratch memory.
     pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
@@ -259,7 +269,7 @@ impl Basis {
         for _ in 0..MARCH_STEPS {
             self.evaluate_and(time, values, |b, size| {
                 if self.exponents[b].re < 0.0 {
-                    magnitudes[b] = size; // from here on it is smaller
+                    magnitudes[b] = size; // it decays from here on
                 }
             });
             let (mut step, mut nearest, mut settled) = (f64::INFINITY, 0, false);
@@ -281,7 +291,7 @@ impl Basis {
                 if safe >= step {
                     continue;
                 }
-                // over twice that step the second derivative is within `change` of its value
+                // Over twice that step the second derivative stays within `change` of its value.
                 let reach = 2.0 * safe;
                 let curvature = real_dot(&second[range.clone()], values);
                 let change = reach * bounded_by(&third_weights[range], magnitudes);
@@ -291,7 +301,7 @@ impl Basis {
                     last_possible = fall(g, slope, curvature + change);
                 }
                 if first_possible < step {
-                    // time itself has no room for more digits
+                    // The interval of the zero is below the resolution of the time.
                     let settled_here = last_possible <= reach && last_possible - first_possible <= resolution;
                     (step, nearest, settled) = (first_possible, k, settled_here);
                 }
@@ -307,14 +317,15 @@ impl Basis {
                 if real_dot(&first[range], values) <= 0.0 {
                     return FirstZero::At { index: nearest, time };
                 }
-                step = resolution; // it touches zero and rises again
+                step = resolution; // the signal touches zero and rises again
             }
             time += step;
         }
         FirstZero::TooManySteps
     }
 
-    /// For a signal that starts at zero, with derivative `slope`: how long it certainly stays positive, or `None` if it falls.
+    /// Returns a time until which a signal that starts at zero stays positive,
+    /// or `None` if it falls. `slope` is its derivative.
     fn rises_until(&self, slope: &[Complex64], magnitudes: &[f64], memory: &mut [Vec<Complex64>; 2]) -> Option<f64> {
         let [current, next] = memory;
         current.clear();
@@ -340,6 +351,7 @@ impl Basis {
         Some(f64::INFINITY) // flat: a contact that stays exactly at its limit
     }
 
+    /// Returns true if a signal has no resonant and no drifting terms.
     fn is_exponential(&self, coefficients: &[Complex64]) -> bool {
         let zero = Complex64::new(0.0, 0.0);
         let c = self.constant();
@@ -347,12 +359,14 @@ impl Basis {
     }
 }
 
-/// Integrals of products of the signals of one basis over one stretch of time, in closed form for exponentials: with `e_b` the exponentials
-/// and the constant, the integrals `∫ e_b e_c dτ` and `∫ e_b e_c* dτ` serve all signals.
+/// Integrals of products of two signals over one time interval, in closed form for exponentials.
+///
+/// With `e_b` the exponentials and the constant, the integrals `∫ e_b e_c dτ` and
+/// `∫ e_b e_c* dτ` serve all signals of a basis.
 #[derive(Debug, Clone, Default)]
 pub struct Products {
     length: f64,
-    /// Number of exponentials and the constant.
+    /// Number of exponentials plus one for the constant.
     terms: usize,
     /// `∫ e_b e_c dτ`, terms × terms.
     plain: Vec<Complex64>,
@@ -361,7 +375,8 @@ pub struct Products {
 }
 
 impl Products {
-    /// Integrals over `[0, length]`; `at_end` are the basis functions at `length`.
+    /// Computes the integrals over `[0, length]`. `at_end` contains the basis
+    /// functions at `length`.
     pub fn new(basis: &Basis, at_end: &[Complex64], length: f64) -> Self {
         let (e, zero, one) = (basis.exponents.len(), Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
         let terms = e + 1;
@@ -382,7 +397,7 @@ impl Products {
         Products { length, terms, plain, mixed }
     }
 
-    /// `∫ g h dτ`
+    /// Returns `∫ g h dτ`.
     pub fn integral(&self, basis: &Basis, g: &[Complex64], h: &[Complex64]) -> f64 {
         if !(basis.is_exponential(g) && basis.is_exponential(h)) {
             return quadrature((basis, g), (basis, h), self.length);
@@ -407,17 +422,19 @@ impl Products {
     }
 }
 
-/// Fourier integrals `∫ g e^{-jντ} dτ` of the signals of one basis over one stretch of time, in closed form for exponentials.
+/// Fourier integrals `∫ g e^{-jντ} dτ` of signals over one time interval, in
+/// closed form for exponentials.
 #[derive(Debug, Clone, Default)]
 pub struct FourierIntegrals {
     nu: f64,
     length: f64,
-    /// `∫ e_b e^{-jντ} dτ` and `∫ e_b* e^{-jντ} dτ` of the exponentials and the constant.
+    /// `∫ e_b e^{-jντ} dτ` and `∫ e_b* e^{-jντ} dτ` for the exponentials and the constant.
     terms: Vec<(Complex64, Complex64)>,
 }
 
 impl FourierIntegrals {
-    /// Integrals over `[0, length]` at `nu` (rad/s); `at_end` are the basis functions at `length`.
+    /// Computes the integrals over `[0, length]` at `nu` (rad/s). `at_end`
+    /// contains the basis functions at `length`.
     pub fn new(basis: &Basis, at_end: &[Complex64], nu: f64, length: f64) -> Self {
         let (sin, cos) = (nu * length).sin_cos();
         let (rate, turn) = (Complex64::new(0.0, -nu), Complex64::new(cos, -sin));
@@ -429,7 +446,7 @@ impl FourierIntegrals {
         FourierIntegrals { nu, length, terms: terms.collect() }
     }
 
-    /// `∫ g e^{-jντ} dτ`
+    /// Returns `∫ g e^{-jντ} dτ`.
     pub fn integral(&self, basis: &Basis, g: &[Complex64]) -> Complex64 {
         if !basis.is_exponential(g) {
             let probe = Basis { exponents: vec![Complex64::new(0.0, self.nu)], ..Basis::default() };
@@ -446,11 +463,13 @@ impl FourierIntegrals {
     }
 }
 
-/// Those of a panel.
+/// Quadrature nodes and weights of a panel.
 const NODES: [(f64, f64); 8] = quadrature::outwards(quadrature::EIGHT);
-/// A panel of the quadrature spans at most this phase of the fastest exponential: the 8-point rule is exact to rounding there.
+/// Maximum phase of the fastest exponential in a panel of the quadrature, up to
+/// which the 8-point rule is exact to rounding.
 const PANEL_PHASE: f64 = 1.0;
 
+/// Returns `∫ g h dτ` over `[0, length]` by Gauss-Legendre quadrature in panels.
 fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Complex64]), length: f64) -> f64 {
     let fastest = g_basis.exponents.iter().chain(&h_basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
     let panels = (2.0 * fastest * length / PANEL_PHASE).ceil().clamp(1.0, 1e5) as usize;
@@ -470,7 +489,8 @@ fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Com
     0.5 * width * sum
 }
 
-/// The first positive root of `g + slope h + curvature h²/2`, `g > 0`, in the form that does not cancel.
+/// Returns the first positive root of `g + slope h + curvature h²/2`, `g > 0`,
+/// in the form without cancellation.
 #[inline]
 fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
     let square = slope * slope - 2.0 * curvature * g;
@@ -481,25 +501,26 @@ fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
     if slope < 0.0 { 2.0 * g / (root - slope) } else { (slope + root) / -curvature }
 }
 
-/// Bound of a signal from the sizes of its coefficients and those of the basis functions.
+/// Returns a bound of a signal from the magnitudes of its coefficients and of the basis functions.
 #[inline]
 pub(crate) fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
     weights.iter().zip(magnitudes).map(|(w, m)| w * m).sum()
 }
 
-/// Size of a coefficient; no overflow here, so that `hypot` would only cost.
+/// Returns the magnitude of a coefficient. Overflow cannot occur here, so the
+/// slower `hypot` is not needed.
 #[inline]
 pub fn size_of(c: &Complex64) -> f64 {
     c.norm_sqr().sqrt()
 }
 
-/// `Re Σ c_b B_b`.
+/// Returns `Re Σ c_b B_b`.
 #[inline]
 pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
     coefficients.iter().zip(values).map(|(c, v)| c.re * v.re - c.im * v.im).sum()
 }
 
-/// Memory of [`Basis::first_zero`], kept between calls.
+/// Scratch memory of [`Basis::first_zero`], reused between calls.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     values: Vec<Complex64>,
@@ -535,13 +556,14 @@ mod tests {
         Complex64::new(re, im)
     }
 
-    /// cos τ - 0.999 touches zero narrowly: both crossings are found, and 1.001 - cos τ has none.
+    /// 0.999 - cos τ dips narrowly below zero, and the search finds it.
+    /// 1.000001 - cos τ has no zero.
     #[test]
     fn narrow_dips_are_found_and_near_misses_are_not_zeros() {
         let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
         let mut scratch = Scratch::default();
         let dip = [c(-1.0, 0.0), c(0.999, 0.0)];
-        // starts below zero at τ = 0, so shift: g(τ) = 0.999 - cos(τ + 1)
+        // At τ = 0 the signal is below zero, so it is shifted: g(τ) = 0.999 - cos(τ + 1).
         let shifted = [dip[0] * c(0.0, 1.0).exp(), dip[1]];
         let FirstZero::At { time, .. } = basis.first_zero(&shifted, &[Begin::Positive], 10.0, &mut scratch) else {
             panic!("a zero was missed");
@@ -551,7 +573,8 @@ mod tests {
         assert_eq!(basis.first_zero(&near_miss, &[Begin::Positive], 100.0, &mut scratch), FirstZero::None);
     }
 
-    /// A signal that leaves zero is not taken for one that returns to it: 1 - cos τ starts with two vanishing derivatives.
+    /// A signal that starts at zero and rises has no zero there: 1 - cos τ
+    /// starts with a zero value and a zero slope.
     #[test]
     fn a_start_at_zero_is_no_zero() {
         let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
@@ -570,7 +593,8 @@ mod tests {
         );
     }
 
-    /// Products of exponentials, polynomials and resonant terms against each other: closed form and quadrature agree.
+    /// The closed-form integrals agree with quadrature, and the derivatives of
+    /// the basis functions with differences.
     #[test]
     fn integrals_agree_with_quadrature() {
         let (s, delta) = (c(-0.1, 2.0), c(0.1, 1e-7));
@@ -588,7 +612,7 @@ mod tests {
         let probe = Basis { exponents: vec![c(0.0, nu)], ..Basis::default() };
         let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero]), 3.0);
         assert!((of - c(part(c(1.0, 0.0)), -part(c(0.0, -1.0)))).norm() < 1e-13 * of.norm(), "{of}");
-        // derivative of every basis function, by differences
+        // The derivative of every basis function, by differences.
         for b in 0..basis.len() {
             let mut unit = vec![zero; basis.len()];
             unit[b] = c(0.8, -0.6);

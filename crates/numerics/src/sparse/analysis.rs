@@ -1,4 +1,4 @@
-//! What is known of a factor before any number, and the factors made with it.
+//! Symbolic analysis of sparse matrices, and the factors made from it.
 
 use super::factor::{ComplexFactor, Factor, Singular};
 use super::matrix::Matrix;
@@ -6,9 +6,10 @@ use super::pattern::Pattern;
 use num_complex::Complex64;
 use std::sync::Arc;
 
-/// The common pattern of some matrices, ordered for elimination.
+/// The common pattern of several matrices, ordered for elimination.
 ///
-/// Any sum of these matrices is factored by it, as often as one likes: `K - ω² M` for every shift, `K - ω² M + jω C` for every frequency.
+/// It serves to factor any sum of these matrices, any number of times: `K - ω² M` for every
+/// shift, `K - ω² M + jω C` for every frequency.
 ///
 /// # Example
 /// ```
@@ -18,7 +19,7 @@ use std::sync::Arc;
 /// let k = Matrix::from_triplets(3, k).unwrap();
 /// let m = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
 /// let analysis = Analysis::new(&[&k, &m]);
-/// // as many pivots are negative as there are eigenvalues below the shift
+/// // the number of negative pivots is the number of eigenvalues below the shift
 /// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative(), 1);
 /// assert_eq!(analysis.factor(&[(1.0, &k), (-2.1, &m)]).unwrap().negative(), 2);
 /// let mut x = [1.0, 0.0, 0.0];
@@ -31,35 +32,40 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Of matrices of one size. The pattern need not be symmetric; its mirror image is added.
+    /// Analyses matrices of one size. A pattern need not be symmetric: the
+    /// mirrored entries are added.
     ///
     /// # Panics
-    /// If the matrices have different sizes, or factors that 32 bits do not count.
+    /// If the matrices differ in size, or if the entries of the factor exceed the 32-bit indices.
     pub fn new(matrices: &[&Matrix]) -> Self {
         Analysis { pattern: Arc::new(Pattern::new(matrices)) }
     }
 
-    /// Of other matrices of the same size in the order of this one. Any order will do; where their entries stand among those that were analysed, it is
-    /// as good for them as for those, and seeking one of their own takes longer than a factor of few entries.
+    /// Analyses other matrices of the same size, with the elimination order of this analysis.
+    ///
+    /// Any order is valid. It is as good as for the analysed matrices if the entries lie within
+    /// their pattern. A new order takes longer than a factor of few entries.
     ///
     /// # Panics
-    /// If the matrices have another size, or factors that 32 bits do not count.
+    /// If the matrices have another size, or if the entries of the factor
+    /// exceed the 32-bit indices.
     #[must_use]
     pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
         Analysis { pattern: Arc::new(self.pattern.in_order(matrices)) }
     }
 
-    /// Rows, and columns.
+    /// Returns the number of rows and columns.
     pub fn n(&self) -> usize {
         self.pattern.n
     }
 
-    /// Entries of a real factor: eight bytes each.
+    /// Returns the number of entries of a real factor, eight bytes each.
     pub fn fill(&self) -> usize {
         if self.pattern.n == 0 { 0 } else { self.pattern.real().cholesky.len_val() }
     }
 
-    /// Memory of the factor of a symmetric complex sum, bytes: real and imaginary parts stand in blocks of two rows and columns.
+    /// Returns the memory of the factor of a symmetric complex sum, bytes. Real and imaginary
+    /// parts form blocks of two rows and two columns.
     pub fn complex_bytes(&self) -> usize {
         if self.pattern.n == 0 {
             return 0;
@@ -67,25 +73,28 @@ impl Analysis {
         size_of::<f64>() * (self.pattern.complex().cholesky.len_val() + 2 * self.pattern.n)
     }
 
-    /// Factors the sum of symmetric matrices with real factors, `L D Lᵀ`; of every matrix the lower triangle counts.
+    /// Factors a sum of symmetric matrices as `L D Lᵀ` in real numbers. Only
+    /// the lower triangle of each matrix is read.
     ///
     /// # Errors
     /// [`Singular`] if the sum is singular to rounding.
     ///
     /// # Panics
-    /// If an entry stands where none of the analysed matrices has one.
+    /// If an entry lies outside the analysed pattern.
     pub fn factor(&self, sum: &[(f64, &Matrix)]) -> Result<Factor, Singular> {
         Factor::new(&self.pattern, sum, vec![])
     }
 
-    /// Factors the sum of matrices with complex factors. Symmetric sums take `L D Lᵀ`, others, and those that it does not factor accurately, an
-    /// elimination with row exchanges, which takes a few times as long.
+    /// Factors a sum of matrices in complex numbers.
+    ///
+    /// A symmetric sum is factored as `L D Lᵀ`. A sum that is not symmetric, or whose factor is not
+    /// accurate, gets an LU factorization with row exchanges. This takes a few times as long.
     ///
     /// # Errors
     /// [`Singular`] if the sum is singular to rounding.
     ///
     /// # Panics
-    /// If an entry stands where none of the analysed matrices has one.
+    /// If an entry lies outside the analysed pattern.
     pub fn factor_complex(&self, sum: &[(Complex64, &Matrix)]) -> Result<ComplexFactor, Singular> {
         ComplexFactor::new(&self.pattern, self.pattern.sum(sum))
     }

@@ -1,14 +1,14 @@
-//! Vectors of one length side by side in one slice, and their products.
+//! Products with blocks of vectors, stored column by column in one slice.
 
 use super::matrix::Matrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
-/// `Vᵀ W` of columns of length `n`.
+/// Returns `Vᵀ W` of columns of length `n`.
 ///
 /// # Panics
-/// If a length is no multiple of `n`.
+/// If a length is not a multiple of `n`.
 ///
 /// # Example
 /// ```
@@ -32,10 +32,11 @@ pub fn products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
     product
 }
 
-/// `W += factor V S` of columns of length `n`.
+/// Computes `W += factor V S` of columns of length `n`.
 ///
 /// # Panics
-/// If a length is no multiple of `n`, or `S` has not a row for every column of V and a column for every one of W.
+/// If a length is not a multiple of `n`. Also if `S` does not have a row for
+/// every column of V and a column for every column of W.
 pub fn add(n: usize, w: &mut [f64], factor: f64, v: &[f64], s: &DMatrix<f64>) {
     let (inner, columns) = (count(n, v), count(n, w));
     assert_eq!(s.shape(), (inner, columns), "a combination of {inner} columns to {columns}");
@@ -51,10 +52,10 @@ pub fn add(n: usize, w: &mut [f64], factor: f64, v: &[f64], s: &DMatrix<f64>) {
     }
 }
 
-/// `V S` of columns of length `n`.
+/// Returns `V S` of columns of length `n`.
 ///
 /// # Panics
-/// As [`add`].
+/// Under the conditions of [`add`].
 pub fn combination(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
     let mut w = vec![0.0; n * s.ncols()];
     add(n, &mut w, 1.0, v, s);
@@ -62,10 +63,10 @@ pub fn combination(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
 }
 
 impl Matrix {
-    /// `A V` of columns of length n.
+    /// Returns `A V` of columns of length n.
     ///
     /// # Panics
-    /// If the length of `v` is no multiple of n.
+    /// If the length of `v` is not a multiple of n.
     pub fn times_columns(&self, v: &[f64]) -> Vec<f64> {
         let n = self.n();
         let all = count(n, v);
@@ -84,7 +85,8 @@ impl Matrix {
         product
     }
 
-    /// The same of `N` columns at once, the last ones filled up with zeros: row by row, so that an entry meets its row of all columns side by side.
+    /// Computes `A V` for `N` columns at once, with zeros in place of missing columns. The columns
+    /// are stored row by row, so an entry meets one row of all columns in consecutive memory.
     fn times_side_by_side<const N: usize>(&self, v: &[f64], product: &mut [f64]) {
         let n = self.n();
         if v.is_empty() {
@@ -110,11 +112,11 @@ impl Matrix {
     }
 }
 
-/// Adds a column of a matrix, times the numbers of its row of N columns, to N columns side by side.
+/// Adds a matrix column times `from` to `to`: N products at once.
 #[inline]
 fn add_column<const N: usize>(from: [f64; N], rows: &[u32], values: &[f64], to: &mut [[f64; N]]) {
     for (&row, &value) in rows.iter().zip(values) {
-        // whole arrays, of which the compiler knows that none is a part of another, go through wide registers
+        // Copied arrays cannot overlap, so the compiler uses vector registers.
         let to = &mut to[row as usize];
         let mut sum = *to;
         for k in 0..N {
@@ -124,10 +126,10 @@ fn add_column<const N: usize>(from: [f64; N], rows: &[u32], values: &[f64], to: 
     }
 }
 
-/// Columns that a sparse matrix is multiplied with at once: the entries are read once for all of them.
+/// Number of columns multiplied at once: the entries are read once for all of them.
 const TOGETHER: usize = 8;
 
-/// How many columns of length `n`.
+/// Returns the number of columns of length `n`.
 fn count(n: usize, v: &[f64]) -> usize {
     if n == 0 {
         assert!(v.is_empty(), "{} numbers are no columns of length zero", v.len());
@@ -141,7 +143,7 @@ fn count(n: usize, v: &[f64]) -> usize {
 mod tests {
     use super::*;
 
-    /// Columns side by side are the same columns, to the last bit.
+    /// Columns multiplied together have the same bits as columns multiplied alone.
     #[test]
     fn columns_together_are_columns_alone() {
         let n = 9;

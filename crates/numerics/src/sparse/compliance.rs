@@ -1,7 +1,7 @@
-//! What forces move where they act, `Fᵀ A⁻¹ F`: by half of a solution.
+//! Compliance at loaded rows, `Fᵀ A⁻¹ F`, by a forward substitution only.
 //!
-//! With `A = L D Lᵀ` this is `Yᵀ D⁻¹ Y` of `L Y = F`, and where a force acts on few rows, Y has entries only on their way to the root of the tree of
-//! elimination.
+//! With `A = L D Lᵀ` this is `Yᵀ D⁻¹ Y` with `L Y = F`. If a force acts on few rows, Y has
+//! entries only on the paths from these rows to the root of the elimination tree.
 
 use super::factor::Factor;
 use faer::linalg::matmul::matmul;
@@ -10,10 +10,10 @@ use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
 impl Factor {
-    /// `Fᵀ A⁻¹ F` of columns F that have few entries each, by their (row, value).
+    /// Returns `Fᵀ A⁻¹ F` for columns F with few entries each, given as (row, value).
     ///
     /// # Panics
-    /// If an entry lies outside.
+    /// If an entry lies outside the matrix.
     ///
     /// # Example
     /// ```
@@ -27,7 +27,7 @@ impl Factor {
         let k = forces.len();
         let mut compliance = DMatrix::zeros(k, k);
         let Some(parts) = self.parts() else { return compliance };
-        // the rows of Y side by side, in the order of elimination
+        // The rows of Y in elimination order, k numbers each.
         let mut y = vec![0.0; self.n() * k];
         let mut moved = vec![false; self.n()];
         for (column, force) in forces.iter().enumerate() {
@@ -84,7 +84,7 @@ mod tests {
     use crate::sparse::{Analysis, Matrix};
     use nalgebra::DMatrix;
 
-    /// Of matrices with pivots of one and of two rows, against whole solutions.
+    /// Matrices with pivots of one and of two rows, compared with full solutions.
     #[test]
     fn half_a_solution_against_a_whole_one() {
         let n = 90;

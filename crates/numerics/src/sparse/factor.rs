@@ -1,4 +1,4 @@
-//! Factors of sparse matrices, and what they solve.
+//! Real and complex factors of sparse matrices, and their solutions.
 
 use super::matrix::Matrix;
 use super::pattern::{Pattern, Symbolic};
@@ -14,25 +14,27 @@ use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
 use num_complex::Complex64;
 use std::sync::Arc;
 
-/// A pivot of a real factor below this share of the largest entry of its row is rounding: it is what is left of entries that cancelled.
+/// A pivot of a real factor below this fraction of the largest entry of its row
+/// is the rounding of entries that cancelled.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Error of a solution with known result, relative to matrix times solution, up to which elimination without exchanges between blocks counts
-/// as accurate: 1e-15 is usual.
+/// Largest error of a test solution, relative to matrix times solution, at which a factor
+/// without exchanges between supernodes is accurate; 1e-15 is usual.
 const ACCURATE: f64 = 1e-12;
-/// Addition to the diagonal, relative to the largest entry, by which the motion is found that a singular matrix leaves free.
+/// Addition to the diagonal of a singular matrix, relative to its largest
+/// entry, with which its null vector is computed.
 const NUDGE: f64 = 1e-9;
 
-/// A matrix that is singular to rounding.
+/// Error: the matrix is singular to rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the matrix is singular: row {row} (from 0) depends on the others; hold what it belongs to, or shift the matrix"
 )]
 pub struct Singular {
-    /// A row of what nothing holds, from 0.
+    /// A row with a free motion, from 0.
     pub row: usize,
 }
 
-/// `A = L D Lᵀ` of a real symmetric matrix.
+/// The factor `A = L D Lᵀ` of a real symmetric matrix.
 #[derive(Debug, Clone)]
 pub struct Factor {
     pattern: Arc<Pattern>,
@@ -40,7 +42,7 @@ pub struct Factor {
     negative: usize,
 }
 
-/// A complex matrix, factored.
+/// The factor of a complex matrix.
 #[derive(Debug, Clone)]
 pub struct ComplexFactor {
     pattern: Arc<Pattern>,
@@ -54,11 +56,11 @@ enum Kind {
     Empty,
 }
 
-/// The numbers of `L D Lᵀ`: D has pivots of one and of two rows, exchanged inside the blocks of columns.
+/// The numbers of `L D Lᵀ`. D has 1 × 1 and 2 × 2 pivots, with exchanges inside the supernodes.
 #[derive(Debug, Clone)]
 struct Blocks {
     values: Vec<f64>,
-    /// Off the diagonal of D.
+    /// Off-diagonal entries of D.
     beside: Vec<f64>,
     order: Vec<u32>,
     inverse: Vec<u32>,
@@ -85,7 +87,7 @@ impl Factor {
         let (mut negative, mut weak) = (0, None);
         factor.blocks.pivots(symbolic, |row, pivot| {
             negative += usize::from(pivot < 0.0);
-            // a number that is none is no pivot either
+            // NaN is not a valid pivot.
             if !(pivot.abs() > ROUNDING * largest[row] && pivot.is_finite()) && weak.is_none() {
                 weak = Some(row);
             }
@@ -97,40 +99,42 @@ impl Factor {
         Ok(factor)
     }
 
-    /// Of another sum of the matrices analysed, in the memory of this factor: what [`Analysis::factor`](super::Analysis::factor) gives, without asking for
-    /// memory first, which takes a fifth of the time of a large one.
+    /// Factors another sum of the analysed matrices in the memory of this factor, like
+    /// [`Analysis::factor`](super::Analysis::factor).
+    ///
+    /// Allocation takes a fifth of the time of a large factor.
     ///
     /// # Errors
     /// [`Singular`] if the sum is singular to rounding.
     ///
     /// # Panics
-    /// If an entry stands where none of the analysed matrices has one.
+    /// If an entry lies outside the analysed pattern.
     pub fn again(self, sum: &[(f64, &Matrix)]) -> Result<Self, Singular> {
         Factor::new(&self.pattern, sum, self.blocks.values)
     }
 
-    /// Rows, and columns.
+    /// Returns the number of rows and columns.
     pub fn n(&self) -> usize {
         self.pattern.n
     }
 
-    /// The blocks of columns; none of a matrix without rows.
+    /// Returns the supernodes, or `None` for a matrix without rows.
     pub(super) fn parts(&self) -> Option<SupernodalIntranodeLbltRef<'_, u32, f64>> {
         (self.pattern.n > 0).then(|| self.blocks.parts(self.pattern.real()))
     }
 
-    /// Where a row of the matrix stands in the order of elimination.
+    /// Returns the place of a row of the matrix in the elimination order.
     pub(super) fn place(&self, row: usize) -> usize {
         let at = self.pattern.real().cholesky.perm().map_or(row, |order| order.arrays().1[row] as usize);
         self.exchanged(at)
     }
 
-    /// Where a row of the blocks stands after the exchanges inside of them.
+    /// Returns the place of a row of the supernodes after the exchanges inside them.
     pub(super) fn exchanged(&self, row: usize) -> usize {
         self.blocks.inverse[row] as usize
     }
 
-    /// Divides rows of length `k` side by side by the pivots of the block that begins with row `first`.
+    /// Divides rows of length `k` by the pivots of the supernode that begins with row `first`.
     pub(super) fn divide_by_pivots(&self, first: usize, block: MatRef<'_, f64>, rows: &mut [f64], k: usize) {
         let mut at = 0;
         while at < block.ncols() {
@@ -141,7 +145,7 @@ impl Factor {
                 continue;
             }
             let c = block[(at + 1, at + 1)];
-            // by the entry beside the diagonal, which is the largest
+            // Divide by the off-diagonal entry first, which is the largest.
             let (a, c) = (a / b, c / b);
             let scale = 1.0 / (b * (a * c - 1.0));
             let (upper, lower) = rows[at * k..(at + 2) * k].split_at_mut(k);
@@ -152,18 +156,20 @@ impl Factor {
         }
     }
 
-    /// How many pivots are negative: as many as the matrix has negative eigenvalues. Of `K - ω² M` with M positive definite these are the
-    /// natural frequencies below ω.
+    /// Returns the number of negative pivots, which is the number of negative
+    /// eigenvalues of the matrix.
+    ///
+    /// For `K - ω² M` with M positive definite it is the number of natural frequencies below ω.
     ///
     /// Source: Sylvester's law of inertia.
     pub fn negative(&self) -> usize {
         self.negative
     }
 
-    /// Solves in place for right sides of length n, one after the other.
+    /// Solves in place for right sides of length n, stored consecutively.
     ///
     /// # Panics
-    /// If the length of `right` is no multiple of n.
+    /// If the length of `right` is not a multiple of n.
     pub fn solve(&self, right: &mut [f64]) {
         let n = self.pattern.n;
         if n == 0 || right.is_empty() {
@@ -175,7 +181,7 @@ impl Factor {
 }
 
 impl ComplexFactor {
-    /// Memory of its numbers, bytes; roughly, where rows were exchanged.
+    /// Returns the memory of the factor, bytes; an estimate if rows were exchanged.
     pub fn bytes(&self) -> usize {
         match &self.kind {
             Kind::Symmetric(blocks) => size_of::<f64>() * (blocks.values.len() + blocks.beside.len()),
@@ -202,10 +208,10 @@ impl ComplexFactor {
         Err(Singular { row: factor.free_row(values) })
     }
 
-    /// Solves in place for right sides of length n, one after the other.
+    /// Solves in place for right sides of length n, stored consecutively.
     ///
     /// # Panics
-    /// If the length of `right` is no multiple of n.
+    /// If the length of `right` is not a multiple of n.
     pub fn solve(&self, right: &mut [Complex64]) {
         let n = self.pattern.n;
         if n == 0 || right.is_empty() {
@@ -216,7 +222,7 @@ impl ComplexFactor {
             Kind::Symmetric(blocks) => {
                 let mut parts: Vec<f64> = right.iter().flat_map(|z| [z.re, z.im]).collect();
                 blocks.solve(self.pattern.complex(), &mut parts);
-                // the real form gives the conjugate
+                // The real form gives the conjugate.
                 for (z, part) in right.iter_mut().zip(parts.chunks_exact(2)) {
                     *z = Complex64::new(part[0], -part[1]);
                 }
@@ -236,10 +242,11 @@ impl ComplexFactor {
         }
     }
 
-    /// Error of a solution whose result is known, relative to matrix times solution: how far from the matrix the factors are.
+    /// Returns the error of a solution for a known right side, relative to matrix times
+    /// solution: the accuracy of the factor.
     fn error(&self, values: &[Complex64]) -> f64 {
         let n = self.pattern.n;
-        // entries without a pattern
+        // Entries without a pattern.
         let right: Vec<Complex64> =
             (0..n).map(|i| Complex64::new((i as f64 * 0.7 + 1.0).sin(), (i as f64 * 1.3 + 0.4).cos())).collect();
         let mut x = right.clone();
@@ -254,11 +261,12 @@ impl ComplexFactor {
         }
         let off = left.iter().zip(&right).map(|(l, r)| (l - r).norm());
         let share = off.zip(&size).map(|(off, size)| off / (size + 1.0));
-        // what is not a number is no small error
+        // NaN counts as an infinite error.
         share.fold(0.0, |most, share| if share.is_finite() { share.max(most) } else { f64::INFINITY })
     }
 
-    /// Where the motion is largest that a singular matrix leaves free: inverse iteration beside the matrix.
+    /// Returns the row with the largest motion in the null vector of a singular matrix, by
+    /// inverse iteration with a slightly shifted matrix.
     fn free_row(&self, mut values: Vec<Complex64>) -> usize {
         let pattern = &self.pattern;
         let largest = values.iter().fold(0.0f64, |m, v| m.max(v.norm()));
@@ -274,7 +282,7 @@ impl ComplexFactor {
     }
 }
 
-/// Elimination with row exchanges.
+/// Factors with row exchanges.
 fn exchanged(pattern: &Pattern, values: &[Complex64]) -> Box<NumericLu<u32, Complex64>> {
     let n = pattern.n;
     let symbolic = pattern.unsymmetric();
@@ -286,21 +294,21 @@ fn exchanged(pattern: &Pattern, values: &[Complex64]) -> Box<NumericLu<u32, Comp
     if let Err(error) =
         symbolic.factorize_numeric_lu(&mut numeric, matrix, Par::Seq, MemStack::new(&mut memory), params).map(|_| ())
     {
-        // the diagonal is part of every pattern, so that each column has a pivot
+        // The diagonal is part of every pattern, so each column has a pivot.
         panic!("{n} rows, {} entries: {error:?}", values.len());
     }
     numeric
 }
 
 impl Blocks {
-    /// Of the lower triangle, in memory that another one had, if any.
+    /// Factors the lower triangle, in the memory of an earlier factor if its size fits.
     fn new(symbolic: &Symbolic, lower: &[f64], mut memory: Vec<f64>) -> Self {
         let cholesky = &symbolic.cholesky;
         let n = cholesky.nrows();
         let params = Spec::<LbltParams, f64>::default();
         let mut scratch = MemBuffer::new(cholesky.factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, params));
         if memory.len() != cholesky.len_val() {
-            // zeros that nobody has written yet
+            // Zeroed memory that the system need not touch yet.
             memory = vec![0.0; cholesky.len_val()];
         }
         let mut blocks = Blocks { values: memory, beside: vec![0.0; n], order: vec![0; n], inverse: vec![0; n] };
@@ -342,7 +350,7 @@ impl Blocks {
         SupernodalIntranodeLbltRef::new(supernodal, &self.values, &self.beside, exchanges)
     }
 
-    /// Tells `each` the eigenvalues of D, with a row that they belong to.
+    /// Calls `each` with a row and the eigenvalue of D that belongs to it.
     fn pivots(&self, symbolic: &Symbolic, mut each: impl FnMut(usize, f64)) {
         let parts = self.parts(symbolic);
         let row = |at: usize| match symbolic.cholesky.perm() {
@@ -362,7 +370,8 @@ impl Blocks {
                 }
                 let c = values[(k + 1, k + 1)];
                 let (mean, radius) = (0.5 * (a + c), (0.5 * (a - c)).hypot(b));
-                // the eigenvalue of the larger magnitude, and the other by the determinant: no difference of large numbers
+                // Compute the eigenvalue of larger magnitude first. The determinant gives the
+                // other one without a difference of large numbers.
                 let large = if mean < 0.0 { mean - radius } else { mean + radius };
                 each(row(first + k), large);
                 each(row(first + k + 1), (a * c - b * b) / large);
@@ -387,7 +396,7 @@ impl Pattern {
         })
     }
 
-    /// The lower triangle of `[Re Im; Im -Re]`.
+    /// Returns the lower triangle of `[Re Im; Im -Re]`.
     fn doubled(&self, values: &[Complex64]) -> Vec<f64> {
         let mut lower = Vec::with_capacity(2 * values.len());
         for column in 0..self.n {
@@ -413,7 +422,7 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
-    /// Springs of stiffness one between neighbours and, `held`, to the walls at both ends.
+    /// Springs of stiffness one between neighbours and, if `held`, to walls at both ends.
     fn chain(n: usize, held: bool) -> Matrix {
         let between = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
         let walls = [(0, 0, f64::from(u8::from(held))), (n - 1, n - 1, f64::from(u8::from(held)))];
@@ -424,7 +433,8 @@ mod tests {
         Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap()
     }
 
-    /// Springs between the neighbours of a cube of `side`³ nodes, the ground behind one face.
+    /// Springs between the neighbours of a cube of `side`³ nodes. One face is
+    /// connected to the ground.
     fn brick(side: usize) -> Matrix {
         let at = |x: usize, y: usize, z: usize| (x * side + y) * side + z;
         let mut entries = Vec::new();
@@ -450,7 +460,8 @@ mod tests {
         full
     }
 
-    /// Between the frequencies `4 sin²(π k / 2 (n + 1))` of a chain between walls there are as many below as there should be.
+    /// Between two frequencies `4 sin²(π k / 2 (n + 1))` of a chain between
+    /// walls, the count below is exact.
     #[test]
     fn the_frequencies_of_a_chain_are_counted() {
         for n in [1, 2, 3, 40, 257] {
@@ -465,7 +476,7 @@ mod tests {
         }
     }
 
-    /// The static deflection of a chain under a force in it is two straight lines.
+    /// The static deflection of a chain under a force on one mass consists of two straight lines.
     #[test]
     fn the_deflection_of_a_chain() {
         let n = 1000;
@@ -476,7 +487,7 @@ mod tests {
         (x[0], x[n + 399]) = (1.0, 1.0);
         factor.solve(&mut x);
         let line = |at: f64, i: f64| if i <= at { i * (1001.0 - at) / 1001.0 } else { at * (1001.0 - i) / 1001.0 };
-        // condition 4 (n / π)², times the rounding of the largest deflection
+        // Condition number 4 (n / π)², times the rounding of the largest deflection.
         let rounding = 4.0 * 1e6 / 9.9 * f64::EPSILON * 240.0;
         for i in 0..n {
             assert!((x[i] - line(1.0, i as f64 + 1.0)).abs() < rounding);
@@ -484,12 +495,13 @@ mod tests {
         }
     }
 
-    /// What nothing holds is singular, and the row is one of it; a soft spring beside stiff ones holds.
+    /// A part without support is singular, and the reported row belongs to it.
+    /// A soft spring next to stiff ones is a support.
     #[test]
     fn what_is_free_is_named() {
         let n = 50;
         for first in [0, 20] {
-            // masses from `first` on are held by nobody, the others by a wall
+            // Masses from `first` on have no support; the others have a wall.
             let mut entries: Vec<_> =
                 chain(n, false).entries().filter(|(i, k, _)| (*i < first) == (*k < first)).collect();
             if first > 0 {
@@ -510,7 +522,8 @@ mod tests {
         assert_eq!(complex.unwrap_err(), Singular { row: 1 });
     }
 
-    /// Dynamic stiffness with symmetric and with gyroscopic damping, against the dense solution.
+    /// Dynamic stiffness with symmetric and with gyroscopic damping, compared
+    /// with the dense solution.
     #[test]
     fn dynamic_stiffness_against_dense() {
         for (k, gyroscopic) in [(brick(4), false), (brick(4), true), (chain(64, true), false), (chain(64, true), true)]
@@ -539,7 +552,8 @@ mod tests {
         }
     }
 
-    /// Masses on the diagonal only by their coupling: pivots of two rows, which have one negative eigenvalue each.
+    /// Zero diagonal with coupled pairs of rows: pivots of two rows, each with
+    /// one negative eigenvalue.
     #[test]
     fn zeros_on_the_diagonal() {
         let n = 60;
@@ -561,7 +575,7 @@ mod tests {
         assert_eq!(analysis.fill(), 0);
     }
 
-    /// Same input, same bits, on any thread; and one order of elimination serves every shift.
+    /// Same input, same bits, on any thread. One elimination order serves every shift.
     #[test]
     fn same_bits_on_every_thread() {
         let solve = || {
@@ -579,7 +593,8 @@ mod tests {
     }
 
     proptest! {
-        /// Of random symmetric matrices: solutions, and negative eigenvalues, are those of the dense ones.
+        /// Random symmetric matrices: solutions and numbers of negative
+        /// eigenvalues agree with the dense ones.
         #[test]
         fn random_matrices(entries in proptest::collection::vec((0usize..30, 0usize..30, -1.0f64..1.0), 20..200)) {
             let both = entries.iter().flat_map(|&(i, k, v)| [(i, k, v), (k, i, v)]);

@@ -1,19 +1,20 @@
-//! A square sparse matrix, by columns.
+//! A square sparse matrix in compressed column storage.
 
 use num_complex::Complex64;
 use std::ops::Range;
 
-/// Rows and entries are counted in 32 bits, which halves the memory of the pattern.
+/// Maximum number of rows and entries. Indices have 32 bits, which halves the
+/// memory of the pattern.
 const MOST: usize = i32::MAX as usize;
 
-/// A square matrix of which only the entries that are not zero are kept, by columns, rows rising.
+/// A square matrix of which only nonzero entries are stored, by columns with rising rows.
 ///
-/// A symmetric matrix has both of its triangles; [`asymmetry`](Matrix::asymmetry) tells whether it is one.
+/// A symmetric matrix stores both triangles; [`asymmetry`](Matrix::asymmetry) tests the symmetry.
 ///
 /// # Example
 /// ```
 /// use stickslip_numerics::sparse::Matrix;
-/// // a spring between two masses, given as what it adds to either
+/// // a spring between two masses, as its contributions to either mass
 /// let k = Matrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
 /// assert_eq!((k.get(0, 0), k.get(0, 1), k.entries().count()), (6.0, -5.0, 4));
 /// assert_eq!(k.times(&[1.0, 1.0]), [1.0, 0.0]);
@@ -22,64 +23,66 @@ const MOST: usize = i32::MAX as usize;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     n: usize,
-    /// Where the columns start in the other two, n + 1.
+    /// Start of each column in `rows` and `values`, n + 1 numbers.
     pub(super) starts: Vec<u32>,
     pub(super) rows: Vec<u32>,
     pub(super) values: Vec<f64>,
 }
 
-/// Why triplets make no matrix. Rows and columns count from 0.
+/// The reason why triplets do not form a matrix. Rows and columns count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MatrixError {
-    /// An entry stands outside.
+    /// An entry lies outside the matrix.
     #[error("an entry stands in row {row}, column {column} (from 0), and the matrix is {n} x {n}")]
     OutOfRange {
-        /// Its row.
+        /// Row of the entry.
         row: usize,
-        /// Its column.
+        /// Column of the entry.
         column: usize,
         /// Rows and columns of the matrix.
         n: usize,
     },
-    /// A number is not finite.
+    /// An entry is not finite.
     #[error("row {row}, column {column} (from 0) has {value}; every entry must be finite")]
     NotFinite {
-        /// Its row.
+        /// Row of the entry.
         row: usize,
-        /// Its column.
+        /// Column of the entry.
         column: usize,
-        /// The entry.
+        /// Value of the entry.
         value: f64,
     },
-    /// More rows or entries than the indices count.
+    /// The numbers of rows or entries exceed the 32-bit indices.
     #[error("a matrix of {n} rows and {entries} entries is too large: at most {MOST} of either")]
     TooLarge {
-        /// Rows.
+        /// Number of rows.
         n: usize,
-        /// Entries.
+        /// Number of entries.
         entries: usize,
     },
 }
 
-/// Two entries across the diagonal that differ.
+/// Two mirrored entries that differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asymmetry {
     /// Row of `value`, from 0.
     pub row: usize,
-    /// Its column.
+    /// Column of `value`, from 0.
     pub column: usize,
-    /// The entry.
+    /// Value of the entry.
     pub value: f64,
-    /// The one across the diagonal.
+    /// Value of the mirrored entry.
     pub mirrored: f64,
 }
 
 impl Matrix {
-    /// Of entries (row, column, value), counted from 0, in any order. Entries of one place are added in the order in which they come; zeros are
-    /// dropped.
+    /// Builds a matrix from entries (row, column, value), counted from 0, in any order.
+    ///
+    /// Entries at the same place are added in the order in which they come. Zeros are dropped.
     ///
     /// # Errors
-    /// [`MatrixError`]: an entry outside, a sum that is not finite, more entries than 32 bits count.
+    /// [`MatrixError`]: an entry outside, a sum that is not finite, more
+    /// entries than 32 bits count.
     pub fn from_triplets(
         n: usize,
         triplets: impl IntoIterator<Item = (usize, usize, f64)>,
@@ -94,7 +97,7 @@ impl Matrix {
             }
             entries.push((column as u32, row as u32, value));
         }
-        // in either sort what is added to one place keeps its order
+        // Both sorts are stable, so contributions to one place keep their order.
         if !entries.is_sorted_by_key(|&(column, row, _)| (column, row)) {
             entries = sorted_by(n, &entries, |entry| entry.1);
             entries = sorted_by(n, &entries, |entry| entry.0);
@@ -117,17 +120,17 @@ impl Matrix {
         Ok(Matrix { n, starts, rows, values: entries.iter().map(|entry| entry.2).collect() })
     }
 
-    /// Rows, and columns.
+    /// Returns the number of rows and columns.
     pub fn n(&self) -> usize {
         self.n
     }
 
-    /// How many entries are not zero.
+    /// Returns the number of nonzero entries.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether all entries are zero.
+    /// Returns true if all entries are zero.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -136,35 +139,36 @@ impl Matrix {
         self.starts[column] as usize..self.starts[column + 1] as usize
     }
 
-    /// The entries of a column that are not zero: (row, value), rows rising.
+    /// Returns the nonzero entries of a column: (row, value), rows rising.
     pub fn column(&self, column: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.range(column);
         self.rows[range.clone()].iter().zip(&self.values[range]).map(|(&row, &value)| (row as usize, value))
     }
 
-    /// All entries that are not zero: (row, column, value), column by column.
+    /// Returns all nonzero entries: (row, column, value), column by column.
     pub fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
         (0..self.n).flat_map(move |column| self.column(column).map(move |(row, value)| (row, column, value)))
     }
 
-    /// The entry (row, column), from 0.
+    /// Returns the entry (row, column), from 0.
     ///
     /// # Panics
-    /// If the column lies outside.
+    /// If the column lies outside the matrix.
     pub fn get(&self, row: usize, column: usize) -> f64 {
         let range = self.range(column);
         let rows = &self.rows[range.clone()];
         rows.binary_search_by(|r| (*r as usize).cmp(&row)).map_or(0.0, |at| self.values[range.start + at])
     }
 
-    /// The largest magnitude of an entry.
+    /// Returns the largest magnitude of an entry.
     pub fn largest(&self) -> f64 {
         self.values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
     }
 
-    /// The first two entries across the diagonal that differ by more than `rounding`, in the unit of the entries; `None` if the matrix is symmetric.
+    /// Returns the first two mirrored entries that differ by more than `rounding`, in the unit
+    /// of the entries, or `None` if the matrix is symmetric.
     pub fn asymmetry(&self, rounding: f64) -> Option<Asymmetry> {
-        // columns come rising, and so do the rows at which a column meets its mirror images
+        // Columns come rising, and so do the mirrored rows of a column.
         let mut met: Vec<u32> = self.starts[..self.n].to_vec();
         self.entries().find_map(|(row, column, value)| {
             let (at, end) = (&mut met[row], self.starts[row + 1]);
@@ -177,10 +181,10 @@ impl Matrix {
         })
     }
 
-    /// `A x`.
+    /// Returns `A x`.
     ///
     /// # Panics
-    /// If `x` has not n entries.
+    /// If `x` does not have n entries.
     pub fn times(&self, x: &[f64]) -> Vec<f64> {
         assert_eq!(x.len(), self.n, "the vector of a product has as many entries as the matrix has columns");
         let mut product = vec![0.0; self.n];
@@ -190,10 +194,10 @@ impl Matrix {
         product
     }
 
-    /// `A x` of a complex `x`.
+    /// Returns `A x` for a complex `x`.
     ///
     /// # Panics
-    /// If `x` has not n entries.
+    /// If `x` does not have n entries.
     pub fn times_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
         assert_eq!(x.len(), self.n, "the vector of a product has as many entries as the matrix has columns");
         let mut product = vec![Complex64::new(0.0, 0.0); self.n];
@@ -207,8 +211,10 @@ impl Matrix {
 /// Column, row, value.
 type Entry = (u32, u32, f64);
 
-/// Entries by rising `key` below `n`, those of one key in the order in which they are: two such sorts, by row and by column, take the time of reading
-/// the entries a few times, however many there are.
+/// Returns the entries sorted by rising `key` below `n`, by a stable counting sort.
+///
+/// Two such sorts, by row and by column, take as long as reading the entries a
+/// few times, for any number of entries.
 fn sorted_by(n: usize, entries: &[Entry], key: impl Fn(&Entry) -> u32) -> Vec<Entry> {
     let mut next = vec![0u32; n + 1];
     entries.iter().for_each(|entry| next[key(entry) as usize + 1] += 1);
@@ -232,12 +238,12 @@ mod tests {
         assert_eq!(make(&[(2, 0, 1.0)]), Err(MatrixError::OutOfRange { row: 2, column: 0, n: 2 }));
         assert!(matches!(make(&[(0, 1, f64::NAN)]), Err(MatrixError::NotFinite { row: 0, column: 1, .. })));
         assert!(matches!(make(&[(0, 1, f64::MAX), (0, 1, f64::MAX)]), Err(MatrixError::NotFinite { .. })));
-        // what cancels is no entry
+        // Entries that cancel are not stored.
         assert!(make(&[(0, 1, 2.0), (0, 1, -2.0)]).unwrap().is_empty());
         let one_sided = make(&[(0, 1, 2.0), (0, 0, 1.0)]).unwrap();
         assert_eq!(one_sided.asymmetry(1.0), Some(Asymmetry { row: 0, column: 1, value: 2.0, mirrored: 0.0 }));
         assert_eq!(one_sided.asymmetry(2.0), None);
-        // above the diagonal alone, below it alone, and both
+        // Above the diagonal only, below it only, and both.
         let sided = |entries: &[(usize, usize, f64)]| {
             let matrix = Matrix::from_triplets(4, entries.iter().copied()).unwrap();
             matrix.asymmetry(0.0).map(|pair| (pair.row, pair.column, pair.mirrored))
@@ -247,7 +253,8 @@ mod tests {
         assert_eq!(sided(&[(2, 2, 1.0), (2, 0, 1.0), (0, 2, 1.0), (3, 0, 5.0), (0, 3, 5.0)]), None);
     }
 
-    /// Products are those of the dense matrix, and any order of triplets without repetitions makes the same matrix.
+    /// Products agree with those of the dense matrix. Any order of triplets
+    /// without repetitions gives the same matrix.
     #[test]
     fn products_and_orders() {
         let n = 7;

@@ -1,12 +1,15 @@
-//! Sparse matrices and their factors: for structures whose degrees of freedom touch a few neighbours each.
+//! Sparse matrices and their factors, for structures in which each degree of
+//! freedom is coupled to a few others.
 //!
-//! [`Matrix`] holds the entries; [`Analysis`] finds, once for all matrices of a pattern, an order of elimination with little fill (nested
-//! dissection) and where the factors will have entries; [`Factor`] and [`ComplexFactor`] solve for many right sides. Everything runs on the
-//! caller's thread, in an order that depends on the input alone: same input, same bits.
+//! [`Matrix`] contains the entries. [`Analysis`] computes the elimination order (nested
+//! dissection) and the fill-in once for all matrices of a pattern. [`Factor`] and
+//! [`ComplexFactor`] solve for many right sides. All computations run on the caller's thread,
+//! in an order that depends on the input alone: same input, same bits.
 //!
-//! Sources: Karypis and Kumar (1998), "A fast and high quality multilevel scheme for partitioning irregular graphs"; Davis, "Direct
-//! Methods for Sparse Linear Systems" (2006), Chap. 4; Schenk and Gärtner (2006), "On fast factorization pivoting methods for sparse symmetric
-//! indefinite systems", for exchanges inside blocks of columns only.
+//! Sources: Karypis and Kumar (1998), "A fast and high quality multilevel scheme for
+//! partitioning irregular graphs"; Davis, "Direct Methods for Sparse Linear Systems" (2006),
+//! Chap. 4; Schenk and Gärtner (2006), "On fast factorization pivoting methods for sparse
+//! symmetric indefinite systems", for pivoting inside supernodes only.
 
 mod analysis;
 pub mod columns;

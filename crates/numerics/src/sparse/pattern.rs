@@ -1,4 +1,4 @@
-//! Where the entries of some matrices stand, the order of their elimination, and where entries of a factor appear.
+//! Sparsity pattern of several matrices, their elimination order, and the symbolic factors.
 
 use super::matrix::Matrix;
 use faer::Side;
@@ -13,14 +13,14 @@ use feral_metis::{CscPattern, metis_order};
 use std::ops::{AddAssign, Mul};
 use std::sync::OnceLock;
 
-/// Shared by the factors that were made with it.
+/// The pattern and order that all factors of an analysis share.
 #[derive(Debug)]
 pub(super) struct Pattern {
     pub n: usize,
-    /// Both triangles, the diagonal whole.
+    /// Both triangles and the whole diagonal, by columns.
     pub starts: Vec<u32>,
     pub rows: Vec<u32>,
-    /// The place of every row in the order of elimination, and its inverse.
+    /// The row eliminated at each place of the order, and the place of every row.
     order: Vec<u32>,
     inverse: Vec<u32>,
     real: OnceLock<Symbolic>,
@@ -28,7 +28,7 @@ pub(super) struct Pattern {
     unsymmetric: OnceLock<SymbolicLu<u32>>,
 }
 
-/// Lower triangle and the entries of its factor.
+/// The lower triangle of the pattern and its symbolic factor.
 #[derive(Debug)]
 pub(super) struct Symbolic {
     pub starts: Vec<u32>,
@@ -37,7 +37,7 @@ pub(super) struct Symbolic {
 }
 
 impl Pattern {
-    /// Of matrices of one size and their mirror images.
+    /// Builds the pattern of matrices of one size, with mirrored entries added, and orders it.
     pub fn new(matrices: &[&Matrix]) -> Self {
         let n = matrices.first().map_or(0, |matrix| matrix.n());
         let (starts, rows) = union(n, matrices);
@@ -45,7 +45,8 @@ impl Pattern {
         Pattern::ordered(n, (starts, rows), &order)
     }
 
-    /// Of other matrices, nearly in the order of this one.
+    /// Builds the pattern of other matrices with the order of this one,
+    /// rearranged by their elimination tree.
     pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
         Pattern::ordered(self.n, union(self.n, matrices), &self.order)
     }
@@ -58,7 +59,7 @@ impl Pattern {
         Pattern { n, starts, rows, order, inverse, real, complex, unsymmetric }
     }
 
-    /// The entries of a sum, in the places of the pattern.
+    /// Returns the entries of a sum, in the storage order of the pattern.
     pub fn sum<T: Copy + Default + AddAssign + Mul<f64, Output = T>>(&self, sum: &[(T, &Matrix)]) -> Vec<T> {
         let mut values = vec![T::default(); self.rows.len()];
         for &(factor, matrix) in sum {
@@ -77,7 +78,7 @@ impl Pattern {
         values
     }
 
-    /// The lower triangle of a sum, in the places of that of the real factor.
+    /// Returns the lower triangle of a sum, in the storage order of the real factor.
     pub fn lower_sum(&self, sum: &[(f64, &Matrix)]) -> Vec<f64> {
         let symbolic = self.real();
         let mut values = vec![0.0; symbolic.rows.len()];
@@ -100,7 +101,7 @@ impl Pattern {
         values
     }
 
-    /// Of the real factor.
+    /// Returns the symbolic real factor.
     pub fn real(&self) -> &Symbolic {
         self.real.get_or_init(|| {
             let mut lower = (vec![0], Vec::new());
@@ -113,8 +114,10 @@ impl Pattern {
         })
     }
 
-    /// Of the factor of `[Re Im; Im -Re]`, row by row and column by column: a symmetric complex matrix as a symmetric real one of twice
-    /// the size, whose products are those of the complex one with the conjugate.
+    /// Returns the symbolic factor of `[Re Im; Im -Re]`, with interleaved rows and columns.
+    ///
+    /// This is a symmetric complex matrix as a symmetric real one of twice the size. Its
+    /// solution is the conjugate of the complex solution.
     pub fn complex(&self) -> &Symbolic {
         self.complex.get_or_init(|| {
             let mut lower = (vec![0], Vec::new());
@@ -122,7 +125,7 @@ impl Pattern {
                 let rows = &self.rows[self.starts[column] as usize..self.starts[column + 1] as usize];
                 for part in 0..2 {
                     for &row in rows.iter().filter(|row| **row as usize >= column) {
-                        // on the diagonal the upper entry belongs to the other triangle
+                        // On the diagonal the upper entry belongs to the other triangle.
                         let first = if row as usize == column { part } else { 0 };
                         lower.1.extend((first..2).map(|other| 2 * row + other));
                     }
@@ -138,7 +141,7 @@ impl Pattern {
         let n = order.len();
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, inverse, n));
-        // blocks of columns always: rows are exchanged inside of them only
+        // Always use supernodes, because pivots are chosen inside supernodes only.
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -148,7 +151,7 @@ impl Pattern {
         Symbolic { starts, rows, cholesky }
     }
 
-    /// Of the factor with row exchanges.
+    /// Returns the symbolic LU factor with row exchanges.
     pub fn unsymmetric(&self) -> &SymbolicLu<u32> {
         self.unsymmetric.get_or_init(|| {
             let pattern = SymbolicSparseColMatRef::new_checked(self.n, self.n, &self.starts, None, &self.rows);
@@ -158,14 +161,15 @@ impl Pattern {
     }
 }
 
-/// Where any of the matrices, or its mirror image, has an entry, and the diagonal: columns with rising rows.
+/// Returns the union of the patterns, the mirrored patterns and the diagonal,
+/// by columns with rising rows.
 fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
     assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum have one size");
     let mirrored: Vec<_> = matrices.iter().map(|matrix| mirrored(n, &matrix.starts, &matrix.rows)).collect();
     let most = matrices.iter().map(|matrix| matrix.rows.len()).max().unwrap_or(0);
     let (mut starts, mut rows) = (Vec::with_capacity(n + 1), Vec::with_capacity(most + n));
     starts.push(0);
-    // the last column that met a row
+    // The last column in which a row was added.
     let mut met = vec![NONE; n];
     for column in 0..n {
         let first = rows.len();
@@ -188,7 +192,7 @@ fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
     (starts, rows)
 }
 
-/// The pattern across the diagonal: columns with rising rows.
+/// Returns the transposed pattern, by columns with rising rows.
 fn mirrored(n: usize, starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let mut next = vec![0; n + 1];
     rows.iter().for_each(|row| next[*row as usize + 1] += 1);
@@ -204,10 +208,12 @@ fn mirrored(n: usize, starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
     (own, across)
 }
 
-/// The rows in the order of their elimination: nested dissection. Rows whose columns have the same places, as those of a node, are one there.
+/// Returns the rows in elimination order, by nested dissection. Rows with equal patterns, such
+/// as those of one node, are one vertex of the graph.
 fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
     let column = |at: u32| &rows[starts[at as usize] as usize..starts[at as usize + 1] as usize];
-    // the first row with the same places, which is one of them: the diagonal is whole
+    // The first row with the same pattern. The diagonal is whole, so this row
+    // is one of the row's entries.
     let mut first: Vec<u32> = (0..n as u32).collect();
     let mut alike = vec![0u32; n];
     let mut number = 0;
@@ -236,11 +242,13 @@ fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
     order.iter().flat_map(|number| members[*number as usize].iter().copied()).collect()
 }
 
-/// No row.
+/// Marks the absence of a row.
 const NONE: u32 = u32::MAX;
 
-/// The same factor with its rows so that what follows from each other stands side by side: by the tree of elimination, children before their parent. Then
-/// columns of like places make blocks as large as they can be.
+/// Returns the order sorted by the elimination tree, children before parents.
+///
+/// The fill-in stays the same. Columns with similar patterns become consecutive
+/// and form the largest possible supernodes.
 ///
 /// Source: Liu (1990), "The role of elimination trees in sparse factorization".
 fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
@@ -252,7 +260,7 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
         let row = order[place as usize] as usize;
         for other in &rows[starts[row] as usize..starts[row + 1] as usize] {
             let mut below = at[*other as usize];
-            // paths that were followed once lead straight here
+            // Path compression: visited paths lead directly to this place.
             while below < place {
                 let next = std::mem::replace(&mut ancestor[below as usize], place);
                 if next == NONE {
@@ -263,7 +271,7 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
             }
         }
     }
-    // the children of a row as a list, the lowest first
+    // The children of each row as a linked list, the lowest first.
     let (mut child, mut next) = (vec![NONE; n + 1], vec![NONE; n]);
     for place in (0..n).rev() {
         let of = if parent[place] == NONE { n } else { parent[place] as usize };
@@ -290,7 +298,8 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// Nodes of three rows each on a grid: the order is one of all rows, rows of a node follow each other, and children precede their parents.
+    /// Nodes of three rows each on a grid: the order contains all rows, the rows of a node
+    /// follow each other, and children precede their parents.
     #[test]
     fn rows_of_a_node_are_ordered_as_one() {
         let (wide, n) = (12, 3 * 12 * 12);
@@ -302,9 +311,9 @@ mod tests {
         sorted.sort_unstable();
         assert!(sorted.iter().enumerate().all(|(at, row)| at == *row as usize));
         assert!(pattern.order.chunks(3).all(|rows| rows.iter().all(|row| row / 3 == rows[0] / 3)));
-        // what is in the order of the tree stays as it is
+        // An order that follows the tree does not change.
         assert_eq!(by_tree(&pattern.order, &pattern.starts, &pattern.rows), pattern.order);
-        // a diagonal matrix has no tree to go by
+        // A diagonal matrix has an elimination tree without edges, so the order does not change.
         let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap();
         assert_eq!(pattern.in_order(&[&one]).order, pattern.order);
     }

@@ -1,41 +1,47 @@
-//! Natural modes that were found, and why there are none.
+//! Results of the search for natural modes, and its errors.
 
 use crate::sparse::Singular;
 
-/// Vectors of a block: eigenvalues of multiplicity up to four are found in one run, and a solution for four right sides takes much less
-/// than four times one.
+/// Vectors of a block.
+///
+/// One run finds eigenvalues of multiplicity up to four. A solution for four right sides takes
+/// much less than four times the time of one.
 pub(super) const BLOCK: usize = 4;
-/// Eigenvalues below this share of a usual `k_ii / m_ii` are those of free motions, in matrices of ten digits.
+/// Eigenvalues below this fraction of a typical `k_ii / m_ii` may be rigid-body
+/// modes, in matrices of ten digits.
 const FREE: f64 = 1e-10;
-/// So many times as large is the first eigenvalue of another motion; those of a slender beam, as small as it may be, follow each other closer.
+/// The first elastic eigenvalue exceeds those of the rigid-body modes by more than this factor.
+/// Consecutive eigenvalues of a slender beam, however small, have a smaller ratio.
 const APART: f64 = 1e3;
 
-/// The lowest natural modes, complete.
+/// The lowest natural modes, without gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NaturalModes {
-    /// λ = ω², rad²/s², rising. Free motions have rounding around zero.
+    /// Eigenvalues λ = ω², rad²/s², rising. Rigid-body modes have rounding around zero.
     pub values: Vec<f64>,
-    /// Shapes φ, columns of length n one after the other, with `φᵀ M φ = 1`.
+    /// Mode shapes φ with `φᵀ M φ = 1`: columns of length n, stored consecutively.
     pub shapes: Vec<f64>,
-    /// Of every mode `‖φ - (λ - σ)(K - σM)⁻¹ M φ‖` in the norm of M: some eigenvalue has a distance from the shift σ that differs by no more
-    /// than this share.
+    /// Residual of every mode, `‖φ - (λ - σ)(K - σM)⁻¹ M φ‖` in the norm of M.
+    ///
+    /// There is an eigenvalue whose distance from the shift σ agrees with
+    /// `λ - σ` to this relative error.
     pub residuals: Vec<f64>,
-    /// A usual `k_ii / m_ii`, rad²/s²: rounding of λ is far below it.
+    /// A typical `k_ii / m_ii`, rad²/s². The rounding of λ is far below it.
     pub scale: f64,
-    /// What they took.
+    /// Cost of the search.
     pub effort: Effort,
 }
 
-/// What modes took.
+/// Cost of a search for modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Effort {
-    /// Factors.
+    /// Number of factorizations.
     pub factors: usize,
-    /// Vectors of the Lanczos process.
+    /// Number of Lanczos vectors.
     pub vectors: usize,
 }
 
-/// Why there are no modes.
+/// The reason why the search for modes failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModesError {
     /// A motion has neither mass nor stiffness.
@@ -47,25 +53,25 @@ pub enum ModesError {
         if *count == 1 { "1 eigenvalue lies".to_owned() } else { format!("{count} eigenvalues lie") }
     )]
     Negative {
-        /// How many.
+        /// Number of eigenvalues.
         count: usize,
-        /// Below this, rad²/s².
+        /// Bound that they lie below, rad²/s².
         below: f64,
     },
     /// The mass is not positive semidefinite.
     #[error("some motion has a negative mass; the mass matrix must be positive semidefinite")]
     NegativeMass,
-    /// More modes than asked for.
+    /// More modes lie below the bound than allowed.
     #[error("{count} modes lie below {below:.3e} rad²/s², and at most {most} are allowed; lower the bound")]
     TooMany {
-        /// How many.
+        /// Number of modes.
         count: usize,
         /// The bound, rad²/s².
         below: f64,
-        /// How many are allowed.
+        /// Number of modes allowed.
         most: usize,
     },
-    /// The factor is too inaccurate.
+    /// The factor is not accurate enough.
     #[error(
         "the mode at {value:.6e} rad²/s² keeps a residual of {residual:.1e}: stiffness and mass range over so many orders that rounding drowns it; \
          replace what is nearly rigid by constraints, or take longer elements"
@@ -73,23 +79,23 @@ pub enum ModesError {
     Inaccurate {
         /// λ, rad²/s².
         value: f64,
-        /// As [`NaturalModes::residuals`].
+        /// Its residual, see [`NaturalModes::residuals`].
         residual: f64,
     },
-    /// Numbers left the range.
+    /// Numbers overflow.
     #[error("the entries of mass and stiffness leave the range of numbers; choose other units")]
     OutOfRange,
-    /// The count and the modes found disagree, or nothing more is found.
+    /// The number of modes found differs from the count, or the search finds no further mode.
     #[error(
         "the search for modes ended with {found} below {below:.3e} rad²/s², where the count of negative pivots is {counted}; \
          matrices whose entries are scaled very differently need better units"
     )]
     NotConverged {
-        /// Modes found below.
+        /// Modes found below the bound.
         found: usize,
-        /// Eigenvalues below.
+        /// Eigenvalues counted below the bound.
         counted: usize,
-        /// Where, rad²/s².
+        /// The bound, rad²/s².
         below: f64,
     },
 }
@@ -99,28 +105,29 @@ impl NaturalModes {
         NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, effort: Effort::default() }
     }
 
-    /// How many.
+    /// Returns the number of modes.
     pub fn count(&self) -> usize {
         self.values.len()
     }
 
-    /// How many of them are free motions: eigenvalues that are zero to the ten digits of a file, and far below the next.
+    /// Returns the number of rigid-body modes: eigenvalues that are zero to the
+    /// ten digits of a file, and far below the next.
     pub fn free(&self) -> usize {
         let values = &self.values;
         let apart = |k: &usize| *k == 0 || *k == values.len() || values[*k] > APART * values[*k - 1].abs();
         (0..=self.below(FREE * self.scale)).rev().find(apart).unwrap_or(0)
     }
 
-    /// Shape φ of a mode, from 0.
+    /// Returns the shape φ of a mode, counted from 0.
     ///
     /// # Panics
-    /// If there is no such mode.
+    /// If the mode does not exist.
     pub fn shape(&self, mode: usize) -> &[f64] {
         let n = self.shapes.len() / self.count();
         &self.shapes[mode * n..(mode + 1) * n]
     }
 
-    /// The first `count` of them.
+    /// Keeps the first `count` modes.
     pub fn truncate(&mut self, count: usize) {
         if count < self.count() {
             let n = self.shapes.len() / self.count();
@@ -130,11 +137,12 @@ impl NaturalModes {
         }
     }
 
+    /// Returns the number of modes below a value.
     pub(super) fn below(&self, value: f64) -> usize {
         self.values.partition_point(|v| *v < value)
     }
 
-    /// Adds modes and sorts all.
+    /// Adds modes and sorts all by eigenvalue.
     pub(super) fn join(&mut self, n: usize, other: NaturalModes) {
         self.values.extend(other.values);
         self.shapes.extend(other.shapes);

@@ -1,4 +1,5 @@
-//! A run of the Lanczos process: a basis that grows block by block, and the modes that have converged in it.
+//! A run of the block Lanczos process: a basis that grows by blocks, and the
+//! modes that converge in it.
 
 use super::found::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
@@ -6,44 +7,48 @@ use crate::interrupt;
 use crate::sparse::{Factor, Matrix, columns};
 use nalgebra::DMatrix;
 
-/// Largest relative error bound of `λ - σ` with which a mode is handed out; 1e-11 to 1e-15 is usual. The error itself is about its square.
+/// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
+/// 1e-11 to 1e-15 is usual. The error is about its square.
 const ACCURATE: f64 = 1e-8;
-/// Norm of a new vector, relative to its norm before what is known was projected out, below which it is rounding.
+/// A new vector is rounding if its norm, relative to its norm before the projection, is below this.
 const DEPENDENT: f64 = 1e-14;
-/// Below this share so many digits have cancelled that it is made orthogonal once more; if half of it goes, it was rounding after all.
+/// Below this fraction, so much has cancelled that the vector is orthogonalized once more. If
+/// half of it then vanishes, it was rounding.
 const CANCELLED: f64 = 1e-6;
-/// Below this share `M v` is computed anew instead of being followed through the projection: its digits cancel with those of v.
+/// Below this fraction `M v` is recomputed, because the digits of a projected
+/// `M v` cancel with those of v.
 const FOLLOWED: f64 = 0.1;
-/// A negative `vᵀ M v` is rounding of a file of ten digits up to this share of `Σ |vᵢ Mᵢₖ vₖ|`.
+/// A negative `vᵀ M v` up to this fraction of `Σ |vᵢ Mᵢₖ vₖ|` is the rounding
+/// of a file with ten digits.
 const MASSLESS: f64 = 1e-10;
 
-/// An eigenvalue of the projected operator.
+/// An eigenvalue of the projected operator (Ritz value) and its vector.
 pub(super) struct Pair {
     pub(super) theta: f64,
-    /// Combination of the basis.
+    /// Coefficients of the Ritz vector in the basis.
     vector: Vec<f64>,
-    /// `‖(K - σM)⁻¹ M y - θ y‖` in the norm of M.
+    /// `‖(K - σM)⁻¹ M y - θ y‖` in the norm of M, for the Ritz vector y.
     pub(super) residual: f64,
 }
 
-/// A basis of vectors that M makes orthonormal, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
+/// An M-orthonormal basis V, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
 pub(super) struct Lanczos<'a> {
     factor: &'a Factor,
     mass: &'a Matrix,
-    /// Largest entry of the mass.
+    /// Largest entry of the mass matrix.
     heaviest: f64,
     found: &'a [f64],
     n: usize,
     basis: Vec<f64>,
-    /// M times the vectors of the basis that the operator was not applied to.
+    /// M times the basis vectors that are not expanded yet.
     heavy: Vec<f64>,
-    /// Columns of T, each as long as the basis was.
+    /// Columns of T, each as long as the basis was at its expansion.
     projected: Vec<Vec<f64>>,
-    /// How many vectors of the basis the operator was applied to.
+    /// Number of basis vectors to which the operator was applied.
     pub(super) expanded: usize,
-    /// What the last block that the operator was applied to has of the block after it.
+    /// Components of the last expansion along the block that it added.
     beyond: DMatrix<f64>,
-    /// State of the start vectors' sequence.
+    /// State of the random start vectors.
     seed: u64,
 }
 
@@ -70,7 +75,8 @@ impl<'a> Lanczos<'a> {
         self.basis.len().checked_div(self.n).unwrap_or(0)
     }
 
-    /// Applies the operator to the last block and adds what is new; false if nothing is.
+    /// Applies the operator to the last block and adds the new directions.
+    /// Returns false if there are no new directions.
     pub(super) fn expand(&mut self) -> Result<bool, ModesError> {
         if self.size() == 0 {
             self.fill(BLOCK)?;
@@ -98,19 +104,21 @@ impl<'a> Lanczos<'a> {
         Ok(self.size() > self.expanded)
     }
 
-    /// `(K - σM)⁻¹ M V`.
+    /// Returns `(K - σM)⁻¹ M V`.
     fn operator(&self, v: &[f64]) -> Vec<f64> {
         let mut block = self.mass.times_columns(v);
         self.factor.solve(&mut block);
         block
     }
 
-    /// In the norm of M, with M times the block.
+    /// Returns the norms of the columns of a block in the inner product of M.
+    /// `forces` is M times the block.
     fn norms(&self, block: &[f64], forces: &[f64]) -> Result<Vec<f64>, ModesError> {
         block.chunks(self.n).zip(forces.chunks(self.n)).map(|(v, force)| self.norm(v, force)).collect()
     }
 
-    /// The norm of a vector by M times it; zero if all digits of `vᵀ M v` cancel, as they do where a motion has no mass.
+    /// Returns the norm of a vector `v`, with `force` = M v. It is zero if all digits of
+    /// `vᵀ M v` cancel, as for a motion without mass.
     fn norm(&self, v: &[f64], force: &[f64]) -> Result<f64, ModesError> {
         let (square, longest) = (dot(v, force), self.heaviest * dot(v, v));
         if !square.is_finite() {
@@ -130,7 +138,8 @@ impl<'a> Lanczos<'a> {
         }
     }
 
-    /// Projects the modes found and the basis out of a block and of M times the block, and returns its components along the basis. Twice is enough.
+    /// Projects the modes found and the basis out of a block and of M times the block. Returns
+    /// the components along the basis. Two passes are enough.
     fn clear(&self, block: &mut [f64], forces: &mut Vec<f64>) -> DMatrix<f64> {
         let n = self.n;
         let mut coefficients = DMatrix::zeros(self.size(), block.len() / n);
@@ -148,8 +157,11 @@ impl<'a> Lanczos<'a> {
         coefficients
     }
 
-    /// Makes the columns of a cleared block orthonormal, one after the other, with M times them, and adds those that are not rounding beside their former
-    /// `sizes`. Returns the block's components along the new vectors.
+    /// Orthonormalizes the columns of a projected block one by one, together
+    /// with M times them, and adds them to the basis.
+    ///
+    /// Columns that are rounding relative to their former `sizes` are dropped. Returns the
+    /// components of the block along the new vectors.
     fn append(&mut self, block: Vec<f64>, forces: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
         let n = self.n;
         let first = self.size();
@@ -163,7 +175,7 @@ impl<'a> Lanczos<'a> {
                 columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
                 columns::add(n, &mut force, -1.0, &self.heavy[(first - self.expanded) * n..], &part);
                 along += part;
-                // what cancels to rounding has no sign either
+                // The sign of a product that cancels to rounding is not reliable either.
                 if dot(&column, &force) < (FOLLOWED * left).powi(2) {
                     force = self.mass.times_columns(&column);
                 }
@@ -192,11 +204,12 @@ impl<'a> Lanczos<'a> {
         Ok(components)
     }
 
-    /// Adds up to `count` vectors that have nothing to do with those before; fewer where the space has no more.
+    /// Adds up to `count` random vectors that are orthogonal to the known ones,
+    /// fewer if the space is exhausted.
     fn fill(&mut self, count: usize) -> Result<(), ModesError> {
         let mut start: Vec<f64> = (0..count * self.n).map(|_| self.next()).collect();
         let mut forces = self.mass.times_columns(&start);
-        // without what is known before the operator, which would drown the rest in it
+        // Project out the known vectors before the operator, which would amplify them.
         self.clear(&mut start, &mut forces);
         start = forces;
         self.factor.solve(&mut start);
@@ -207,7 +220,8 @@ impl<'a> Lanczos<'a> {
         Ok(())
     }
 
-    /// Numbers between -1 and 1 without a pattern, the same on every machine (Steele, Lea and Flood 2014, splitmix64).
+    /// Returns a random number between -1 and 1, with the same bits on every
+    /// machine (Steele, Lea and Flood 2014, splitmix64).
     fn next(&mut self) -> f64 {
         self.seed = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.seed;
@@ -216,13 +230,13 @@ impl<'a> Lanczos<'a> {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    /// Eigenvalues of the projected operator, the largest |θ| first.
+    /// Returns the eigenvalues of the projected operator, in falling order of |θ|.
     pub(super) fn pairs(&self) -> Result<Vec<Pair>, ModesError> {
         let m = self.expanded;
         if m == 0 {
             return Ok(vec![]);
         }
-        // of the symmetric matrix the upper triangle was computed
+        // Only the upper triangle of the symmetric matrix is computed.
         let upper = |i: usize, k: usize| self.projected[k].get(i).copied().unwrap_or(0.0);
         let t = DMatrix::from_fn(m, m, |i, k| upper(i.min(k), i.max(k)));
         let eigen = eigen::symmetric(t).ok_or(ModesError::OutOfRange)?;
@@ -237,7 +251,8 @@ impl<'a> Lanczos<'a> {
         Ok(order.into_iter().map(pair).filter(|pair| pair.theta != 0.0).collect())
     }
 
-    /// Modes of eigenvalues of the projected operator: multiplied by the operator once more, and combined so that K and M are diagonal.
+    /// Computes modes from Ritz pairs: applies the operator once more and
+    /// diagonalizes K and M in the resulting space.
     pub(super) fn modes(&self, stiffness: &Matrix, shift: f64, pairs: &[Pair]) -> Result<NaturalModes, ModesError> {
         let (n, count) = (self.n, pairs.len());
         if count == 0 {
@@ -262,7 +277,8 @@ impl<'a> Lanczos<'a> {
             .map(|c| c.l())
             .and_then(|l| l.solve_lower_triangular(&DMatrix::identity(count, count)));
         let inverse = inverse.ok_or_else(failed)?;
-        // relative to the shift, so that modes far above do not drown those near it in their rounding
+        // Relative to the shift, so that the rounding of modes far above does
+        // not affect those near it.
         let eigen = eigen::symmetric(&inverse * (k - m * shift) * inverse.transpose()).ok_or_else(failed)?;
         let shapes = columns::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
         let values: Vec<f64> = eigen.eigenvalues.iter().map(|v| v + shift).collect();
@@ -270,13 +286,15 @@ impl<'a> Lanczos<'a> {
         for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
             off.iter_mut().zip(shape).for_each(|(off, x)| *off = x - (value - shift) * *off);
         }
-        // inside of the modes' own space K and M are diagonal: what the factor's rounding adds there is no error of theirs
+        // K and M are diagonal in the space of the modes. The rounding of the factor inside
+        // that space is therefore not an error of the modes.
         for modes in [self.found, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
             let inside = columns::products(n, modes, &self.mass.times_columns(&off));
             columns::add(n, &mut off, -1.0, modes, &inside);
         }
         let residuals = self.norms(&off, &self.mass.times_columns(&off))?;
-        // a free motion that is not found yet may drown others by the factor's rounding; they are found after it
+        // A rigid-body mode not found yet may spoil others by the rounding of
+        // the factor. A later run finds those.
         let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();
         if good.is_empty() {
             return Err(ModesError::Inaccurate { value: values[0], residual: residuals[0] });

@@ -1,21 +1,25 @@
-//! The lowest natural modes of `K φ = λ M φ`, λ = ω², and the proof that none is missing.
+//! Lowest natural modes of `K φ = λ M φ`, λ = ω², with a proof that none is missing.
 //!
-//! Block Lanczos process with `(K - σM)⁻¹ M` in the inner product of M, every vector orthogonalised against all others: near the shift σ the
-//! eigenvalues `θ = 1 / (λ - σ)` are large and well apart, and converge first. A block finds eigenvalues of its own multiplicity at once, and
-//! modes that are already found are projected out, so that a next run finds the rest of larger groups.
+//! The method is a block Lanczos process with the operator `(K - σM)⁻¹ M` in the inner product
+//! of M, with full reorthogonalization. Near the shift σ the eigenvalues `θ = 1 / (λ - σ)` of
+//! the operator are large and well separated, and converge first. A block finds eigenvalues of
+//! its own multiplicity at once. Modes that are already found are projected out, so that the
+//! next run finds the other modes of a larger cluster.
 //!
-//! How many eigenvalues lie below μ is known without computing them: as many as the factor of `K - μM` has negative pivots. Modes are handed
-//! out when that number agrees with those found below; otherwise the same factor becomes the next shift, and the search goes on around it. A
-//! run in which nothing converges, as all eigenvalues are about equally far from the shift, tells where they are: the next one begins there.
+//! The number of eigenvalues below μ is known without computing them: it is the number of
+//! negative pivots of the factor of `K - μM`. The search ends when this number agrees with the
+//! number of modes found below μ. Otherwise the factor becomes that of the next shift, and the
+//! search continues there. A run without any converged mode, because all eigenvalues are about
+//! equally far from the shift, estimates their place, and the next run begins there.
 //!
-//! M may be singular: vectors that come out of the operator have no component without mass, up to rounding that another multiplication
-//! removes. K may be singular too: the first shift is negative.
+//! M may be singular. Results of the operator have no massless component, except rounding that
+//! another multiplication removes. K may be singular too, because the first shift is negative.
 //!
-//! Sources: Ericsson and Ruhe (1980), "The spectral transformation Lanczos method for the numerical solution of large sparse generalized
-//! symmetric eigenvalue problems"; Nour-Omid, Parlett, Ericsson and Jensen (1987), "How to implement the spectral transformation", for singular
-//! M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving sparse symmetric generalized eigenproblems", for
-//! blocks, shifts
-//! and counts.
+//! Sources: Ericsson and Ruhe (1980), "The spectral transformation Lanczos method for the
+//! numerical solution of large sparse generalized symmetric eigenvalue problems"; Nour-Omid,
+//! Parlett, Ericsson and Jensen (1987), "How to implement the spectral transformation", for
+//! singular M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving
+//! sparse symmetric generalized eigenproblems", for blocks, shifts and counts.
 
 mod found;
 mod lanczos;
@@ -25,65 +29,77 @@ use found::BLOCK;
 pub use found::{Effort, ModesError, NaturalModes};
 use lanczos::{Lanczos, Pair};
 
-/// Residual of a mode in the Lanczos process, relative to θ, at which it counts as found: what follows squares the error of the eigenvalue.
+/// Residual in the Lanczos process, relative to θ, at which a mode has
+/// converged. The error of the eigenvalue is about its square.
 const CONVERGED: f64 = 1e-10;
-/// An eigenvalue counts as one up to a bound if it is above by less than this share.
+/// An eigenvalue above a bound by less than this relative difference counts as below it.
 const ROUNDING: f64 = 1e-9;
-/// Vectors of a run at most: memory is n numbers for each.
+/// Maximum number of vectors of a run. Each takes memory of n numbers.
 const MOST: usize = 320;
-/// Runs at most. Each but the first starts where eigenvalues are known to be missing, and a run finds about a third of `MOST`.
+/// Maximum number of runs. Each run except the first starts where eigenvalues are known to be
+/// missing, and finds about `MOST` / 3 modes.
 const RUNS: usize = 100;
-/// The first shift, relative to a usual `k_ii / m_ii`, if nothing else is known: below the first mode of a compact body, and far above the rounding
-/// of a free motion. An eigenvalue as far below zero is no rounding.
+/// The first shift without other knowledge, relative to a typical `k_ii / m_ii`.
+///
+/// It is below the first mode of a compact body and far above the rounding of a rigid-body
+/// mode. An eigenvalue as far below zero is not rounding.
 const SHIFT: f64 = 1e-6;
-/// No shift is smaller than this, relative to a usual `k_ii / m_ii`: rounding of K.
+/// Smallest shift relative to a typical `k_ii / m_ii`: the rounding of K.
 const LEAST_SHIFT: f64 = 1e-12;
-/// The first shift relative to the bound up to which modes are wanted.
+/// The first shift relative to the upper bound of the wanted modes.
 const SHIFT_OF_BOUND: f64 = 0.01;
-/// A first eigenvalue between these shares of the first shift says that the shift is far too large for a slender structure; below the smaller
-/// one the motion is free.
+/// Range of the first eigenvalue, relative to the first shift, in which the shift is far too
+/// large for a slender structure. Below the range the mode is a rigid-body mode.
 const SLENDER: (f64, f64) = (1e-6, 0.1);
-/// Blocks after which a search that has not ended asks whether its first shift was too large: these cost about as much as another factor.
+/// Number of blocks after which an unfinished search tests if its first shift was too large.
+/// These blocks cost about as much as another factor.
 const JUDGED: usize = 12;
-/// Blocks between two looks at what has converged.
+/// Number of blocks between two convergence checks.
 const CHECKED: usize = 4;
-/// The same as a share of the blocks before, where there are many: the projected problem grows with their cube.
+/// Divisor of the number of blocks so far that gives a longer interval between checks. The cost
+/// of the projected problem grows with the cube of the blocks.
 const CHECKED_SHARE: usize = 8;
-/// Gap between two eigenvalues, relative to their distance from the first shift, in which they can be counted.
+/// Smallest gap between two eigenvalues, relative to their distance from the
+/// first shift, in which eigenvalues can be counted.
 const GAP: f64 = 1e-5;
-/// How far beyond the last mode found eigenvalues are counted, and the next are looked for, relative to its distance from the first shift;
-/// at least as far as that shift is from zero, where many free motions are.
+/// Distance beyond the last mode found at which eigenvalues are counted and the next run
+/// starts. It is relative to the distance of that mode from the first shift.
+///
+/// It is at least the magnitude of that shift, for structures with many rigid-body modes.
 const BEYOND: f64 = 0.1;
-/// Attempts to factor beside an eigenvalue, each further by `GAP`.
+/// Number of attempts to factor near an eigenvalue, each further away by `GAP`.
 const ATTEMPTS: usize = 8;
 
-/// Which modes.
+/// The modes to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wanted {
-    /// The lowest so many, or all if there are fewer.
+    /// The given number of lowest modes, or all if there are fewer.
     Lowest(usize),
-    /// All with an eigenvalue λ = ω² up to a bound.
+    /// All modes with an eigenvalue λ = ω² up to a bound.
     UpTo {
         /// The bound, rad²/s².
         value: f64,
-        /// More than these are refused: memory is n numbers for each.
+        /// Largest number of modes allowed: each takes memory of n numbers.
         most: usize,
     },
 }
 
 impl NaturalModes {
-    /// The lowest modes of symmetric `stiffness` K and `mass` M, both positive semidefinite, both among the matrices of `analysis`.
+    /// Finds the lowest modes of symmetric, positive semidefinite `stiffness` K and `mass` M.
+    ///
+    /// Both are among the matrices of `analysis`.
     ///
     /// # Errors
-    /// [`ModesError`]: a motion without mass and stiffness, a negative eigenvalue, more modes than allowed, no convergence.
+    /// [`ModesError`]: a motion without mass and stiffness, a negative
+    /// eigenvalue, more modes than allowed, no convergence.
     ///
     /// # Panics
-    /// If the matrices have not the size of the analysis.
+    /// If the matrices do not have the size of the analysis.
     ///
     /// # Example
     /// ```
     /// use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
-    /// // two equal masses on a ring of two springs, held by nobody: 0 and 4
+    /// // two equal masses connected by two parallel springs, without support: 0 and 4
     /// let k = Matrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
     /// let m = Matrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
     /// let modes = NaturalModes::new(&Analysis::new(&[&k, &m]), &k, &m, Wanted::Lowest(2)).unwrap();
@@ -98,7 +114,7 @@ impl NaturalModes {
     }
 }
 
-/// The median of `k_ii / m_ii`, rad²/s²; one if there is none.
+/// Returns the median of `k_ii / m_ii`, rad²/s², or one if no ratio is positive and finite.
 fn usual(stiffness: &Matrix, mass: &Matrix) -> f64 {
     let mut ratios: Vec<f64> = (0..mass.n())
         .map(|i| stiffness.get(i, i) / mass.get(i, i))
@@ -108,33 +124,34 @@ fn usual(stiffness: &Matrix, mass: &Matrix) -> f64 {
     ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// A search under way.
+/// A search in progress.
 struct Search<'a> {
     analysis: &'a Analysis,
     stiffness: &'a Matrix,
     mass: &'a Matrix,
     wanted: Wanted,
-    /// A usual `k_ii / m_ii`, rad²/s².
+    /// A typical `k_ii / m_ii`, rad²/s².
     scale: f64,
     found: NaturalModes,
 }
 
-/// A run of the Lanczos process.
+/// The result of a run of the Lanczos process.
 struct Run {
     modes: NaturalModes,
     vectors: usize,
     end: End,
 }
 
-/// What ended it.
+/// The reason why a run ended.
 enum End {
-    /// Enough modes, or no more room.
+    /// Enough modes, or the maximum number of vectors.
     Full,
-    /// No more room and no mode yet: the eigenvalues are closer to each other than to the shift, and about here.
+    /// The maximum number of vectors without a converged mode: the eigenvalues are closer to
+    /// each other than to the shift. The value estimates their place.
     Clustered(f64),
-    /// The space has no further vectors: all modes are known.
+    /// The Krylov space is exhausted: all modes are known.
     Exhausted,
-    /// A first shift that is much larger than this eigenvalue.
+    /// The first shift is much larger than this eigenvalue.
     Slender(f64),
 }
 
@@ -184,7 +201,8 @@ impl Search<'_> {
         Err(ModesError::NotConverged { found: self.found.below(shift), counted, below: shift })
     }
 
-    /// The first so many of the modes found. A first shift that the bound makes large may have negative eigenvalues above it.
+    /// Returns the first `keep` modes. Fails if a mode is negative, because a large first shift
+    /// does not detect eigenvalues just below zero.
     fn whole(mut self, keep: usize) -> Result<NaturalModes, ModesError> {
         let below = -SHIFT * self.scale;
         match self.found.below(below) {
@@ -196,7 +214,7 @@ impl Search<'_> {
         }
     }
 
-    /// The factor at a shift, in the memory of the last one.
+    /// Factors at a shift, in the memory of the last factor.
     fn factor(&mut self, shift: f64, last: Option<Factor>) -> Result<Factor, Singular> {
         self.found.effort.factors += 1;
         let sum = [(1.0, self.stiffness), (-shift, self.mass)];
@@ -206,7 +224,7 @@ impl Search<'_> {
         }
     }
 
-    /// The factor at the first, negative shift.
+    /// Factors at the first, negative shift.
     fn first(&mut self, depth: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
         let factor = self.factor(-depth, last).map_err(ModesError::Massless)?;
         match factor.negative() {
@@ -215,7 +233,7 @@ impl Search<'_> {
         }
     }
 
-    /// The factor at a shift, or a little further where that is an eigenvalue.
+    /// Factors at a shift, or slightly above it if the shift is an eigenvalue.
     fn beside(&mut self, shift: f64, depth: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
         let (mut last, mut failed) = (Some(last), Singular { row: 0 });
         for attempt in 0..ATTEMPTS {
@@ -228,10 +246,10 @@ impl Search<'_> {
         Err(ModesError::Massless(failed))
     }
 
-    /// Up to where the modes found may be complete, in a gap between them.
+    /// Returns a value up to which the modes found may be complete, in a gap between them.
     fn bound(&self, exhausted: bool, depth: f64) -> f64 {
         let values = &self.found.values;
-        // so many have to lie below, and the bound above this
+        // The bound needs this number of modes below it, and lies above `above`.
         let (below, above) = match self.wanted {
             Wanted::Lowest(n) => (n.min(values.len()), f64::NEG_INFINITY),
             Wanted::UpTo { value, .. } => match values.partition_point(|v| *v <= value) {
@@ -242,13 +260,13 @@ impl Search<'_> {
         let last = values.last().copied().unwrap_or(0.0).max(above);
         let gaps = (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
         let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + depth);
-        // in a cluster no gap is wide: the widest of all will do
+        // Inside a cluster no gap is wide, so the widest one serves.
         let widest = || gaps.clone().filter(wide(ROUNDING)).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
         let gap = gaps.clone().find(wide(GAP)).or_else(widest);
         gap.map_or(last + (BEYOND * (last + depth)).max(depth), |(low, high)| 0.5 * (low + high))
     }
 
-    /// A run of the Lanczos process around a shift, below which `counted` eigenvalues lie.
+    /// Runs the Lanczos process at a shift with `counted` eigenvalues below it.
     fn around(&self, shift: f64, factor: &Factor, counted: usize, depth: f64) -> Result<Run, ModesError> {
         let mut lanczos = Lanczos::new(factor, self.mass, &self.found.shapes);
         let missing = counted.saturating_sub(self.found.below(shift));
@@ -320,7 +338,7 @@ mod tests {
         matrix(n, (0..n).map(|i| (i, i, 1.0)))
     }
 
-    /// Springs between (i, k) of stiffness one; a spring to oneself is one to the ground.
+    /// Springs of stiffness one between i and k. A pair (i, i) is a spring to the ground.
     fn springs(n: usize, between: impl IntoIterator<Item = (usize, usize)>) -> Matrix {
         let spring = |(i, k): (usize, usize)| match i == k {
             true => vec![(i, i, 1.0)],
@@ -329,7 +347,8 @@ mod tests {
         matrix(n, between.into_iter().flat_map(spring))
     }
 
-    /// Eigenvalues are those expected, to `tolerance` of the value plus `rounding`; shapes are orthonormal and belong to them.
+    /// The eigenvalues agree with the expected ones to `tolerance` of the value plus
+    /// `rounding`. The shapes are orthonormal and satisfy the equations.
     fn check(k: &Matrix, m: &Matrix, modes: &NaturalModes, expected: &[f64], rounding: f64) {
         assert_eq!(modes.count(), expected.len(), "{:?}", modes.values);
         let n = k.n();
@@ -348,8 +367,8 @@ mod tests {
         }
     }
 
-    /// A chain between walls, `λ = 4 sin²(π i / 2 (n + 1))`; alone in the space, `4 sin²(π i / 2 n)` from zero; as a ring, `4 sin²(π i /
-    /// n)`, twice.
+    /// A chain between walls: `λ = 4 sin²(π i / 2 (n + 1))`. A free chain: `4 sin²(π i / 2 n)`
+    /// from zero. A ring: `4 sin²(π i / n)`, twice each.
     #[test]
     fn chains_and_rings() {
         for n in [1, 2, 3, 5, 40, 900] {
@@ -373,7 +392,8 @@ mod tests {
         }
     }
 
-    /// A bar of linear elements with their own mass matrix, held at one end: `λ = (6 / h²) (1 - cos β) / (2 + cos β)`, `β = (i - ½) π / n`.
+    /// A bar of linear elements with consistent mass, fixed at one end:
+    /// `λ = (6 / h²) (1 - cos β) / (2 + cos β)`, `β = (i - ½) π / n`.
     #[test]
     fn a_bar_held_at_one_end() {
         let n = 400;
@@ -390,7 +410,7 @@ mod tests {
             6.0 / (h * h) * (1.0 - cosine) / (2.0 + cosine)
         };
         let expected: Vec<f64> = (0..30).map(value).collect();
-        // the largest eigenvalue is 12 / h² = 2e6, and its rounding is everywhere
+        // The largest eigenvalue is 12 / h² = 2e6. Its rounding affects all others.
         check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected, 1e-9);
         let bound = 0.5 * (expected[24] + expected[25]);
         let up_to = modes(&k, &m, Wanted::UpTo { value: bound, most: 25 }).unwrap();
@@ -401,7 +421,7 @@ mod tests {
         assert_eq!(modes(&k, &m, Wanted::UpTo { value: -1.0, most: 9 }).unwrap().count(), 0);
     }
 
-    /// Groups of eigenvalues that are larger than a block, and a bound that is one of them.
+    /// Clusters of eigenvalues larger than a block, and an upper bound equal to an eigenvalue.
     #[test]
     fn groups_larger_than_a_block() {
         let n = 300;
@@ -413,7 +433,8 @@ mod tests {
         check(&k, &m, &modes(&k, &m, Wanted::Lowest(n + 5)).unwrap(), &expected, 0.0);
     }
 
-    /// Equal oscillators on weak springs: all eigenvalues are within 0.4 % of each other, `λ = k (1 + 2 ε - 2 ε cos(π i / (n + 1)))`.
+    /// Equal oscillators with weak coupling springs: all eigenvalues agree to 0.4 %,
+    /// `λ = k (1 + 2 ε - 2 ε cos(π i / (n + 1)))`.
     #[test]
     fn clusters_larger_than_a_run() {
         let (n, stiffness, weak) = (500, 1e6, 1e-3);
@@ -428,7 +449,7 @@ mod tests {
         check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected[..30], 1e-8);
     }
 
-    /// More modes than one run has room for.
+    /// More modes than fit into one run.
     #[test]
     fn hundreds_of_modes() {
         let n = 1500;
@@ -443,7 +464,8 @@ mod tests {
         check(&k, &m, &found, &expected[..351], 1e-13);
     }
 
-    /// A slender beam is softer than its elements by many orders: `λ = (β / L)⁴ EI / (ρA)` of a cantilever, β = 1.8751, 4.6941, 7.8548.
+    /// A slender beam is softer than its elements by many orders of magnitude. A cantilever has
+    /// `λ = (β / L)⁴ EI / (ρA)`, β = 1.8751, 4.6941, 7.8548.
     #[test]
     fn a_slender_cantilever() {
         let n = 120;
@@ -471,20 +493,22 @@ mod tests {
         let (k, m) = (element(bending, h.powi(-3)), element(inertia, h / 420.0));
         let found = modes(&k, &m, Wanted::Lowest(8)).unwrap();
         assert_eq!(found.free(), 0);
-        // roots of cos β cosh β = -1, by Newton's method
+        // Roots of cos β cosh β = -1, by Newton's method.
         for (i, value) in found.values.iter().enumerate() {
             let mut beta = (i as f64 + 0.5) * PI;
             for _ in 0..50 {
                 let f = beta.cos() + 1.0 / beta.cosh();
                 beta += f / (beta.sin() + beta.sinh() / beta.cosh().powi(2));
             }
-            // elements err by (β h)⁴ / 720; rounding is that of the largest eigenvalue, 9e11
+            // The discretization error is (β h)⁴ / 720. The rounding is that of
+            // the largest eigenvalue, 9e11.
             let tolerance = (beta * h).powi(4) / 700.0 * beta.powi(4) + 1e-4;
             assert!((value - beta.powi(4)).abs() < tolerance, "{i}: {value} instead of {}", beta.powi(4));
         }
     }
 
-    /// Places without mass follow the others: a chain in which every second place is massless is one of springs in series.
+    /// Massless places follow the others: in a chain with every second place
+    /// massless, the springs act in series.
     #[test]
     fn places_without_mass() {
         let n = 201;
@@ -492,7 +516,7 @@ mod tests {
         let m = matrix(n, (0..n).filter(|i| i % 2 == 1).map(|i| (i, i, 1.0)));
         let expected: Vec<f64> = (1..=100).map(|i| 2.0 * (PI * i as f64 / 202.0).sin().powi(2)).collect();
         check(&k, &m, &modes(&k, &m, Wanted::Lowest(9)).unwrap(), &expected[..9], 1e-14);
-        // no more than have mass
+        // No more modes than places with mass.
         check(&k, &m, &modes(&k, &m, Wanted::Lowest(150)).unwrap(), &expected, 1e-14);
         let none = matrix(n, []);
         assert_eq!(modes(&k, &none, Wanted::Lowest(3)).unwrap().count(), 0);
@@ -517,7 +541,8 @@ mod tests {
         assert_eq!(modes(&none, &none, Wanted::Lowest(3)).unwrap().count(), 0);
     }
 
-    /// Two sets of three masses each, all modes of which fill the space: what is left of further vectors is rounding, and no negative mass.
+    /// Two sets of three masses. All modes fill the space, and further vectors are rounding:
+    /// this must not count as a negative mass.
     #[test]
     fn all_modes_of_few_rows() {
         for step in 0..400 {
@@ -547,8 +572,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
 
-        /// Masses seen by fewer motions than there are coordinates, `M = Tᵀ T`: without the massless part, `λ` is one over an eigenvalue of
-        /// the flexibility `T K⁻¹ Tᵀ` of these motions. Coordinates have units that differ by up to a thousand.
+        /// A singular mass `M = Tᵀ T` of lower rank than the number of
+        /// coordinates. Then 1/λ are the eigenvalues of the flexibility
+        /// `T K⁻¹ Tᵀ`. The units of the coordinates differ by factors up to 10⁶.
         #[test]
         fn massless_combinations(
             size in 2usize..24,
@@ -575,7 +601,8 @@ mod tests {
                 let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
                 prop_assert_eq!(found.count(), count.min(rank), "{:?} of {:?}", found.values, thetas);
                 for (value, theta) in found.values.iter().zip(&thetas) {
-                    // a mode far above the lowest has as many digits as it is above fewer
+                    // The relative error of a mode grows with its eigenvalue
+                    // relative to the lowest.
                     let error = (value * theta - 1.0).abs();
                     prop_assert!(error < 1e-11 * thetas[0] / theta, "{} instead of {}", value, 1.0 / theta);
                 }
@@ -584,7 +611,8 @@ mod tests {
     }
 
     proptest! {
-        /// Of random structures, eigenvalues are those of the dense problem `L⁻¹ K L⁻ᵀ`, M = L Lᵀ.
+        /// Random structures: the eigenvalues agree with those of the dense
+        /// problem `L⁻¹ K L⁻ᵀ`, M = L Lᵀ.
         #[test]
         fn random_structures(
             links in proptest::collection::vec((0usize..40, 0usize..40, 0.1f64..10.0), 30..120),
