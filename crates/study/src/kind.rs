@@ -1,4 +1,4 @@
-//! A study kind: what it says of itself, and how its studies are cut, computed and drawn.
+//! A study kind: its description, and how its studies are divided, computed and drawn.
 
 use crate::cost::{Cost, Costing};
 use crate::dataset::Figure;
@@ -11,16 +11,17 @@ use crate::work::{Computed, Grain, Work};
 /// A row of the table of study kinds.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind {
-    /// What it says of itself.
+    /// The description of the kind.
     pub info: KindInfo,
-    /// How its studies are cut into units of work.
+    /// Divides a study into units of work.
     pub grain: fn(&Study) -> Grain,
-    /// How much its studies hold, and what they take; too much rather than too little.
+    /// Estimates size and time of a study, from above rather than from below.
     pub cost: fn(&Costing<'_>) -> Cost,
-    /// What looks like a mistake in a study of this kind, as sentences; cases that are spread over all of it.
+    /// Warns of probable mistakes in a study of this kind, in sentences. The argument is a
+    /// selection of cases that covers the study.
     pub warnings: fn(&[Surveyed]) -> Vec<String>,
-    /// Computes one unit: rows of its tables.
+    /// Computes one unit: rows of the tables.
     pub compute: fn(&Work<'_>) -> Computed,
-    /// Draws the figure of finished tables; the title is the study's.
+    /// Draws the figure of finished tables; the study supplies the title.
     pub draw: fn(&Drawing<'_>) -> Figure,
 }
