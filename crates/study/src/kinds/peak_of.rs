@@ -1,6 +1,6 @@
 //! The key `peak_of` of the kinds with a resonance peak: the masses whose amplitude counts.
 //!
-//! Of several masses the largest amplitude counts, at each frequency separately.
+//! With several masses, the largest amplitude counts, at each frequency separately.
 
 use crate::info::Complaint;
 use crate::key::{Key, Takes, optional};
