@@ -18,9 +18,9 @@ use stickslip_numerics::leading::leading;
 /// Factors on the frequency limit of the basis. The check uses the first factor whose number of
 /// modes is at most [`MODES`].
 ///
-/// Measured on chains of 80 and 300 masses with a slider of 2 N/um or a rigid one at the driven
-/// end, compared with all rows: a basis up to fifteen harmonics had errors of 3 to 8 %; twice
-/// that limit 2 %, four times 0.3 to 0.8 %, eight times 0.02 to 0.3 %.
+/// Measured on chains of 80 and 300 masses, compared with all rows. The driven end has a slider
+/// of 2 N/um or a rigid one. A basis up to fifteen harmonics had errors of 3 to 8 %; twice that
+/// limit gave 2 %, four times 0.3 to 0.8 %, eight times 0.02 to 0.3 %.
 const TIMES: [f64; 2] = [8.0, 4.0];
 /// Number of points per unit of work that are solved again: the largest, and others over the
 /// whole range.

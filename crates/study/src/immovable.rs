@@ -1,11 +1,11 @@
 //! Errors for masses whose stiffness is so high that their inertia has no effect.
 //!
-//! In `k - m Ω²` the second term is lost in the rounding of the first if `m Ω² < ε k`, with ε =
-//! 2.2e-16; a mass of zero gives the same result. Such a stiffness is meant as "rigid". It
+//! In `k - m Ω²` the second term is lost in the rounding of the first if `m Ω² < ε k`, with
+//! `ε = 2.2e-16`; a mass of zero gives the same result. Such a stiffness is meant as "rigid". It
 //! costs the exact method `√(k/m)/Ω` > 7e7 oscillations per period, and it is refused. If this
 //! holds for every mass, the excitation is too slow. Conversely, a spring can be lost in the
-//! rounding of the inertia: a mode far below the excitation creates terms of `Ω/ω` times the
-//! motion that cancel, and only rounding remains.
+//! rounding of the inertia. A mode far below the excitation creates terms of `Ω/ω` times the
+//! motion; they cancel, and only rounding remains.
 
 use crate::expression::displayed;
 use crate::info::Complaint;

@@ -17,10 +17,10 @@ pub struct KindInfo {
     pub summary: &'static str,
     /// Keys of `[study]`, in addition to the keys that every kind has.
     pub keys: &'static [Key],
-    /// Checks conditions that one key alone cannot check.
+    /// Checks conditions between keys, and names that must exist in the model.
     ///
-    /// These are conditions between keys, names that must exist in the model, and the number of
-    /// values that the last parameter of `vary` must have (1 without `vary`).
+    /// The last argument is the number of values of the last parameter of `vary`, 1 without
+    /// `vary`.
     pub check: fn(&Values, &Model, usize) -> Result<(), Complaint>,
     /// Dimensions of the two axes of the figure, if they are the same in every panel.
     pub axes: [Option<Dimension>; 2],

@@ -3,7 +3,7 @@
 //!
 //! The model states how its stiffness depends on the speed: the speed is a parameter, and a
 //! spring `k0 + k1*speed^2` stiffens. On a tuned disk an engine order `e` excites the modes of
-//! one nodal diameter, the distance of `e` to the nearest multiple of the number of sectors.
+//! one nodal diameter: the distance from `e` to the nearest multiple of the sector count.
 
 use super::keys::anything;
 use super::nodal_diameter::{STATES, waves};

@@ -330,7 +330,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
 /// Draws the shapes of a disk at the smallest amplitude, where joints stick, and at the
 /// largest.
 ///
-/// The colours belong to one of `cases` cases.
+/// The colours begin after those of the `cases` curves.
 fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cases): (&Stretch, usize)) -> Vec<Panel> {
     let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
     let Some(ring) = case.model.ring else { return Vec::new() };

@@ -13,9 +13,9 @@ type Point = (f64, Option<Result<Orbit, OrbitError>>);
 
 /// Returns the unit of work of a study.
 ///
-/// A unit is a range of frequencies with a cold start. It is the whole curve if a law allows
-/// several orbits at a frequency, because a cold start and a warm start can then lead to
-/// different orbits. The laws of the first case represent all cases.
+/// A unit is a range of frequencies with a cold start. If a law allows several orbits at a
+/// frequency, the unit is the whole curve. A cold start could then lead to another orbit than a
+/// warm start. The laws of the first case represent all cases.
 pub(super) fn grain(study: &Study) -> Grain {
     let unique = |case: Case| case.model.joints.iter().all(|joint| joint.law.is_incrementally_passive());
     if study.case(0).is_ok_and(unique) { Grain::Frequencies } else { Grain::Case }

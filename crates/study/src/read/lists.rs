@@ -40,8 +40,7 @@ impl Reader {
                 (Takes::Table(keys), Content::Table(table)) if name == "disk" => {
                     lists.disk = self.disk(table, keys);
                 }
-                // the structure is read with its files or with its template elsewhere; errors
-                // are reported there
+                // read elsewhere, together with its files
                 (Takes::Table(_), _) if name == "structure" => {}
                 (Takes::Table(keys), Content::Table(table)) => {
                     self.table(table, keys, &format!("[{name}]"));

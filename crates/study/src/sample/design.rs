@@ -216,8 +216,7 @@ mod tests {
 
     /// With 2^m draws, scrambled or not, each of 2^m intervals of every dimension has one draw.
     ///
-    /// The same holds for each box of a pair of the first dimensions, which form a net of
-    /// quality zero.
+    /// The first two dimensions form a net of quality zero: each box has one draw.
     #[test]
     fn scrambling_keeps_the_net() {
         for seed in [1, 2, 77] {

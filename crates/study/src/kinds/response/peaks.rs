@@ -138,8 +138,8 @@ fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
 /// Returns true if a peak of the reverse sweep is only its jump to the orbits of the forward
 /// sweep.
 ///
-/// At the nearest frequency the peak is closer to the orbit of the forward sweep than to that
-/// of the reverse sweep, and it is not higher.
+/// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
+/// than to that of the reverse sweep, and not higher.
 fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought: &Sought) -> bool {
     let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };

@@ -46,8 +46,8 @@ pub(super) fn others(study: &Study) -> f64 {
 
 /// Returns a solver of a linear reference.
 ///
-/// The laws of its joints differ from those for which the method was chosen, so any method that
-/// supports them is used if that one does not.
+/// Its joints have other laws than those for which the method was chosen. If that method does
+/// not support them, the first method that does is used.
 fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
         let others = method::ways(system).methods.into_iter().filter_map(method::find);
