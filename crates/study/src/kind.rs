@@ -1,4 +1,4 @@
-//! A study kind: its description, and how its studies are divided, computed and drawn.
+//! A study kind: what it says of itself, and how its studies are cut, computed and drawn.
 
 use crate::cost::{Cost, Costing};
 use crate::dataset::Figure;
@@ -11,17 +11,16 @@ use crate::work::{Computed, Grain, Work};
 /// A row of the table of study kinds.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind {
-    /// The description of the kind.
+    /// What it says of itself.
     pub info: KindInfo,
-    /// Divides a study into units of work.
+    /// How its studies are cut into units of work.
     pub grain: fn(&Study) -> Grain,
-    /// Estimates size and time of a study, from above rather than from below.
+    /// How much its studies hold, and what they take; too much rather than too little.
     pub cost: fn(&Costing<'_>) -> Cost,
-    /// Warns of probable mistakes in a study of this kind, in sentences. The argument is a
-    /// selection of cases that covers the study.
+    /// What looks like a mistake in a study of this kind, as sentences; cases that are spread over all of it.
     pub warnings: fn(&[Surveyed]) -> Vec<String>,
-    /// Computes one unit: rows of the tables.
+    /// Computes one unit: rows of its tables.
     pub compute: fn(&Work<'_>) -> Computed,
-    /// Draws the figure of finished tables; the study supplies the title.
+    /// Draws the figure of finished tables; the title is the study's.
     pub draw: fn(&Drawing<'_>) -> Figure,
 }
