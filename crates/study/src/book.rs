@@ -1,11 +1,12 @@
-//! The reference of study files for the book, made of what the schema, the lists of laws and methods, and the templates say of themselves.
+//! The study file reference in the book, generated from the schema, the lists of laws and
+//! methods, and the templates.
 
 use crate::kind::Kind;
 use crate::schema::{FILE, Key, Presence, SAMPLE, STUDY, Takes, described};
 use crate::{kinds, templates};
 use stickslip::{law, method};
 
-/// The reference of study files, key by key, as Markdown tables.
+/// Returns the reference of study files, key by key, as Markdown tables.
 pub fn markdown() -> String {
     let mut book = String::new();
     let rows = |book: &mut String, heading: &str, intro: &str, keys: &[Key]| {
@@ -26,7 +27,7 @@ pub fn markdown() -> String {
         }
         book.push('\n');
     };
-    // tables in tables come after the one that has them
+    // nested tables follow the table that contains them
     let inner = |book: &mut String, of: &str, keys: &[Key]| {
         for key in keys.iter().filter(|key| key.is_taken()) {
             if let Takes::Table(keys) | Takes::TableOrNone(keys) = key.takes {

@@ -1,19 +1,22 @@
-//! Which values of a user make an expression of a template wrong: its text is not the user's, so that the values are where the problem is.
+//! Finds the user's values that make an expression of a template wrong.
+//!
+//! The user did not write the template's text, so the error is reported at the values.
 
 use crate::error::{Location, Problem};
 use crate::expression::Expression;
 use crate::near::shown;
 use std::collections::BTreeSet;
 
-/// The value of a parameter in a case, as it is stated.
+/// The value of a parameter in a case, as stated.
 pub(crate) struct Stated<'a> {
     pub text: &'a str,
     pub location: &'a Location,
-    /// `None` of one out of a range.
+    /// `None` for a value from a range.
     pub expression: Option<&'a Expression>,
 }
 
-/// The parameters by which each one is computed and that are not stated in the file of the template, itself among them, in their order.
+/// Returns the parameters outside the template file on which the parameters `of` depend, `of`
+/// included, in index order.
 pub(crate) fn given(template: usize, stated: &[Stated<'_>], of: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
     let (mut found, mut open) = (BTreeSet::new(), of.into_iter().collect::<Vec<_>>());
     while let Some(next) = open.pop() {
@@ -25,7 +28,8 @@ pub(crate) fn given(template: usize, stated: &[Stated<'_>], of: impl IntoIterato
     found
 }
 
-/// The same problem, placed at the first value of the user that leads to it where it is one of a parameter of the template.
+/// Moves a problem of a template parameter to the first user value that causes it; returns
+/// other problems unchanged.
 pub(crate) fn blame(problem: Problem, template: Option<usize>, names: &[String], stated: &[Stated<'_>]) -> Problem {
     let Some(template) = template.filter(|source| *source == problem.location.source) else { return problem };
     let Some(wrong) = names.iter().position(|name| *name == problem.key) else { return problem };

@@ -1,5 +1,7 @@
-//! How much a study will hold and how long it will take, by counting: rows, columns, orbits; and by what each method was
-//! measured to need. How many of these a study has, its kind says.
+//! Estimates of size and time of a study: counts of rows, columns and orbits times measured
+//! costs of the methods.
+//!
+//! Each study kind supplies the counts.
 
 use crate::error::{Problem, StudyError};
 use crate::extra;
@@ -16,56 +18,68 @@ use stickslip::law::SharedLaw;
 use stickslip::method::{Method, auto::Auto, event_driven, evidence_steps, harmonic_balance};
 use stickslip::model::System;
 
-/// What a study will hold.
+/// The size of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Size {
     /// Rows of its tables.
     pub rows: u64,
-    /// Its tables as numbers of eight bytes.
+    /// Size of its tables as numbers of eight bytes, bytes.
     pub results: u64,
-    /// Most memory at one time, bytes, of a run that writes its tables while it goes on: rough.
+    /// Peak memory of a run that writes its tables as it proceeds, bytes; a rough estimate.
     pub memory: u64,
-    /// The same of a run that keeps them all.
+    /// Peak memory of a run that holds all tables, bytes.
     pub whole: u64,
 }
 
 /// Bytes of a number in a table.
 const NUMBER: f64 = 8.0;
-/// Bytes of a word in a table: its handle, and its own piece of memory.
+/// Bytes of a word in a table: its handle and its heap allocation.
 const WORD: f64 = 56.0;
-/// Bytes of a cell as text of a CSV file. Measured: 85 for three numbers and a word.
+/// Bytes of a cell as text in a CSV file. Measured: 85 for three numbers and a word.
 const WRITTEN: f64 = 20.0;
-/// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in HTML.
+/// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in
+/// HTML.
 const DRAWN: f64 = 240.0;
-/// Bytes of an orbit of an exact law, per entry of its state and per switch; and of a smooth law per entry. Measured:
-/// exact 8 kB for the couple and 170 kB for 8 masses and joints, smooth 80 kB and 600 kB.
+/// Bytes of an orbit: of exact laws per entry of its state and per switch, of smooth laws per
+/// entry.
+///
+/// Measured: exact 8 kB for the couple and 170 kB for 8 masses and joints; smooth 80 kB and 600
+/// kB.
 const ORBIT_ENTRY: f64 = 500.0;
 const SMOOTH_ENTRY: f64 = 24_000.0;
-/// Bytes of a series while it is sought, per harmonic coefficient of a place or joint. Measured: 15 kB for the couple,
-/// 130 kB for 8 masses and joints, at 15 harmonics.
+/// Bytes per harmonic coefficient of a place or joint while harmonic balance solves an orbit.
+///
+/// Measured: 15 kB for the couple, 130 kB for 8 masses and joints, at 15 harmonics.
 const SERIES_ENTRY: f64 = 80.0;
-/// Bytes of the samples of a joint's forces and contact over a period. Measured: a ring of 480 blades and joints with seven harmonics takes
-/// 87 MB on two threads, those that are about to be solved included.
+/// Bytes of the samples of force and contact of a joint over a period.
+///
+/// Measured: a ring of 480 blades and joints with seven harmonics takes 87 MB on two threads,
+/// including the orbits that are next to be solved.
 const SERIES_SAMPLES: f64 = 40.0 * 1024.0;
-/// Bytes of a complex coefficient: of the motion that an orbit keeps, one for every harmonic, the mean and the state at its start, of every degree of
-/// freedom; of its equations, along the directions of a joint.
+/// Bytes of a complex coefficient.
+///
+/// An orbit keeps one for every degree of freedom, for each harmonic, the mean and the initial
+/// state. Its equations have one for each direction of a joint.
 const COEFFICIENT: f64 = 16.0;
 const DIRECTIONS: f64 = 3.0;
-/// Bytes of what is measured of a place, with its name.
+/// Bytes of the measured quantities of a place, including its name.
 const MEASURED: f64 = 100.0;
-/// Samples per period for which those of the joints were measured.
+/// Samples per period at which [`SERIES_SAMPLES`] was measured.
 const SAMPLED: f64 = 1024.0;
-/// Numbers, per entry of a full matrix, of a method that follows the motion in time: three of the structure, its inverse mass, and the return
-/// map with its products, of twice as many rows.
+/// Numbers per entry of a full matrix for a method that integrates in time.
+///
+/// These are three matrices of the structure, the inverse mass, and the return map with its
+/// products, which has twice the rows.
 const IN_TIME: f64 = 16.0;
 /// Bytes of the motion at one instant, per mass and joint.
 const SAMPLE: f64 = 64.0;
-/// Points that a curve with adaptive frequencies takes, per case. Measured: 100 to 600 at tolerances of 1 %.
+/// Points per case of a curve with adaptive frequencies. Measured: 100 to 600 at tolerances of
+/// 1 %.
 const ADAPTIVE: f64 = 300.0;
-/// Points per period, per joint, that are there beside those that were asked for: the switches.
+/// Switching points per period and joint, in addition to the requested instants.
 const SWITCHES: f64 = 4.0;
 
-/// A table to be: rows and columns.
+/// The shape of a planned table: rows and columns.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Shape {
     /// Rows.
@@ -76,66 +90,71 @@ pub struct Shape {
     pub words: f64,
 }
 
-/// What a study of a kind costs; the kind says it.
+/// The cost of a study, as its kind estimates it.
 #[derive(Debug, Default)]
 pub struct Cost {
-    /// Its tables.
+    /// Shapes of its tables.
     pub tables: Vec<Shape>,
-    /// Points of figures.
+    /// Number of points in figures.
     pub drawn: f64,
-    /// What one unit of work keeps while it is computed, beside its tables, bytes. Of the units only as many are computed at a time as
-    /// there are threads; the tables of those that wait are counted with the tables.
+    /// Memory of one unit of work during its computation, without its tables, bytes.
+    ///
+    /// At most one unit per thread is computed at a time. The tables of units that wait are
+    /// counted with the tables.
     pub unit: f64,
     /// Time of the methods on one thread, s.
     pub work: f64,
-    /// How much of it there is only where the results ask for it, s, and where it is spared, in words.
+    /// Part of the work that is needed only for some results, s, and a text that says when it
+    /// is skipped.
     pub spared: Option<(f64, &'static str)>,
 }
 
-/// What is known of a study when its cost is asked: counts, and what one orbit takes. The first case stands for all.
+/// Data for a cost estimate: counts, and the cost of one orbit. The first case represents all
+/// cases.
 #[derive(Debug, Clone)]
 pub struct Costing<'a> {
     /// The study.
     pub study: &'a Study,
     /// Its first case.
     pub case: &'a Case,
-    /// Cases.
+    /// Number of cases.
     pub cases: f64,
-    /// Frequencies of a case; of adaptive ones how many they are likely to be.
+    /// Number of frequencies of a case; a typical number for adaptive frequencies.
     pub frequencies: f64,
-    /// Varied parameters, a column each.
+    /// Number of varied parameters, one column each.
     pub varied: f64,
-    /// Degrees of freedom, a few for each mass.
+    /// Number of degrees of freedom.
     pub masses: f64,
-    /// Places that results are given at: of masses every degree of freedom.
+    /// Number of places with results; every degree of freedom of a mass is one.
     pub places: f64,
-    /// Joints.
+    /// Number of joints.
     pub joints: f64,
-    /// Sliders of the joints that have any, one for every other joint.
+    /// Number of sliders in all joints; a joint without sliders counts as one.
     sliders: f64,
     surveyed: &'a Surveyed,
-    /// Whether a law is smooth, or made so, and whether one has internal states, which makes the flow stiff.
+    /// True if a law is smooth, or is made smooth by `width`.
     smooth: bool,
     has_states: bool,
-    /// Whether a law has no rate: integration then goes in equal steps.
+    /// True if a law has no rate form; integration then uses equal time steps.
     stepped: bool,
-    /// Whether friction falls with velocity somewhere.
+    /// True if the friction of a law falls with velocity.
     falls: bool,
-    /// Whether nothing bounds the force of a law.
+    /// True if the force of a law is unbounded.
     unbounded: bool,
-    /// Whether the method of the study finds series of harmonics.
+    /// True if the method of the study is harmonic balance.
     series: bool,
-    /// Memory of a factor of the dynamic stiffness in all rows, bytes; zero where none is made. To know it of a large structure takes seconds.
+    /// Memory of one factor of the dynamic stiffness in all rows, bytes; zero if none is made.
+    /// Stored here because computing it takes seconds for a large structure.
     factor_bytes: f64,
     pace: Pace,
 }
 
-/// How hard orbits are to find.
+/// The assumed difficulty of finding orbits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Pace {
-    /// As they mostly are.
+    /// The typical case.
     Usual,
-    /// Where many are not found, or only after long searches.
+    /// The hard case: many orbits are not found, or only after long searches.
     Slow,
 }
 
@@ -148,7 +167,7 @@ impl Pace {
     }
 }
 
-/// Whether the method of a case finds series of harmonics.
+/// Returns true if the method of a case is harmonic balance.
 fn finds_series(case: &Case, system: &System) -> bool {
     match case.method.name.as_str() {
         "harmonic-balance" => true,
@@ -158,10 +177,10 @@ fn finds_series(case: &Case, system: &System) -> bool {
 }
 
 impl<'a> Costing<'a> {
-    /// Of a study whose orbits are hard to find.
+    /// Returns the costing of a study whose orbits are hard to find.
     pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
-        // a width makes exact laws smooth
+        // the option `width` makes exact laws smooth
         let width = case.method.options.get("width");
         let followed = |law: &SharedLaw| width.and_then(|width| law.regularised(*width)).unwrap_or_else(|| law.clone());
         let laws: Vec<SharedLaw> = system.joints().iter().map(|joint| followed(joint.law())).collect();
@@ -190,53 +209,60 @@ impl<'a> Costing<'a> {
         }
     }
 
-    /// Of the same study, where orbits are as easy to find as they mostly are.
+    /// Returns the costing of the same study with typical orbits.
     pub(crate) fn usual(&self) -> Self {
         Costing { pace: Pace::Usual, ..self.clone() }
     }
 
-    /// The system of the first case.
+    /// Returns the system of the first case.
     pub fn system(&self) -> &System {
         self.surveyed.survey.system()
     }
 
-    /// Cases times frequencies.
+    /// Returns the number of points: cases times frequencies.
     pub fn points(&self) -> f64 {
         self.cases * self.frequencies
     }
 
-    /// Groups of cases that differ in the last parameter of `vary` only.
+    /// Returns the number of groups of cases that differ in the last parameter of `vary` only.
     pub fn curves(&self) -> f64 {
         self.cases / self.study.last_varied().max(1) as f64
     }
 
-    /// The column of the frequency, where a table has it for several frequencies only.
+    /// Returns the number of frequency columns: 1 for several frequencies, otherwise 0.
     pub fn several(&self) -> f64 {
         if self.frequencies > 1.0 { 1.0 } else { 0.0 }
     }
 
-    /// A table with a row for each of `rows` orbits: frequency, amplitude, mean and phase of each mass, dissipation and slip of each joint,
-    /// what `output` asks for, evidence, status.
+    /// Returns the shape of a table with one row for each of `rows` orbits.
+    ///
+    /// The columns are frequency; amplitude, mean and phase of each place; dissipation and slip
+    /// of each joint; the columns of `output`; evidence; status.
     pub fn orbits(&self, rows: f64) -> Shape {
         let extra = extra::columns(self.case, self.system()).len() as f64;
         let numbers = self.varied + 3.0 * self.places + 2.0 * self.joints + extra + 6.0;
         Shape { rows, numbers, words: 1.0 }
     }
 
-    /// A table with a row for each of `rows` instants: time and frequency, displacement and velocity of each mass, three of each joint and
-    /// its contact.
+    /// Returns the shape of a table with one row for each of `rows` instants.
+    ///
+    /// The columns are time and frequency; displacement and velocity of each place; three
+    /// numbers and the contact state of each joint.
     pub fn motion(&self, rows: f64) -> Shape {
         Shape { rows, numbers: self.varied + 2.0 + 2.0 * self.places + 3.0 * self.joints, words: self.joints }
     }
 
-    /// Instants of a period in a table: `samples` steps, both ends, and the switches.
+    /// Returns the instants of a period in a table: `samples` steps, both ends, and the
+    /// switches.
     pub fn instants(&self) -> f64 {
         self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + SWITCHES * self.joints
     }
 
-    /// Peaks of a place between the first and the last frequency that resonances make: each lifts the frequency that is nearest to it. Usually there
-    /// are as many as both with all joints free and with all stuck, at most as many as with either. `None` where the resonances or the frequencies are
-    /// not known.
+    /// Estimates the number of resonance peaks of a place strictly inside the frequency range.
+    ///
+    /// Each resonance raises the given frequency nearest to it. The typical number is the
+    /// smaller of the counts with all joints free and with all joints stuck; the upper number
+    /// is the larger of both. Returns `None` if the resonances or the frequencies are unknown.
     pub fn resonances(&self) -> Option<f64> {
         let given = self.case.frequencies.as_ref().filter(|_| !self.study.is_adaptive())?;
         let survey = &self.surveyed.survey;
@@ -255,17 +281,17 @@ impl<'a> Costing<'a> {
         self.pace.of(peaks().min(), peaks().max()).map(|peaks| peaks as f64)
     }
 
-    /// Lowest and highest drive frequency, rad/s.
+    /// Returns the lowest and highest excitation frequency, rad/s.
     pub fn range(&self) -> Option<(f64, f64)> {
         range(self.case)
     }
 
-    /// Lowest natural frequency with all joints stuck, rad/s; zero if there is none.
+    /// Returns the lowest natural frequency with all joints stuck, rad/s; zero without one.
     pub fn slowest_mode(&self) -> f64 {
         self.surveyed.survey.stuck().elastic.first().map_or(0.0, |mode| mode.omega)
     }
 
-    /// Bytes of the orbits that a unit of frequencies keeps at a time.
+    /// Returns the bytes of the orbits that a unit of frequencies keeps at a time.
     pub fn kept_orbits(&self) -> f64 {
         let orbits = self.frequencies.min(BLOCK as f64);
         if self.is_series() {
@@ -276,14 +302,16 @@ impl<'a> Costing<'a> {
         orbits * self.orbit_bytes()
     }
 
-    /// Bytes of an orbit that is a series of so many harmonics, once it is found. Measured: 1.0 MB for a ring of 12 sectors with 1188 coordinates and 12
-    /// joints of three directions, at 15 harmonics.
+    /// Returns the bytes of a converged orbit with this number of harmonics.
+    ///
+    /// Measured: 1.0 MB for a ring of 12 sectors with 1188 coordinates and 12 joints of three
+    /// directions, at 15 harmonics.
     pub fn kept_series_bytes(&self, harmonics: f64, samples: f64) -> f64 {
         let coefficients = (harmonics + 2.0) * (self.masses + DIRECTIONS * self.joints);
         COEFFICIENT * coefficients + MEASURED * self.places + SERIES_SAMPLES * samples / SAMPLED * self.joints
     }
 
-    /// Bytes of an orbit in memory.
+    /// Returns the bytes of an orbit in memory while it is computed.
     pub fn orbit_bytes(&self) -> f64 {
         let state = 2.0 * self.masses + self.joints + 1.0;
         if self.is_series() {
@@ -294,17 +322,18 @@ impl<'a> Costing<'a> {
         matrices + if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + SWITCHES * self.joints) }
     }
 
-    /// Whether the method of the study finds series of harmonics.
+    /// Returns true if the method of the study is harmonic balance.
     pub fn is_series(&self) -> bool {
         self.series
     }
 
-    /// Bytes of the motion at the instants of one period.
+    /// Returns the bytes of the motion at the instants of one period.
     pub fn samples_bytes(&self) -> f64 {
         self.instants() * SAMPLE * (2.0 + self.masses + self.joints)
     }
 
-    /// Bytes that a series of so many harmonics takes while it is sought.
+    /// Returns the bytes that harmonic balance needs to solve an orbit of this number of
+    /// harmonics.
     pub fn series_bytes(&self, harmonics: f64) -> f64 {
         SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.masses + 4.0 * self.joints)
     }
@@ -319,7 +348,7 @@ impl Cost {
         self.tables.iter().map(|table| table.rows * (number * table.numbers + word * table.words)).sum()
     }
 
-    /// The same, of no more rows than a figure shows.
+    /// Returns the cells of at most as many rows as a figure shows.
     fn shown(&self, number: f64, word: f64) -> f64 {
         let rows = |table: &Shape| table.rows.min(MOST_ROWS as f64);
         self.tables.iter().map(|table| rows(table) * (number * table.numbers + word * table.words)).sum()
@@ -327,18 +356,19 @@ impl Cost {
 }
 
 impl Costing<'_> {
-    /// Size of a study of this cost whose work is cut into so many units.
+    /// Returns the size of a study of this cost, divided into `units` units of work.
     pub(crate) fn size(&self, cost: &Cost, units: usize) -> Size {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let tables = cost.cells(NUMBER + WRITTEN, WORD + WRITTEN);
-        // units wait for their turn; of the tables as many rows are read back as a figure shows
+        // finished units wait until they are in order; a figure reads back at most
+        // [`MOST_ROWS`] rows of a table
         let waiting = tables * ((AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
         let shown = cost.shown(NUMBER + WRITTEN, WORD + WRITTEN);
         let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.places + self.joints));
         let factor = self.factor_bytes;
         let factors = factor + (KEPT_FACTORS.0 * factor).min(KEPT_FACTORS.1);
         let working = units.min(threads) as f64 * (cost.unit + factors);
-        // a float that is too large for the type becomes its largest value
+        // a float above the largest value of the type becomes that value
         let whole = |value: f64| value as u64;
         Size {
             rows: whole(cost.rows()),
@@ -348,24 +378,26 @@ impl Costing<'_> {
         }
     }
 
-    /// Rough time of a study of this cost on one thread, s.
+    /// Estimates the time of a study of this cost on one thread, s.
     pub(crate) fn seconds(&self, cost: &Cost) -> f64 {
         let elements = self.masses + self.joints;
-        // the modes of large models are not asked for
+        // the modes of large models are not computed
         let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { MODES * self.masses.powi(3) };
         let preparing = self.cases * (PREPARING + modes + ASSEMBLING * elements);
         let writing = CELL * cost.cells(1.0, 1.0);
         OVERHEAD + GENEROUS * (cost.work + self.matrices() + self.again() + preparing + writing + POINT * cost.drawn)
     }
 
-    /// Time to bring a structure by its matrices into few coordinates, s, which all cases share.
+    /// Returns the time to read and reduce a structure given by matrices, s; all cases share
+    /// it.
     fn matrices(&self) -> f64 {
         let reduced = self.system().reduced().and(self.case.model.substructure.as_ref());
         let rows = reduced.map_or(0.0, |substructure| substructure.component.dofs() as f64);
         MATRICES.0 * rows.powf(MATRICES.1) + SEEN * rows * self.places
     }
 
-    /// Time to solve points again where joints slip on a structure in few coordinates, s.
+    /// Returns the time of the basis check, s: points with slip are solved again in a larger
+    /// reduction basis.
     fn again(&self) -> f64 {
         let Some(reduced) = self.system().reduced() else { return 0.0 };
         let rows = self.case.model.substructure.as_ref().map_or(0, |own| own.component.dofs());
@@ -379,10 +411,11 @@ impl Costing<'_> {
     }
 }
 
-// ------------------------------------------------------------------------------------------ the limit
+// ------------------------------------------------------------------------------------------
+// memory limit
 
 impl Size {
-    /// Why a study is not run that needs so much memory, if that is more than it may take.
+    /// Returns the error that refuses a study which needs more memory than the limit.
     pub(crate) fn refusal(&self, study: &Study, memory: u64) -> Option<StudyError> {
         let limit = study.memory_limit();
         if memory <= limit {
@@ -400,7 +433,7 @@ impl Size {
         let fewer = if study.points() > study.cases() { "take fewer frequencies, " } else { "" };
         let split = if study.cases() > 1 { "split `vary` over several files, " } else { "" };
         let help = format!("{}{fewer}{split}or allow more with --memory", given.concat());
-        // at what makes most of it
+        // the error stands at the key that contributes most
         let place = match (study.varied.first(), study.points() / study.cases().max(1)) {
             (Some(varied), frequencies) if study.cases() >= frequencies => &varied.location,
             _ => study.study.location_of("frequency", None),
@@ -409,135 +442,212 @@ impl Size {
     }
 }
 
-// ------------------------------------------------------------------------------------------ time
+// ------------------------------------------------------------------------------------------
+// time
 
-/// The estimates are of one core of 2020 and are doubled: too long rather than too short.
+/// Safety factor on times measured on one core of 2020: estimates are high rather than low.
 const GENEROUS: f64 = 2.0;
-/// Reading, drawing and writing, s.
+/// Time for reading, drawing and writing, s.
 const OVERHEAD: f64 = 0.2;
-/// Work on a row of a table and its text, per cell, s. Measured: 0.4 s for 200,000 rows of ten.
+/// Time for one cell of a table and its text, s. Measured: 0.4 s for 200,000 rows of ten.
 const CELL: f64 = 3e-7;
-/// Work on a point of a figure, s. Measured: 1 s for 800,000 in HTML, as much for SVG.
+/// Time for one point of a figure, s. Measured: 1 s for 800,000 in HTML, the same for SVG.
 const POINT: f64 = 3e-6;
-/// Event-driven: a closed form per segment where the neighbour's orbit is near, and where it is not. Measured: 19 to 49 µs for the couple.
+/// Event-driven: time for the closed forms of an orbit, s, with and without an orbit at a near
+/// frequency. Measured: 19 to 49 µs for the couple.
 const EVENT_DRIVEN: (f64, f64) = (3e-5, 2e-4);
-/// How many times as much an orbit takes that Newton's method finds only after waiting.
+/// Factor on the time of an orbit that Newton's method finds only after waiting.
 const EVENTS_WAITED: f64 = 3.0;
-/// The tolerance of harmonic balance for which its time was measured.
+/// Tolerance of harmonic balance at which its time was measured.
 const SERIES_TOLERANCE: f64 = 1e-3;
-/// Harmonic balance per mass and joint at 15 harmonics. Measured with springs before the sliders: 54 µs for the massless couple, 3 ms for a
-/// ring of 48 blades and joints, 12 ms for a chain of 300; a tenth of this, but points that are not found take the rest.
+/// Harmonic balance: time per mass and joint at 15 harmonics, s, in the hard case.
+///
+/// Measured for sliders behind springs: 54 µs for the massless couple, 3 ms for a ring of 48
+/// blades and joints, 12 ms for a chain of 300. That is a tenth of this value; points that are
+/// not found take the rest.
 const SERIES: f64 = 5e-4;
-/// The same where they are found.
+/// Time of [`SERIES`] in the typical case, in which orbits are found.
 const SERIES_USUAL: f64 = 1.5e-5;
-/// Rigid sliders and smooth laws need more harmonics and more steps: measured 20 ms at 4 blades, 0.9 s at 32. Where
-/// the harmonics are given they need more steps only, as a rule from a neighbour and where none is near: 0.8 and 2.1 s for rings of 100 and 300 with five.
+/// Factors for rigid sliders and smooth laws, which need more harmonics and more Newton steps.
+///
+/// Measured: 20 ms at 4 blades, 0.9 s at 32. With given harmonics they need only more Newton
+/// steps, with a warm start and without one. Measured with five harmonics: 0.8 and 2.1 s for
+/// rings of 100 and 300.
 const HARD: f64 = 40.0;
 const HARD_RIGID: (f64, f64) = (3.0, 80.0);
 const HARD_SMOOTH: f64 = 10.0;
-/// Friction that falls with velocity needs the most of both. Measured: 0.16 to 0.4 s for two masses and a joint; 2.4 s a point where 511 harmonics are tried
-/// in vain.
+/// Factors for friction that falls with velocity, which needs the most harmonics and Newton
+/// steps.
+///
+/// Measured: 0.16 to 0.4 s for two masses and a joint; 2.4 s for a point at which 511 harmonics
+/// do not converge.
 const HARD_FALLING: (f64, f64) = (120.0, 500.0);
-/// A multiplication in an elimination, s. Measured: 2.8e-10 in bands, for steps of a ring of 96 blades with 96 rigid joints and 15 harmonics, and 1e-10 in blocks.
+/// Time of one multiplication in an elimination, s.
+///
+/// Measured: 2.8e-10 in bands, for Newton steps of a ring of 96 blades with 96 rigid joints and
+/// 15 harmonics; 1e-10 in blocks.
 const ELIMINATED: f64 = 2e-10;
-/// Steps of rigid friction at the harmonics that are given and at those of the estimate: from a neighbour, and where Newton's method alone finds
-/// nothing. Measured: 3 to 5 for rings of 12 and 24 blades, 30 to 55 for 48 to 192; 4 to 8 for an estimate.
+/// Newton steps of rigid friction with given harmonics, and with the harmonics of the error
+/// estimate.
+///
+/// Typical: from a warm start. Hard: Newton's method alone does not converge. Measured: 3 to 5
+/// for rings of 12 and 24 blades, 30 to 55 for 48 to 192; 4 to 8 for an estimate.
 const RIGID_STEPS_USUAL: (f64, f64) = (8.0, 4.0);
 const RIGID_STEPS: (f64, f64) = (60.0, 8.0);
-/// The same where the harmonics are chosen, at each number of them and at twice that; usually and at worst.
+/// Newton steps of rigid friction per number of harmonics if the method chooses the harmonics;
+/// typical and hard.
 const RIGID_EACH: (f64, f64) = (3.0, 8.0);
-/// Harmonics that rigid friction needs for [`SERIES_TOLERANCE`], usually and at worst, and the power of one over the tolerance that they go with: the error
-/// falls with an order between 1 and 3/2. Measured: 14 trees of 8 to 30 masses took 0.02 to 2 s a point, with 15 to 255.
+/// Harmonics that rigid friction needs for [`SERIES_TOLERANCE`], typical and hard, and the
+/// exponent of their growth with one over the tolerance.
+///
+/// The order of the error is between 1 and 3/2. Measured: 14 trees of 8 to 30 masses took 0.02
+/// to 2 s per point, with 15 to 255 harmonics.
 const RIGID_HARMONICS: (f64, f64) = (31.0, 255.0);
 const RIGID_ORDER: f64 = 2.0 / 3.0;
-/// Time of the derivatives of a law with memory beside rigid friction in a plane, which asks for hundreds of harmonics and tens of thousands of samples, s for every
-/// pair of its directions; usually, where few are enough, and at worst. Measured: 0.3 to 14.5 s a point with four to eight pairs.
+/// Time of the derivatives of laws with memory in a model with rigid planar friction, s per
+/// pair of directions.
+///
+/// Such friction needs hundreds of harmonics and tens of thousands of samples. Typical: few are
+/// enough. Measured: 0.3 to 14.5 s per point with four to eight pairs.
 const BESIDE_RIGID: (f64, f64) = (0.0, 1.5);
-/// What a point spends of it at most, s.
+/// Upper bound of that time per point, s.
 const BESIDE_RIGID_MOST: f64 = 15.0;
-/// Where harmonic balance ends.
+/// Largest number of harmonics in harmonic balance.
 const MOST_HARMONICS: f64 = 511.0;
-/// The order with which the error of a series falls with its length where forces have corners, and the power of its length with which its time grows.
-/// Measured for two masses and a `jenkins`: twice the time from 1e-3 to 1e-7; 15, 60 and 240 harmonics 0.1, 0.25 and 2.4 ms. With `bouc-wen` nine times
-/// the time from 1e-3 to 1e-6.
+/// Order of the truncation error in the number of harmonics for forces with corners, and
+/// exponent of the time in the number of harmonics.
+///
+/// Measured for two masses and a `jenkins`: twice the time from 1e-3 to 1e-7; 0.1, 0.25 and 2.4
+/// ms for 15, 60 and 240 harmonics. With `bouc-wen`, nine times the time from 1e-3 to 1e-6.
 const SERIES_ORDER: f64 = 3.0;
 const SERIES_LENGTH: f64 = 1.5;
-/// Harmonic balance with all rows of a sparse structure: its dynamic stiffness is factored once for every harmonic of the series and of the estimate, and a
-/// few times more for loads and the mean.
+/// Number of factorizations per orbit for a sparse structure in all rows.
+///
+/// One for every harmonic of the series and of its estimate, and a few more for loads and the
+/// mean.
 const FACTORS: (f64, f64) = (2.0, 6.0);
-/// A factor, s, by this power of its numbers. Measured: 0.057 s for 2.35 million, of 3,168 rows, 8 s for 163 million, of 69,930.
+/// Time of a factorization, s: coefficient and exponent of its number of entries.
+///
+/// Measured: 0.057 s for 2.35 million entries of 3,168 rows, 8 s for 163 million of 69,930
+/// rows.
 const FACTOR: (f64, f64) = (2.1e-9, 1.17);
-/// Memory of the factors and motions that are kept, in factors and bytes at most: the one that is being made comes to them.
+/// Memory of stored factors and motions: number of factors, and bytes at most. The factor that
+/// is being computed comes in addition.
 const KEPT_FACTORS: (f64, f64) = (2.0, 3e9);
-/// What contacts that the structure couples all with all add, per square of their directions, as a smooth law. Measured with five harmonics on a
-/// block, where many slip: 0.05, 0.29 and 1.1 s for 10, 100 and 300 nodes of three directions; a fifth of that where they stick.
+/// Time for contacts that a reduced structure couples all with all, per square of their
+/// directions, s, as for a smooth law.
+///
+/// Measured with five harmonics on a block in which many contacts slip: 0.05, 0.29 and 1.1 s
+/// for 10, 100 and 300 nodes of three directions; a fifth of that if they stick.
 const COUPLED: f64 = 4e-8;
-/// How much harder orbits are where contacts alone hold some bodies of a structure that is not solved by its sector: from a neighbour, and from one
-/// that is farther away than this many widths of a resonance, or none. Measured: 0.4 s and 4 s for 12 mistuned blades with wedges.
+/// Factors on the time of an orbit if only contacts hold some bodies of a structure that is not
+/// solved by one sector.
+///
+/// With a warm start, and without one: no neighbouring frequency is within [`FAR`] widths of a
+/// resonance. Measured: 0.4 s and 4 s for 12 mistuned blades with wedges.
 const UNHELD: (f64, f64) = (14.0, 200.0);
 const FAR: f64 = 10.0;
-/// Harmonics of [`SERIES`].
+/// Number of harmonics for which [`SERIES`] holds.
 const SERIES_HARMONICS: f64 = 15.0;
-/// Shooting, times the square of masses and joints; more where the sliders have springs. Measured: 25 ms for two
-/// masses, 0.6 s for four.
+/// Shooting: time per square of masses and joints, s, without and with internal states of the
+/// laws.
+///
+/// Measured: 25 ms for two masses, 0.6 s for four.
 const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
-/// The same in a sweep. Measured for two masses and a joint: 0.7 ms with `coulomb-arctan` and `cubic`, 1.5 to 3.5 ms with laws that have states.
+/// Times of [`SHOOTING`] in a sweep with warm starts.
+///
+/// Measured for two masses and a joint: 0.7 ms with `coulomb-arctan` and `cubic`, 1.5 to 3.5 ms
+/// with laws that have states.
 const SHOOTING_USUAL: (f64, f64) = (5e-5, 3e-4);
-/// Shooting in equal steps: as many periods of a transient does an orbit take. Measured: 0.29 s a point for a body on a contact of two directions, 0.33 s for
-/// three with two of them.
+/// Shooting with equal steps: the periods of transient motion that take the time of one orbit.
+///
+/// Measured: 0.29 s per point for a body on a contact of two directions, 0.33 s for three
+/// bodies with two such contacts.
 const STEPPED: f64 = 40.0;
-/// Method `transient`: the periods in which a mode with the least damping loses a digit. Measured at a damping ratio of 7e-4: exact laws
-/// 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses; smooth laws 0.9 s and 8 s for 2 and 4. At 1.6 % a ring took 80 periods. The shortest windows of two decays take 16.
+/// Method `transient`: periods in which the mode with the least damping loses one digit, at
+/// least and at most.
+///
+/// Measured at a damping ratio of 7e-4: exact laws 20 ms, 0.1 s, 0.5 s for 2, 4, 8 masses;
+/// smooth laws 0.9 s and 8 s for 2 and 4. At 1.6 % a ring took 80 periods. The shortest windows
+/// of two decays take 16.
 const SETTLING_PERIODS: (f64, f64) = (30.0, 50_000.0);
-/// Highest drive frequencies up to which the drive moves a mode.
+/// The excitation moves modes up to this multiple of its highest frequency.
 const DRIVEN: f64 = 2.0;
-/// Periods after which it ends where nothing settles, which a force without a bound (a gap, a cubic spring) may make of some points; twice, as
-/// a motion that does not settle from its neighbour's is followed from rest again.
+/// Periods after which method `transient` gives up if the motion does not settle.
+///
+/// A law with unbounded force (a gap, a cubic spring) can cause this at some points. The factor
+/// 2 counts the restart from rest after a warm start that did not settle.
 const UNSETTLED_PERIODS: f64 = 2.0 * 4096.0;
-/// Share of the points at which that happens, of all such studies. Measured: one in five of two masses on a hard cubic spring with little
-/// damping, none with more.
+/// Share of points that do not settle, averaged over studies with unbounded laws.
+///
+/// Measured: one in five of two masses on a hard cubic spring with little damping, none with
+/// more.
 const UNSETTLED: f64 = 0.05;
-/// A period of a transient: integration, times the square of masses and joints; more with states.
+/// Time of a period of integration, per square of masses and joints, s, without and with
+/// internal states.
 const PERIOD: (f64, f64) = (2.5e-4, 1.3e-3);
-/// A period from event to event, per mass and slider, and times their cube, for the decomposition of each new pattern. Measured: 0.6, 3.5 and
-/// 21 ms for rings of 12, 24 and 48 masses and joints, 4 ms for three masses and a joint of 32 sliders.
+/// Time of an event-driven period per mass and slider, s, and per cube of their number, for the
+/// decomposition of each new pattern.
+///
+/// Measured: 0.6, 3.5 and 21 ms for rings of 12, 24 and 48 masses and joints, 4 ms for three
+/// masses and a joint of 32 sliders.
 const PERIOD_EVENTS: (f64, f64) = (2e-5, 2.4e-8);
-/// The decomposition of a new pattern of stick and slip, per cube of the degrees of freedom, s. Measured: 4 ms for a ring of 20 blades on a rim.
+/// Time to decompose a new pattern of stick and slip, per cube of the degrees of freedom, s.
+/// Measured: 4 ms for a ring of 20 blades on a rim.
 const PATTERN: f64 = 6e-8;
-/// New patterns of a slider in a period of a motion that does not repeat: it comes to rest and leaves twice.
+/// New patterns per slider and period of a motion that does not repeat: a slider stops and
+/// starts twice.
 const PATTERNS: f64 = 2.0;
-/// Digits of a motion that rings that make the steps of an integration short: as many as its error per step.
+/// Number of digits to which an undamped fast oscillation shortens the integration steps: the
+/// digits of the step tolerance.
 const RINGING: f64 = 9.0;
-/// Periods of the drive that an integration takes as long for as for one oscillation of what rings, at the lowest. Measured: 1000 oscillations at
-/// 18 kHz in 8 periods at 151 Hz, 0.8 s for four masses.
+/// Excitation periods whose integration takes as long as one oscillation of the fastest mode; a
+/// lower bound.
+///
+/// Measured: 0.8 s for four masses, 1000 oscillations at 18 kHz in 8 periods at 151 Hz.
 const RUNG: f64 = 0.2;
-/// Steps of a period in equal steps, usually and at worst: the solutions with two and four times as many, too. Measured: 0.7 to 2 ms a period for a body on
-/// a joint where little slips, 10 to 24 ms where much does.
+/// Equal steps per period, typical and hard, including the solutions with two and four times
+/// the steps.
+///
+/// Measured: 0.7 to 2 ms per period for a body on a joint with little slip, 10 to 24 ms with
+/// much slip.
 const STEPS: (f64, f64) = (2500.0, 25_000.0);
-/// Such a step, s: per direction of a joint, per pair of them, and per pair of masses. Measured, little and much slip: 3 and 20 ms a period for five
-/// directions, 12 and 107 for eight that friction couples, 35 and 296 for 16 of these; as much for one joint of one mass and of eight.
+/// Time of one equal step, s: per direction of a joint, per pair of directions, and per pair of
+/// masses.
+///
+/// Measured with little and much slip: 3 and 20 ms per period for five directions, 12 and 107
+/// for eight that friction couples, 35 and 296 for 16 of these; the same for one joint of one
+/// mass and of eight.
 const STEP: (f64, f64, f64) = (7.5e-7, 5e-8, 4e-9);
-/// What derivatives add to such a step, s, per pair of masses. Measured: returns of 4096 steps in 6 ms for two masses and a contact of two directions, and in
-/// 37 ms for 13 coordinates and one of three.
+/// Time that derivatives add to such a step, s, per pair of masses.
+///
+/// Measured for returns of 4096 steps: 6 ms for two masses and a contact of two directions,
+/// 37 ms for 13 coordinates and a contact of three.
 const JUDGED: f64 = 4e-8;
-/// Resolving and assembling a case, s.
+/// Time to resolve and assemble a case, s.
 const PREPARING: f64 = 2e-4;
-/// Its modes, times the cube of its masses, s. Measured: 0.35 s for 500.
+/// Time of the modes of a case, s, per cube of its masses. Measured: 0.35 s for 500.
 const MODES: f64 = 2.8e-9;
-/// Reading a structure by its matrices, its factors, modes and samples of the whole, s, by this power of its rows; and what a place adds per row.
-/// Measured: 0.2 s for 3,200 rows, 3 to 5 s for 28,000, 10 to 15 s for 70,000; 900 places of 31,500 rows take 7.
+/// Time to read a structure given by matrices, with its factors, modes and samples of the
+/// whole: coefficient (s) and exponent of its rows; and the time per place and row.
+///
+/// Measured: 0.2 s for 3,200 rows, 3 to 5 s for 28,000, 10 to 15 s for 70,000; 900 places of
+/// 31,500 rows take 7.
 const MATRICES: (f64, f64) = (2.4e-6, 1.4);
 const SEEN: f64 = 2e-7;
-/// Solving points again in coordinates that reach farther: their reduction, in multiples of the first, and an orbit from rest in them, in multiples of one.
-/// Measured: twice as long for 3,200 rows; 57 instead of 10 coordinates of a chain of 300 masses, 0.3 s instead of 0.03.
+/// Basis check: time of the larger reduction in multiples of the first one, and time of a cold
+/// orbit in it in multiples of an orbit.
+///
+/// Measured: twice as long for 3,200 rows; 57 instead of 10 coordinates of a chain of 300
+/// masses, 0.3 s instead of 0.03.
 const AGAIN: (f64, f64) = (2.0, 10.0);
-/// Reading, checking and assembling, s, per mass and joint.
+/// Time to read, check and assemble, s, per mass and joint.
 const ASSEMBLING: f64 = 5e-5;
-/// Reading the motion at one instant, per mass and joint, s.
+/// Time to evaluate the motion at one instant, per mass and joint, s.
 const INSTANT: f64 = 5e-7;
 
 impl Costing<'_> {
-    /// Time of one orbit by the method of the study, s.
+    /// Returns the time of one orbit by the method of the study, s.
     pub fn orbit(&self) -> f64 {
         let case = self.case;
         let size = self.masses + self.joints;
@@ -563,7 +673,7 @@ impl Costing<'_> {
         }
     }
 
-    /// Time of one orbit from event to event, s.
+    /// Returns the time of one event-driven orbit, s.
     fn events(&self) -> f64 {
         let counted = ELIMINATED * event_driven::orbit_work(self.system()).unwrap_or(0.0);
         let far = event_driven::ALONE * counted;
@@ -571,7 +681,8 @@ impl Costing<'_> {
         self.pace.of(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + EVENTS_WAITED * far)
     }
 
-    /// Whether there are neighbouring frequencies, no farther apart than so many widths of a resonance.
+    /// Returns true if there are several frequencies, spaced by at most `widths` widths of a
+    /// resonance.
     fn is_dense(&self, widths: f64) -> bool {
         self.range().is_some_and(|(lowest, highest)| {
             self.frequencies > 1.0
@@ -579,12 +690,14 @@ impl Costing<'_> {
         })
     }
 
-    /// Time of one orbit of a linear reference, s: with no joint that slips or opens nothing is hard to find.
+    /// Returns the time of one orbit of a linear reference, s.
+    ///
+    /// A linear reference has no joint that slips or opens, so its orbits are easy to find.
     pub fn reference(&self) -> f64 {
         if self.is_series() { self.orbit() / self.unheld() } else { self.orbit() }
     }
 
-    /// How much harder orbits are to find than those of a structure that holds all of its bodies itself.
+    /// Returns the factor on the time of orbits if only contacts hold some bodies.
     fn unheld(&self) -> f64 {
         let survey = &self.surveyed.survey;
         let contacts = self.smooth && self.stepped;
@@ -594,17 +707,22 @@ impl Costing<'_> {
         self.pace.of(if self.is_dense(FAR) { UNHELD.0 } else { UNHELD.1 }, 1.0)
     }
 
-    /// Steps of a curve, of what it usually takes and what it takes where it is hard to follow.
+    /// Returns the number of steps along a curve: `usual` in the typical case, otherwise
+    /// `hard`.
     pub fn steps(&self, (usual, hard): (f64, f64)) -> f64 {
         self.pace.of(usual, hard)
     }
 
-    /// Share of the structure that is solved for an orbit: of a ring in a travelling wave one sector of twice the size.
+    /// Returns the share of the structure that is solved for an orbit.
+    ///
+    /// A ring in a travelling wave is solved by one sector of twice the size.
     pub fn sector(&self) -> f64 {
         self.system().cyclic().map_or(1.0, |ring| (2.0 / ring.sectors as f64).min(1.0))
     }
 
-    /// Time of one series of harmonics of the whole structure, s; of as many as it needs if `None`.
+    /// Returns the time of harmonic balance for the whole structure, s.
+    ///
+    /// With `harmonics = None` the method chooses the number of harmonics.
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let factor = match (self.smooth, self.is_rigid(), harmonics) {
             (_, _, None) if self.falls => self.pace.of(HARD_FALLING.0, HARD_FALLING.1),
@@ -619,18 +737,18 @@ impl Costing<'_> {
             Some(harmonics) => harmonics / SERIES_HARMONICS,
             None => (SERIES_TOLERANCE / asked).powf(SERIES_ORDER.recip()).min(MOST_HARMONICS / SERIES_HARMONICS),
         };
-        // friction that falls with velocity is hard to find everywhere
+        // friction that falls with velocity is hard to solve in the typical case too
         let usual = if self.falls { SERIES } else { SERIES_USUAL };
         let each = self.pace.of(usual, SERIES) * (self.masses + self.joints).max(1.0);
         (each + self.coupled()) * factor * length.max(1.0).powf(SERIES_LENGTH)
     }
 
-    /// Time to eliminate so many unknowns, s.
+    /// Returns the time to eliminate `unknowns` unknowns, s.
     pub fn eliminated(&self, unknowns: f64) -> f64 {
         ELIMINATED * unknowns.powi(3) / 3.0
     }
 
-    /// What contacts add to a series that a structure in few coordinates couples all with all, s.
+    /// Returns the time that contacts add if a reduced structure couples all of them, s.
     fn coupled(&self) -> f64 {
         let system = self.system();
         let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
@@ -638,7 +756,8 @@ impl Costing<'_> {
         if all { COUPLED * (directions as f64).powi(2) } else { 0.0 }
     }
 
-    /// Time of the eliminations of such a series where friction is rigid, s; zero where none is.
+    /// Returns the elimination time of harmonic balance with rigid friction, s; zero without
+    /// rigid friction.
     fn rigid_series(&self, harmonics: Option<f64>) -> f64 {
         let system = self.system();
         if self.smooth || !self.is_rigid() {
@@ -657,7 +776,9 @@ impl Costing<'_> {
         ELIMINATED * sought.min(harmonic_balance::most_work(system))
     }
 
-    /// Time of laws with memory beside rigid friction in a plane, s; zero where harmonics are given, which are fewer.
+    /// Returns the time of laws with memory in a model with rigid planar friction, s.
+    ///
+    /// Returns zero for given harmonics, which are fewer.
     fn beside_rigid(&self, harmonics: Option<f64>) -> f64 {
         let laws = || self.system().joints().iter().map(|joint| joint.law());
         let is_rigid =
@@ -670,25 +791,26 @@ impl Costing<'_> {
         (self.pace.of(BESIDE_RIGID.0, BESIDE_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
     }
 
-    /// Time to factor the dynamic stiffness for one orbit, s; zero where none is.
+    /// Returns the time to factor the dynamic stiffness for one orbit, s; zero if no factor is
+    /// made.
     fn factored(&self, harmonics: Option<f64>) -> f64 {
         let numbers = self.factor_bytes / NUMBER;
         let count = FACTORS.0 * harmonics.unwrap_or(SERIES_HARMONICS) + FACTORS.1;
         count * FACTOR.0 * numbers.powf(FACTOR.1)
     }
 
-    /// Whether friction is rigid somewhere.
+    /// Returns true if a joint has a rigid slider.
     fn is_rigid(&self) -> bool {
         let rigid =
             |law: &SharedLaw| law.sliders().is_some_and(|all| all.iter().any(|branch| branch.stiffness.is_none()));
         self.system().joints().iter().any(|joint| rigid(joint.law()))
     }
 
-    /// Time of a period of a transient, s.
+    /// Returns the time of one period of a transient, s.
     pub fn period(&self) -> f64 {
         let size = self.masses + self.joints;
         let exact = self.masses + self.sliders;
-        // a width makes sliders integrate that no smooth law replaces
+        // `width` makes methods integrate sliders that have no smooth replacement
         if self.stepped && (self.smooth || self.case.method.options.contains_key("width")) {
             return self.pace.of(STEPS.0, STEPS.1) * self.step();
         }
@@ -699,26 +821,29 @@ impl Costing<'_> {
         }
     }
 
-    /// Time in which the return of an orbit by harmonic balance is followed in equal steps, s; zero where it takes no time beside the orbit.
+    /// Returns the time of the return check of a harmonic balance orbit in equal steps, s.
+    ///
+    /// Returns zero if the check takes no time compared with the orbit.
     fn judged(&self) -> f64 {
         let Some((steps, with_derivatives)) = evidence_steps(self.system()) else { return 0.0 };
         let derivatives = if with_derivatives { JUDGED * self.masses.powi(2) } else { 0.0 };
         steps as f64 * (self.step() + derivatives)
     }
 
-    /// Time of an orbit between others, whose return nobody asks for, s.
+    /// Returns the time of an intermediate orbit, whose return is not checked, s.
     pub fn between(&self) -> f64 {
         self.orbit() - if self.is_series() { self.judged() } else { 0.0 }
     }
 
-    /// Time of one of equal steps, s.
+    /// Returns the time of one equal step, s.
     fn step(&self) -> f64 {
         let joints = self.system().joints();
         let directions = joints.iter().map(|joint| joint.law().directions()).sum::<usize>() as f64;
         STEP.0 * directions + STEP.1 * directions.powi(2) + STEP.2 * self.masses.powi(2)
     }
 
-    /// Time to decompose the patterns of stick and slip of a motion of so many periods that does not repeat, s.
+    /// Returns the time to decompose the patterns of stick and slip in `periods` periods of a
+    /// motion that does not repeat, s.
     pub fn patterns(&self, periods: f64) -> f64 {
         if self.smooth || self.stepped {
             return 0.0;
@@ -726,7 +851,8 @@ impl Costing<'_> {
         (periods * PATTERNS * self.sliders).max(1.0) * PATTERN * self.masses.powi(3)
     }
 
-    /// How many times as long a period takes to integrate in which the fastest mode rings that is not damped away within it.
+    /// Returns the factor on the integration time of a period due to the fastest mode that does
+    /// not decay within the period.
     fn ringing(&self) -> f64 {
         let drive = self.range().map_or(self.slowest_mode(), |(lowest, _)| lowest);
         let modes = &self.surveyed.survey.stuck().elastic;
@@ -734,8 +860,10 @@ impl Costing<'_> {
         (RUNG * rings.map(|mode| mode.omega).fold(drive, f64::max) / drive.max(f64::MIN_POSITIVE)).max(1.0)
     }
 
-    /// Damping ratio of the mode, with all joints free, whose transient dies last: of all, or usually of those that the drive moves, since friction damps
-    /// the others as long as they are seen.
+    /// Returns the smallest modal damping ratio with all joints free.
+    ///
+    /// The hard case takes all modes. The typical case takes only modes that the excitation
+    /// moves, because friction damps the others while they are visible.
     fn least_damping(&self) -> f64 {
         let modes = &self.surveyed.survey.free().elastic;
         let highest = self.range().map_or(f64::INFINITY, |(_, highest)| DRIVEN * highest);
@@ -743,12 +871,12 @@ impl Costing<'_> {
         driven.map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE)
     }
 
-    /// Time to read the motion at so many instants, s.
+    /// Returns the time to evaluate the motion at `instants` instants, s.
     pub fn reading(&self, instants: f64) -> f64 {
         INSTANT * instants * (self.masses + self.joints)
     }
 
-    /// Time to read what `output` asks of one orbit, s.
+    /// Returns the time to evaluate the columns of `output` for one orbit, s.
     pub fn extra(&self) -> f64 {
         match self.case.values.names("output").unwrap_or_default().len() {
             0 => 0.0,

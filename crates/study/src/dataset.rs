@@ -1,4 +1,5 @@
-//! What a study yields: tables, figures and the record of the run, free of any file format.
+//! The results of a study: tables, figures and the record of the run, independent of file
+//! formats.
 //!
 //! The writers in `stickslip-report` see nothing else.
 
@@ -10,23 +11,23 @@ use std::fmt;
 /// The result of one study.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Dataset {
-    /// Name of the study: the stem of its file. Also the name of its folder of results.
+    /// Name of the study: the stem of its file. Also the name of its results folder.
     pub name: String,
     /// Title, for figures and pages.
     pub title: String,
-    /// Where the study comes from (a paper, a figure), if said.
+    /// Origin of the study (a paper, a figure), if stated.
     pub source: Option<String>,
     /// Study kind, for example `response`.
     pub kind: String,
-    /// Tables in the order of importance; each becomes one file.
+    /// Tables in order of importance; each becomes one file.
     pub tables: Vec<Table>,
     /// The figure of the study.
     pub figure: Figure,
-    /// Plain sentences that a reader of the results must know.
+    /// Sentences that a reader of the results must know.
     pub notes: Vec<String>,
     /// The points that did not converge.
     pub failures: Vec<Failure>,
-    /// How the run was made.
+    /// The record of the run.
     pub record: Record,
 }
 
@@ -48,7 +49,8 @@ pub struct Column {
     pub values: Values,
 }
 
-/// The values of a column. A number that does not exist (a failed point) is NaN and is written as an empty cell.
+/// The values of a column. A missing number (of a failed point) is NaN and is written as an
+/// empty cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Values {
     /// Real numbers, written with all their digits.
@@ -57,12 +59,13 @@ pub enum Values {
     Integer(Vec<u64>),
     /// Words.
     Text(Vec<String>),
-    /// Written as `true` and `false`; `None` (unknown: a failed point) as an empty cell.
+    /// Flags, written as `true` and `false`; `None` (unknown, of a failed point) as an empty
+    /// cell.
     Flag(Vec<Option<bool>>),
 }
 
 impl Values {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         match self {
             Values::Number(v) => v.len(),
@@ -71,12 +74,14 @@ impl Values {
             Values::Flag(v) => v.len(),
         }
     }
-    /// Whether there is no row.
+    /// Returns true if there is no row.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Cells of the same sort, without a value: what a case does not have. A count that there is not is zero.
+    /// Returns cells of the same type without a value, for columns that a case does not have.
+    ///
+    /// A missing count is zero.
     pub(crate) fn blank(&self, rows: usize) -> Values {
         match self {
             Values::Number(_) => Values::Number(vec![f64::NAN; rows]),
@@ -86,7 +91,7 @@ impl Values {
         }
     }
 
-    /// More cells of the same sort after these.
+    /// Appends cells of the same type.
     pub(crate) fn extend(&mut self, more: Values) {
         match (self, more) {
             (Values::Number(a), Values::Number(b)) => a.extend(b),
@@ -98,14 +103,17 @@ impl Values {
     }
 }
 
-/// The header of a column that is named after a place: a direction of a node, `node.direction`, is written with `_`.
+/// Returns the column header for a place: a `.` as in `node.direction` becomes `_`.
 pub fn column_name(name: &str) -> Cow<'_, str> {
     if name.contains('.') { Cow::Owned(name.replace('.', "_")) } else { Cow::Borrowed(name) }
 }
 
 impl Column {
-    /// The unit of its numbers as it is written in study files, which the end of its name says: `N/m` of `kt_N_per_m`. `None` for pure
-    /// numbers, and for what is no number.
+    /// Returns the unit of the numbers as study files write it, read from the end of the column
+    /// name.
+    ///
+    /// The name `kt_N_per_m` gives `N/m`. `None` for pure numbers and for columns without
+    /// numbers.
     ///
     /// # Example
     /// ```
@@ -114,7 +122,7 @@ impl Column {
     /// assert_eq!(unit("blade1_amplitude_m").as_deref(), Some("m"));
     /// assert_eq!(unit("tip_velocity_m_per_s").as_deref(), Some("m/s"));
     /// assert_eq!((unit("slip_fraction"), unit("residual")), (None, None));
-    /// assert_eq!(unit("blade_shape_per_sqrt_kg"), None); // study files know no roots
+    /// assert_eq!(unit("blade_shape_per_sqrt_kg"), None); // study files have no root units
     /// ```
     pub fn unit(&self) -> Option<String> {
         if !matches!(self.values, Values::Number(_)) || self.name.contains("_sqrt_") {
@@ -124,12 +132,12 @@ impl Column {
         ends.filter(|end| !end.starts_with("per_")).find_map(written_unit)
     }
 
-    /// Of numbers.
+    /// Builds a column of numbers.
     pub fn numbers(name: &str, values: Vec<f64>) -> Column {
         Column { name: name.to_owned(), values: Values::Number(values) }
     }
 
-    /// Its values, if they are numbers.
+    /// Returns the values if they are numbers.
     pub fn as_numbers(&self) -> Option<&[f64]> {
         match &self.values {
             Values::Number(values) => Some(values),
@@ -137,13 +145,14 @@ impl Column {
         }
     }
 
-    /// Of words.
+    /// Builds a column of words.
     pub fn texts(name: &str, values: Vec<String>) -> Column {
         Column { name: name.to_owned(), values: Values::Text(values) }
     }
 }
 
-/// The unit that the end of a column's name says, see [`table_unit`](crate::values::table_unit).
+/// Parses the unit at the end of a column name; the inverse of
+/// [`table_unit`](crate::values::table_unit).
 fn written_unit(end: &str) -> Option<String> {
     let mut unit = String::new();
     for (i, part) in end.replace("_to_minus_", "^-").split("_per_").enumerate() {
@@ -159,56 +168,59 @@ fn written_unit(end: &str) -> Option<String> {
 }
 
 impl Table {
-    /// The column of this name.
+    /// Returns the column with this name.
     pub fn column(&self, name: &str) -> Option<&Column> {
         let name = column_name(name);
         self.columns.iter().find(|column| column.name == name)
     }
-    /// The numbers of a column.
+    /// Returns the numbers of a column.
     pub fn numbers(&self, column: &str) -> Option<&[f64]> {
         self.column(column)?.as_numbers()
     }
-    /// Its columns by name, for who asks for thousands of them.
+    /// Returns all columns by name, for callers that look up thousands of them.
     pub fn index(&self) -> HashMap<&str, &Column> {
         self.columns.iter().rev().map(|column| (column.name.as_str(), column)).collect()
     }
-    /// The counts of a column.
+    /// Returns the counts of a column.
     pub fn integers(&self, column: &str) -> Option<&[u64]> {
         match &self.column(column)?.values {
             Values::Integer(values) => Some(values),
             _ => None,
         }
     }
-    /// The words of a column.
+    /// Returns the words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {
         self.column(column).and_then(|c| match &c.values {
             Values::Text(v) => Some(v.as_slice()),
             _ => None,
         })
     }
-    /// The flags of a column.
+    /// Returns the flags of a column.
     pub fn flags(&self, column: &str) -> Option<&[Option<bool>]> {
         self.column(column).and_then(|c| match &c.values {
             Values::Flag(v) => Some(v.as_slice()),
             _ => None,
         })
     }
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
     }
 
-    /// The columns without rows.
+    /// Returns the columns without rows.
     pub fn header(&self) -> Table {
         let empty = |column: &Column| Column { name: column.name.clone(), values: column.values.blank(0) };
         Table { name: self.name.clone(), columns: self.columns.iter().map(empty).collect() }
     }
 
-    /// The rows of `more` after these. Cases may have columns that others lack (the `return_defect` of a method that `auto` chooses for some): the table has
-    /// those of both, in the order of both, with cells without a value where there was none.
+    /// Appends the rows of `more`.
+    ///
+    /// One case may have columns that another case lacks, for example the `return_defect` of a
+    /// method that `auto` chooses for some cases. The result has the columns of both tables in
+    /// the order of both, and empty cells for the missing values.
     ///
     /// # Panics
-    /// If a column has two sorts of values.
+    /// If a column has values of two types.
     ///
     /// # Example
     /// ```
@@ -244,32 +256,33 @@ impl Table {
     }
 }
 
-/// A figure of one or several panels, side by side in rows.
+/// A figure of one or several panels, in rows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figure {
     /// Title above the panels.
     pub title: String,
     /// The panels, in reading order.
     pub panels: Vec<Panel>,
-    /// Whether panels of the same quantity and unit have the same axes.
+    /// Selects which panels share the range of an axis.
     #[serde(default)]
     pub sharing: Sharing,
-    /// What [`Series::value`] means, for the title and the scale of the colour bar; its range is that of the colours.
+    /// The quantity of [`Series::value`]: title and scale of the colour bar, and range of the
+    /// colours.
     #[serde(default)]
     pub varied: Option<Axis>,
 }
 
-/// Whether panels that show the same quantity in the same unit and scale share the range of that axis.
+/// Selects whether panels with the same quantity, unit and scale share the range of that axis.
 ///
-/// A panel whose axis differs from that of such a panel says so in the title of the axis.
+/// A panel whose axis differs from the others states this in the title of the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Sharing {
-    /// Where each panel still fills a good part of its axis.
+    /// Panels share the range if each panel still fills a good part of its axis.
     #[default]
     WhereLegible,
-    /// All of them: the panels are there to be compared.
+    /// All such panels share the range, because they are meant to be compared.
     Always,
-    /// None: every panel fills its own axes.
+    /// No panels share the range; every panel fills its axes.
     Never,
 }
 
@@ -284,159 +297,169 @@ pub struct Panel {
     pub y: Axis,
     /// The curves.
     pub series: Vec<Series>,
-    /// Whether it is a picture of a plane: both axes have one measure, and are not drawn.
+    /// True for a picture of a plane: both axes have the same scale and are not drawn.
     #[serde(default)]
     pub picture: bool,
 }
 
-/// An axis: what it shows and in which unit. The values of the series are already in this unit.
+/// An axis: its quantity and unit. The values of the series are already in this unit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Axis {
     /// Quantity, for example `frequency`.
     pub quantity: String,
     /// Unit, for example `Hz`.
     pub unit: String,
-    /// How values become lengths.
+    /// Maps values to lengths.
     #[serde(default)]
     pub scale: Scale,
-    /// Its two ends, the smaller first; without them the data decide. Ends that are equal, not finite, or not positive
-    /// on a logarithmic axis count as absent.
+    /// The two ends, the smaller first; without them the data decide. Ends count as absent if
+    /// they are equal, not finite, or not positive on a logarithmic axis.
     #[serde(default)]
     pub range: Option<[f64; 2]>,
-    /// What stands at 0, 1, 2 … instead of numbers.
+    /// Labels at 0, 1, 2 … that replace the numbers.
     #[serde(default)]
     pub names: Vec<String>,
-    /// Whether the values are whole numbers, as counts and the numbers of sectors are: no tick stands between two of them.
+    /// True if the values are whole numbers, such as counts or sector numbers: ticks are at
+    /// integers only.
     #[serde(default)]
     pub whole: bool,
 }
 
-/// How the values of an axis become lengths.
+/// The map from values to lengths on an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Scale {
-    /// Equal differences are equal lengths.
+    /// Equal differences have equal lengths.
     #[default]
     Linear,
-    /// Equal ratios are equal lengths; values that are not positive interrupt a curve.
+    /// Equal ratios have equal lengths; values that are not positive interrupt a curve.
     Log,
 }
 
 impl Axis {
-    /// A linear axis whose range follows from the data.
+    /// Returns a linear axis whose range follows from the data.
     pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Axis {
         Axis { quantity: quantity.into(), unit: unit.into(), ..Axis::default() }
     }
-    /// The same axis, logarithmic.
+    /// Makes the axis logarithmic.
     pub fn log(self) -> Axis {
         Axis { scale: Scale::Log, ..self }
     }
-    /// The same axis, of whole numbers.
+    /// Makes the axis one of whole numbers.
     pub fn whole(self) -> Axis {
         Axis { whole: true, ..self }
     }
-    /// The same axis between two fixed ends.
+    /// Fixes the two ends of the axis.
     pub fn between(self, from: f64, to: f64) -> Axis {
         Axis { range: Some([from.min(to), from.max(to)]), ..self }
     }
 }
 
-/// A curve of a panel. A point with a NaN interrupts it.
+/// A curve of a panel. A NaN interrupts it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Series {
-    /// Legend; curves with the same label share one legend entry, a curve without label has none.
+    /// Legend entry. Curves with the same label share one entry; a curve without label has no
+    /// entry.
     pub label: String,
-    /// Abscissae in the axis' unit.
+    /// Abscissae in the unit of the axis.
     pub x: Vec<f64>,
-    /// Ordinates in the axis' unit.
+    /// Ordinates in the unit of the axis.
     pub y: Vec<f64>,
-    /// How it is drawn.
+    /// The line or mark style.
     pub style: Style,
-    /// Index into the palette; curves that belong together share it. Motions count from 0, joints go on where the
-    /// motions end, so that a figure of both never gives two of them one colour.
+    /// Index into the palette, shared by curves that belong together. Places count from 0, and
+    /// joints continue after the places, so that a figure of both never gives one colour to two
+    /// of them.
     pub colour: usize,
-    /// How much it stands out.
+    /// The visual weight of the curve.
     #[serde(default)]
     pub emphasis: Emphasis,
-    /// The varied parameter, in the unit of [`Figure::varied`]. More than seven different values in a figure that says
-    /// what they are get a sequential scale of colours and a colour bar instead of legend entries; `colour` does not
-    /// count then.
+    /// The varied parameter, in the unit of [`Figure::varied`].
+    ///
+    /// A figure with [`Figure::varied`] and more than seven different values gets a sequential
+    /// colour scale and a colour bar in place of legend entries; `colour` is then ignored.
     #[serde(default)]
     pub value: Option<f64>,
-    /// Lower edge of a band, foot of a bar, in the axis' unit; empty: zero, or the lower end of the axis.
+    /// Lower edge of a band or foot of a bar, in the unit of the axis. If empty: zero, or the
+    /// lower end of the axis.
     #[serde(default)]
     pub base: Vec<f64>,
-    /// Of a stripe the value of every point, in the unit of [`Figure::varied`].
+    /// For a stripe: the value at every point, in the unit of [`Figure::varied`].
     #[serde(default)]
     pub shades: Vec<f64>,
 }
 
 impl Series {
-    /// A continuous line.
+    /// Returns a continuous line.
     pub fn line(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
         Series { label: label.into(), x, y, colour, ..Series::default() }
     }
-    /// Marks without a line.
+    /// Returns marks without a line.
     pub fn marks(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Marks, ..Series::line(label, x, y, colour) }
     }
-    /// Crosses at abscissae without a value, in a row above the lower edge, from 1.
+    /// Returns crosses at abscissae without a value, in row `row` (from 1) above the lower
+    /// edge.
     pub fn missing(label: impl Into<String>, x: Vec<f64>, row: usize, colour: usize) -> Series {
         let y = vec![row as f64; x.len()];
         Series { style: Style::Missing, ..Series::line(label, x, y, colour) }
     }
-    /// A filled band between two curves over the same abscissae, for example percentiles.
+    /// Returns a filled band between two curves over the same abscissae, for example
+    /// percentiles.
     pub fn band(label: impl Into<String>, x: Vec<f64>, lower: Vec<f64>, upper: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Band, base: lower, ..Series::line(label, x, upper, colour) }
     }
-    /// Bars from zero, for example harmonics.
+    /// Returns bars from zero, for example harmonics.
     pub fn bars(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Bars, ..Series::line(label, x, y, colour) }
     }
-    /// A stripe at the height `y`, coloured along `x`, which rises, by the scale of [`Figure::varied`].
+    /// Returns a stripe at height `y`, coloured along ascending `x` by the scale of
+    /// [`Figure::varied`].
     pub fn stripe(x: Vec<f64>, y: f64, shades: Vec<f64>) -> Series {
         let y = vec![y; x.len()];
         Series { style: Style::Stripe, shades, ..Series::line("", x, y, 0) }
     }
-    /// The same curve, pale: one of many behind the one that matters.
+    /// Makes the curve pale: one of many in the background of a main curve.
     pub fn pale(self) -> Series {
         Series { emphasis: Emphasis::Pale, ..self }
     }
-    /// The same curve as a reference: dashed, grey, behind all others.
+    /// Makes the curve a reference: dashed, grey, behind all others.
     pub fn reference(self) -> Series {
         Series { emphasis: Emphasis::Reference, ..self }
     }
-    /// The same curve as a reference of one case among others, in its colour.
+    /// Makes the curve the reference of one case among several, in the colour of the case.
     pub fn reference_of_its_own(self) -> Series {
         Series { emphasis: Emphasis::OwnReference, ..self }
     }
-    /// The same curve, of this value of the varied parameter.
+    /// Sets the value of the varied parameter.
     pub fn of(self, value: f64) -> Series {
         Series { value: Some(value), ..self }
     }
 }
 
-/// How much a curve stands out.
+/// The visual weight of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Emphasis {
     /// A result.
     #[default]
     Normal,
-    /// One of many behind the one that matters: thin and pale.
+    /// One of many curves in the background of a main curve: thin and pale.
     Pale,
-    /// What a result is compared with (all joints free, all joints stuck): grey and dashed, behind all others.
+    /// A reference for all results (all joints free, all joints stuck): grey and dashed, behind
+    /// all others.
     Reference,
-    /// What one result among several is compared with: in its colour, thin, behind all others.
+    /// A reference for one result among several: in the colour of that result, thin, behind all
+    /// others.
     OwnReference,
 }
 
 impl Emphasis {
-    /// Whether the curve is what results are compared with.
+    /// Returns true if the curve is a reference for results.
     pub fn is_reference(self) -> bool {
         matches!(self, Emphasis::Reference | Emphasis::OwnReference)
     }
 }
 
-/// How a curve is drawn.
+/// The line or mark style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Style {
     /// Continuous line.
@@ -448,27 +471,31 @@ pub enum Style {
     Dotted,
     /// Marks without a line (peaks).
     Marks,
-    /// Crosses at the lower edge of the panel, at abscissae that have no value (failed points); `y` is the row of crosses, from 1.
+    /// Crosses at the lower edge of the panel, at abscissae without a value (failed points);
+    /// `y` is the row of crosses, from 1.
     Missing,
     /// Filled between [`Series::base`] and `y`.
     Band,
-    /// A bar at every abscissa, from [`Series::base`] to `y`; several series of bars stand side by side.
+    /// A bar at every abscissa, from [`Series::base`] to `y`; several series of bars are drawn
+    /// side by side.
     Bars,
-    /// A stripe of height one whose colours are [`Series::shades`]; several make a map.
+    /// A stripe of height one with the colours of [`Series::shades`]; several stripes form a
+    /// map.
     Stripe,
 }
 
-/// A point that did not converge: where, and why.
+/// A point that did not converge: its position and the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// The place in words, for example `Ft = 2 N, frequency = 121.25 Hz`; empty in a study that has but one.
+    /// The point in words, for example `Ft = 2 N, frequency = 121.25 Hz`; empty if the study
+    /// has only one point.
     pub at: String,
-    /// The reason and what to try.
+    /// The reason and a suggestion.
     pub reason: String,
 }
 
 impl fmt::Display for Failure {
-    /// `failed at PLACE: REASON`; of a study that has but one place, without it.
+    /// Writes `failed at PLACE: REASON`, or `failed: REASON` if the study has only one point.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.at.as_str() {
             "" => write!(f, "failed: {}", self.reason),
@@ -477,18 +504,19 @@ impl fmt::Display for Failure {
     }
 }
 
-/// How a run was made, so that it can be repeated.
+/// The record of a run, which allows repeating it.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Version of Stickslip.
     pub version: String,
-    /// The study as it was understood: all values resolved to SI.
+    /// The study as understood: all values in SI.
     pub study: serde_json::Value,
-    /// The methods that found the orbits, with the reason where one was chosen; none for kinds that need no method.
+    /// The methods that found the orbits, with the reason for an automatic choice; empty for
+    /// kinds that use no method.
     pub methods: Vec<String>,
     /// Seed of the random numbers, if any were used.
     pub seed: Option<u64>,
-    /// Threads used.
+    /// Number of threads.
     pub threads: usize,
     /// Wall time, s.
     pub wall_time_s: f64,

@@ -1,24 +1,29 @@
-//! Damping read off a free decay, cycle by cycle.
+//! Damping from a free decay, cycle by cycle.
 //!
-//! Three turning points in a row make a cycle of two swings, `s` and `s'` (half of what the motion covers between two turning points, so
-//! that an offset does not matter). A mean that creeps, as that of friction with memory does, makes every other swing longer: it
-//! cancels in the sum of two swings in a row, so that the logarithmic decrement of a whole cycle is that of two such sums, half a
-//! cycle apart: `δ = 2 ln((s + s')/(s' + s''))` with the next swing `s''`. Of a linear oscillator that is exact. The last cycle has no
-//! next swing, and takes the one before it. `ζ = δ/√(4π² + δ²)` is the damping ratio of the linear oscillator that would lose as much.
+//! Three consecutive turning points form a cycle of two swings `s` and `s'`. A swing is half
+//! the distance between two turning points, so an offset cancels. A drifting mean, as friction
+//! with memory has, lengthens every other swing, but it cancels in the sum of two consecutive
+//! swings. So the logarithmic decrement of a cycle compares two such sums, half a cycle apart:
+//!
+//! `δ = 2 ln((s + s')/(s' + s''))`, with the next swing `s''`.
+//!
+//! The formula is exact for a linear oscillator. The last cycle has no next swing and uses the
+//! previous one. `ζ = δ/√(4π² + δ²)` is the damping ratio of the linear oscillator with the
+//! same decrement.
 
 use std::f64::consts::TAU;
 
-/// Swings below this share of the largest are rest.
+/// Swings below this share of the largest swing count as rest.
 const REST: f64 = 1e-9;
 
 /// One cycle of a decay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
-    /// When it begins, s.
+    /// Start time, s.
     pub time: f64,
     /// Mean of its two swings, m.
     pub amplitude: f64,
-    /// One over its duration, Hz.
+    /// Inverse of its duration, Hz.
     pub frequency: f64,
     /// Damping ratio of the linear oscillator with the same decrement.
     pub damping_ratio: f64,
@@ -27,21 +32,21 @@ pub struct Cycle {
 /// Displacement (m) and velocity (m/s) of a place at a time (s) between two samples.
 pub type Motion<'a> = dyn Fn(f64) -> [f64; 2] + 'a;
 
-/// The turning points of one place, found as the samples come.
+/// The turning points of one place, detected as samples arrive.
 #[derive(Debug, Clone, Default)]
 pub struct Decay {
     last: Option<[f64; 3]>,
     turns: Vec<(f64, f64)>,
-    /// Least and largest displacement of a sample, m.
+    /// Smallest and largest displacement of a sample, m.
     extent: Option<(f64, f64)>,
 }
 
 impl Decay {
-    /// Takes in a sample: time (s), displacement (m), velocity (m/s). A turning point since the
-    /// last sample is located by the motion between
-    /// both, or by the cubic through them where that is not given. The cubic errs where the
-    /// acceleration jumps, as at the turning points of
-    /// dry friction.
+    /// Adds a sample: time (s), displacement (m), velocity (m/s).
+    ///
+    /// Locates a turning point since the last sample by `motion`, or by the cubic through both
+    /// samples if `motion` is `None`. The cubic has an error where the acceleration jumps, as
+    /// at the turning points of dry friction.
     pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&Motion<'_>>) {
         match self.last {
             // a motion that begins at rest begins with a turning point
@@ -57,17 +62,17 @@ impl Decay {
         self.last = Some([time, displacement, velocity]);
     }
 
-    /// How far the samples so far lie apart, m.
+    /// Returns the range of the displacements so far, m.
     pub fn extent(&self) -> f64 {
         self.extent.map_or(0.0, |(low, high)| high - low)
     }
 
-    /// Largest swing, m.
+    /// Returns the largest swing, m.
     pub fn largest(&self) -> f64 {
         self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).fold(0.0, f64::max)
     }
 
-    /// The cycles one after the other, until the motion rests.
+    /// Returns the consecutive cycles until the motion rests.
     pub fn cycles(&self) -> Vec<Cycle> {
         let least = REST * self.largest();
         let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
@@ -89,13 +94,13 @@ impl Decay {
     }
 }
 
-/// Logarithmic decrement of the cycle whose second swing this is.
+/// Returns the logarithmic decrement of the cycle whose second swing has index `second`.
 fn decrement(swings: &[f64], second: usize) -> f64 {
     let cycle = swings[second - 1] + swings[second];
     match (swings.get(second + 1), second.checked_sub(2)) {
         (Some(next), _) => 2.0 * (cycle / (swings[second] + next)).ln(),
         (None, Some(before)) => 2.0 * ((swings[before] + swings[second - 1]) / cycle).ln(),
-        // two swings are all there is
+        // the decay has two swings only
         (None, None) => 2.0 * (swings[second - 1] / swings[second]).ln(),
     }
 }
@@ -104,7 +109,7 @@ fn swing(a: (f64, f64), b: (f64, f64)) -> f64 {
     0.5 * (a.1 - b.1).abs()
 }
 
-/// The cubic through two samples and their velocities.
+/// Returns the cubic through two samples and their velocities.
 fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64; 2] {
     let step = t1 - t0;
     // x = x0 + step (v0 s + b s² + c s³) with 0 <= s <= 1
@@ -116,9 +121,11 @@ fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64
     }
 }
 
-/// Time and displacement where a motion between two times first has no velocity in the direction
-/// of `v0`, which it has at the first of them: where it
-/// turns, or begins to stick.
+/// Returns time and displacement of the first turning point, or onset of stick, between two
+/// times.
+///
+/// The motion has velocity `v0` at the first time; the search ends where the velocity in the
+/// direction of `v0` vanishes.
 fn turning_point(motion: &Motion<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -128,7 +135,7 @@ fn turning_point(motion: &Motion<'_>, [mut low, mut high]: [f64; 2], v0: f64) ->
     (time, motion(time)[0])
 }
 
-/// Halvings of the time between two samples: all bits of a double.
+/// Number of bisections of the time between two samples: all bits of a double.
 const HALVINGS: usize = 53;
 
 #[cfg(test)]
@@ -158,13 +165,14 @@ mod tests {
         let cycles = decay(motion, 1.0, 1e-3);
         assert!(cycles.len() >= 8, "{}", cycles.len());
         for cycle in &cycles {
-            // the cubic between samples 1/100 of a period apart errs by 1e-7
+            // samples are 1/100 of a period apart; the cubic has an error of 1e-7
             assert!((cycle.damping_ratio - zeta).abs() < 1e-5, "{cycle:?}");
             assert!((cycle.frequency - damped / TAU).abs() < 1e-4, "{cycle:?}");
         }
     }
 
-    /// A mean that creeps by more than the amplitude falls: the same motion beside `c t`, and with a mean that comes to rest.
+    /// The mean drifts by more than the decay of the amplitude: linearly, and with a mean that
+    /// comes to rest.
     #[test]
     fn a_mean_that_creeps_is_no_growth() {
         let (zeta, omega) = (0.002f64, TAU * 10.0);
@@ -179,7 +187,8 @@ mod tests {
             let cycles = decay(motion, 2.0, 1e-3);
             assert!(cycles.len() >= 18, "{}", cycles.len());
             for cycle in &cycles {
-                // what is left of the creep is its second difference over half a cycle, 0.3 (1/20)² of an amplitude of 1, over 2π
+                // the remaining error is the second difference of the drift over half a cycle,
+                // 0.3 (1/20)² of an amplitude of 1, over 2π
                 assert!((cycle.damping_ratio - zeta).abs() < 1.3e-4, "{cycle:?}");
             }
         }

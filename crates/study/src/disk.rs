@@ -13,25 +13,25 @@ use std::collections::{HashMap, HashSet};
 use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Mistuned, Model, normal_pattern, too_far};
 use stickslip::structure::{Axis, Boundary, Component, Faces, FacesError, Node, Reduction};
 
-/// What differs from sector to sector.
+/// The quantity that differs from sector to sector.
 enum Differs {
-    /// A parameter by its index.
+    /// A parameter, by index.
     Parameter(usize),
     /// A part of the sector.
     Part(Mistuned),
 }
 
-/// What of a blade by its matrices may deviate.
+/// Quantities of a blade given by matrices that may deviate.
 const OF_BLADE: [(&str, Mistuned); 2] =
     [("blade.stiffness", Mistuned::BladeStiffness), ("blade.frequency", Mistuned::BladeFrequency)];
 
-/// Rows of all sectors of a disk that are not reduced, at most: matrices of some GB.
+/// Limit on the rows of all sectors of a disk without reduction: matrices of several GB.
 const MOST_ROWS: usize = 1_000_000;
 
-/// The values of the parameters with some of them changed: (index, value in SI).
+/// Evaluates the parameters with some of them changed: (index, value in SI).
 pub(crate) type Again<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<Value>, Problem>;
 
-/// The ring.
+/// Builds the model of the ring.
 pub(crate) fn ring_of(
     structure: &ModelStatement,
     disk: &StatedDisk,
@@ -82,7 +82,7 @@ pub(crate) fn ring_of(
     })
 }
 
-/// Ties a sector by its matrices to the next.
+/// Ties a sector given by matrices to the next sector.
 fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
     let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
@@ -95,7 +95,8 @@ fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &
             None => Ok(()),
         };
     }
-    let Some(substructure) = &mut sector.substructure else { return Ok(()) }; // names alone
+    // only names are known
+    let Some(substructure) = &mut sector.substructure else { return Ok(()) };
     let axis = match table.entry("axis").map(|entry| &entry.value) {
         Some(Stated::Fixed(Given::Text(axis))) => [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
             .into_iter()
@@ -126,7 +127,10 @@ fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &
     Ok(())
 }
 
-/// The node pairs of both sides: those that are named, which are those of the coordinates where these are known, or the latter.
+/// Returns the node pairs of both sides of a sector.
+///
+/// Named pairs are checked against the node coordinates if these are known. Without named
+/// pairs, the coordinates determine them.
 fn pairs<'a>(
     disk: &'a StatedDisk,
     component: &Component,
@@ -147,7 +151,7 @@ fn pairs<'a>(
         let message = "coordinates tell the sides of a sector by a turn about the axis, and there is no `axis`";
         return Err(problem("nodes", message.to_owned()).help("add axis = \"z\", or leave `nodes` out"));
     };
-    // a node that is held, or a centre of rotation, has no rows and cannot be tied
+    // a fixed node or a centre of rotation has no rows and cannot be tied
     let moving = component.rows().iter().filter_map(|row| Some(row.rsplit_once('.')?.0));
     let named = disk.boundary.iter().flatten().flat_map(|(low, high)| [low.as_str(), high.as_str()]);
     let counts: HashSet<&str> = moving.chain(named).collect();
@@ -170,7 +174,7 @@ fn pairs<'a>(
     })
 }
 
-/// The rows of these nodes, or a node that has none.
+/// Returns the rows of these nodes, or the first node without rows as the error.
 fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usize>, &'a str> {
     let mut met: HashMap<&str, bool> = nodes.iter().map(|node| (node.as_str(), false)).collect();
     let mut rows = Vec::new();
@@ -191,7 +195,7 @@ fn sectors(disk: &StatedDisk, values: &Values) -> Result<usize, Vec<Problem>> {
     })
 }
 
-/// The deviation of every sector; `None` if they are tuned.
+/// Returns the deviation of every sector; `None` for a tuned disk.
 fn deviations(disk: &StatedDisk, values: &Values, sectors: usize) -> Result<Option<Vec<f64>>, Vec<Problem>> {
     let Some((table, mistuning)) = mistuning(disk, values) else { return Ok(None) };
     if let Some(pattern) = &disk.pattern {
@@ -211,7 +215,7 @@ fn mistuning<'a>(disk: &'a StatedDisk, values: &'a Values) -> Option<(&'a Stated
     Some((table, values.table("mistuning")?))
 }
 
-/// The sectors, each with its deviation.
+/// Returns the sectors, each with its deviation.
 fn mistuned(
     structure: &ModelStatement,
     disk: &StatedDisk,
@@ -261,7 +265,7 @@ fn mistuned(
     Ok(models)
 }
 
-/// What `of` names.
+/// Finds the quantity that `of` names.
 fn target(
     disk: &StatedDisk,
     table: &StatedTable,

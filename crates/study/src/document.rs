@@ -14,12 +14,13 @@ pub(crate) struct Node {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Content {
-    /// A string; `inner` is the byte of the source where its content begins, if that stands there without escapes.
+    /// A string; `inner` is the byte of the source at which its content begins, if the source
+    /// contains the string without escapes.
     Text {
         text: String,
         inner: Option<usize>,
     },
-    /// A number. `whole` if it was written as an integer that fits.
+    /// A number; `whole` is set if it was written as an integer that fits.
     Number {
         value: f64,
         whole: Option<i64>,
@@ -30,10 +31,10 @@ pub(crate) enum Content {
     Table(Table),
 }
 
-/// A table, its entries in the order of the file.
+/// A table, its entries in file order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Table {
-    /// Its header, or all of an inline table.
+    /// Location of its header, or of the whole inline table.
     pub location: Location,
     pub entries: Vec<Entry>,
 }
@@ -46,7 +47,7 @@ pub(crate) struct Entry {
 }
 
 impl Content {
-    /// What it is, for messages.
+    /// Describes the value for messages.
     pub fn described(&self) -> String {
         match self {
             Content::Text { text, .. } => format!("the text \"{}\"", shown(text)),
@@ -115,7 +116,7 @@ impl Reader<'_> {
     }
 
     fn node(&self, value: &DeValue<'_>, span: Range<usize>, key: Range<usize>) -> Node {
-        // tables made by dotted keys have no location of their own
+        // tables made by dotted keys have no span
         let span = if span.is_empty() { key.clone() } else { span };
         let value = match value {
             DeValue::String(text) => {

@@ -1,4 +1,5 @@
-//! Figures from finished tables: what the kinds need to draw, whether the tables were computed just now or read from a disk.
+//! Tools for kinds to draw figures from finished tables, computed in this run or read from
+//! disk.
 
 use crate::dataset::{Axis, Table, Values as Cells, column_name};
 use crate::study::{Study, VariedValue};
@@ -18,58 +19,62 @@ pub struct Drawing<'a> {
     pub tables: &'a [Table],
 }
 
-/// Rows of a table that belong to one case.
+/// The rows of a table that belong to one case.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Stretch {
-    /// The case by number.
+    /// Number of the case.
     pub case: usize,
-    /// Its varied parameters.
+    /// Values of the varied parameters.
     pub varied: Vec<VariedValue>,
-    /// The rows.
+    /// Range of rows.
     pub rows: Range<usize>,
 }
 
 impl Stretch {
-    /// The varied parameters in words.
+    /// Returns the varied parameters in words.
     pub fn label(&self) -> String {
         crate::study::varied_text(&self.varied)
     }
 }
 
-/// More curves than this in a panel say nothing; they are thinned out evenly, and the panel says so.
+/// Largest number of curves in a panel. Further curves are left out evenly, and the panel
+/// states this.
 pub(crate) const MOST_CURVES: usize = 400;
 
-/// What the curves of a figure belong to.
+/// The assignment of curves to panels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// A panel for every case, with a curve for every mass.
+    /// One panel per case, with a curve for every mass.
     Cases,
-    /// A panel for every mass, with a curve for every case.
+    /// One panel per mass, with a curve for every case.
     Masses,
 }
 
 impl<'a> Drawing<'a> {
-    /// The values of `[figure]`.
+    /// Returns the values of `[figure]`.
     pub(crate) fn options(&self) -> Values {
         self.study.figure_values()
     }
 
-    /// Whether the figure shows a mass or joint of this name.
+    /// Returns true if the figure shows a mass or joint of this name.
     pub(crate) fn shows(&self, name: &str) -> bool {
         let sectors = self.study.structure.lists.disk.is_some();
         let is = |shown: &String| shown == name || is_of(shown, name) || (sectors && is_of_sector(shown, name));
         self.options().names("only").is_none_or(|names| names.iter().any(is))
     }
 
-    /// The places that the figure shows, with their numbers: displacements, as rotations have no place on an axis of lengths.
+    /// Returns the places that the figure shows, with their indices.
+    ///
+    /// Rotations are left out, because the axis has lengths.
     pub(crate) fn displacements(&self, system: &System) -> Vec<(String, usize)> {
         let places = system.places().iter().zip(system.seen()).enumerate();
         let shown = places.filter(|(_, (name, along))| !along.is_rotation() && self.shows(name));
         shown.map(|(place, (name, _))| (name.clone(), place)).collect()
     }
 
-    /// How curves of so many masses and cases are laid out, where each case has so many panels; draws are shown by their percentiles, for every
-    /// mass.
+    /// Chooses the layout for this number of masses and cases, with `panels` panels per case.
+    ///
+    /// Random draws are shown by percentiles for every mass.
     pub(crate) fn layout(&self, masses: usize, cases: usize, panels: usize) -> Layout {
         if self.study.draws().is_some() {
             return Layout::Masses;
@@ -88,8 +93,10 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// An axis of the figure (0 or 1) in the unit that is asked for, else in one that suits `largest`, and the factor from the values of
-    /// tables, which are in `si`.
+    /// Returns an axis of the figure (0 or 1) and the factor from table values, which are in
+    /// `si`.
+    ///
+    /// The unit is the requested one, or else one that suits `largest`.
     pub(crate) fn axis(&self, which: usize, quantity: &str, largest: f64, si: &str) -> (Axis, f64) {
         let options = self.options();
         let (unit_key, scale_key) = [("x_unit", "x"), ("y_unit", "y")][which];
@@ -103,7 +110,9 @@ impl<'a> Drawing<'a> {
         (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
     }
 
-    /// What the colours of curves mean whose varied parameter number `which` differs; none if there is none, or it has no numbers to tell.
+    /// Returns the colour axis of curves that differ in the varied parameter number `which`.
+    ///
+    /// Returns `None` without such a parameter.
     pub(crate) fn varied_axis(&self, stretches: &[Stretch], which: usize) -> Option<Axis> {
         let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
@@ -113,7 +122,7 @@ impl<'a> Drawing<'a> {
             whole: unit.is_empty() && values.iter().all(|value| value.fract() == 0.0),
             ..Axis::new(&last.name, unit)
         };
-        // values that are spaced by ratios belong on a logarithmic scale
+        // values spaced by ratios get a logarithmic scale
         let positive = values.iter().all(|value| *value > 0.0);
         let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
         let middle = values.get(values.len() / 2).copied().unwrap_or(0.0);
@@ -121,7 +130,8 @@ impl<'a> Drawing<'a> {
         Some(if by_ratio { axis.log() } else { axis })
     }
 
-    /// The stretches of the same parameters of `vary`, whatever is drawn: these in words, and the stretches.
+    /// Groups the stretches by their parameters of `vary`, without drawn parameters: text and
+    /// stretches.
     pub(crate) fn by_listed<'s>(&self, stretches: &'s [Stretch]) -> Vec<(String, Vec<&'s Stretch>)> {
         let (drawn, combinations) = (self.study.drawn(), self.study.cases_of_a_draw());
         let mut groups: BTreeMap<usize, Vec<&Stretch>> = BTreeMap::new();
@@ -130,7 +140,7 @@ impl<'a> Drawing<'a> {
         groups.into_values().map(|group| (group.first().map_or_else(String::new, |s| words(s)), group)).collect()
     }
 
-    /// How many of the draws curves of so many show, in words.
+    /// States in words how many of the draws are shown.
     pub(crate) fn draws(&self, shown: usize) -> String {
         match self.study.draws() {
             Some(all) if all > shown => format!("the first {shown} of {all} draws"),
@@ -138,28 +148,32 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// How many of the cases figures show, if not all.
+    /// States how many of the cases are shown, if not all.
     pub(crate) fn left_out(&self, shown: usize) -> Option<String> {
         let all = self.study.cases();
         (shown < all && self.study.draws().is_none()).then(|| format!("{shown} of {all} cases"))
     }
 
-    /// A table by name; one that nothing was written to is absent.
+    /// Returns a table by name; `None` if it has no rows.
     pub(crate) fn table(&self, name: &str) -> Option<&'a Table> {
         self.tables.iter().find(|table| table.name == name && table.rows() > 0)
     }
 
-    /// The system of the first case; the others differ from it in numbers only.
+    /// Returns the system of the first case; the other cases differ in numbers only.
     pub(crate) fn system(&self) -> Option<System> {
         self.study.case(0).ok()?.model.assemble().ok()
     }
 
-    /// The rows of `table` case by case. The first columns of a table are the varied parameters, all of them or all but the last.
+    /// Returns the rows of `table` case by case.
+    ///
+    /// The first columns of the table are the varied parameters, all of them or all but the
+    /// last.
     pub(crate) fn stretches(&self, table: &Table) -> Vec<Stretch> {
         self.stretches_of(table, self.study.varied().len())
     }
 
-    /// The same by the first `keys` varied parameters only; `case` is the first one of each stretch.
+    /// Does the same by the first `keys` varied parameters; `case` is the first case of each
+    /// stretch.
     pub(crate) fn stretches_of(&self, table: &Table, keys: usize) -> Vec<Stretch> {
         let columns: Vec<&[f64]> = table
             .columns
@@ -179,7 +193,7 @@ impl<'a> Drawing<'a> {
             while to < table.rows() && same(from, to) {
                 to += 1;
             }
-            // rows stand in the order of the cases; a case may have none
+            // rows are in the order of the cases; a case may have no rows
             while case < self.study.cases() {
                 let varied = self.study.varied_values(case).unwrap_or_default();
                 if varied
@@ -199,14 +213,15 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// More panels than this say nothing; the tables have all.
+/// Largest number of panels in a figure; the tables hold all cases.
 pub(crate) const MOST_PANELS: usize = 12;
-/// Up to this many cases each has a panel with all masses; beyond, each mass has a panel with all cases.
+/// Up to this number of cases each case has a panel with all masses; beyond it each mass has a
+/// panel with all cases.
 const MOST_CASES: usize = 6;
-/// Ratio of the ends of a parameter's values from which on they may be spaced by ratios.
+/// Ratio of largest to smallest parameter value above which a logarithmic scale is considered.
 const DECADES: f64 = 10.0;
 
-/// At most `most` of `all`, evenly chosen, both ends included.
+/// Returns at most `most` of `all`, evenly chosen, including both ends.
 pub(crate) fn thinned<T>(all: &[T], most: usize) -> Vec<&T> {
     if all.len() <= most {
         return all.iter().collect();
@@ -214,12 +229,12 @@ pub(crate) fn thinned<T>(all: &[T], most: usize) -> Vec<&T> {
     (0..most).map(|i| &all[i * (all.len() - 1) / (most - 1)]).collect()
 }
 
-/// The parts of a title that there are.
+/// Joins the non-empty parts of a title.
 pub(crate) fn join(parts: impl IntoIterator<Item = String>) -> String {
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
-/// The numbers of a column in some rows; NaN where there are none.
+/// Returns the numbers of a column in some rows; NaN without such a column.
 pub(crate) fn numbers(table: &Table, column: &str, rows: Range<usize>) -> Vec<f64> {
     match table.numbers(&column_name(column)) {
         Some(values) => values[rows].to_vec(),
@@ -227,24 +242,26 @@ pub(crate) fn numbers(table: &Table, column: &str, rows: Range<usize>) -> Vec<f6
     }
 }
 
-/// The words of a column.
+/// Returns the words of a column.
 pub(crate) fn words<'t>(table: &'t Table, column: &str) -> &'t [String] {
     table.texts(column).unwrap_or_default()
 }
 
-/// Largest finite size among the columns of these names.
+/// Returns the largest finite magnitude in the columns of these names.
 pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) -> f64 {
     let index = table.index();
     let columns = columns.into_iter().filter_map(|column| index.get(&*column_name(&column))?.as_numbers());
     columns.flatten().map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
 }
 
-/// Whether `name` is an axis or a direction of what `whole` names: `root.x` of `root`.
+/// Returns true if `name` is an axis or direction of `whole`: `root.x` of `root`.
 fn is_of(whole: &str, name: &str) -> bool {
     name.strip_prefix(whole).is_some_and(|rest| rest.starts_with('.'))
 }
 
-/// Whether `name` is what a disk's sector calls `whole`: `blade_3`, or `blade_3.x`, of `blade`; `blade_3.x` of `blade.x`.
+/// Returns true if `name` is the place `whole` in one sector of a disk.
+///
+/// Examples: `blade_3` and `blade_3.x` for `blade`; `blade_3.x` for `blade.x`.
 fn is_of_sector(whole: &str, name: &str) -> bool {
     let (node, along) = whole.split_once('.').map_or((whole, None), |(node, along)| (node, Some(along)));
     let (in_ring, direction) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));

@@ -1,15 +1,19 @@
-//! Panels of many draws: what the panels of one case show, of all draws at once.
+//! Panels of many random draws in place of the panels of one case.
 //!
-//! Curves over an abscissa become their median and band, point by point. Where that has no meaning, because a curve turns back (a loop, a branch around
-//! a fold), draws do not show the same curves (one has an unstable stretch) or each has an abscissa of its own (a branch that steps as it bends),
-//! every draw has its own curve, pale. Pictures of a plane, and
-//! marks and bars that stand elsewhere in each draw, are left to the tables.
+//! Curves over an abscissa become their median and a band, point by point. A band has no
+//! meaning in three cases: a curve turns back (a loop, a branch around a fold); draws show
+//! different curves (one has an unstable stretch); or each draw has a different abscissa (a
+//! branch with adaptive steps). Then every draw is drawn as a pale curve. Pictures of a plane
+//! are left out, and so are marks and bars whose abscissae differ between draws; the tables
+//! have them.
 
 use crate::dataset::{Emphasis, Panel, Series, Style};
 use crate::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, thinned};
 use crate::percentiles::percentiles;
 
-/// The panels of all cases, as `of_case` draws them under a title; of draws those of each combination of `vary`.
+/// Returns the panels of all cases, as `of_case` draws them under a title.
+///
+/// For draws, returns the combined panels of each combination of `vary`.
 pub(crate) fn panels(
     drawing: &Drawing<'_>,
     stretches: &[Stretch],
@@ -29,7 +33,7 @@ pub(crate) fn panels(
     drawing.by_listed(stretches).into_iter().take(MOST_PANELS).flat_map(of_group).take(MOST_PANELS).collect()
 }
 
-/// One panel of that of every draw; none of pictures.
+/// Combines the panels of all draws into one; returns `None` for pictures.
 fn together(draws: &[&Panel]) -> Option<Panel> {
     let first = draws.first().filter(|panel| !panel.picture)?;
     let lines: Vec<Vec<&Series>> = draws.iter().map(|panel| curves(panel, is_line)).collect();
@@ -44,9 +48,9 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
         first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
     let pairs: Vec<Vec<Series>> =
         if bands { (0..lines[0].len()).map(|at| of_lines(&lines, at)).collect() } else { Vec::new() };
-    // ranges that have nothing in common leave none
+    // draws whose abscissae do not overlap leave an empty band
     if bands && pairs.iter().flatten().all(|series| !series.x.is_empty()) {
-        // bands first, so that none hides a median
+        // bands first, so that they do not hide the medians
         series.extend(pairs.iter().flat_map(|pair| pair.first()).cloned());
         series.extend(pairs.iter().flat_map(|pair| pair.get(1)).cloned());
         series.extend(of_points(draws));
@@ -63,11 +67,15 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
     Some(panel)
 }
 
-/// Most points of a curve between two neighbours of another abscissa over which it is a common one: points that are evenly spaced in both.
+/// Largest number of points of a curve between two adjacent abscissae of a common grid.
+///
+/// Two evenly spaced grids satisfy this.
 const BETWEEN: usize = 2;
 
-/// Whether the points of an abscissa stand as close as those of another one: a curve over that one loses nothing there. What is stepped as each curve
-/// bends has many points where others have few.
+/// Returns true if `grid` is as fine as the points `x`, so that a curve over `grid` loses no
+/// detail.
+///
+/// Adaptive steps fail this test: they put many points where other curves have few.
 fn resolves(grid: &[f64], x: &[f64]) -> bool {
     let mut cells = x.chunk_by(|a, b| grid.partition_point(|at| at < a) == grid.partition_point(|at| at < b));
     cells.all(|cell| cell.len() <= BETWEEN)
@@ -77,12 +85,12 @@ fn is_line(style: Style) -> bool {
     matches!(style, Style::Solid | Style::Dashed | Style::Dotted)
 }
 
-/// The results of a panel whose style is one of these.
+/// Returns the results of a panel with one of these styles.
 fn curves(panel: &Panel, of: fn(Style) -> bool) -> Vec<&Series> {
     panel.series.iter().filter(|series| series.emphasis == Emphasis::Normal && of(series.style)).collect()
 }
 
-/// Band and median of one line of all draws.
+/// Returns band and median of one line of all draws.
 fn of_lines(lines: &[Vec<&Series>], at: usize) -> Vec<Series> {
     let line = lines[0][at];
     let all: Vec<(Vec<f64>, Vec<f64>)> = lines.iter().map(|one| (one[at].x.clone(), one[at].y.clone())).collect();
@@ -91,7 +99,7 @@ fn of_lines(lines: &[Vec<&Series>], at: usize) -> Vec<Series> {
     pair
 }
 
-/// Marks and bars at the same abscissae in all draws, at their medians.
+/// Returns the medians of marks and bars that have the same abscissae in all draws.
 fn of_points(draws: &[&Panel]) -> Vec<Series> {
     let points: Vec<Vec<&Series>> =
         draws.iter().map(|panel| curves(panel, |style| matches!(style, Style::Marks | Style::Bars))).collect();
@@ -121,8 +129,11 @@ mod tests {
         }
     }
 
-    /// Three draws: the median is the middle one, the band reaches 5 % and 95 % of the way between them (NumPy 2: `np.percentile([1, 2, 4], [5, 95])`
-    /// is 1.1, 3.8); marks at the same abscissae stand at the median, others are left out.
+    /// Three draws: the median is the middle draw, and the band is interpolated at 5 % and 95
+    /// %.
+    ///
+    /// NumPy 2: `np.percentile([1, 2, 4], [5, 95])` is 1.1, 3.8. Marks at common abscissae are
+    /// drawn at the median; others are left out.
     #[test]
     fn lines_become_bands() {
         let x = vec![0.0, 1.0];
@@ -154,15 +165,15 @@ mod tests {
         assert_eq!((median.style, marks.style), (Style::Dashed, Style::Marks));
     }
 
-    /// What turns back has no value at an abscissa, what only some draws have none in the others, and what is stepped as it bends is not seen between
-    /// the steps of others: each draw has its curve.
+    /// Every draw has its curve in each of these cases: the curve turns back, labels differ,
+    /// the steps are adaptive, or the abscissae do not overlap.
     #[test]
     fn what_has_no_band_is_drawn_draw_by_draw() {
         let around = |y: f64| panel(vec![Series::line("joint", vec![0.0, 1.0, 0.5], vec![y, 1.0, 2.0], 0)]);
         let straight = |label: &str| panel(vec![Series::line(label, vec![0.0, 1.0], vec![1.0, 2.0], 0)]);
-        // many points where the other has none between
+        // several points between two abscissae of the other curve
         let bent = panel(vec![Series::line("stable", vec![0.0, 0.4, 0.5, 0.6, 1.0], vec![1.0; 5], 0)]);
-        // nothing in common
+        // no common abscissa
         let beyond = panel(vec![Series::line("stable", vec![2.0, 3.0], vec![1.0, 2.0], 0)]);
         for draws in [
             [around(1.0), around(2.0)],

@@ -1,4 +1,4 @@
-//! What is wrong in a study file: where, what was expected, what to do.
+//! Errors in a study file: where, what was expected, what to do.
 
 use crate::units::Fault;
 use miette::{Diagnostic, LabeledSpan, MietteError, SourceCode, SourceSpan, SpanContents};
@@ -6,21 +6,21 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A text that values come from: the file, or the value of a `--set`.
+/// A text that contains values: the file, or the value of a `--set`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Source {
     pub name: String,
     pub text: String,
 }
 
-/// Where a value stands: the text (by index) and its bytes.
+/// The position of a value: index of the source and byte range in its text.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Location {
     pub source: usize,
     pub span: Range<usize>,
 }
 
-/// An error before it knows its text.
+/// An error that refers to its source by index.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Problem {
     pub location: Location,
@@ -44,7 +44,10 @@ impl Problem {
         self
     }
 
-    /// A fault inside the text at `location`; `inner` says where the text begins in the source, if it stands there as it is.
+    /// Builds the problem of a fault inside the text at `location`.
+    ///
+    /// `inner` is the byte of the source at which the text begins. It is `None` if the source
+    /// does not contain the text literally; then the whole location is wrong.
     pub fn fault(location: &Location, inner: Option<usize>, key: &str, fault: Fault) -> Self {
         let span = match inner {
             Some(start) => start + fault.span.start..start + fault.span.end,
@@ -55,17 +58,17 @@ impl Problem {
     }
 }
 
-/// Why a study is refused.
+/// The reason why a study is refused.
 ///
-/// One line with file, line and column as [`Display`](fmt::Display); as a [`Diagnostic`] it underlines the wrong value and carries the
-/// other errors of the same file as related ones.
+/// [`Display`](fmt::Display) writes one line with file, line and column. As a [`Diagnostic`] it
+/// underlines the wrong value and carries the other errors of the same file as related errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyError(Box<Inner>);
 
 #[derive(Debug, Clone, PartialEq)]
 struct Inner {
     source: Arc<Source>,
-    /// Bytes in the text and (line, column); `None` for a file that could not be read.
+    /// Byte range in the text, line and column; `None` for a file that could not be read.
     at: Option<(Range<usize>, usize, usize)>,
     key: Option<String>,
     message: String,
@@ -74,13 +77,13 @@ struct Inner {
 }
 
 impl StudyError {
-    /// An error about a file as a whole.
+    /// Returns an error about a file as a whole.
     pub(crate) fn file(name: &str, message: impl Into<String>, help: Option<String>) -> Self {
         let source = Arc::new(Source { name: name.to_owned(), text: String::new() });
         StudyError(Box::new(Inner { source, at: None, key: None, message: message.into(), help, others: Vec::new() }))
     }
 
-    /// An error at a location of one of the texts.
+    /// Returns an error at a location in one of the sources.
     pub(crate) fn at(sources: &[Arc<Source>], problem: Problem) -> Self {
         let source = match sources.get(problem.location.source) {
             Some(source) => Arc::clone(source),
@@ -99,10 +102,10 @@ impl StudyError {
         }))
     }
 
-    /// The first of several errors, in the order of the file, with the rest behind it.
+    /// Returns the first of several errors in file order, with the others attached.
     pub(crate) fn all(sources: &[Arc<Source>], mut problems: Vec<Problem>) -> Option<Self> {
         problems.sort_by_key(|p| (p.location.source, p.location.span.start));
-        // one mistake in an entry that is repeated is one error
+        // a repeated entry reports one mistake once
         problems.dedup_by(|later, first| later.location == first.location && later.key == first.key);
         let mut errors = problems.into_iter().map(|problem| StudyError::at(sources, problem));
         let mut first = errors.next()?;
@@ -110,7 +113,7 @@ impl StudyError {
         Some(first)
     }
 
-    /// Name of the file as it was given; `--set NAME` for a value from the command line.
+    /// Name of the file as given; `--set NAME` for a value from the command line.
     pub fn file_name(&self) -> &str {
         &self.0.source.name
     }
@@ -125,37 +128,40 @@ impl StudyError {
         self.0.at.as_ref().map(|at| at.2)
     }
 
-    /// The key that the error is about, for example `stiffness`.
+    /// Key that the error is about, for example `stiffness`.
     pub fn key(&self) -> Option<&str> {
         self.0.key.as_deref()
     }
 
-    /// What is wrong and what was expected, in one line.
+    /// States in one line what is wrong and what was expected.
     pub fn message(&self) -> &str {
         &self.0.message
     }
 
-    /// What to do.
+    /// States what to do.
     pub fn help_text(&self) -> Option<&str> {
         self.0.help.as_deref()
     }
 
-    /// The text that is wrong.
+    /// Returns the text that is wrong.
     pub fn underlined(&self) -> Option<&str> {
         self.0.at.as_ref().and_then(|(span, _, _)| self.0.source.text.get(span.clone()))
     }
 
-    /// Other errors that were found in the same file.
+    /// Returns the other errors that were found in the same file.
     pub fn others(&self) -> &[StudyError] {
         &self.0.others
     }
 }
 
-/// Longest line that is drawn, bytes: beyond it a picture helps nobody, and miette panics on columns above 65535.
+/// Longest line that is drawn, bytes.
+///
+/// A picture of a longer line is not readable, and `miette` panics on columns above 65535.
 const LONGEST_LINE: usize = 2_000;
 
 impl StudyError {
-    /// The bytes to underline, if the lines there and their neighbours are short enough to be drawn.
+    /// Returns the bytes to underline if their lines and the adjacent lines are short enough to
+    /// draw.
     fn drawable(&self) -> Option<&Range<usize>> {
         let (span, _, _) = self.0.at.as_ref()?;
         let text = &self.0.source.text;
@@ -167,7 +173,7 @@ impl StudyError {
     }
 }
 
-/// The nearest character boundary at or before `at`.
+/// Returns the nearest character boundary at or before `at`.
 fn boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -176,7 +182,7 @@ fn boundary(text: &str, at: usize) -> usize {
     at
 }
 
-/// Line and column (in characters) of a byte, both from 1.
+/// Returns line and column (in characters) of a byte, both from 1.
 fn line_and_column(text: &str, at: usize) -> (usize, usize) {
     let before = &text[..at];
     let line = before.matches('\n').count() + 1;

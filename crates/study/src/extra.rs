@@ -1,4 +1,4 @@
-//! What a table gives of an orbit beside amplitude, mean and phase, if `output` asks for it. One row of [`TABLE`] each.
+//! Additional columns of an orbit that `output` selects. Each is one row of [`TABLE`].
 
 use crate::columns;
 use crate::study::Case;
@@ -8,11 +8,11 @@ use std::f64::consts::TAU;
 use stickslip::model::{Axis, System, SystemJoint};
 use stickslip::orbit::{JointMotion, Orbit, Sample};
 
-/// Something that `output` can ask for.
+/// A group of columns that `output` can select.
 pub(crate) struct Extra {
     /// Name in `output`.
     pub name: &'static str,
-    /// One line of what it is.
+    /// One-line description.
     pub doc: &'static str,
     /// Names of its columns.
     columns: fn(&System) -> Vec<String>,
@@ -20,7 +20,7 @@ pub(crate) struct Extra {
     values: fn(&Prepared, &Orbit, &[Sample]) -> Vec<f64>,
 }
 
-/// Everything that `output` can ask for.
+/// All choices of `output`.
 pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "joint_force",
@@ -39,7 +39,7 @@ pub(crate) const TABLE: &[Extra] = &[
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
-            // switches stand behind the instants, which are evenly spaced
+            // the switches follow the evenly spaced instants
             let sum = |j: usize, a: usize| -> f64 {
                 samples[..INSTANTS].iter().map(|sample| sample.joints[j].force[a]).sum()
             };
@@ -118,7 +118,8 @@ pub(crate) const TABLE: &[Extra] = &[
 
 /// Highest harmonic of `harmonics`.
 const HARMONICS: usize = 5;
-/// Instants per period at which ranges are read, beside every switch: a sine's range is then known to 2e-6.
+/// Instants per period at which ranges are evaluated, in addition to every switch. The range of
+/// a sine has an error of 2e-6.
 pub(crate) const INSTANTS: usize = 1024;
 
 fn of_joints(system: &System, quantity: &str) -> Vec<String> {
@@ -135,7 +136,9 @@ fn half_range(values: impl Iterator<Item = f64>) -> f64 {
     0.5 * (high - low)
 }
 
-/// Amplitudes of the harmonics by the rectangle rule, which for a smooth period errs by the harmonics near [`INSTANTS`] only.
+/// Returns the amplitudes of the harmonics by the rectangle rule.
+///
+/// For a smooth periodic motion the error comes only from harmonics near [`INSTANTS`].
 fn harmonics(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
     let mut sums = vec![Complex64::new(0.0, 0.0); prepared.system.places().len() * HARMONICS];
     for instant in 0..INSTANTS {
@@ -150,18 +153,18 @@ fn harmonics(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
     sums.iter().map(|sum| sum.norm() * 2.0 / INSTANTS as f64).collect()
 }
 
-/// What `output` of a case asks for, in the order of [`TABLE`].
+/// Iterates over the choices in `output` of a case, in the order of [`TABLE`].
 fn wanted(case: &Case) -> impl Iterator<Item = &'static Extra> + '_ {
     let names = case.values.names("output").unwrap_or_default();
     TABLE.iter().filter(move |extra| names.iter().any(|name| name == extra.name))
 }
 
-/// Names of the columns that `output` asks for.
+/// Returns the names of the columns that `output` selects.
 pub(crate) fn columns(case: &Case, system: &System) -> Vec<String> {
     wanted(case).flat_map(|extra| (extra.columns)(system)).collect()
 }
 
-/// Their values.
+/// Returns the values of these columns.
 pub(crate) fn values(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
     if wanted(&prepared.case).next().is_none() {
         return Vec::new();

@@ -1,8 +1,9 @@
-//! What few coordinates of a structure leave out of the harmonics that joints make: where these slip, some points solved again in coordinates that reach
-//! farther.
+//! Check of the reduction basis: some points with slip are solved again in a larger basis.
 //!
-//! The error of a reduction is that of harmonic forces up to a frequency. Friction makes harmonics above it, and a mode that one of them meets is missing.
-//! So such an orbit is sought once more, by the same method and from rest, in coordinates that know the modes far above.
+//! The error of a reduced model is known for harmonic forces up to a frequency. Friction
+//! creates harmonics above it, and the basis lacks the modes that they excite. The check solves
+//! such an orbit again by the same method, from a cold start, in a basis with modes of much
+//! higher frequency.
 
 use crate::expression::displayed;
 use serde::{Deserialize, Serialize};
@@ -14,33 +15,43 @@ use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
 use stickslip_numerics::leading::leading;
 
-/// Coordinates that reach so many times as far stand for all rows: the first of which there are few enough. Measured on chains of 80 and 300 masses with a
-/// slider of 2 N/um or a rigid one at the driven end, against all rows: coordinates up to fifteen harmonics were off by 3 to 8 %, those that reach twice as far
-/// by 2 %, four times 0.3 to 0.8 %, eight times 0.02 to 0.3 %.
+/// Factors on the frequency limit of the basis. The check uses the first factor whose number of
+/// modes is at most [`MODES`].
+///
+/// Measured on chains of 80 and 300 masses, compared with all rows. The driven end has a slider
+/// of 2 N/um or a rigid one. A basis up to fifteen harmonics had errors of 3 to 8 %; twice that
+/// limit gave 2 %, four times 0.3 to 0.8 %, eight times 0.02 to 0.3 %.
 const TIMES: [f64; 2] = [8.0, 4.0];
-/// Points of a unit of work that are solved again: the largest, and others from end to end, as the error goes with which mode a harmonic meets. Measured on
-/// 300 masses: 0.8 % at the largest of 21 points, 9 % at the worst.
+/// Number of points per unit of work that are solved again: the largest, and others over the
+/// whole range.
+///
+/// The error depends on which mode a harmonic excites. Measured on 300 masses: 0.8 % at the
+/// largest of 21 points, 9 % at the worst.
 const POINTS: usize = 4;
-/// The first units of work of a study, of which each has its turn: where cases differ in a slip limit, so do the harmonics that it makes. One of three gave 0.6 %
-/// where the others were wrong by 2.6 %.
+/// Number of first units of work that are all checked.
+///
+/// Cases with different slip limits have different harmonics. Measured: one of three cases had
+/// an error of 0.6 %, the others 2.6 %.
 const FIRST: usize = 16;
-/// Modes up to there of which there may be so many: methods that follow motions in time are slow with more.
+/// Largest number of modes in the larger basis; methods that integrate in time are slow with
+/// more.
 const MODES: usize = 60;
-/// Rows beyond which nothing is solved again: to reduce so many takes ten seconds.
+/// Largest number of rows for the check; reducing this size takes ten seconds.
 pub(crate) const ROWS: usize = 30_000;
-/// Difference relative to the largest amplitude above which it shows in a response, and one must be told what to do.
+/// Difference relative to the largest amplitude above which the note becomes a warning with
+/// advice.
 const SHOWS: f64 = 0.01;
 
-/// Points at which joints slip on a structure in few coordinates.
+/// Points with slip on a reduced structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Slipping {
     points: usize,
-    /// The lowest frequency up to which the error of the coordinates is known, rad/s.
+    /// The lowest frequency limit of the known reduction error, rad/s.
     up_to: f64,
-    /// Those of a unit of work, in order, until some were solved again.
+    /// The points of a unit of work in order, until some were solved again.
     #[serde(skip)]
     all: Vec<Point>,
-    /// What came of it: the worst.
+    /// The worst result of solving again.
     again: Option<Again>,
 }
 
@@ -48,36 +59,42 @@ pub struct Slipping {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Point {
     omega: f64,
-    /// Of every place, m.
+    /// Amplitudes of all places, m.
     amplitudes: Vec<f64>,
 }
 
 /// A point that was solved again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Again {
-    /// The largest difference of the amplitudes, relative to the largest amplitude, and the place that has it.
+    /// Largest difference of an amplitude, relative to the largest amplitude.
     pub error: f64,
     place: String,
-    /// Where, in words, and how many were solved.
+    /// The point in words, and the number of points solved again.
     at: String,
     of: usize,
     coordinates: usize,
-    /// How far they reach, rad/s.
+    /// Frequency limit of the larger basis, rad/s.
     up_to: f64,
 }
 
-/// Whether it is the turn of a unit of work of so many points: [`POINTS`] of every [`BLOCK`] or so are solved again, and of each of the first units.
+/// Returns true if a unit of work with this number of points is checked.
+///
+/// About [`POINTS`] of every [`BLOCK`] points are solved again, and [`POINTS`] of each of the
+/// first units.
 pub(crate) fn has_turn(unit: usize, points: usize) -> bool {
     unit < FIRST || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
 }
 
-/// How many of so many points, in so many cases, are solved again where joints slip at all of them.
+/// Returns the number of points solved again if joints slip at all points.
 pub(crate) fn count(points: f64, cases: f64) -> f64 {
     (POINTS as f64 * (points / BLOCK as f64).ceil().max(cases.min(FIRST as f64))).min(points)
 }
 
 impl Slipping {
-    /// At a point, on coordinates whose error is known up to `up_to` (rad/s); `None` where no joint slips, and of a series without harmonics above.
+    /// Returns the record of one orbit; `up_to` is the frequency limit of the known reduction
+    /// error, rad/s.
+    ///
+    /// Returns `None` if no joint slips, or if the series has no harmonic above the limit.
     pub(crate) fn of(orbit: &Orbit, up_to: f64) -> Option<Slipping> {
         let highest = orbit.evidence.harmonics.map(|h| h as f64 * orbit.omega / orbit.periods as f64);
         let slips = orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0);
@@ -87,7 +104,7 @@ impl Slipping {
         counts.then_some(Slipping { points: 1, up_to, all, again: None })
     }
 
-    /// Takes in those of other points, which follow these.
+    /// Appends the record of the following points.
     pub(crate) fn join(&mut self, more: &Slipping) {
         let error = |again: &Option<Again>| again.as_ref().map_or(-1.0, |again| again.error);
         self.points += more.points;
@@ -98,7 +115,10 @@ impl Slipping {
         }
     }
 
-    /// Solves some again, if it is the `turn` of these points; the largest difference, if there is any answer. `at` says where a frequency is.
+    /// Solves some points again if `turn` is true, and returns the largest difference if a
+    /// point converged.
+    ///
+    /// `at` states a frequency in words.
     pub(crate) fn solve_again(
         &mut self,
         turn: bool,
@@ -119,7 +139,7 @@ impl Slipping {
         self.again.as_ref().map(|again| again.error)
     }
 
-    /// For the reader.
+    /// Returns the note for the reader.
     pub(crate) fn text(&self, warning: &str) -> String {
         let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
         let Slipping { points, up_to, again, .. } = self;
@@ -160,14 +180,14 @@ impl Point {
     }
 }
 
-/// The largest of some points, the first if several are, and others from end to end; rising.
+/// Returns the indices of the largest point and of others over the whole range, ascending.
 fn chosen(points: &[Point]) -> BTreeSet<usize> {
     let heights: Vec<f64> = points.iter().map(Point::largest).collect();
     let others = (0..POINTS - 1).map(|k| k * points.len().saturating_sub(1) / (POINTS - 2));
     leading(heights.iter().copied()).into_iter().chain(others).filter(|index| *index < points.len()).collect()
 }
 
-/// The same model in coordinates that reach farther than those of its `system`, if there are few enough.
+/// Assembles the same model with a larger reduction basis, if it has few enough modes.
 fn farther(model: &Model, system: &System) -> Option<System> {
     let (own, few) = (model.substructure.as_ref()?, system.reduced()?);
     if own.component.dofs() > ROWS {
@@ -179,7 +199,7 @@ fn farther(model: &Model, system: &System) -> Option<System> {
     model.assemble().ok()
 }
 
-/// What a point differs from the orbit in other coordinates, if one is found.
+/// Returns the difference of a point from the orbit in the larger basis, if that converges.
 fn again(farther: &System, method: &dyn Method, point: &Point) -> Option<Again> {
     let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
     let reduced = farther.reduced()?;

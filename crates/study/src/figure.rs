@@ -1,4 +1,4 @@
-//! The table `[figure]`: what in it can only be judged with a model and a kind.
+//! Checks of `[figure]` that need the model and the kind.
 
 use crate::info::{Complaint, KindInfo};
 use crate::names::Names;
@@ -7,7 +7,7 @@ use crate::units;
 use crate::values::Values;
 use stickslip::model::Model;
 
-/// What is wrong in `[figure]`.
+/// Checks the values of `[figure]`.
 pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), Complaint> {
     let known = Names::of_places(model).and_joints(model);
     for name in figure.names("only").unwrap_or_default() {

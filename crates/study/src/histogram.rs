@@ -1,20 +1,22 @@
-//! How often a quantity was how large: bars, and of maxima the distribution that fits them with its high percentiles.
+//! Histograms, and for maxima the fitted Weibull distribution with its high percentiles.
 
 use crate::dataset::{Axis, Panel, Series, Style};
 use crate::weibull::Maxima;
 
-/// Fewer values make no histogram.
+/// Smallest number of values for a histogram.
 pub(crate) const LEAST: usize = 20;
-/// Bars of a histogram.
+/// Smallest and largest number of bars.
 const BARS: (f64, f64) = (6.0, 60.0);
-/// Values to which a distribution is fitted, the first ones: with more, percentiles are known without.
+/// Number of first values used for the fit; more values give the percentiles without a fit.
 const MOST_FITTED: usize = 20_000;
-/// Percentiles that designs are made for.
+/// Percentiles used in design.
 const HIGH: [(f64, &str); 2] = [(0.99, "99 %"), (0.999, "99.9 %")];
-/// Points of the fitted curve, and the shares between which it is drawn, and in any case from the first bar on.
+/// Number of points of the fitted curve, and the probabilities between which it is drawn. The
+/// curve begins at the first bar at the latest.
 const CURVE: (usize, [f64; 2]) = (120, [0.0005, 0.9995]);
 
-/// The bars of `values`, which are in the unit of `x`: what they are the values of, `each`, is counted.
+/// Returns the histogram of `values`, which are in the unit of `x`; `each` names what is
+/// counted.
 pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
@@ -36,12 +38,13 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     })
 }
 
-/// The width of a bar after Freedman and Diaconis (1981), `2 IQR n^(-1/3)`.
+/// Returns the bar width by Freedman and Diaconis (1981), `2 IQR n^(-1/3)`, within the limits
+/// [`BARS`].
 fn width_of(sorted: &[f64]) -> f64 {
     let last = sorted.len() - 1;
     let range = sorted[last] - sorted[0];
     if range <= 0.0 {
-        // all in one bar, somewhat as wide as they are large
+        // equal values form one bar, a tenth of their magnitude wide
         return 0.1 * sorted[0].abs().max(f64::MIN_POSITIVE);
     }
     let quarters = sorted[3 * last / 4] - sorted[last / 4];
@@ -49,7 +52,9 @@ fn width_of(sorted: &[f64]) -> f64 {
     range / (range / width).clamp(BARS.0, BARS.1).ceil()
 }
 
-/// The same of the largest of many, with their Weibull distribution; its high percentiles stand in the title if it fits.
+/// Returns the histogram of maxima with their Weibull distribution.
+///
+/// The title states the high percentiles if the distribution fits.
 pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
     let mut panel = panel(values, x, title, each)?;
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MOST_FITTED).collect();
@@ -79,7 +84,8 @@ pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str)
 mod tests {
     use super::*;
 
-    /// NumPy 2: `np.histogram_bin_edges([1..=100], bins="fd")` has 5 bars; six are the least here.
+    /// NumPy 2: `np.histogram_bin_edges([1..=100], bins="fd")` has 5 bars; the minimum here is
+    /// six.
     #[test]
     fn every_value_stands_in_one_bar() {
         let values: Vec<f64> = (1..=100).map(f64::from).collect();
@@ -90,12 +96,12 @@ mod tests {
         assert!(panel(&values[..19], &Axis::new("x", ""), "", "draws").is_none());
         let same = panel(&[2.0; 50], &Axis::new("x", ""), "", "draws").unwrap();
         assert_eq!(same.series[0].y, [50.0]);
-        // no number is none
+        // NaN is not counted
         let failed = panel(&[&values[..], &[f64::NAN]].concat(), &Axis::new("x", ""), "", "draws").unwrap();
         assert_eq!(failed.series[0].y.iter().sum::<f64>(), 100.0);
     }
 
-    /// The area under the curve is that of the bars, but for what lies beyond them.
+    /// The area under the curve equals that of the bars, except for the tails beyond them.
     #[test]
     fn the_curve_has_the_area_of_the_bars() {
         let draw = |i: u64| 2.0 - 0.6 * (-stickslip_numerics::random::Stream::new(1).uniform(i).ln()).powf(1.0 / 3.0);

@@ -1,9 +1,11 @@
-//! Masses that cannot move: so stiffly held that their inertia makes no difference.
+//! Errors for masses whose stiffness is so high that their inertia has no effect.
 //!
-//! In `k - m Ω²` the second term is lost in the rounding of the first where `m Ω² < ε k`, with ε = 2.2e-16: the result is the same for a mass of
-//! zero. Such a stiffness stands for "rigid", costs the exact method `√(k/m)/Ω` > 7e7 oscillations per period, and is refused. Where it is so of every
-//! mass, no stiffness stands out, and the drive is too slow. The other way round a spring is lost beside a mass: a mode far below the drive makes terms of
-//! `Ω/ω` times the motion that cancel each other, and rounding is left.
+//! In `k - m Ω²` the second term is lost in the rounding of the first if `m Ω² < ε k`, with
+//! `ε = 2.2e-16`; a mass of zero gives the same result. Such a stiffness is meant as "rigid". It
+//! costs the exact method `√(k/m)/Ω` > 7e7 oscillations per period, and it is refused. If this
+//! holds for every mass, the excitation is too slow. Conversely, a spring can be lost in the
+//! rounding of the inertia. A mode far below the excitation creates terms of `Ω/ω` times the
+//! motion; they cancel, and only rounding remains.
 
 use crate::expression::displayed;
 use crate::info::Complaint;
@@ -13,7 +15,7 @@ use stickslip::dimension::Dimension;
 use stickslip::law::{Law, Parameter};
 use stickslip::model::{Element, GROUND, Mass, Model, ModelError};
 
-/// A mass beside what is stiffest of all that holds it.
+/// A mass and the stiffest element attached to it.
 struct Held<'a> {
     mass: &'a Mass,
     stiffness: f64,
@@ -21,13 +23,15 @@ struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// Drive frequency below which its inertia is lost, rad/s.
+    /// Returns the excitation frequency below which the inertia is lost, rad/s.
     fn slowest(&self) -> f64 {
         (f64::EPSILON * self.stiffness / self.mass.mass).sqrt()
     }
 }
 
-/// The masses that anything holds. A place without mass is no mistake of its stiffness, a moved one moves.
+/// Iterates over the masses with an attached stiffness.
+///
+/// Places without mass and places with an imposed motion are left out.
 fn held(model: &Model) -> impl Iterator<Item = Held<'_>> {
     let mut stiffest: HashMap<&str, (f64, Element)> = HashMap::new();
     let springs = model.springs.iter().enumerate().map(|(i, s)| (&s.between, s.stiffness, Element::Spring(i)));
@@ -47,7 +51,8 @@ fn held(model: &Model) -> impl Iterator<Item = Held<'_>> {
     })
 }
 
-/// The element that holds a mass so that it does not move at the drive frequency `omega`, rad/s; `None` if there is none.
+/// Returns the error of an element so stiff that a mass does not move at `omega`, rad/s; `None`
+/// without one.
 pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
     let Held { mass, stiffness, by } = held(model).find(|held| omega < held.slowest())?;
     let message = format!(
@@ -61,11 +66,14 @@ pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
     Some(refused(by, message))
 }
 
-/// Share of a motion that rounding may take beside a mode far below the drive.
+/// Share of a motion that rounding may reach because of a mode far below the excitation.
 const LOST: f64 = 1e-6;
 
-/// The stiffest element that holds a mass and is lost beside its inertia at the drive frequency `omega`, rad/s, `ε √(m Ω²/k) >` [`LOST`]; `None` if there
-/// is none.
+/// Returns the error of a spring whose stiffness is lost in the rounding of the inertia at
+/// `omega`, rad/s.
+///
+/// The condition is `ε √(m Ω²/k) >` [`LOST`] for the stiffest element of a mass. Returns `None`
+/// without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     let lost = |held: &Held<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
     let Held { mass, stiffness, by } = held(model).find(lost)?;
@@ -80,16 +88,18 @@ pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     Some(refused(by, message))
 }
 
-/// What is wrong with an element.
+/// Builds the error of an element.
 fn refused(by: Element, message: String) -> ModelError {
     let key = if matches!(by, Element::Joint(_)) { "law" } else { "stiffness" };
     ModelError { element: by, key, message, wrong_name: None }
 }
 
-/// By how much more than rounding inertia is there at the frequency that is named instead: so slow a motion is that of rest all the same.
+/// Factor of inertia over rounding at the suggested frequency; the motion is still quasi-static
+/// there.
 const SEEN: f64 = 100.0;
 
-/// What is wrong with a drive frequency `omega`, rad/s, that is too slow for every mass.
+/// Returns the error of an excitation frequency `omega`, rad/s, that is too slow for every
+/// mass.
 pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
     let mut slowest = 0.0f64;
     let mut softest: Option<(f64, &str)> = None;
@@ -118,9 +128,10 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
     Some(Complaint::new("frequency", message, help))
 }
 
-/// Stiffness of a law while it sticks, N/m; zero of a rigid one, and of one that holds nothing.
+/// Returns the stiffness of a law while it sticks, N/m; zero for a rigid law and for one
+/// without force.
 fn stiffness(law: &dyn Law) -> f64 {
-    // that of a cubic spring goes with the motion
+    // the stiffness of a cubic spring depends on the motion
     let is = |parameter: &Parameter| parameter.key == "stiffness" && parameter.dimension == Dimension::STIFFNESS;
     let linear = law.info().parameters.iter().any(is);
     law.value("stiffness").filter(|_| linear && !law.is_free()).unwrap_or(0.0)

@@ -1,4 +1,5 @@
-//! What a study kind says of itself: its name, its keys, and what must hold before anything is computed.
+//! The description of a study kind: its name, its keys, and conditions checked before
+//! computing.
 
 use crate::key::Key;
 use crate::near;
@@ -7,40 +8,45 @@ use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, Options};
 use stickslip::model::{Model, System};
 
-/// What a study kind says of itself; a study knows of its kind no more than this.
+/// The description of a study kind; a study knows nothing else about its kind.
 #[derive(Debug, Clone, Copy)]
 pub struct KindInfo {
     /// Name in study files.
     pub name: &'static str,
-    /// One line of what it computes.
+    /// One line that says what the kind computes.
     pub summary: &'static str,
-    /// Its keys of `[study]`, beside those that every kind has.
+    /// Keys of `[study]`, in addition to the keys that every kind has.
     pub keys: &'static [Key],
-    /// What one key alone cannot tell: conditions between keys, names that must exist in the model, and how many values the last parameter
-    /// of `vary` must have (1 if there is none).
+    /// Checks conditions between keys, and names that must exist in the model.
+    ///
+    /// The last argument is the number of values of the last parameter of `vary`, 1 without
+    /// `vary`.
     pub check: fn(&Values, &Model, usize) -> Result<(), Complaint>,
-    /// Dimensions of the two axes of its figure, if they are the same in every panel.
+    /// Dimensions of the two axes of the figure, if they are the same in every panel.
     pub axes: [Option<Dimension>; 2],
-    /// Whether it finds its orbits with the method of `[method]`, which must then be able to take the model.
+    /// True if the kind finds its orbits with the method of `[method]`, which must then support
+    /// the model.
     pub uses_method: bool,
-    /// What it needs of a system, beside what its method needs; a kind that uses no method may read options of `[method]` all the same.
+    /// Checks requirements on the system in addition to those of the method.
+    ///
+    /// A kind that uses no method may still read options of `[method]`.
     pub needs: fn(&Values, &Options, &System) -> Result<(), MethodError>,
-    /// Whether it can place its frequencies where the curve bends.
+    /// True if the kind can refine its frequencies where the curve bends.
     pub adapts: bool,
-    /// Its tables, the most important first.
+    /// Names of its tables, the most important first.
     pub tables: &'static [&'static str],
 }
 
-/// What a kind finds wrong in the values of its keys.
+/// An error that a kind finds in the values of its keys.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Complaint {
-    /// The key; the error stands at its value, or at `[study]` if it is absent.
+    /// The key; the error is reported at its value, or at `[study]` if the key is absent.
     pub key: &'static str,
-    /// The name inside the key's value that is wrong, if it is one.
+    /// The wrong name inside the value of the key, if the error is about a name.
     pub name: Option<String>,
-    /// What is wrong and what was expected.
+    /// States what is wrong and what was expected.
     pub message: String,
-    /// What to do.
+    /// States what to do.
     pub help: Option<String>,
 }
 
@@ -49,7 +55,8 @@ impl Complaint {
         Complaint { key, name: None, message: message.into(), help: Some(help.into()) }
     }
 
-    /// A name in the value of `key` that is none of `candidates`.
+    /// Returns the complaint about a name in the value of `key` that is not one of
+    /// `candidates`.
     pub(crate) fn unknown(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
         let help = match near::nearest(name, candidates.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),

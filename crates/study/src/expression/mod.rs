@@ -1,21 +1,25 @@
 //! Quantities and expressions: `"25 s/mm"`, `"m - m1/2"`, `"sqrt(k/m) * 1 rad"`.
 //!
-//! `+ - * / ^`, parentheses, numbers, numbers with a unit, names of parameters, `pi`, and the functions of [`FUNCTIONS`].
+//! An expression has `+ - * / ^`, parentheses, numbers, numbers with a unit, names of
+//! parameters, `pi`, and the functions of [`FUNCTIONS`].
 //!
-//! **Bare numbers.** A number without a unit has no dimension yet. It is SI of whatever dimension its place expects, also when it
-//! arrives through a parameter. The rules:
+//! **Bare numbers.** A bare number has no unit, and so no dimension yet. Its key supplies the
+//! dimension: the number is in the SI unit that the key expects, also when it arrives through a
+//! parameter. The rules:
 //!
-//! | operation | bare with bare | bare with dimension `d` |
-//! | --- | --- | --- |
-//! | `a + b`, `a - b`, `min`, `max` | bare | the bare one is taken in the SI unit of `d`; result `d` |
-//! | `a * b`, `a / b` | bare | the bare one is a pure number |
-//! | `a ^ b` | bare | the exponent must be bare or a pure number |
-//! | `sqrt`, `abs` | bare | of a bare number: bare |
-//! | `sin`, `cos`, `tan`, `exp`, `ln` | bare | of a bare number (radians, or a pure number): bare |
+//! - `a + b`, `a - b`, `min`, `max`: the result of bare numbers is bare. A bare number combined
+//!   with dimension `d` is in the SI unit of `d`, and the result has dimension `d`.
+//! - `a * b`, `a / b`: the result of bare numbers is bare. A bare number combined with a
+//!   dimension is a pure number.
+//! - `a ^ b`: the exponent must be bare or a pure number. The result of a bare base is bare.
+//! - `sqrt`, `abs`: the result of a bare number is bare.
+//! - `sin`, `cos`, `tan`, `exp`, `ln`: a bare argument is in radians or a pure number, and its
+//!   result is bare.
 //!
-//! The SI unit of a frequency is Hz here, and of a sweep rate Hz/s: `f = 121`, `frequency = "f"` means 121 Hz. A bare number that was
-//! computed with `pi` is refused as a frequency, since it was probably meant in rad/s. A ratio of two masses is a pure number; it is
-//! *not* bare and does not fit where a stiffness is expected.
+//! The SI unit of a frequency is Hz here, and that of a sweep rate is Hz/s: `f = 121` and
+//! `frequency = "f"` mean 121 Hz. A bare number that was computed with `pi` is refused as a
+//! frequency, because it was probably meant in rad/s. A ratio of two masses is a pure number.
+//! It is *not* bare, and it is refused as a stiffness.
 
 mod operation;
 mod parser;
@@ -31,22 +35,24 @@ use stickslip::dimension::Dimension;
 pub use value::Value;
 pub(crate) use value::{described, displayed};
 
-/// An expression, compiled: steps for a stack machine, so that no depth of nesting can exhaust ours.
+/// A compiled expression: steps of a stack machine.
+///
+/// Evaluation does not recurse, so deep nesting cannot exhaust the call stack.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
     steps: Vec<(Operation, Range<usize>)>,
 }
 
 impl Expression {
-    /// A bare number.
+    /// Returns the expression of one bare number.
     pub fn number(value: f64) -> Self {
         Expression { steps: vec![(Operation::Push(Value::bare(value)), 0..0)] }
     }
 
-    /// Compiles `text`; a name means the parameter at its index in `parameters`.
+    /// Compiles `text`. A name means the parameter at its index in `parameters`.
     ///
     /// # Errors
-    /// [`Fault`] with the bytes of `text` that are wrong.
+    /// Returns a [`Fault`] with the byte range of `text` that is wrong.
     ///
     /// # Example
     /// ```
@@ -62,7 +68,9 @@ impl Expression {
         Expression::compile_with(text, &index, &|_| None, &names)
     }
 
-    /// With bare numbers that have names; `names` are those that can have been meant by a wrong one.
+    /// Compiles `text` with named bare numbers (`constant`).
+    ///
+    /// `names` are the candidates that an error suggests for an unknown name.
     pub(crate) fn compile_with(
         text: &str,
         index: &dyn Fn(&str) -> Option<usize>,
@@ -81,7 +89,7 @@ impl Expression {
         Ok(Expression { steps: parser.steps })
     }
 
-    /// The parameters it reads, by index.
+    /// Iterates over the indices of the parameters that the expression reads.
     pub fn parameters(&self) -> impl Iterator<Item = usize> + '_ {
         self.steps.iter().filter_map(|(operation, _)| match operation {
             Operation::Parameter(index) => Some(*index),
@@ -89,7 +97,9 @@ impl Expression {
         })
     }
 
-    /// The parameters in arguments of `sin`, `cos` and `tan`, by index, but for arguments with pi: these are in radians.
+    /// Iterates over the indices of parameters in arguments of `sin`, `cos` and `tan`.
+    ///
+    /// Arguments that contain `pi` are left out, because they are in radians.
     pub(crate) fn angles(&self) -> impl Iterator<Item = usize> + '_ {
         let turns =
             |operation: &Operation| matches!(operation, Operation::Call { function: "sin" | "cos" | "tan", .. });
@@ -106,20 +116,22 @@ impl Expression {
         })
     }
 
-    /// Whether it is one literal number, with or without a unit.
+    /// Returns true if the expression is one literal number, with or without a unit and a sign.
     pub fn is_literal(&self) -> bool {
         matches!(self.steps.as_slice(), [(Operation::Push(_), _)] | [(Operation::Push(_), _), (Operation::Negate, _)])
     }
 
-    /// The value, with `parameters` by index.
+    /// Evaluates the expression with `parameters` by index.
     ///
     /// # Errors
-    /// [`Fault`] with the bytes of the sub-expression whose dimensions do not fit or whose value is not finite.
+    /// Returns a [`Fault`] with the byte range of the sub-expression whose dimensions do not
+    /// fit or whose value is not finite.
     pub fn evaluate(&self, parameters: &[Value]) -> Result<Value, Fault> {
         let mut stack: Vec<Value> = Vec::with_capacity(8);
         for (operation, span) in &self.steps {
             let fault = |message: String| Fault::new(span.clone(), message);
-            let mut pop = || stack.pop().unwrap_or(Value::bare(f64::NAN)); // the compiler balances the stack
+            // the parser balances the stack
+            let mut pop = || stack.pop().unwrap_or(Value::bare(f64::NAN));
             let value = match *operation {
                 Operation::Push(value) => value,
                 Operation::Parameter(index) => parameters.get(index).copied().unwrap_or(Value::bare(f64::NAN)),
@@ -202,7 +214,8 @@ impl Clash {
     }
 }
 
-/// Two values in one dimension: both numbers, and what the result is like.
+/// Brings two values to one dimension: both numbers, and a value with the dimension of the
+/// result.
 fn unify(a: Value, b: Value) -> Result<(f64, f64, Value), Clash> {
     let none = Dimension::NONE;
     let unit = |value: Value, d| value.in_si_unit_of(d).map_err(|e| Clash { a: none, b: none, other: Some(e) });
@@ -242,10 +255,10 @@ fn call(function: &str, a: Value) -> Result<Value, String> {
     }
 }
 
-/// The value in SI of a quantity without parameters, as a study file would read it at a place that expects `dimension`.
+/// Evaluates a quantity without parameters, in SI, for a key that expects `dimension`.
 ///
 /// # Errors
-/// [`Fault`].
+/// Returns a [`Fault`] if the text is not an expression or has another dimension.
 ///
 /// # Example
 /// ```
@@ -292,13 +305,14 @@ mod tests {
         check("m1 - m1/2", Dimension::MASS, 0.001);
         check("20 /s", Dimension { kg: 0, m: 0, s: -1, rad: 0 }, 20.0);
         check("20/ms * 1 mm", Dimension::VELOCITY, 20.0 / 1e-3 * 1e-3);
-        check("0.182 kg * 8/m", Dimension::NONE, 0.182 * 8.0 / 0.182); // a parameter is no unit
+        // `m` is the parameter, not metre
+        check("0.182 kg * 8/m", Dimension::NONE, 0.182 * 8.0 / 0.182);
         check("-2^2", Dimension::NONE, -4.0);
         check("2^-1", Dimension::NONE, 0.5);
         check("2^3^2", Dimension::NONE, 512.0);
         check("sqrt(k/m) * 1 rad", Dimension::FREQUENCY, (105_103.0f64 / 0.182).sqrt());
         check("k * 2 mm", Dimension::FORCE, 105_103.0 * 0.002);
-        // the unit of a number may begin with what it divides by, unless that is a parameter
+        // a number may have an inverse unit, unless the name after `/` is a parameter
         for text in ["5 /mm", "5/mm", "5 1/mm", "5 mm^-1"] {
             check(text, Dimension { m: -1, ..Dimension::NONE }, 5000.0);
         }

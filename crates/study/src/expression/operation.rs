@@ -1,11 +1,11 @@
-//! The steps of an expression, and the words that mean one.
+//! The steps of an expression, and the reserved words.
 
 use super::Value;
 
 /// The functions of expressions.
 pub const FUNCTIONS: &[&str] = &["sqrt", "sin", "cos", "tan", "exp", "ln", "abs", "min", "max"];
 
-/// Whether a parameter cannot have this name.
+/// Returns true if no parameter can have this name.
 pub(crate) fn is_reserved(name: &str) -> bool {
     FUNCTIONS.contains(&name) || name == "pi" || is_not_finite(name)
 }

@@ -1,4 +1,4 @@
-//! Text to the steps of an expression, by recursive descent.
+//! Parses the text of an expression into steps by recursive descent.
 
 use super::Value;
 use super::operation::{FUNCTIONS, Operation, is_not_finite};
@@ -7,14 +7,14 @@ use crate::units::{self, Fault, Names};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 
-/// What people call the drive frequency, in small letters.
+/// Lower-case names that users give to the excitation frequency.
 const OF_THE_DRIVE: [&str; 5] = ["frequency", "freq", "omega", "ohm", "w"];
-/// How a model depends on the drive frequency.
+/// Help text: expressions read parameters only, so the frequency must be a parameter.
 const OF_PARAMETERS: &str = "expressions know parameters, not the drive frequency of each point; make the frequency a parameter, \
                              f = \"100 Hz\" in [parameters], use `f` here, and ask for kind = \"orbit\" with frequency = \"f\" and \
                              vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
 
-/// Parentheses and powers inside each other.
+/// Greatest depth of nested parentheses and powers.
 const DEEPEST: usize = 64;
 
 pub(super) struct Parser<'a> {
@@ -175,7 +175,7 @@ impl Parser<'_> {
         let parameter = |name: &str| (self.index)(name).is_some() || (self.constant)(name).is_some();
         let function = |name: &str| FUNCTIONS.contains(&name);
         let names = Names { parameter: &parameter, function: &function };
-        // `5000 1/m` is `5000 /m`: two numbers in a row mean nothing else
+        // `5000 1/m` means `5000 /m`; two numbers in a row have no other meaning
         if self.rest().strip_prefix('1').is_some_and(|rest| units::divides(rest, &names)) {
             self.at += 1;
         }
@@ -206,7 +206,10 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// The unit behind `/` in `20 /s`, the dimension of one by it, and where it ends; none where a parameter has its name.
+    /// Reads the unit after `/` in `20 /s`: the unit, the inverse dimension, and the byte where
+    /// it ends.
+    ///
+    /// Returns `None` if a parameter has the name of the unit.
     fn inverse_unit(&self) -> Option<(units::Unit, Dimension, usize)> {
         let start = self.at + 1;
         let word = |c: char| c.is_ascii_alphanumeric() || c == '_';

@@ -1,4 +1,4 @@
-//! Numbers with and without a dimension.
+//! Numbers with or without a dimension.
 
 use crate::mistaken;
 use std::f64::consts::TAU;
@@ -7,34 +7,34 @@ use stickslip::dimension::Dimension;
 /// A number with or without a dimension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Value {
-    /// The number, SI (rad/s for frequencies); of a bare number, as written.
+    /// The number in SI (rad/s for frequencies), or as written for a bare number.
     pub si: f64,
-    /// Its dimension; `None` for a bare number.
+    /// The dimension; `None` for a bare number.
     pub dimension: Option<Dimension>,
-    /// Whether a bare number was computed with `pi`.
+    /// True if a bare number was computed with `pi`.
     pub(crate) with_pi: bool,
 }
 
 impl Value {
-    /// A bare number.
+    /// Returns a bare number.
     pub fn bare(si: f64) -> Self {
         Value { si, dimension: None, with_pi: false }
     }
 
-    /// A number of known dimension, SI.
+    /// Returns a number in SI with a dimension.
     pub fn of(si: f64, dimension: Dimension) -> Self {
         Value { si, dimension: Some(dimension), with_pi: false }
     }
 
-    /// The number in SI as a quantity of this dimension.
+    /// Returns the number in SI as a quantity of dimension `expected`.
     ///
     /// # Errors
-    /// Message and help, if the dimension is another one.
+    /// Returns message and help if the value has another dimension.
     pub fn to(self, expected: Dimension) -> Result<f64, (String, Option<String>)> {
         self.written_as("", expected)
     }
 
-    /// The same of what was written as `text`.
+    /// Does the same as [`Value::to`]; errors quote `text`, which the user wrote.
     pub(crate) fn written_as(self, text: &str, expected: Dimension) -> Result<f64, (String, Option<String>)> {
         let Some(found) = self.dimension else {
             return self.in_si_unit_of(expected);
@@ -68,7 +68,7 @@ impl Value {
     }
 }
 
-/// Dimension with an article-free name: `stiffness (N/m)`.
+/// Returns the dimension as error texts name it: `stiffness (N/m)`, `a pure number`.
 pub(crate) fn described(dimension: Dimension) -> String {
     match dimension {
         Dimension::NONE => "a pure number".to_owned(),
@@ -77,7 +77,8 @@ pub(crate) fn described(dimension: Dimension) -> String {
     }
 }
 
-/// A number in its dimension's main unit, with as many digits as a reader wants: `2.5 N`, `121 Hz`.
+/// Formats a number in the main unit of its dimension, with up to nine digits: `2.5 N`,
+/// `121 Hz`.
 pub(crate) fn displayed(si: f64, dimension: Option<Dimension>) -> String {
     let (value, unit) = match dimension {
         None | Some(Dimension::NONE) => (si, String::new()),

@@ -1,4 +1,5 @@
-//! Branches of orbits by arc length, along the drive frequency or along a design parameter, around turning points.
+//! Branches of orbits by continuation, along the excitation frequency or a parameter, around
+//! turning points.
 
 mod standing;
 
@@ -55,8 +56,10 @@ pub(super) const KIND: Kind = Kind {
             default(
                 "tolerance",
                 Takes::Quantity(Dimension::NONE, Within::Positive),
-                // what 15 harmonics leave of rigid friction, whose force decays as 1/h: 5e-3 to 1e-2 were measured. More are no default: a
-                // branch turns at every border of stick, and 127 take forty times as long
+                // the truncation error of 15 harmonics with rigid friction, whose force decays
+                // as 1/h, was measured as 5e-3 to 1e-2. The default is not higher, because a
+                // branch turns at every border of stick, and 127 harmonics take forty times as
+                // long
                 "0.01",
                 "estimated error relative to the largest amplitude, beyond which a point is `truncated`",
                 "0.001",
@@ -64,13 +67,13 @@ pub(super) const KIND: Kind = Kind {
         ],
         check,
         axes: [None, Some(Dimension::LENGTH)],
-        // harmonic balance is what branches are made of
+        // branches always use harmonic balance
         uses_method: false,
         needs: |values, _, system| method(values).solver(system).map(drop),
         adapts: false,
         tables: &["branch", "peaks", "turns"],
     },
-    // along a parameter the cases of one branch differ in the last one only
+    // the cases of one branch along a parameter differ in the last parameter only
     grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
     cost,
     warnings: |cases| resonant(cases).into_iter().chain(undamped(cases)).collect(),
@@ -78,12 +81,14 @@ pub(super) const KIND: Kind = Kind {
     draw,
 };
 
-/// Points of a branch for each of the steps that were asked for: it shortens them where it bends. Measured: 3 to 15,
-/// and 109 for a ring of three whose branch turns at every border of stick.
+/// Points of a branch per requested step; the continuation shortens steps where the branch
+/// bends.
+///
+/// Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border of stick.
 const POINTS: f64 = 5.0;
-/// Solutions per step that was asked for, each of full equations.
+/// Solutions of the full equations per requested step.
 const FOLLOWED: f64 = 15.0;
-/// Peaks and turns of a branch.
+/// Peaks and turning points per branch.
 const MARKS: f64 = 2.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
@@ -121,21 +126,21 @@ fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Co
     check_samples(values)
 }
 
-/// What a branch can run along.
+/// Help text: a branch needs a range of the frequency or of a parameter.
 const RANGE: &str = "write frequency = { from = …, to = … }, or vary = { Ft = [ … ] } with two different values";
 
-/// Why there is no branch.
+/// The reason why a branch is missing.
 enum Missing {
     NoRange,
     Trace(TraceError),
 }
 
-/// Whether branches run along the last varied parameter, at one frequency, rather than along the frequency.
+/// Returns true if branches run along the last varied parameter at one frequency.
 fn along_parameter(study: &Study) -> bool {
     !study.varied().is_empty() && study.points() == study.cases()
 }
 
-/// The varied parameters that tell branches apart, and the one that a branch runs along.
+/// Separates the parameters that distinguish branches from the parameter along a branch.
 fn split<'v>(study: &Study, varied: &'v [VariedValue]) -> (&'v [VariedValue], Option<&'v VariedValue>) {
     match varied.split_last() {
         Some((last, outer)) if along_parameter(study) => (outer, Some(last)),
@@ -143,7 +148,7 @@ fn split<'v>(study: &Study, varied: &'v [VariedValue]) -> (&'v [VariedValue], Op
     }
 }
 
-/// Name of the column of what a branch runs along, and its factor from SI.
+/// Returns the column name of the parameter along a branch, and its factor from SI.
 fn axis(along: Option<&VariedValue>) -> (String, f64) {
     along.map_or_else(|| ("frequency_Hz".to_owned(), 1.0 / TAU), |parameter| (parameter.name.clone(), 1.0))
 }
@@ -215,12 +220,12 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// The peaks of a branch that stand out by more than the error of its rows.
+/// Returns the peaks of a branch whose prominence exceeds the error of its rows.
 fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
     let heights: Vec<f64> = branch.points.iter().map(|point| worst(&point.orbit, places)).collect();
     let errors: Vec<f64> =
         branch.points.iter().map(|point| point.orbit.evidence.truncation.unwrap_or(f64::NAN)).collect();
-    // a peak stands between the neighbours of the row that is next to it
+    // a peak lies between the rows before and after its nearest row
     let near = |row: usize, (value, height): (f64, f64)| {
         let [a, b, c] = [row - 1, row, row + 1].map(|row| branch.points[row].value);
         (a.min(b).min(c)..=a.max(b).max(c)).contains(&value)
@@ -235,7 +240,7 @@ fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
     branch.peaks.iter().zip(kept).filter(|(_, kept)| *kept).map(|(peak, _)| *peak).collect()
 }
 
-/// The method that solves the series of a branch.
+/// Returns the method that solves the orbits of a branch.
 fn method(values: &Values) -> HarmonicBalance {
     let count = |key: &str, default: u64| values.count(key).unwrap_or(default) as usize;
     HarmonicBalance {
@@ -245,7 +250,7 @@ fn method(values: &Values) -> HarmonicBalance {
     }
 }
 
-/// What part of the range a branch does not have that left it, and how it is found.
+/// States which part of the range is missing after the branch left the range, and what to do.
 fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64)) -> Option<String> {
     let reached = branch
         .points
@@ -262,7 +267,7 @@ fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64))
     })
 }
 
-/// From which value to which a branch runs.
+/// Returns the first and last value along a branch.
 fn range(work: &Work<'_>, along: Option<&VariedValue>) -> (f64, f64) {
     let last = &work.cases[work.cases.len() - 1];
     match (along, split(work.study, &last.case.varied).1) {
@@ -281,7 +286,7 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Re
         let case = work.study.case_with(prepared.case.index, &along?.name, value).ok()?;
         case.model.assemble().ok()
     };
-    // a value that the model cannot have has no drive, and the branch ends before it
+    // the model has no excitation at an invalid value, so the branch ends before it
     let at = |value: f64| match along {
         None => (prepared.system.clone(), value),
         Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
@@ -297,7 +302,7 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Re
     trace.branch().map_err(Missing::Trace)
 }
 
-/// Of several branches only the place whose peaks count is shown.
+/// Draws the branches; with several branches, only the place whose peak counts.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Ok(prepared)) = (drawing.table("branch"), Prepared::new(drawing.study, 0)) else {
         return Figure::default();
@@ -313,7 +318,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let one = stretches.len() == 1;
     let names: Vec<&str> = places.iter().map(|place| system.places()[*place].as_str()).collect();
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
-    // of several branches the masses whose peaks count are shown, the largest amplitude of them
+    // with several branches, the curve is the largest amplitude of the places whose peak counts
     let shown: Vec<Vec<usize>> = match one {
         true => drawing.displacements(system).into_iter().map(|(_, place)| vec![place]).collect(),
         false => vec![places],
@@ -321,12 +326,13 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let unstable = unstable(table);
     let line_of = |stretch: &Stretch, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
         let mut from = stretch.rows.start;
-        // between two points at one end of the range the curve runs outside of it
+        // between two equal values at an end of the range, the branch runs outside the range
         let at = numbers(table, &name_of_axis(table, outer.len()), stretch.rows.clone());
         let leaves = |row: usize| row > 0 && at[row - 1] == at[row];
         let rows: Vec<usize> = (0..stretch.rows.len()).collect();
         let unstable = &unstable[stretch.rows.clone()];
-        // unstable stretches are dashed; each begins at the last point of the one before
+        // unstable stretches are dashed; each stretch begins at the last point of the previous
+        // stretch
         let runs = rows.chunk_by(|a, b| unstable[*a] == unstable[*b] && !leaves(*b)).map(|rows| {
             let run = &unstable[rows[0]..];
             let joined = usize::from(rows[0] > 0 && !leaves(rows[0]));
@@ -353,7 +359,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
                 shown.iter().enumerate().flat_map(|(colour, places)| line_of(stretch, places, &name(places), colour));
             vec![panel(title, lines.collect())]
         };
-        // what the branch runs along tells no draws apart
+        // the parameter along the branch does not distinguish draws
         let apart: Vec<Stretch> = stretches
             .iter()
             .map(|stretch| Stretch { varied: stretch.varied[..outer.len()].to_vec(), ..stretch.clone() })
@@ -370,12 +376,12 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     Figure { panels: vec![panel(String::new(), series)], ..Figure::default() }
 }
 
-/// The column of what a branch runs along stands behind the outer varied parameters.
+/// Returns the name of the column along the branch, which follows the outer varied parameters.
 fn name_of_axis(table: &Table, outer: usize) -> String {
     table.columns.get(outer).map_or_else(String::new, |column| column.name.clone())
 }
 
-/// Which rows are known to be unstable.
+/// Returns for every row whether it is known to be unstable.
 fn unstable(table: &Table) -> Vec<bool> {
     match table.flags("stable") {
         Some(flags) => flags.iter().map(|stable| *stable == Some(false)).collect(),

@@ -1,7 +1,9 @@
-//! Campbell diagrams: natural frequencies over the speed of a rotor, with the lines of the engine orders and where they cross.
+//! Campbell diagrams: natural frequencies over the speed of a rotor, engine order lines and
+//! their crossings.
 //!
-//! What a rotor's stiffness gains from the speed is stated in the model: the speed is a parameter, and a spring `k0 + k1*speed^2` stiffens.
-//! On a tuned disk an engine order e meets the modes of one nodal diameter, `e` less whole turns.
+//! The model states how its stiffness depends on the speed: the speed is a parameter, and a
+//! spring `k0 + k1*speed^2` stiffens. On a tuned disk an engine order `e` excites the modes of
+//! one nodal diameter: the distance from `e` to the nearest multiple of the sector count.
 
 use super::keys::anything;
 use super::nodal_diameter::{STATES, waves};
@@ -30,7 +32,7 @@ const DIAMETER: &str = "nodal_diameter";
 const MODE: &str = "mode";
 const ORDER: &str = "engine_order";
 
-/// The name of the parameter when none is given.
+/// Default name of the parameter.
 const PARAMETER: &str = "speed";
 
 pub(super) const KIND: Kind = Kind {
@@ -77,7 +79,7 @@ fn check(values: &Values, _: &Model, _: usize) -> Result<(), Complaint> {
     Err(Complaint::new("speed", message, "write { from = \"10 Hz\", to = \"120 Hz\", points = 56 }"))
 }
 
-/// Time of an eigenvalue problem over the cube of its size, s.
+/// Time of an eigenvalue problem per cube of its size, s.
 const EIGEN: f64 = 1e-8;
 
 fn cost(costing: &Costing<'_>) -> Cost {
@@ -87,11 +89,11 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let sectors = costing.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors as f64);
     let waves = sectors.map_or(1.0, |sectors| sectors / 2.0 + 1.0);
     let lines = 2.0 * waves * count("modes", 3);
-    // an engine order meets the modes of one nodal diameter
+    // an engine order excites the modes of one nodal diameter
     let crossings = lines / waves * count("engine_orders", 6);
     let depends = costing.case.parameters.contains_key(costing.case.values.text("parameter").unwrap_or(PARAMETER));
     let found = if depends { speeds + REFINED * crossings } else { 1.0 };
-    // both states of every wave; complex ones are twice as large
+    // free and stuck joints for every wave; the complex problem of a wave has twice the size
     let size = sectors.map_or(costing.masses, |sectors| 2.0 * costing.masses / sectors);
     Cost {
         tables: vec![
@@ -105,14 +107,15 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-/// A natural frequency: state of the joints (see [`STATES`]), nodal diameter if the disk is tuned, number from 0, rad/s.
+/// A natural frequency, rad/s, with state of the joints (index in [`STATES`]), nodal diameter
+/// of a tuned disk, and mode number from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Natural {
     state: usize,
     diameter: Option<usize>,
     mode: usize,
     omega: f64,
-    /// Of the structure at that speed.
+    /// Reduction error of the structure at that speed.
     reduction: Option<ReductionEvidence>,
 }
 
@@ -122,7 +125,7 @@ impl Natural {
     }
 }
 
-/// The natural frequencies of a model.
+/// Returns the natural frequencies of a model.
 fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
     let mut found = Vec::new();
     let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes, reduction| {
@@ -147,13 +150,14 @@ fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
     Ok(found)
 }
 
-/// The nodal diameter that an engine order excites on so many sectors.
+/// Returns the nodal diameter that an engine order excites.
 fn excited(order: usize, sectors: usize) -> usize {
     let turns = order % sectors;
     turns.min(sectors - turns)
 }
 
-/// Every engine order with the modes that it can excite: of a tuned disk those of its nodal diameter.
+/// Pairs every engine order with the modes that it can excite; on a tuned disk, those of its
+/// nodal diameter.
 fn met(found: &[Natural], orders: usize, sectors: Option<usize>) -> impl Iterator<Item = (f64, &Natural)> {
     let meets = move |natural: &Natural, order: usize| match (natural.diameter, sectors) {
         (Some(diameter), Some(sectors)) => diameter == excited(order, sectors),
@@ -164,24 +168,25 @@ fn met(found: &[Natural], orders: usize, sectors: Option<usize>) -> impl Iterato
     })
 }
 
-/// Evaluations that find a crossing between two speeds.
+/// Typical number of evaluations per crossing.
 const REFINED: f64 = 4.0;
-/// Most of them.
+/// Largest number of evaluations per crossing.
 const MOST_REFINED: usize = 60;
-/// A crossing is found when it moves by no more than this share of its speed: a hundred times what is seen of the frequencies' rounding.
+/// Relative change of the speed at which the search for a crossing stops: a hundred times the
+/// observed rounding of the frequencies.
 const FOUND: f64 = 1e-11;
 
-/// One case while its speeds are gone through.
+/// The evaluation of one case over its speeds.
 struct Diagram<'a> {
     work: &'a Work<'a>,
     prepared: &'a Prepared,
     most: usize,
-    /// The frequencies, where they do not depend on the speed.
+    /// The frequencies, if they do not depend on the speed.
     same: Option<Result<Vec<Natural>, String>>,
 }
 
 impl Diagram<'_> {
-    /// The natural frequencies at a speed, rad/s.
+    /// Returns the natural frequencies at a speed, rad/s.
     fn at(&self, speed: f64) -> Result<Vec<Natural>, String> {
         if let Some(same) = &self.same {
             return same.clone();
@@ -192,10 +197,12 @@ impl Diagram<'_> {
         naturals(&case.model, self.most)
     }
 
-    /// Where `order` times the speed is the frequency of a mode, between two speeds that lie on either side, each with the mode there.
+    /// Returns the speed at which `order` times the speed equals the frequency of a mode.
     ///
-    /// Squares of frequencies are nearly linear in the square of the speed: softening and stiffening are proportional to it. So false position in these
-    /// is nearly Newton's method; where a step does not halve the interval twice in a row, that is halved.
+    /// The crossing lies between two speeds, each given with the mode at that speed. Squares of
+    /// frequencies are nearly linear in the square of the speed, because softening and
+    /// stiffening are proportional to it. So false position in these squares is nearly Newton's
+    /// method. If two steps in a row do not halve the interval, the next step bisects it.
     fn crossing(
         &self,
         order: f64,
@@ -211,7 +218,7 @@ impl Diagram<'_> {
             }
             let secant = (a * a - at_a * (b * b - a * a) / (at_b - at_a)).sqrt();
             let next = if slow < 2 { secant.clamp(a.min(b), a.max(b)) } else { 0.5 * (a + b) };
-            // at an end only rounding is left
+            // at an end of the interval only rounding remains
             let near = [a, b, last].into_iter().any(|known| (next - known).abs() <= FOUND * next.abs());
             if near || (b - a).abs() <= FOUND * b.abs() {
                 return Ok(next);
@@ -272,7 +279,7 @@ fn compute(work: &Work<'_>) -> Computed {
             for (order, natural) in met(&found, orders, sectors) {
                 let Some(was) = all.iter().find(|was| was.is_like(natural)) else { continue };
                 if work.context.stopped() || (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
-                    continue; // a part during which the run is stopped is computed again
+                    continue; // an interrupted unit is computed again
                 }
                 match diagram.crossing(order, (*last, was), (speed, natural)) {
                     Ok(at) => {
@@ -308,7 +315,8 @@ fn write(prepared: &Prepared, speed: f64, natural: &Natural, rows: &mut Rows) {
     rows.reduced(natural.reduction);
 }
 
-/// A panel for every case: the frequencies, of a tuned disk those that an engine order meets, the lines of the engine orders, the crossings.
+/// Draws a panel per case: frequencies, engine order lines and crossings. For a tuned disk it
+/// shows the frequencies that an engine order excites.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (x, x_factor) = drawing.axis(0, "speed of rotation", largest(table, [SPEED.to_owned()]), "Hz");
@@ -329,7 +337,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let highest = series.iter().flat_map(|line| &line.y).copied().fold(0.0, f64::max);
         let top = ROOM * highest;
         for order in 1..=orders {
-            // to the end of the speeds, or out of the frequencies that there are
+            // the line ends at the highest speed or at the top of the panel
             let end = (high * x_factor).min(top * x_factor / (order as f64 * y_factor));
             let line = |speed: f64| order as f64 * speed / x_factor * y_factor;
             let ends = vec![low * x_factor, end.max(low * x_factor)];
@@ -352,7 +360,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     Figure { panels: draws::panels(drawing, &drawing.stretches(table), &panel), ..Figure::default() }
 }
 
-/// Room above the highest frequency, as a share of it.
+/// Top of the panel as a multiple of the highest frequency.
 const ROOM: f64 = 1.1;
 
 fn frequencies(

@@ -1,4 +1,5 @@
-//! Hysteresis loops: force over displacement of joints and moved places, over one period of the steady motion.
+//! Hysteresis loops: force over displacement of joints and moved places, over one period of an
+//! orbit.
 
 mod tables;
 
@@ -120,12 +121,13 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// What can have a loop.
+/// Returns the names that can have a loop.
 fn known(model: &Model) -> Names {
     Names::default().and_joints(model).and_moved(model)
 }
 
-/// The joints, along each of their directions, and moved places whose loops are wanted: those that are named, or every joint.
+/// Returns the names of the requested loops: joints by direction, and moved places; by default
+/// every joint.
 fn wanted(values: &Values, model: &Model) -> Vec<String> {
     let known = known(model);
     let meant =
@@ -133,29 +135,29 @@ fn wanted(values: &Values, model: &Model) -> Vec<String> {
     let every = || model.joint_labels().into_iter().flatten().collect();
     let mut wanted: Vec<String> =
         values.names("loop").map_or_else(every, |names| names.iter().flat_map(meant).collect());
-    // a joint and one of its directions may both be named
+    // the list may contain a joint and one of its directions
     let mut seen = BTreeSet::new();
     wanted.retain(|name| seen.insert(name.clone()));
     wanted
 }
 
-/// Where the force and displacement of a loop stand in a sample.
+/// The origin of force and displacement of a loop in a sample.
 #[derive(Debug, Clone, PartialEq)]
 struct Source {
     force: Of,
-    /// The mass whose displacement counts, instead of that of the joint or moved place.
+    /// The place whose displacement replaces that of the joint or moved place.
     against: Option<Along>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 enum Of {
-    /// The sum over these joints, each with one of its axes.
+    /// The sum over these joints, each with the index of an axis.
     Joints(Vec<(usize, usize)>),
     Moved(usize),
 }
 
 impl Source {
-    /// Displacement (m) and force (N).
+    /// Returns displacement (m) and force (N).
     fn read(&self, sample: &Sample) -> (f64, f64) {
         let (displacement, force) = match &self.force {
             Of::Joints(joints) => {
@@ -212,7 +214,7 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// The loops that the study asks for.
+/// Returns the loops that the study requests.
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
@@ -230,7 +232,7 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     }
     let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
     if values.flag("sum") == Some(true) {
-        // forces along different directions are no sum: each direction has its own
+        // forces along different directions are not added: each direction has its sum
         let mut sums: Vec<Sum> = Vec::new();
         for (name, (j, axis)) in names.into_iter().filter_map(|name| Some((name.clone(), joint(&name)?))) {
             let direction = system.joints()[j].axes()[axis].name();
@@ -255,19 +257,22 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
         .collect()
 }
 
-/// The joints whose forces along one direction are added up.
+/// The joints whose forces along one direction are added.
 struct Sum<'a> {
-    /// Name of the direction; none of joints that have but one.
+    /// Name of the direction; `None` for joints with one direction.
     direction: Option<&'a str>,
     names: Vec<String>,
     joints: Vec<(usize, usize)>,
 }
 
-/// Loss per period where the orbit knows it in closed form: of joints over their own displacement, and of the only source of work.
+/// Returns the loss per period if the orbit has it in closed form.
+///
+/// This holds for joints over their relative displacement, and for a moved place that is the
+/// only source of work.
 fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64> {
     match &source.force {
         _ if source.against.is_some() => None,
-        // what a joint loses along one of several directions is not told apart
+        // the dissipation of a joint is not known per direction
         Of::Joints(joints) if joints.iter().any(|(j, _)| prepared.system.joints()[*j].axes().len() > 1) => None,
         Of::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
         Of::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
@@ -284,10 +289,12 @@ struct First {
     damping: f64,
 }
 
-/// Panels of the quadrature per period; they end at the switches, so that exact laws are smooth within each.
+/// Intervals of the quadrature per period. They end at the switches, so exact laws are smooth
+/// within each interval.
 const QUADRATURE: usize = 256;
 impl First {
-    /// `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement; loss `∮ F du`.
+    /// Integrates `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement,
+    /// and the loss `∮ F du`.
     fn new(orbit: &Orbit, source: &Source) -> Self {
         let (omega, times) = (orbit.omega, orbits::times(orbit, QUADRATURE));
         // u cos, u sin, F cos, F sin
@@ -319,13 +326,14 @@ impl First {
     }
 }
 
-/// The fastest varied parameter and the frequency tell the loops of one panel apart, the others the panels.
+/// Draws the loops. The last varied parameter and the frequency distinguish loops in a panel;
+/// the others distinguish panels.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let Some(table) = drawing.table(LOOPS) else { return Figure::default() };
     let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, [DISPLACEMENT.to_owned()]), "m");
     let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, [FORCE.to_owned()]), "N");
     let joints = words(table, JOINT);
-    // a table from elsewhere may lack columns
+    // a table from another source may lack columns
     if joints.len() != table.rows() {
         return Figure::default();
     }

@@ -1,4 +1,4 @@
-//! Keys of `[study]` that several kinds have, and what must hold for their values.
+//! Keys of `[study]` that several kinds have, and checks of their values.
 
 use crate::extra;
 use crate::info::Complaint;
@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use stickslip::method::{MethodError, Options};
 use stickslip::model::{Mass, Model, System};
 
-/// Whether there is a mass whose peak could count.
+/// Checks that the model has a place whose amplitude can have a peak.
 pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
     if model.masses.is_empty() && model.bodies.is_empty() && model.places.is_empty() {
         let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
@@ -24,19 +24,19 @@ pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Of a kind that needs nothing of a system beside what its method needs.
+/// Accepts every system, for kinds without requirements beyond those of the method.
 pub(super) fn anything(_: &Values, _: &Options, _: &System) -> Result<(), MethodError> {
     Ok(())
 }
 
-/// Most samples per period.
+/// Largest number of samples per period.
 pub(super) const MOST_SAMPLES: i64 = 100_000;
 
-/// Harmonics and samples of the kinds that solve series of their own, when none are given.
+/// Default harmonics and samples of the kinds that always use harmonic balance.
 pub(super) const HARMONICS: u64 = 15;
 pub(super) const SERIES_SAMPLES: u64 = 1024;
 
-/// Whether such a kind has enough samples for its harmonics.
+/// Checks that such a kind has enough samples for its harmonics.
 pub(super) fn check_samples(values: &Values) -> Result<(), Complaint> {
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS);
     let samples = values.count("samples").unwrap_or(SERIES_SAMPLES);
@@ -47,7 +47,7 @@ pub(super) fn check_samples(values: &Values) -> Result<(), Complaint> {
     Err(Complaint::new("samples", message, "write an even number, at least 4 (harmonics + 1)"))
 }
 
-/// The key `frequency` of the kinds that need a drive.
+/// The key `frequency` of the kinds that need an excitation frequency.
 pub(super) const FREQUENCY: Key = required(
     "frequency",
     Takes::Frequencies(RANGE),
@@ -55,7 +55,7 @@ pub(super) const FREQUENCY: Key = required(
     "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
 );
 
-/// The key `output` of the kinds that have one row per orbit.
+/// The key `output` of the kinds with one row per orbit.
 pub(super) const OUTPUT: Key = optional(
     "output",
     Takes::Names,
@@ -63,7 +63,7 @@ pub(super) const OUTPUT: Key = optional(
     "[\"joint_force\", \"harmonics\"]",
 );
 
-/// Whether it names what there is.
+/// Checks that `output` contains known names only.
 pub(super) fn check_output(values: &Values) -> Result<(), Complaint> {
     let known: Vec<&str> = extra::TABLE.iter().map(|extra| extra.name).collect();
     match values.names("output").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
@@ -72,5 +72,5 @@ pub(super) fn check_output(values: &Values) -> Result<(), Complaint> {
     }
 }
 
-/// The key `samples` of the kinds that show a motion over one period.
+/// The key `samples` of the kinds that show the motion over one period.
 pub(super) const SAMPLES: Key = default("samples", Takes::Count(8, MOST_SAMPLES), "720", "points per period", "720");

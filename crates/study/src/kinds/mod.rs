@@ -1,6 +1,7 @@
-//! Study kinds: what can be asked for. One file each, one line in [`TABLE`].
+//! Study kinds: the available computations. Each kind is one file and one line in [`TABLE`].
 //!
-//! A kind states its keys of `[study]`; the reader checks them and hands over their [`Values`](crate::Values) for every case.
+//! A kind states its keys of `[study]`; the reader checks them and passes their
+//! [`Values`](crate::Values) for every case.
 
 mod branch;
 mod campbell;
@@ -23,7 +24,7 @@ use crate::study::Study;
 pub use crate::info::{Complaint, KindInfo};
 pub use crate::kind::Kind;
 
-/// Every study kind there is, in the order in which lists show them.
+/// All study kinds, in the order in which lists show them.
 pub const TABLE: &[Kind] = &[
     hysteresis::KIND,
     orbit::KIND,
@@ -36,18 +37,18 @@ pub const TABLE: &[Kind] = &[
     campbell::KIND,
 ];
 
-/// The kind with this name.
+/// Returns the kind with this name.
 pub fn find(name: &str) -> Option<&'static Kind> {
     TABLE.iter().find(|kind| kind.info.name == name)
 }
 
-/// The kind of a study.
+/// Returns the kind of a study.
 pub(crate) fn of(study: &Study) -> &'static Kind {
     let name = study.kind().name;
     find(name).unwrap_or_else(|| unreachable!("the reader takes kinds from this table, `{name}` is none of it"))
 }
 
-/// What `output` can ask for: name, and one line of what it is.
+/// Returns the choices of `output`: name and one-line description.
 pub fn outputs() -> Vec<(&'static str, &'static str)> {
     extra::TABLE.iter().map(|extra| (extra.name, extra.doc)).collect()
 }

@@ -24,7 +24,7 @@ use stickslip::model::Model;
 
 const LENGTH: Takes = Takes::Quantity(Dimension::LENGTH, Within::Positive);
 
-/// Most points of one mode.
+/// Largest number of points of one mode.
 const MOST_POINTS: i64 = 10_000;
 
 const AMPLITUDE: &[Key] = &[
@@ -50,7 +50,8 @@ pub(super) const KIND: Kind = Kind {
         ],
         check,
         axes: [Some(Dimension::LENGTH), None],
-        // free vibration has no drive frequency: harmonic balance with an unknown frequency and damping is solved
+        // free vibration has no excitation frequency: harmonic balance solves for frequency and
+        // damping
         uses_method: false,
         needs: |_, _, system| stickslip::curve::modes::check(system),
         adapts: false,
@@ -63,9 +64,11 @@ pub(super) const KIND: Kind = Kind {
     draw,
 };
 
-/// Solutions per point, each of full equations. Measured: 0.3 s a point for a disk of 24 sectors.
+/// Solutions of the full equations per point. Measured: 0.3 s per point for a disk of 24
+/// sectors.
 const FOLLOWED: f64 = 8.0;
-/// Steps of the curve from its large end, whatever is asked of it: usually, and where modes are near each other.
+/// Steps of the curve from its large end, independent of the request: typical, and with close
+/// modes.
 const STEPS: (f64, f64) = (100.0, 200.0);
 
 fn cost(costing: &Costing<'_>) -> Cost {
@@ -73,7 +76,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
     let rows = costing.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
-    // odd harmonics, two parts of each, of every degree of freedom
+    // odd harmonics, two parts each, of every degree of freedom
     let elimination = costing.eliminated((harmonics + 1.0) * costing.masses);
     Cost {
         tables: vec![
@@ -126,7 +129,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let (mut stretch, mut before) = (1, f64::INFINITY);
     let reduction = prepared.system.reduction_evidence();
     for point in &mode.points {
-        // the values jump where the curve turns
+        // the values jump at a turning point of the curve
         stretch += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
         before = point.amplitude;
         rows.varied(&prepared.case);
@@ -158,16 +161,19 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// Index of the mode, from 0.
+/// Returns the index of the mode, from 0.
 fn number(prepared: &Prepared) -> usize {
     prepared.case.values.count("mode").unwrap_or(1) as usize - 1
 }
 
-/// What is wrong where no modal amplitude belongs to the amplitudes of the study.
+/// Error text for a mode without a displacement at any place.
 const UNSEEN: &str =
     "the structure has no such mode, or no place moves in it; ask for another mode, or add a [[place]] where it moves";
 
-/// Follows the mode; `unit` is the modal amplitude of a unit displacement of the place that moves most, m √kg per m.
+/// Computes the mode.
+///
+/// `unit` is the modal amplitude per unit displacement of the place that moves most, m √kg per
+/// m.
 fn follow(prepared: &Prepared, unit: f64) -> Result<Mode, MethodError> {
     let values = &prepared.case.values;
     let range = values.table("amplitude");
@@ -184,20 +190,21 @@ fn follow(prepared: &Prepared, unit: f64) -> Result<Mode, MethodError> {
     )
 }
 
-/// The mode and its parameters in words.
+/// Returns the mode and its parameters in words.
 fn location_of(prepared: &Prepared) -> String {
     let (mode, label) = (format!("mode {}", number(prepared) + 1), prepared.case.label());
     if label.is_empty() { mode } else { format!("{label}, {mode}") }
 }
 
-/// A modal amplitude in words, as the study file gives it: the amplitude of the place that moves most.
+/// Returns a modal amplitude in words as the study file states it: the amplitude of the place
+/// that moves most.
 fn amplitude(unit: f64, modal: f64) -> String {
     let si = modal / unit;
     let (name, factor) = display_unit(si, "m");
     format!("{:.3} {name}", si * factor)
 }
 
-/// The status of a mode, and what is missing or in doubt.
+/// Returns the status of a mode, and the reason if it is incomplete or uncertain.
 fn judged(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     let words = |modal: f64| amplitude(unit, modal);
     if let Some(lost) = mode.lost {
@@ -220,10 +227,11 @@ fn judged(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     (CONVERGED, None)
 }
 
-/// Damping ratio of the joints, absolute, up to which none of them slips: solutions are good to 1e-11.
+/// Damping ratio of the joints, absolute, below which no joint slips. Solutions are accurate to
+/// 1e-11.
 const SLIPS: f64 = 1e-9;
 
-/// What the reader must know of a mode that was followed.
+/// Returns the notes about a computed mode.
 fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
     let mut remarks: Vec<String> = mode
         .turns
@@ -250,10 +258,11 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
     remarks
 }
 
-/// Of every case the place that moves most at the largest amplitude; of a disk the shapes at both ends of the amplitudes as well.
+/// Draws the place that moves most at the largest amplitude of every case. For a disk it adds
+/// the shapes at the smallest and largest amplitude.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
-    // results of before have the first harmonic alone, under this name
+    // results of earlier versions have only the first harmonic in this column
     let column = |place: &String| amplitude_of(place);
     let displacements: Vec<String> = system
         .places()
@@ -273,7 +282,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let moves = |place: &&String| at_last(place).unwrap_or(0.0);
         displacements.iter().max_by(|a, b| moves(a).total_cmp(&moves(b)))
     };
-    // draws in one band are of one place: that of the first
+    // draws in one band show one place: that of the first draw
     let common = stretches.first().filter(|_| drawing.study.draws().is_some()).and_then(widest_of);
     let panel = |stretches: &[Stretch], title: &str, (quantity, unit_of): (&str, &str), read: &str, scale: f64| Panel {
         title: title.to_owned(),
@@ -284,11 +293,11 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             .enumerate()
             .flat_map(|(colour, stretch)| {
                 let Some(widest) = common.or_else(|| widest_of(stretch)) else { return Vec::new() };
-                // of many draws the curves are one band
+                // the curves of many draws form one band
                 let alone = stretch.varied.is_empty() || drawing.study.draws().is_some();
                 let label = if alone { widest.clone() } else { stretch.label() };
                 let mut from = stretch.rows.start;
-                // the line is interrupted where the curve turns
+                // the line is interrupted at turning points of the curve
                 let lines = parts[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
                     let rows = from..from + part.len();
                     from = rows.end;
@@ -318,7 +327,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     Figure { panels, ..Figure::default() }
 }
 
-/// The shapes of a disk at the smallest amplitude, where joints stick, and at the largest, of one of so many cases, in colours of their own.
+/// Draws the shapes of a disk at the smallest amplitude, where joints stick, and at the
+/// largest.
+///
+/// The colours begin after those of the `cases` curves.
 fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cases): (&Stretch, usize)) -> Vec<Panel> {
     let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
     let Some(ring) = case.model.ring else { return Vec::new() };

@@ -1,4 +1,5 @@
-//! Frequencies of a tuned disk over its nodal diameters, with all joints free and with all of them stuck, and the shapes of its modes.
+//! Frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck,
+//! and mode shapes.
 
 use super::keys::anything;
 use super::wheel::{self, Around, of_sector};
@@ -17,14 +18,14 @@ use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, WaveModes};
 
-/// The table, and its columns.
+/// Names of the table and its columns.
 const TABLE: &str = "nodal_diameters";
 const DIAMETER: &str = "nodal_diameter";
 const MODE: &str = "mode";
 const JOINTS: &str = "joints";
-/// Both states of the joints, as in the column of that name.
+/// Both states of the joints, as written in the column `joints`.
 pub(super) const STATES: [&str; 2] = ["free", "stuck"];
-/// Wheels that are drawn of a case, at most.
+/// Largest number of shapes drawn per case.
 const WHEELS: usize = 4;
 
 pub(super) const KIND: Kind = Kind {
@@ -88,7 +89,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Whether the model is a disk of equal sectors.
+/// Checks that the model is a disk of equal sectors.
 fn check_disk(model: &Model) -> Result<(), Complaint> {
     match model.ring {
         Some(ring) if ring.equal => Ok(()),
@@ -122,20 +123,24 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-/// Size above which the lowest modes alone are sought, by sparse factors.
+/// Size above which sparse factors give only the lowest modes.
 const SPARSE: f64 = 700.0;
-/// Time of an eigenvalue problem over the cube of its size, s.
+/// Time of an eigenvalue problem per cube of its size, s.
 const EIGEN: f64 = 1e-8;
-/// Time of the lowest modes of a wave, free and stuck, over the size to the power of 1.5, s. Measured: a sector of 1935 rows in seven waves, 8 s.
+/// Time of the lowest modes of a wave, free and stuck, per size to the power of 1.5, s.
+/// Measured: 8 s for a sector of 1935 rows in seven waves.
 const LOWEST: f64 = 4.6e-6;
 /// Bytes of matrices and factors per row. Measured: 0.7 GB for 61,000 rows.
 const FACTOR: f64 = 12e3;
 
-/// What is wrong with sectors that have no modes.
+/// Error text for sectors whose modes cannot be computed.
 const TOO_LARGE: &str = "the sectors are too large for all of their modes, or without masses; of a sector by its matrices take fewer coordinates \
                          with `reduce`";
 
-/// The lowest modes by nodal diameter, or that the sectors are too large for that.
+/// Returns the lowest modes by nodal diameter.
+///
+/// # Errors
+/// Returns a text if the sectors are too large or the modes are not found.
 pub(super) fn waves(model: &Model, most: usize) -> Result<Vec<WaveModes>, String> {
     match model.wave_modes(most) {
         Ok(Some(waves)) => Ok(waves),
@@ -179,7 +184,8 @@ fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
                 rows.number(FREQUENCY, hertz(found.omega));
                 rows.number("damping_ratio", found.damping);
                 for (i, (name, place)) in places.iter().enumerate() {
-                    // a mode by its unit modal mass has rotations in rad/(m √kg), beside displacements in 1/√kg
+                    // rotations of a mode of unit modal mass are left out: their unit is rad/(m
+                    // √kg), not 1/√kg
                     if prepared.case.model.is_rotation(name) {
                         continue;
                     }
@@ -194,13 +200,15 @@ fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
     }
 }
 
-/// The places of the first sector, as they are called in the ring, and in their sector.
+/// Returns the places of the first sector: name in the ring and name in the sector.
 fn places(model: &Model) -> Vec<(String, String)> {
     let both = |name: String| of_sector(&name).map(|(place, _)| (name, place));
     model.sector_places().into_iter().filter_map(both).collect()
 }
 
-/// A panel for every case: a line with marks for every mode, joints free and joints stuck; behind it, if there is room, shapes on wheels.
+/// Draws a panel per case: a line with marks for every mode, with joints free and joints stuck.
+///
+/// Shapes follow if the figure has room.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
@@ -220,7 +228,10 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     Figure { panels: draws::panels(drawing, &stretches, &of_case), ..Figure::default() }
 }
 
-/// The shapes of a case: the lowest modes of a nodal diameter, one mode of the lowest nodal diameters, or the one that is both.
+/// Returns the shapes of a case.
+///
+/// These are the lowest modes of one nodal diameter, one mode of the lowest nodal diameters, or
+/// one mode of one nodal diameter.
 fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel> {
     let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
     let (Some(ring), values) = (case.model.ring, &case.values) else { return Vec::new() };

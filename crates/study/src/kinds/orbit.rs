@@ -1,4 +1,4 @@
-//! Orbits: the steady motion over one period, in time.
+//! Orbits over one period, in time.
 
 use super::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
 use super::orbits;
@@ -20,8 +20,9 @@ use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
-/// Length of a state, with those of joints, up to which an orbit by itself is followed for its return, however it was found. Measured: 12 s for a
-/// mistuned ring of 48 blades and joints, whose states are 144.
+/// Length of the state, with the states of joints, up to which the return of an orbit is
+/// checked for every method. Measured: 12 s for a mistuned ring of 48 blades and joints, whose
+/// state has length 144.
 const FOLLOWED: usize = 200;
 
 pub(super) const KIND: Kind = Kind {
@@ -59,7 +60,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let rows = points * costing.instants();
     let orbits = costing.orbits(points);
     let wanted = costing.case.values.flag("multipliers") == Some(true);
-    // a series is followed over a period for its return, and once more with the derivative for multipliers
+    // the return check of a harmonic balance orbit takes one period; multipliers take one more,
+    // with the derivative
     let followed = if costing.is_series() { costing.period() } else { 0.0 };
     let (multipliers, map) = if wanted { (points * 2.0 * costing.masses, costing.period()) } else { (0.0, 0.0) };
     Cost {
@@ -68,7 +70,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
             Shape { numbers: orbits.numbers + 4.0, ..orbits },
             Shape { rows: multipliers, numbers: costing.varied + 5.0, words: 0.0 },
         ],
-        // the panels beyond the most that are drawn are made all the same
+        // the panels beyond the limit are also built
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
         spared: None,
@@ -124,7 +126,9 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// That the orbit of a joint that sticks is one of a continuum; where it is not its own mirror image, [`Note::History`] says so.
+/// Returns the note that a permanently stuck joint makes the orbit one of a continuum.
+///
+/// It covers orbits with half-period symmetry; [`Note::History`] covers the others.
 fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");
@@ -135,7 +139,7 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
     })
 }
 
-/// The cells of one instant.
+/// Writes the cells of one instant.
 pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
     let system = &prepared.system;
     for (place, along) in system.places().iter().zip(system.seen()) {
@@ -165,16 +169,16 @@ fn word(contact: Contact) -> &'static str {
     }
 }
 
-/// Displacements of the masses, and forces of the joints, over time: two panels for every orbit.
+/// Draws displacements of the places and forces of the joints over time: two panels per orbit.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
-    // a table from elsewhere may lack columns
+    // a table from another source may lack columns
     let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
     let times_of = |rows: Range<usize>| numbers(motion, "time_s", rows);
     let longest = times_of(0..motion.rows()).into_iter().fold(0.0, f64::max);
     let of_orbit = |title: &str, rows: Range<usize>| {
         let times = times_of(rows.clone());
-        // draws in one panel have one unit
+        // draws in one panel share one unit
         let last = if drawing.study.draws().is_some() { longest } else { times.last().copied().unwrap_or(0.0) };
         let (time_unit, time_factor) = display_unit(last, "s");
         let x: Vec<f64> = times.iter().map(|time| time * time_factor).collect();

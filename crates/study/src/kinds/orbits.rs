@@ -1,4 +1,4 @@
-//! What the kinds share that look at whole orbits: the orbits of a unit, their instants, their failures.
+//! Shared by the kinds with whole orbits: the orbits of a unit, their instants, and failures.
 
 use crate::note::Note;
 use crate::point::location_of;
@@ -8,17 +8,22 @@ use stickslip::curve::sweep::{See, Watch, solver, stretch};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
-/// A frequency (rad/s) and what was found there; `None` if the run was stopped before.
+/// A frequency (rad/s) and its outcome; `None` if the run was stopped before.
 type Point = (f64, Option<Result<Orbit, OrbitError>>);
 
-/// What is computed at a time: stretches of frequencies, each of which begins alone; the whole curve where laws allow several orbits at a frequency, since
-/// what is found alone need not be what the points before lead to. The laws of the first case stand for all.
+/// Returns the unit of work of a study.
+///
+/// A unit is a range of frequencies with a cold start. If a law allows several orbits at a
+/// frequency, the unit is the whole curve. A cold start could then lead to another orbit than a
+/// warm start. The laws of the first case represent all cases.
 pub(super) fn grain(study: &Study) -> Grain {
     let unique = |case: Case| case.model.joints.iter().all(|joint| joint.law.is_incrementally_passive());
     if study.case(0).is_ok_and(unique) { Grain::Frequencies } else { Grain::Case }
 }
 
-/// The outcomes at the frequencies of a unit of one case, each started from its neighbour; `see` looks at each as soon as it is there.
+/// Solves the frequencies of a unit of one case, each with a warm start from the previous one.
+///
+/// `see` receives each outcome immediately.
 pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodError> {
     let prepared = work.case();
     let watch = Watch { finished: &*work.context.finished, stop: &work.context.stop };
@@ -27,7 +32,7 @@ pub(super) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodErro
     Ok(())
 }
 
-/// The orbits of a unit of one case.
+/// Returns the outcomes of a unit of one case.
 fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
     let mut points = Vec::with_capacity(work.points.len());
     sweep(work, &mut |omega, outcome| {
@@ -37,10 +42,10 @@ fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
     Ok(points)
 }
 
-/// An orbit, and whether it is stable, if that is known.
+/// An orbit, and its stability if known.
 type Judged = (Orbit, Option<bool>);
 
-/// The orbits of a unit of one case that there are; all its points are counted, and what is missing is named.
+/// Returns the orbits of a unit of one case. Counts all its points and records the failures.
 pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (usize, MethodError)> {
     let case = &work.case().case;
     let mut orbits = Vec::with_capacity(work.points.len());
@@ -57,13 +62,13 @@ pub(super) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (us
     Ok(orbits)
 }
 
-/// Counts an orbit and notes what its stability and its accuracy ask for, in the words of the kind.
+/// Counts an orbit and adds the notes on its stability and accuracy, worded by the kind.
 pub(super) fn count(part: &mut Part, case: &Case, orbit: &Orbit, (stable, words): (Option<bool>, fn(Note) -> Note)) {
     part.count(|| location_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
     Note::of_orbit(&case.model, orbit, stable).into_iter().map(words).for_each(|note| note.join(&mut part.notes));
 }
 
-/// Counts a point that has no orbit.
+/// Counts a point without an orbit.
 fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
     match point {
         Some(Err(error)) => part.count(|| location_of(case, omega), error.status(), Some(error.to_string())),
@@ -71,13 +76,14 @@ fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result
     }
 }
 
-/// `samples` equal steps over the period, both ends included, and every switch, rising, s.
+/// Returns the instants of a period, ascending, s: `samples` equal steps with both ends, and
+/// every switch.
 pub(super) fn times(orbit: &Orbit, samples: usize) -> Vec<f64> {
     let period = orbit.period();
     let mut times: Vec<f64> = (0..=samples).map(|i| period * i as f64 / samples as f64).collect();
     times.extend(orbit.switch_times());
     times.sort_by(f64::total_cmp);
-    // a switch on a grid point would stand twice
+    // a switch at an instant of the grid is kept once
     times.dedup_by(|a, b| (*a - *b).abs() <= 1e-12 * period);
     times
 }

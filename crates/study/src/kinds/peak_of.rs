@@ -1,4 +1,6 @@
-//! The key `peak_of` of the kinds that look for a resonance: which masses count. Of several the worst does, at every frequency anew.
+//! The key `peak_of` of the kinds with a resonance peak: the masses whose amplitude counts.
+//!
+//! With several masses, the largest amplitude counts, at each frequency separately.
 
 use crate::info::Complaint;
 use crate::key::{Key, Takes, optional};
@@ -8,10 +10,10 @@ use crate::work::Prepared;
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
 
-/// Stands for every mass, unless one has this name.
+/// Means every mass, unless a mass has this name.
 const ALL: &str = "all";
 
-/// The key.
+/// The key `peak_of`.
 pub(super) const PEAK_OF: Key = optional(
     "peak_of",
     Takes::Names,
@@ -19,14 +21,14 @@ pub(super) const PEAK_OF: Key = optional(
     "[\"blade1\", \"blade3\"]",
 );
 
-/// Whether it names masses of the model.
+/// Checks that the key names masses of the model.
 pub(super) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
     let masses = Names::of_displacements(model);
     let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
     named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
 }
 
-/// The places that the key names; none if it is absent.
+/// Returns the places that the key names; empty if the key is absent.
 pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     let names = prepared.case.values.names("peak_of").unwrap_or_default();
     let places = &prepared.system.places();
@@ -37,7 +39,7 @@ pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     let meant = names.iter().filter_map(|name| masses.all(PEAK_OF.name, "mass", name).ok()).flatten();
     let mut found: Vec<usize> = Vec::new();
     for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {
-        // a place and its node may both be named
+        // the list may contain a place and its node
         if !found.contains(&place) {
             found.push(place);
         }
@@ -45,7 +47,7 @@ pub(super) fn named_places(prepared: &Prepared) -> Vec<usize> {
     found
 }
 
-/// The places whose peak counts: the named ones, or the first that a force acts on.
+/// Returns the places whose peak counts: the named places, or the first place with a force.
 pub(super) fn peak_places(prepared: &Prepared) -> Vec<usize> {
     let named = named_places(prepared);
     if !named.is_empty() {
@@ -57,13 +59,13 @@ pub(super) fn peak_places(prepared: &Prepared) -> Vec<usize> {
     vec![driven.or_else(|| displacements(&prepared.system).first().copied()).unwrap_or(0)]
 }
 
-/// The places that are no rotations.
+/// Returns the places that are not rotations.
 pub(super) fn displacements(system: &System) -> Vec<usize> {
     let seen = system.seen().iter().enumerate();
     seen.filter(|(_, place)| !place.is_rotation()).map(|(place, _)| place).collect()
 }
 
-/// The largest amplitude among some places, m.
+/// Returns the largest amplitude of some places, m.
 pub(super) fn worst(orbit: &Orbit, places: &[usize]) -> f64 {
     places.iter().map(|place| orbit.places[*place].amplitude()).fold(0.0, f64::max)
 }

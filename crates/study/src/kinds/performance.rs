@@ -1,4 +1,4 @@
-//! Performance curves: the resonance peak as a function of a design parameter, and its best value.
+//! Performance curves: the resonance peak over a design parameter, and its minimum.
 
 mod tables;
 
@@ -48,7 +48,7 @@ pub(super) const KIND: Kind = Kind {
     draw,
 };
 
-/// Orbits that refine a peak. Values that the search for an optimum tries.
+/// Orbits that refine a peak, and parameter values that the search for an optimum tries.
 const REFINING: f64 = 12.0;
 const OPTIMUM: f64 = 35.0;
 
@@ -69,7 +69,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-/// Values of the parameter that make a curve.
+/// Smallest number of parameter values, and of frequencies, that form a curve.
 const FEWEST_VALUES: usize = 3;
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
@@ -89,7 +89,7 @@ fn compute(work: &Work<'_>) -> Computed {
             "A performance curve needs at least {FEWEST_VALUES} values of one parameter: add vary = {{ Ft = [ … ] }} to [study]."
         )));
     }
-    // the curve goes by the values as they rise, the table as they are listed
+    // the curve has ascending values, the table has them as listed
     let value = |case: &usize| split(&work.cases[*case]).map_or(0.0, |(_, inner)| inner.si);
     let mut order: Vec<usize> = (0..work.cases.len()).collect();
     order.sort_by(|a, b| value(a).total_cmp(&value(b)));
@@ -145,7 +145,7 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// Why no value of the parameter is the best one; `order` has the case of every row of the curve.
+/// States why there is no optimum; `order` has the case of every row of the curve.
 fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, (parameter, order): (&str, &[usize])) -> String {
     let level = curve.lowest();
     let height = |row: &usize| curve.rows[*row].peak.map_or(f64::NAN, |peak| peak.value);
@@ -169,7 +169,7 @@ fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, (parameter, order): (&s
     }
 }
 
-/// How far the orbits behind a peak may be trusted.
+/// Returns the status of the orbits that support a peak.
 fn status(row: &Row) -> &'static str {
     match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
         (true, _) => "some-failed",
@@ -178,7 +178,7 @@ fn status(row: &Row) -> &'static str {
     }
 }
 
-/// The outer varied parameters of a case, and the last.
+/// Returns the outer varied parameters of a case, and the last one.
 fn split(prepared: &Prepared) -> Option<(&[VariedValue], &VariedValue)> {
     prepared.case.varied.split_last().map(|(last, outer)| (outer, last))
 }
@@ -210,12 +210,12 @@ fn curve(work: &Work<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodErro
     match result {
         Ok(curve) => Ok(curve),
         Err(PerformanceError::Method(error)) => Err(error),
-        // every case was assembled when it was prepared; values between them are of the same model
+        // every case was assembled before; intermediate values belong to the same model
         Err(PerformanceError::System { .. }) => Ok(PerformanceCurve { rows: Vec::new(), optimum: None }),
     }
 }
 
-/// Bands of more combinations of `vary` than this hide each other.
+/// Largest number of bands in the panel; more bands hide each other.
 const MOST_BANDS: usize = 7;
 
 fn draw(drawing: &Drawing<'_>) -> Figure {
@@ -229,7 +229,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let column = inner.column().0;
     let parameter = |table: &crate::dataset::Table, rows| numbers(table, &column, rows);
     let height = |table, rows| numbers(table, AMPLITUDE, rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
-    // of several outer parameters no single value tells a curve
+    // several outer parameters have no common colour scale
     let varied = if outer == 1 { drawing.varied_axis(&stretches, 0) } else { None };
     let value = |curve: usize| {
         let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
@@ -243,7 +243,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         ..Panel::default()
     };
     if drawing.study.draws().is_some() {
-        // the stretches are of all parameters but the last: their first case stands for them
+        // the stretches hold all parameters but the last; the first case represents a stretch
         let groups = drawing.by_listed(&stretches);
         let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let bands = groups.iter().take(MOST_BANDS).enumerate().flat_map(|(colour, (_, group))| {
@@ -263,7 +263,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let mut points: Vec<(f64, f64)> = x.into_iter().zip(y).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(optima) = drawing.table(tables::OPTIMUM).filter(|optima| colour < optima.rows()) {
-            // one row for every curve; the refined optimum is a point of the line
+            // one row per curve; the refined optimum is a point of the line
             let best = (parameter(optima, colour..colour + 1)[0], height(optima, colour..colour + 1)[0]);
             if best.0.is_finite() {
                 let at = points.partition_point(|point| point.0 < best.0);
@@ -274,7 +274,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         series.push(Series { value: value(colour), ..Series::line(label, x, y, colour) });
     }
     if let Some(optima) = drawing.table(tables::OPTIMUM) {
-        // one row for every curve
+        // one row per curve
         for row in 0..optima.rows() {
             let (x, y) = (parameter(optima, row..row + 1), height(optima, row..row + 1));
             if x[0].is_finite() {

@@ -1,4 +1,4 @@
-//! Response curves: amplitude over drive frequency.
+//! Response curves: amplitude over excitation frequency.
 
 mod amplification;
 mod by_case;
@@ -75,7 +75,7 @@ pub(super) const KIND: Kind = Kind {
             tables::WAY_BACK,
         ],
     },
-    // an amplification is that of a whole curve
+    // an amplification needs the whole curve
     grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
         true => Grain::Case,
         false => orbits::grain(study),
@@ -93,12 +93,13 @@ pub(super) const KIND: Kind = Kind {
     draw: figure::draw,
 };
 
-/// Peaks of a mass: some have two. Orbits that refine one, and those at the border of a unit that two units compute.
+/// Peaks per mass, as some have two; and orbits that refine a peak, including those at a unit
+/// border that two units compute.
 const PEAKS: f64 = 1.3;
 const REFINING: f64 = 6.0;
-/// Peaks of the largest amplitude of a disk: of twelve blades that differ by 2 % three or so.
+/// Peaks of the largest amplitude of a disk: about three for twelve blades that differ by 2 %.
 const LEADING: f64 = 3.0;
-/// Share of the points of a curve at which the way back has another orbit.
+/// Share of the points of a curve at which the reverse sweep has another orbit.
 const OTHERS: f64 = 0.2;
 
 fn cost(costing: &Costing<'_>) -> Cost {
@@ -109,16 +110,17 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => costing.cases,
         None => (costing.cases * costing.places * PEAKS).floor(),
     };
-    // a place at an end of the range has its peak there, and no orbit refines it; a structure by its matrices has resonances one after the other
+    // a place whose peak is at an end of the range is not refined; a structure given by
+    // matrices has all its resonances in the range refined
     let refined = match (costing.resonances(), &costing.case.model.substructure) {
         (Some(resonances), Some(_)) if costing.case.model.ring.is_none() => peaks / PEAKS * resonances,
         (Some(resonances), _) => peaks / PEAKS * resonances.min(PEAKS),
         (None, _) => peaks,
     };
-    // those of cases that differ in their limits alone are the same
+    // cases that differ only in their limits share the references
     let others = references::others(costing.study);
     let linear = (costing.frequencies * REFERENCE_POINTS as f64 * others).floor();
-    // a tuned disk takes a sector's time, and its curve the frequencies of the other
+    // a tuned disk takes the time of one sector, at the frequencies of the mistuned disk
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
     let shapes = match costing.case.model.ring {
         Some(_) if values.names("peak_of").is_none() => peaks.min(LEADING * costing.cases),
@@ -146,7 +148,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-/// Says what refining the peaks of thousands of places costs, and how to do without.
+/// Warns of the cost of refining the peaks of thousands of places, and states the alternatives.
 fn many_peaks(cases: &[Surveyed]) -> Option<String> {
     let one = cases.first()?;
     let (values, places) = (&one.case.values, one.survey.system().places().len());
@@ -159,7 +161,8 @@ fn many_peaks(cases: &[Surveyed]) -> Option<String> {
     })
 }
 
-/// Places whose peaks are no longer refined one by one without a word: a disk of many blades wants them, the nodes of a contact hardly.
+/// Number of places from which the warning is given. A disk of many blades needs all peaks; the
+/// nodes of a contact rarely do.
 const MANY_PEAKS: usize = 1000;
 
 fn compute(work: &Work<'_>) -> Computed {
@@ -221,7 +224,7 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// The row of an orbit.
+/// Writes the row of an orbit.
 fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(omega));
@@ -229,7 +232,7 @@ fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows
     rows.end();
 }
 
-/// The row of a peak of a disk, with every place.
+/// Writes the row of a peak of a disk, with every place.
 fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(found.peak.omega));
@@ -242,12 +245,12 @@ fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
     rows.end();
 }
 
-/// A stretch of a curve under way.
+/// The state of a range of points during its computation.
 struct Computing<'a> {
     prepared: &'a Prepared,
     part: Part,
     rows: Rows,
-    /// Those of the way back.
+    /// Rows of the reverse sweep.
     way_back: Rows,
     omegas: Vec<f64>,
     stuck: usize,
@@ -265,7 +268,7 @@ impl<'a> Computing<'a> {
         }
     }
 
-    /// Takes in a point; `None` if the run was stopped before.
+    /// Adds a point; `None` if the run was stopped before.
     fn add(&mut self, omega: f64, point: Option<(Summary, Vec<Note>)>) {
         let case = &self.prepared.case;
         let Some((summary, notes)) = point else {
@@ -278,7 +281,8 @@ impl<'a> Computing<'a> {
         orbit_row(self.prepared, omega, &summary, &mut self.rows);
     }
 
-    /// Takes in the other orbits that the curve has when it is followed the other way: as points among which peaks are sought.
+    /// Adds the other orbits that the reverse sweep finds, and returns them as points for the
+    /// peak search.
     fn compare(&mut self, work: &Work<'_>, ways: Option<BothWays>) -> Result<Vec<Point>, MethodError> {
         let Some(ways) = ways else { return Ok(Vec::new()) };
         let (prepared, sought) = (self.prepared, Sought::new(self.prepared));
@@ -293,7 +297,7 @@ impl<'a> Computing<'a> {
     }
 }
 
-/// What is kept of a point.
+/// Returns the row and the notes of a point.
 fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, Vec<Note>) {
     let summary = Summary::new(prepared, outcome);
     let notes =
@@ -301,10 +305,10 @@ fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, 
     (summary, notes)
 }
 
-/// The points among which peaks are sought, if they are, and what the way back has beside them.
+/// The points for the peak search, if requested, and the other points of the reverse sweep.
 type Followed = (Vec<Point>, Vec<Point>);
 
-/// The points of the unit's frequencies.
+/// Computes the points at the frequencies of the unit.
 fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
@@ -323,7 +327,8 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
     if !wanted || points.is_empty() {
         return Ok((Vec::new(), others));
     }
-    // its first and last points are looked at together with the neighbours that other units compute for themselves
+    // the peak search needs the points of the adjacent units on both sides; each unit computes
+    // them again
     let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
     let mut solver = advised(&*prepared.method, &prepared.system)?;
     let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
@@ -341,11 +346,11 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
     Ok((points, others))
 }
 
-/// The points that the curve needs.
+/// Computes the points of a curve with adaptive frequencies.
 fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
     let prepared = work.case();
     let sought = Sought::new(prepared);
-    // the shape has no say in where points are
+    // the shape does not influence the frequencies
     let quantities = |orbit: &Orbit| sought.amplitudes(orbit);
     let keep = |outcome: Result<&Orbit, &OrbitError>| {
         (work.context.finished)();
@@ -372,7 +377,7 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
     Ok((if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() }, others))
 }
 
-/// Whether peaks are asked for, on a curve that can have any.
+/// Returns true if peaks are requested and the frequencies can have an inner peak.
 fn wants_peaks(work: &Work<'_>) -> bool {
     let case = &work.case().case;
     let rising = |f: &Frequencies| f.len() > 2 && f.is_rising();

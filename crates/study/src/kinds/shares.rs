@@ -1,24 +1,26 @@
-//! The shares of the period in which the faces of joints stick, slip, touch and are apart, as panels: areas on each other for a few joints,
-//! a map with a stripe for every joint of a ring.
+//! Panels of contact states: the shares of the period in which the faces of joints stick, slip,
+//! touch and are apart.
+//!
+//! A few joints have stacked areas; a ring has a map with a stripe for every joint.
 
 use crate::columns;
 use crate::dataset::{Axis, Panel, Series, Style, Table};
 use crate::drawing::numbers;
 use std::ops::Range;
 
-/// Up to this many joints each has a panel of its own.
+/// Up to this number of joints, each joint has one panel.
 const FEW: usize = 3;
 /// Shares below this are rounding.
 const NOTHING: f64 = 1e-9;
-/// What a share is given in.
+/// Factor from shares to percent.
 const PERCENT: f64 = 100.0;
 
-/// What faces do.
+/// The contact state of faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum State {
     Stick,
     Slip,
-    /// A stop, of which nobody knows whether it slides.
+    /// A stop in contact, whose sliding is unknown.
     Touch,
     Open,
 }
@@ -26,7 +28,7 @@ pub(super) enum State {
 impl State {
     const ALL: [State; 4] = [State::Stick, State::Slip, State::Touch, State::Open];
 
-    /// How a panel calls it.
+    /// Returns the state as a panel names it.
     pub(super) fn words(self) -> &'static str {
         match self {
             State::Stick => "sticks",
@@ -37,38 +39,38 @@ impl State {
     }
 }
 
-/// Whether a table has the shares of a joint.
+/// Returns true if a table has the shares of a joint.
 pub(super) fn has(table: &Table, joint: &str) -> bool {
     table.numbers(&columns::sticks(joint)).is_some_and(|shares| shares.iter().any(|share| share.is_finite()))
 }
 
-/// Shares in percent of the period, in the order of [`State::ALL`], row by row.
+/// Returns the shares in percent of the period, in the order of [`State::ALL`], row by row.
 fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
     let [stick, slip, open] = [columns::sticks(joint), columns::slips(joint), columns::open(joint)]
         .map(|column| numbers(table, &column, rows.clone()));
-    // what is left is a stop
+    // the remainder is contact of a stop
     let touch = (0..stick.len()).map(|i| 1.0 - stick[i] - slip[i] - open[i]);
     let touch = touch.map(|share| if share.abs() < NOTHING { 0.0 } else { share }).collect();
     [stick, slip, touch, open].map(|shares: Vec<f64>| shares.into_iter().map(|share| share * PERCENT).collect())
 }
 
-/// The axis of a share, and the scale of its colours.
+/// Returns the axis of a share, which is also the colour scale.
 pub(super) fn axis(quantity: &str) -> Axis {
     Axis::new(quantity, "%").between(0.0, PERCENT)
 }
 
-/// The share of the period in which a joint is in a state, or of several their mean, in percent.
+/// Returns the share of the period of one state, in percent; the mean of several joints.
 pub(super) fn mean(table: &Table, joints: &[String], rows: &Range<usize>, state: State) -> Vec<f64> {
     let all: Vec<Vec<f64>> = joints.iter().map(|joint| of_joint(table, joint, rows)[state as usize].clone()).collect();
     (0..rows.len()).map(|i| all.iter().map(|shares| shares[i]).sum::<f64>() / all.len() as f64).collect()
 }
 
-/// Whether one of the joints is ever in a state.
+/// Returns true if one of the joints is ever in a state.
 pub(super) fn occurs_in(table: &Table, joints: &[String], state: State) -> bool {
     joints.iter().any(|joint| occurs(&of_joint(table, joint, &(0..table.rows()))[state as usize]))
 }
 
-/// The states whose maps are drawn: what sticks is what the others leave.
+/// Returns the states with a map. Stick has no map, because it is the remainder.
 fn mapped(table: &Table, joints: &[String]) -> Vec<State> {
     let drawn = |state: &State| match state {
         State::Stick => false,
@@ -78,12 +80,12 @@ fn mapped(table: &Table, joints: &[String]) -> Vec<State> {
     State::ALL.into_iter().filter(drawn).collect()
 }
 
-/// How many panels [`panels`] makes.
+/// Returns the number of panels that [`panels`] returns.
 pub(super) fn count(table: &Table, joints: &[String]) -> usize {
     if joints.len() <= FEW { joints.len() } else { mapped(table, joints).len() }
 }
 
-/// The joints of panels that show one quantity of each: each for itself, or all together.
+/// Groups joints for panels of one quantity: each of a few joints, or all together.
 pub(super) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> {
     match joints.len() {
         0..=FEW => joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect(),
@@ -91,7 +93,10 @@ pub(super) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> {
     }
 }
 
-/// The panels of some rows over `x`, whose axis is `over`, with a title and in colours from `first` on: those of few joints all have the same.
+/// Returns the panels of some rows over `x`, whose axis is `over`.
+///
+/// The panels have a title and colours from `first`; the panels of a few joints share their
+/// colours.
 pub(super) fn panels(
     table: &Table,
     joints: &[String],
@@ -131,7 +136,7 @@ fn occurs(shares: &[f64]) -> bool {
     shares.iter().any(|share| *share > 0.0)
 }
 
-/// The shares of one joint on each other, in the colours of the states that occur in any.
+/// Returns the stacked shares of one joint, coloured by the states that occur in any joint.
 fn areas(shares: &[Vec<f64>; 4], x: &[f64], occurring: &[State], first: usize) -> Vec<Series> {
     let mut below = vec![0.0; x.len()];
     let mut areas = Vec::new();
@@ -144,7 +149,7 @@ fn areas(shares: &[Vec<f64>; 4], x: &[f64], occurring: &[State], first: usize) -
             below = above;
         }
     }
-    // the upper edge of the last one is that of the panel
+    // the upper edge of the last area is the edge of the panel
     areas.pop();
     areas
 }

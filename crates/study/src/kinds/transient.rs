@@ -1,4 +1,5 @@
-//! Transients: the motion in time from rest or from given displacements; free decay, switched-on drive, or run-up.
+//! Transients: the motion in time from rest or from given displacements; free decay,
+//! switched-on excitation, or run-up.
 
 use super::keys::MOST_SAMPLES;
 use super::orbit::write_sample;
@@ -32,7 +33,7 @@ use stickslip::orbit::Sample;
 const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
 const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
 
-/// Most samples of one transient.
+/// Largest number of samples of one transient.
 const MOST_STEPS: f64 = 1e7;
 
 const RUN_UP: &[Key] = &[
@@ -99,7 +100,7 @@ pub(super) const KIND: Kind = Kind {
         ],
         check,
         axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
-        // exact and smooth laws alike are followed in time; there is no orbit to be found
+        // exact and smooth laws are both integrated in time; no orbit is computed
         uses_method: false,
         needs: |_, options, system| TimeHistory::check(system, options.get(WIDTH).copied()),
         adapts: false,
@@ -112,7 +113,7 @@ pub(super) const KIND: Kind = Kind {
     draw,
 };
 
-/// Duration of one transient (s) and the number of its samples.
+/// Returns the duration of one transient (s) and the number of its samples.
 fn lengths(costing: &Costing<'_>) -> (f64, f64) {
     let values = &costing.case.values;
     let (low, high) = costing.range().unzip();
@@ -129,7 +130,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let (duration, samples) = lengths(costing);
     let points = costing.points();
     let table = costing.motion(points * samples);
-    // the motion follows the drive and the modes alike
+    // the steps resolve both the excitation and the modes
     let fastest = costing.range().map_or(0.0, |(_, high)| high).max(costing.slowest_mode());
     let periods = duration * fastest / TAU;
     // the cycles of a free decay, and their summary
@@ -234,7 +235,7 @@ fn compute(work: &Work<'_>) -> Computed {
         };
         let cycles = values.count("cycles").zip(drive).map(|(cycles, omega)| cycles as f64 * TAU / omega);
         let run_up_time = values.table("run_up").and_then(|table| table.quantity("duration"));
-        // `check` has made sure that one of each is there
+        // `check` ensures that both values are given
         let duration = values.quantity("duration").or(cycles).or(run_up_time).unwrap_or(0.0);
         let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
         let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
@@ -248,7 +249,7 @@ fn compute(work: &Work<'_>) -> Computed {
             width: case.method.options.get(WIDTH).copied(),
         };
         let (mut sampled, mut stopped) = (false, false);
-        // of every mass the largest displacement, and when
+        // largest displacement of every place, and its time
         let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
         let end = transient.visit(&prepared.system, &mut |instant| {
@@ -262,7 +263,7 @@ fn compute(work: &Work<'_>) -> Computed {
             write_sample(prepared, sample, &mut rows);
             rows.end();
             sampled = true;
-            // the turning points of the place that moves most are those that are read off
+            // the turning points are located exactly only for the place that moves most
             let most = leader(&decays).filter(|_| excitation == Excitation::Free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
                 let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
@@ -310,15 +311,20 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-/// The place whose samples lie farthest apart.
+/// Returns the place with the largest range of samples.
 fn leader(decays: &[Decay]) -> Option<usize> {
     (0..decays.len()).max_by(|&a, &b| decays[a].extent().total_cmp(&decays[b].extent()))
 }
 
-/// Samples per cycle that turning points need: with 20 the damping ratio is off by 1e-3 of a cycle's decrement, with 3 it is anything.
+/// Samples per cycle that turning points need.
+///
+/// With 20 the damping ratio has an error of 1e-3 of the decrement of a cycle; with 3 it is
+/// meaningless.
 const PER_CYCLE: f64 = 20.0;
 
-/// Frequency and damping, cycle by cycle, of the mass that moves most; with too few samples what is to be said instead.
+/// Writes frequency and damping, cycle by cycle, of the place that moves most.
+///
+/// Returns the warning for too few samples.
 fn read_off(
     prepared: &Prepared,
     decays: &[Decay],
@@ -359,10 +365,11 @@ fn read_off(
     None
 }
 
-/// A column.
+/// Name of the time column.
 const TIME: &str = "time_s";
 
-/// Damping over amplitude, cycle by cycle, of the place that moves most, with a curve for every case.
+/// Draws damping over amplitude, cycle by cycle, of the place that moves most, with a curve for
+/// every case.
 fn damping(drawing: &Drawing<'_>, table: &Table, places: &[String]) -> Panel {
     let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
     let stretches = drawing.stretches(table);
@@ -370,7 +377,7 @@ fn damping(drawing: &Drawing<'_>, table: &Table, places: &[String]) -> Panel {
         let x = numbers(table, "amplitude_m", stretch.rows.clone()).iter().map(|x| x * factor).collect();
         let y = numbers(table, "damping_ratio", stretch.rows.clone()).iter().map(|y| 100.0 * y).collect();
         let place = words(table, "mass").get(stretch.rows.start).cloned().unwrap_or_default();
-        // one case has the colour that its place has beside it
+        // a single case has the colour of its place in the other panels
         if stretch.varied.is_empty() {
             let colour = places.iter().position(|name| *name == place).unwrap_or(colour);
             return Series::line(place, x, y, colour);
@@ -386,13 +393,13 @@ fn damping(drawing: &Drawing<'_>, table: &Table, places: &[String]) -> Panel {
     }
 }
 
-/// A panel for every case and drive, with a line for every place.
+/// Draws a panel for every case and frequency, with a line for every place.
 fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system()) else { return Figure::default() };
     let drives = motion.numbers("drive_frequency_Hz");
     let column = |place: &String| format!("{place}_displacement_m");
     let panel = |title: String, rows: Range<usize>| {
-        // draws in one panel have one unit
+        // draws in one panel share one unit
         let scope = if drawing.study.draws().is_some() { 0..motion.rows() } else { rows.clone() };
         let shown = drawing.displacements(&system);
         let places = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());

@@ -1,5 +1,7 @@
-//! How a disk stands at the instant at which its worst place is farthest out: displacements as distances from a circle, sector by sector, so
-//! that nodal diameters are seen, and which blades take part.
+//! Pictures of a disk at the instant of the largest displacement of its worst place.
+//!
+//! Displacements are drawn as distances from a circle, sector by sector. The picture shows
+//! nodal diameters and the participating blades.
 
 use crate::dataset::{Axis, Panel, Series};
 use crate::drawing::join;
@@ -14,13 +16,16 @@ pub(super) struct Around {
 }
 
 impl Around {
-    /// A place of every sector of a wave, which leads from each to the next by `diameter / sectors` of a turn.
+    /// Returns a place of every sector in a travelling wave; each sector leads the previous one
+    /// by `diameter / sectors` of a turn.
     pub(super) fn of_wave(place: String, (size, phase): (f64, f64), diameter: usize, sectors: usize) -> Around {
         let lead = |sector: usize| 360.0 * (diameter * sector % sectors) as f64 / sectors as f64;
         Around { place, of: (0..sectors).map(|sector| (sector, size, phase + lead(sector))).collect() }
     }
 
-    /// Places of a ring, each with amplitude and phase, by what they are in their sector; `None` if one is of no sector.
+    /// Groups places of a ring, with amplitude and phase, by their name in the sector.
+    ///
+    /// Returns `None` if a place belongs to no sector.
     pub(super) fn of_ring<'a>(places: impl IntoIterator<Item = (&'a str, f64, f64)>) -> Option<Vec<Around>> {
         let mut all: Vec<Around> = Vec::new();
         for (name, size, phase) in places {
@@ -38,7 +43,8 @@ impl Around {
     }
 }
 
-/// What a place of a ring is called in its sector, and the number of that: `blade` and 3 for `blade_3`, `blade.x` and 3 for `blade_3.x`.
+/// Returns the name of a ring place in its sector, and the sector number: `blade` and 3 for
+/// `blade_3`, `blade.x` and 3 for `blade_3.x`.
 pub(super) fn of_sector(name: &str) -> Option<(String, usize)> {
     let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
     let (place, sector) = node.rsplit_once('_')?;
@@ -46,18 +52,18 @@ pub(super) fn of_sector(name: &str) -> Option<(String, usize)> {
     Some((place, sector.parse().ok()?))
 }
 
-/// Share of the circle's radius that the largest displacement is drawn as.
+/// Length of the largest displacement as a share of the radius of the circle.
 const LARGEST: f64 = 0.35;
-/// Half of the picture, in radii of the circle: all wheels are equally large.
+/// Half the width of the picture in radii of the circle; all pictures have the same size.
 const ROOM: f64 = 1.0 + LARGEST + 0.05;
-/// Fewer sectors show no shape.
+/// Smallest number of sectors for a picture.
 const LEAST: usize = 3;
-/// Points of the circle at rest.
+/// Number of points of the circle at rest.
 const CIRCLE: usize = 180;
-/// More places than these cover each other: those that move most are drawn.
+/// Largest number of places in a picture: those that move most. More places hide each other.
 pub(super) const MOST: usize = 4;
 
-/// So many places at most, those that move most, by their numbers in their own order.
+/// Returns the indices of at most `most` places that move most, in ascending order.
 pub(super) fn leaders(places: &[Around], most: usize) -> Vec<usize> {
     let mut leaders: Vec<usize> = (0..places.len()).collect();
     leaders.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
@@ -66,16 +72,17 @@ pub(super) fn leaders(places: &[Around], most: usize) -> Vec<usize> {
     leaders
 }
 
-/// How many of so many places are shown, if not all.
+/// States how many of the places are shown, if not all.
 pub(super) fn left_out(shown: usize, places: usize) -> String {
     if shown < places { format!("{shown} of {places} places") } else { String::new() }
 }
 
-/// The picture of some places of a ring of so many sectors, in colours from `colour` on. Sector 0 is at the top, the next to the right of it.
+/// Draws some places of a ring in colours from `colour`. Sector 0 is at the top, and sector 1
+/// follows clockwise.
 pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: usize) -> Option<Panel> {
     let largest = places.iter().map(Around::largest).fold(0.0, f64::max);
     let all = places.iter().flat_map(|around| &around.of);
-    // of equal ones the first decides the instant
+    // the first of equal displacements determines the instant
     let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
     if sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
         return None;
@@ -94,7 +101,7 @@ pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: us
         };
         let Around { place: name, of } = &places[place];
         let mut tips: Vec<_> = of.iter().map(tip).collect();
-        // spokes, each from the circle at rest
+        // spokes from the circle at rest
         let nothing = (f64::NAN, f64::NAN);
         let (x, y) = tips.iter().flat_map(|(foot, tip)| [*foot, *tip, nothing]).unzip();
         series.push(Series::line("", x, y, colour + place).pale());
@@ -115,8 +122,9 @@ pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: us
 mod tests {
     use super::*;
 
-    /// A wave of two nodal diameters on eight sectors: out and in by turns, `cos(2·2π s/8)`, nothing at the nodes. Of sectors that are equally
-    /// far out the first is so at the instant that is drawn.
+    /// A wave of two nodal diameters on eight sectors has the displacements `cos(2·2π s/8)`.
+    ///
+    /// The first of equal displacements determines the instant.
     #[test]
     fn a_wave_has_its_nodal_diameters() {
         let wave = Around::of_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
@@ -132,7 +140,7 @@ mod tests {
         assert!(line.x[2] > 0.6 && line.y[2].abs() < 1e-12);
     }
 
-    /// Of many places the four that move most are drawn, each in the colour that it has elsewhere.
+    /// The picture shows the four places that move most, each in its usual colour.
     #[test]
     fn a_wheel_is_not_crowded() {
         let size = [1.0, 5.0, 2.0, 0.5, 3.0, 4.0];

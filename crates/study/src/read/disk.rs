@@ -1,5 +1,7 @@
-//! `[disk]`: what must hold between its keys, and the files that it names: a mistuning pattern, the node pairs of a sector's sides, where its nodes
-//! stand, the nodes of its blade.
+//! Reads `[disk]`: checks between its keys, and the files that it names.
+//!
+//! The files are a mistuning pattern, the node pairs of both sides of a sector, the node
+//! coordinates, and the nodes of the blade.
 
 use super::reader::Reader;
 use crate::document::Table;
@@ -12,7 +14,7 @@ use crate::values::Given;
 use std::io::Read;
 use stickslip::structure::Node;
 
-/// Most bytes of a file: lines for a million nodes.
+/// Largest size of a file in bytes: lines for a million nodes.
 const MOST_BYTES: u64 = 1 << 26;
 
 impl Reader {
@@ -40,7 +42,7 @@ impl Reader {
         Some(StatedDisk { table: stated, pattern, boundary, nodes, blade })
     }
 
-    /// Where the nodes of a sector stand, if a file says so.
+    /// Reads the node coordinates of a sector, if a file is named.
     fn nodes(&mut self, stated: &StatedTable) -> Option<Vec<Node>> {
         let entry = stated.entry("nodes").filter(|_| !self.without_files)?;
         let Stated::Fixed(Given::Text(name)) = &entry.value else { return None };
@@ -56,7 +58,7 @@ impl Reader {
         read.map_err(|problem| self.problems.push(refuse(problem))).ok()
     }
 
-    /// The rows of a CSV file that a key names.
+    /// Reads the rows of the CSV file that a key names.
     fn csv<const N: usize>(
         &mut self,
         stated: &StatedTable,
@@ -76,7 +78,7 @@ impl Reader {
         rows.map_err(|problem| self.problems.push(refuse(problem))).ok()
     }
 
-    /// The deviations of a file, if one is named.
+    /// Reads the deviations of a file, if a file is named.
     fn pattern(&mut self, mistuning: &StatedTable) -> Option<Vec<f64>> {
         let file = mistuning.entry("file").map(|entry| (&entry.value, entry.location.clone()));
         if self.without_files && file.is_some() {
@@ -113,7 +115,7 @@ impl Reader {
         })
     }
 
-    /// The text of a file beside the study.
+    /// Reads a file whose path is relative to the folder of the study.
     fn text_of(&self, name: &str) -> Result<String, Refused> {
         let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
         let failed = |error: std::io::Error| {
@@ -130,13 +132,14 @@ impl Reader {
     }
 }
 
-/// What is wrong, and what to do about it.
+/// Message and help.
 type Refused = (String, Option<String>);
 
 /// Number of the line, from 1, and its fields.
 type CsvRow<const N: usize> = (usize, [String; N]);
 
-/// The lines of a CSV file that has these columns, in any order, or the line that is wrong and why.
+/// Parses a CSV file with these columns in any order. The error is the wrong line and the
+/// reason.
 fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>, (usize, String)> {
     let mut lines = text
         .trim_start_matches('\u{feff}')
@@ -164,10 +167,10 @@ fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>,
     lines.map(row).collect()
 }
 
-/// A node by the fields of its line.
+/// Parses a node from the fields of its line.
 fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, String)> {
     let number = |text: &str| {
-        // Fortran's exponent
+        // the exponent letter of Fortran
         let value = text.trim().replace(['d', 'D'], "e").parse::<f64>().ok().filter(|value| value.is_finite());
         value.ok_or_else(|| (line, format!("`{}` is no coordinate of node `{}`", shown(text), shown(name))))
     };
@@ -175,13 +178,14 @@ fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, Strin
     Ok((name.to_owned(), [x?, y?, z?]))
 }
 
-/// The nodes of a CSV file, or the line that is wrong and why.
+/// Parses the nodes of a CSV file. The error is the wrong line and the reason.
 fn csv_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
     let rows = csv(text, ["node", "x", "y", "z"])?.into_iter();
     rows.map(|(line, [node, x, y, z])| node_of(line, &node, [&x, &y, &z])).collect()
 }
 
-/// The nodes of an input deck of Abaqus or CalculiX, or the line that is wrong and why.
+/// Parses the nodes of an Abaqus or CalculiX input deck. The error is the wrong line and the
+/// reason.
 fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
     let (mut nodes, mut inside) = (Vec::new(), false);
     for (line, text) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
@@ -193,7 +197,7 @@ fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
         } else if inside {
             let fields: Vec<&str> = text.split(',').map(str::trim).collect();
             let [node, ref at @ ..] = fields[..] else { continue };
-            // what is left out is zero
+            // a missing coordinate is zero
             let of = |i: usize| at.get(i).copied().filter(|field| !field.is_empty()).unwrap_or("0");
             nodes.push(node_of(line, node, [of(0), of(1), of(2)])?);
         }
@@ -201,7 +205,7 @@ fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
     if nodes.is_empty() { Err((1, "there is no *NODE with nodes".to_owned())) } else { Ok(nodes) }
 }
 
-/// The deviations of a pattern by sector, or the line that is wrong and why.
+/// Parses the deviations of a pattern by sector. The error is the wrong line and the reason.
 fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
     let mut deviations: Vec<Option<f64>> = Vec::new();
     for (line, [sector, deviation]) in csv(text, ["sector", "deviation"])? {

@@ -1,4 +1,4 @@
-//! Tables whose `kind` says which keys they have: laws, `[method]`, `[study]`; and `[figure]`.
+//! Reads tables whose keys depend on `kind`: laws, `[method]`, `[study]`; and `[figure]`.
 
 use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
@@ -12,7 +12,10 @@ use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo};
 use stickslip::method;
 
-/// The tables of a file that have a key of this name, but for those that may be the table it was found in, whose keys are `own`.
+/// Returns the tables of a study file that have a key of this name.
+///
+/// Tables that contain all keys in `own` are left out, because the name was found in such a
+/// table.
 pub(super) fn homes(name: &str, own: &[Key]) -> Vec<String> {
     let names = |keys: &[Key]| keys.iter().filter(|key| key.is_taken()).map(|key| key.name).collect::<Vec<_>>();
     let tables = FILE.iter().filter_map(|table| {
@@ -36,7 +39,7 @@ pub(super) fn homes(name: &str, own: &[Key]) -> Vec<String> {
 }
 
 impl Reader {
-    /// The row named by `kind` in a table of laws, methods or study kinds.
+    /// Returns the row that `kind` names in a table of laws, methods or study kinds.
     fn kind<T: 'static>(
         &mut self,
         table: &Table,
@@ -118,7 +121,7 @@ impl Reader {
         }));
         let before = self.problems.len();
         let stated = self.table(table, &keys, &format!("method `{}`", row.name));
-        // an option of other methods is no misspelling
+        // an option of another method is not a misspelling
         for problem in &mut self.problems[before..] {
             let others = || method::TABLE.iter().filter(|other| other.options.iter().any(|o| o.key == problem.key));
             if keys.iter().all(|key| key.name != problem.key) && others().next().is_some() {
@@ -143,7 +146,7 @@ impl Reader {
         let kind = &self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.info.name)?.info;
         let mut keys = STUDY.to_vec();
         keys.extend(kind.keys);
-        // `vary` is not a value of the kind: it makes the cases
+        // `vary` is not a value of the kind: it defines the cases
         let owner = format!("a study of kind `{}`", kind.name);
         self.check_keys(table, &keys, &owner);
         let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, Takes::Vary)).collect();
@@ -151,7 +154,7 @@ impl Reader {
         Some((kind, stated, table.get("vary")))
     }
 
-    /// `[figure]`, empty if it is absent.
+    /// Reads `[figure]`; the result is empty if the table is absent.
     pub(super) fn figure(&mut self, root: &Table) -> StatedTable {
         let key = FILE.iter().find(|key| key.name == "figure");
         let stated = root.get("figure").zip(key).and_then(|(entry, key)| self.value(key, &entry.node));
@@ -162,11 +165,12 @@ impl Reader {
     }
 }
 
-/// What people call the coefficient of friction, and the load that presses the faces, in small letters.
+/// Lower-case names that users give to the coefficient of friction, and to the normal load.
 const COEFFICIENTS: [&str; 6] = ["mu", "mue", "coefficient", "friction", "friction_coefficient", "cof"];
 const LOADS: [&str; 8] = ["normal", "n", "n0", "fn", "preload", "normal_load", "normal_force", "load"];
 
-/// What to do about a key that a law does not have and another one has, or that speaks of its normal load.
+/// Returns the help for an unknown key of a law that belongs to another law or names a friction
+/// coefficient or load.
 fn of_another_law(row: &LawInfo, key: &str) -> Option<String> {
     let word = key.to_lowercase();
     let own = one_of(row.parameters.iter().map(|parameter| parameter.key)).replace(" or ", " and ");
@@ -190,7 +194,7 @@ fn of_another_law(row: &LawInfo, key: &str) -> Option<String> {
     (!others.is_empty()).then(|| format!("`{}` takes {own}; `{key}` is a parameter of {}", row.name, one_of(others)))
 }
 
-/// An example of a quantity, for messages.
+/// Returns an example of a quantity for messages.
 fn example_of(dimension: Dimension) -> &'static str {
     match dimension {
         Dimension::FORCE => "\"2 N\"",

@@ -1,4 +1,5 @@
-//! The lists of a model, `[[mass]]` and the others, with entries that `repeat` states many times.
+//! Reads the lists of a model, `[[mass]]` and the others; `repeat` makes one entry state
+//! several.
 
 use super::reader::Reader;
 use crate::document::{Content, Entry, Node, Table};
@@ -13,10 +14,10 @@ use crate::statement::{Stated, StatedTable};
 use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
 
-/// Largest value of an index: names stay short, and sums of indices exact.
+/// Largest value of an index. It keeps names short and sums of indices exact.
 const LARGEST_INDEX: u64 = 1_000_000;
 
-/// A damping in percent is a share of the critical one.
+/// Converts a damping in percent to a damping ratio.
 fn percent(spring: &mut StatedTable) {
     for entry in spring.entries.iter_mut().filter(|entry| entry.key == "damping") {
         if let Stated::Quantity { quantity, dimension, within, example } = &mut entry.value
@@ -39,8 +40,7 @@ impl Reader {
                 (Takes::Table(keys), Content::Table(table)) if name == "disk" => {
                     lists.disk = self.disk(table, keys);
                 }
-                // a template that is unknown, or no table at all
-                // its files are read with it
+                // read elsewhere, together with its files
                 (Takes::Table(_), _) if name == "structure" => {}
                 (Takes::Table(keys), Content::Table(table)) => {
                     self.table(table, keys, &format!("[{name}]"));
@@ -97,7 +97,7 @@ impl Reader {
         Some(lists)
     }
 
-    /// The entries that one entry states, up to the first that is wrong.
+    /// Reads the entries that one repeated entry states, up to the first error.
     fn repeated(&mut self, table: &Table, keys: &[Key], owner: &str, repetition: Repetition) -> Vec<StatedTable> {
         self.repetition = repetition;
         let mut all = Vec::with_capacity(self.repetition.count());
@@ -121,7 +121,7 @@ impl Reader {
         all
     }
 
-    /// The indices of `repeat`; none if it is absent.
+    /// Reads the indices of `repeat`; empty if it is absent.
     fn repetition(&mut self, table: &Table, owner: &str) -> Option<Repetition> {
         let Some(entry) = table.get("repeat") else { return Some(Repetition::default()) };
         let before = self.problems.len();
@@ -179,7 +179,7 @@ impl Reader {
         (self.problems.len() == before).then_some(Repetition { indices })
     }
 
-    /// Which indices wrap around: all, none, or those named.
+    /// Sets the indices that wrap around: all, none, or the named ones.
     fn wrap(&mut self, entry: &Entry, indices: &mut [Index]) {
         let node = &entry.node;
         let named: Vec<&Node> = match &node.value {

@@ -1,4 +1,6 @@
-//! `[parameters]`, values from outside the file, and `vary`: which there are, in which order they can be evaluated, how many cases they make.
+//! Reads `[parameters]`, values from the command line, `vary` and `[sample]`.
+//!
+//! It determines the parameters, the order of their evaluation, and the number of cases.
 
 use super::reader::Reader;
 use crate::cause;
@@ -15,11 +17,12 @@ use crate::values::Given;
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
 
-/// Its name, its numbers, and within which bounds.
+/// Name, numbers, and bounds.
 type StatedDistribution = (&'static str, Vec<Quantity>, Option<[Quantity; 2]>);
 
 impl Reader {
-    /// The parameters: those `given` by a template, whose values the file may replace, and those that the file adds.
+    /// Reads the parameters: those `given` by a template, whose values the file may replace,
+    /// and those that the file adds.
     pub(super) fn parameters(
         &mut self,
         root: &Table,
@@ -98,7 +101,8 @@ impl Reader {
         Some(())
     }
 
-    /// Gives these parameters the dimension that they have in the file, so that other values must have it too.
+    /// Fixes the dimension of these parameters to the one in the file; other values must have
+    /// the same.
     pub(super) fn settle_dimensions(&mut self, parameters: &mut [Parameter], which: &[usize]) -> Option<()> {
         let order = self.order(parameters, &[])?;
         let values = match evaluate(&self.names, parameters, &order, &HashMap::new(), &[]) {
@@ -134,7 +138,8 @@ impl Reader {
                     .map(|(from, to, points)| VariedPoints::Range { from, to, points }),
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| VariedPoints::List(vec![quantity])),
             };
-            // the parameter says its unit, too; what a template says of it nobody reads here
+            // the unit in [parameters] counts too, but not that in a template, which the user
+            // does not see
             let own = &parameters[index].quantity;
             if let Some(points) = points.as_ref().filter(|_| self.template != Some(own.location.source)) {
                 let known = self.problems.len();
@@ -150,7 +155,7 @@ impl Reader {
         Some(varied)
     }
 
-    /// `[sample]`: how the draws are made, and the parameters that are drawn.
+    /// Reads `[sample]`: the design of the draws, and the drawn parameters.
     pub(super) fn sample(
         &mut self,
         root: &Table,
@@ -212,7 +217,7 @@ impl Reader {
         Some((Some(sample), drawn))
     }
 
-    /// A distribution: `{ normal = [mean, deviation], within = [least, most] }`.
+    /// Reads a distribution: `{ normal = [mean, deviation], within = [least, most] }`.
     fn distribution(&mut self, entry: &Entry) -> Option<StatedDistribution> {
         let names = || DISTRIBUTIONS.iter().map(|(name, ..)| *name);
         let example = "write it as in { normal = [\"2 N\", \"0.2 N\"] }";
@@ -261,7 +266,7 @@ impl Reader {
         }
     }
 
-    /// The parameter that an entry of `vary` or of a sample names.
+    /// Returns the parameter that an entry of `vary` or of a sample names.
     fn parameter(&mut self, entry: &Entry, what: &str) -> Option<usize> {
         if let Some(&index) = self.index.get(&entry.key) {
             return Some(index);
@@ -275,7 +280,8 @@ impl Reader {
         None
     }
 
-    /// A value from outside the file stands for all values that `vary` gives its parameter: one case has it.
+    /// Replaces all values of a varied parameter by its value from the command line, which
+    /// leaves one value.
     pub(super) fn replace(
         &self,
         varied: &mut [Varied],
@@ -294,11 +300,12 @@ impl Reader {
         replaced
     }
 
-    /// The order in which parameters can be evaluated; a circle is an error.
+    /// Returns an order in which the parameters can be evaluated. A cycle is an error.
     pub(super) fn order(&mut self, parameters: &[Parameter], varied: &[Varied]) -> Option<Vec<usize>> {
         let mut needs: Vec<Vec<usize>> =
             parameters.iter().map(|p| p.quantity.expression.parameters().collect()).collect();
-        // a circle goes through one entry of each varied parameter, and the outer product contains that combination
+        // a cycle needs one value of each varied parameter, and the cases contain every
+        // combination
         for varied in varied {
             needs[varied.index] = varied.points.quantities().flat_map(|q| q.expression.parameters()).collect();
         }
@@ -354,7 +361,9 @@ impl Reader {
     }
 }
 
-/// Topological order of a graph, or a circle in it (starting at its lowest index). Not recursive: chains can be long.
+/// Returns a topological order of a graph, or a cycle that starts at its lowest index.
+///
+/// The function is not recursive, because chains can be long.
 fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
     #[derive(Clone, Copy, PartialEq)]
     enum State {

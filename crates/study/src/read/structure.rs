@@ -1,6 +1,8 @@
-//! `[structure]`: the matrices of a structure, read from their files once for all cases, with the names of their rows.
+//! Reads `[structure]`: the matrices of a structure with the names of their rows, once for all
+//! cases.
 //!
-//! Rows that a program keeps of what it has constrained, with 1e36 on the diagonal or without any entry, are left out.
+//! Constrained rows that a program keeps, with 1e36 on the diagonal or without any entry, are
+//! left out.
 
 use super::reader::Reader;
 use crate::document::Table;
@@ -17,7 +19,7 @@ use stickslip_formats::{self as formats, names};
 use stickslip_numerics::sparse::Matrix;
 
 impl Reader {
-    /// The table and its matrices; none if a problem was found.
+    /// Reads the table and its matrices; `None` if a problem was found.
     pub(super) fn matrices(&mut self, table: &Table, study_file: &str) -> Option<Matrices> {
         let before = self.problems.len();
         let stated = self.table(table, STRUCTURE, "[structure]");
@@ -47,7 +49,7 @@ impl Reader {
     }
 }
 
-/// A matrix of the table with the key that it stands under.
+/// A matrix and its key in the table.
 type Read = (&'static str, formats::Matrix);
 
 fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffened>, usize), Problem> {
@@ -62,7 +64,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     };
     let missing = |key| problem(key, "the file is missing".to_owned());
     let stiffness = one("stiffness")?.ok_or_else(|| missing("stiffness"))?;
-    // rows without an entry are not written by some programs: those of the stiffness count
+    // some programs leave out empty rows; the rows of the stiffness matrix determine the order
     let ordered = |(key, matrix): Read| {
         let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
         let ordered = formats::aligned(matrix, &stiffness.1).map_err(|error| said(error, &path));
@@ -74,7 +76,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let rows = stiffness.1.rows();
     for (key, matrix) in [Some(&mass), damping.as_ref(), stiffened.as_ref()].into_iter().flatten() {
         if matrix.rows() != rows {
-            // a file that was cut short has the fewer rows
+            // a truncated file has fewer rows
             let (short, long) = if matrix.rows() < rows { (*key, "stiffness") } else { ("stiffness", *key) };
             let (fewer, more) = (rows.min(matrix.rows()), rows.max(matrix.rows()));
             let message = format!("the {short} matrix has {fewer} rows, and the {long} matrix {more}");
@@ -129,7 +131,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let names = kept.iter().map(|row| name(row).unwrap_or_else(|| (row + 1).to_string())).collect();
     let component = Component::new(names, mass, damping, stiffness).map_err(|error| match &error {
         StructureError::NegativeMass => {
-            // the other way round they may be a structure: then that is what is wrong
+            // if the exchanged matrices form a valid structure, the help states the exchange
             let exchanged = match (matrix("mass", &all[0].1), matrix("stiffness", &all[1].1)) {
                 (Ok(mass), Ok(stiffness)) => Component::new(vec![String::new(); kept.len()], mass, None, stiffness).ok(),
                 _ => None,
@@ -151,14 +153,14 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
         }
         _ => problem("stiffness", error.to_string()),
     })?;
-    // what is wrong with the second file is wrong at its own speed
+    // the second export is checked at its speed of rotation
     if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.at(&component, 1.0)) {
         return Err(problem("stiffened", error.to_string()));
     }
     Ok((component, stiffened, left_out.len()))
 }
 
-/// What is wrong with a file, in the words of the formats, and what to do.
+/// Returns message and help for an error of the file formats.
 fn said(error: formats::Error, path: &Path) -> (String, String) {
     let mut error = error;
     if !path.as_os_str().is_empty() {
@@ -169,7 +171,7 @@ fn said(error: formats::Error, path: &Path) -> (String, String) {
     (message.trim_end_matches("; ").to_owned(), remedy)
 }
 
-/// A file as it is stated.
+/// A file as stated in the table.
 struct File {
     path: PathBuf,
     name: Option<String>,
@@ -190,7 +192,8 @@ fn file(stated: &StatedTable, key: &str) -> Option<File> {
     }
 }
 
-/// The names of all rows: from a file of their own, or those that a matrix came with; empty where there are none.
+/// Returns the names of all rows, from a separate file or from a matrix file; unnamed rows are
+/// empty.
 fn row_names(stated: &StatedTable, folder: &Path, matrices: [&formats::Matrix; 2]) -> Result<Vec<String>, Problem> {
     let rows = matrices[0].rows();
     let Some(file) = file(stated, "dofs") else {

@@ -1,4 +1,5 @@
-//! Templates: the model of one that a study names, and what each is by itself, its parameters and its model.
+//! Templates: the model of the template that a study names, and the parameters and model of
+//! each template.
 
 use super::reader::Reader;
 use crate::document::{self, Content, Table};
@@ -15,15 +16,15 @@ use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 
-/// What a template's file states, but for its study.
+/// The content of a template file without its study.
 pub(super) struct TemplateFile {
     pub parameters: Vec<Parameter>,
     pub lists: Lists,
-    /// The file among the sources.
+    /// Index of the file among the sources.
     pub source: usize,
 }
 
-/// The template of `[model]`, with its table.
+/// Returns the template that `[model]` names, with its table.
 pub(super) fn named_template(root: &Table) -> Option<(&'static Template, &Table)> {
     let Content::Table(table) = &root.get("model")?.node.value else { return None };
     let Content::Text { text, .. } = &table.get("template")?.node.value else { return None };
@@ -31,8 +32,10 @@ pub(super) fn named_template(root: &Table) -> Option<(&'static Template, &Table)
 }
 
 impl Reader {
-    /// Reads a template's file, first of all that has parameters: its texts know its own alone, whatever names a
-    /// study adds.
+    /// Reads a template file.
+    ///
+    /// It is read before the parameters of the study, so that its texts know only the
+    /// template's parameters.
     pub(super) fn template(&mut self, row: &Template) -> Option<TemplateFile> {
         let source = self.text(format!("template {}", row.name), row.study.to_owned()).source;
         let root = match document::parse(row.study, source) {
@@ -48,7 +51,7 @@ impl Reader {
         Some(TemplateFile { parameters, lists: self.lists(&root)?, source })
     }
 
-    /// The model of a template, with the law that the study gives its joints.
+    /// Returns the model of a template, with the law that the study sets for its joints.
     pub(super) fn with_template(
         &mut self,
         root: &Table,
@@ -101,10 +104,10 @@ impl Reader {
     }
 }
 
-/// The model of a template with its parameters, compiled.
+/// The compiled model of a template with its parameters.
 struct CompiledTemplate {
     names: Vec<String>,
-    /// Each has the dimension of its default, if that has any.
+    /// Each parameter has the dimension of its default, if the default has one.
     parameters: Vec<Parameter>,
     order: Vec<usize>,
     structure: ModelStatement,
@@ -112,13 +115,13 @@ struct CompiledTemplate {
 }
 
 impl CompiledTemplate {
-    /// The values of the parameters; those that are `fixed` have that value, SI.
+    /// Evaluates the parameters; `fixed` parameters have the given value, SI.
     fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<Value>, StudyError> {
         let values = evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed);
         values.map_err(|problem| StudyError::at(&self.sources, problem))
     }
 
-    /// The model; parameters that are `fixed` have that value, SI.
+    /// Builds the model; `fixed` parameters have the given value, SI.
     fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
         let environment = Environment { names: &self.names, values: self.values(fixed)? };
         let mut problems = Vec::new();
@@ -131,10 +134,10 @@ impl CompiledTemplate {
     }
 }
 
-/// Compiles the model of a template's file.
+/// Compiles the model of a template file.
 ///
 /// # Errors
-/// [`StudyError`]: the file is wrong, which is none of a user's doing.
+/// Returns a [`StudyError`] if the template file is wrong, which is a bug and not a user error.
 fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
     let mut reader = Reader::default();
     let stated = reader.template(row);
@@ -153,18 +156,18 @@ fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
 pub struct TemplateParameter {
     /// Name.
     pub key: String,
-    /// Physical dimension: that of the default; a bare number counts as a pure one.
+    /// Physical dimension of the default; a bare number counts as a pure number.
     pub dimension: Dimension,
     /// Default as in the file: a quantity, or an expression over other parameters.
     pub default: String,
-    /// The same number in SI, with the other parameters at their defaults.
+    /// The default in SI, with the other parameters at their defaults.
     pub value: f64,
-    /// One line.
+    /// One-line description.
     pub doc: String,
 }
 
 impl Template {
-    /// Its parameters, in the order of the file.
+    /// Returns the parameters in file order.
     ///
     /// # Example
     /// ```
@@ -192,7 +195,7 @@ impl Template {
         parameters
     }
 
-    /// The model with every parameter at its default.
+    /// Returns the model with every parameter at its default.
     ///
     /// # Panics
     /// If the file is wrong; those of [`TABLE`](crate::templates::TABLE) are tested.
@@ -200,11 +203,14 @@ impl Template {
         self.model_with(&[]).unwrap_or_else(|error| panic!("template {}: {error}", self.name))
     }
 
-    /// The model with some parameters changed (SI). A parameter whose default is an expression over changed ones
-    /// follows them, unless it is given too.
+    /// Returns the model with some parameters changed (SI).
+    ///
+    /// A parameter whose default is an expression over changed parameters follows them, unless
+    /// it is changed too.
     ///
     /// # Errors
-    /// [`StudyError`]: a name that is no parameter of this template, or values that the model cannot have.
+    /// Returns a [`StudyError`] if a name is not a parameter of this template, or if the model
+    /// refuses a value.
     ///
     /// # Example
     /// ```

@@ -1,4 +1,5 @@
-//! From a node of the document to a stated value: keys that are unknown or missing, types, names, quantities, ranges.
+//! Converts nodes of the document to stated values: unknown and missing keys, types, names,
+//! quantities, ranges.
 
 use super::kinds::homes;
 use super::reader::Reader;
@@ -14,7 +15,7 @@ use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
 
 impl Reader {
-    /// Unknown and missing keys.
+    /// Reports unknown and missing keys.
     pub(super) fn check_keys(&mut self, table: &Table, keys: &[Key], owner: &str) {
         for entry in &table.entries {
             if !keys.iter().any(|key| key.name == entry.key) {
@@ -46,7 +47,8 @@ impl Reader {
         }
     }
 
-    /// What to do about a `step` in a range, which takes a number of points or a tolerance.
+    /// Returns the help for a `step` in a range, which has a number of points or a tolerance
+    /// instead.
     fn by_steps(&self, table: &Table, entry: &Entry, keys: &[Key]) -> Option<String> {
         let is_range = keys.iter().any(|key| key.name == "from") && keys.iter().any(|key| key.name == "to");
         if !is_range || nearest(&entry.key, ["step", "steps", "increment", "spacing"]).is_none() {
@@ -73,7 +75,7 @@ impl Reader {
         self.stated(table, keys)
     }
 
-    /// The values of those keys that are known; unknown and missing ones are the matter of [`Reader::check_keys`].
+    /// Reads the values of known keys. [`Reader::check_keys`] reports unknown and missing keys.
     pub(super) fn stated(&mut self, table: &Table, keys: &[Key]) -> StatedTable {
         let mut entries = Vec::with_capacity(keys.len());
         for key in keys {
@@ -89,7 +91,7 @@ impl Reader {
         StatedTable { location: table.location.clone(), turn: String::new(), entries }
     }
 
-    /// The value that stands for an absent key.
+    /// Reads the default value of an absent key.
     fn standing_for(&mut self, key: &Key, text: &str, location: &Location) -> Option<Stated> {
         let value = match key.takes {
             Takes::Count(..) => {
@@ -153,7 +155,7 @@ impl Reader {
             }
             (Takes::Frequencies(keys), Content::Table(table)) => {
                 let (from, to, points) = self.range(table, keys, key.name)?;
-                // where the ends alone count they say which way it goes
+                // if only the ends matter, their order gives the direction
                 let ends = |key: &Key| key.name == "points" && matches!(key.presence, Presence::Default(_));
                 let order = if keys.iter().any(ends) { Order::Any } else { Order::Rising };
                 Some(Stated::Range { from, to, points, within: within(keys), order })
@@ -221,7 +223,7 @@ impl Reader {
         }
     }
 
-    /// A whole number within limits.
+    /// Reads a whole number within limits.
     fn count(&mut self, key: &Key, whole: i64, within: RangeInclusive<i64>, location: &Location) -> Option<Stated> {
         if within.contains(&whole) {
             return Some(Stated::Fixed(Given::Count(u64::try_from(whole).unwrap_or(0))));
@@ -235,7 +237,7 @@ impl Reader {
         None
     }
 
-    /// A range whose points follow the curve.
+    /// Reads a range with adaptive points.
     fn adaptive(&mut self, key: &Key, table: &Table) -> Option<Stated> {
         let before = self.problems.len();
         if let Some(entry) = table.entries.iter().find(|entry| entry.key == "points") {
@@ -265,11 +267,13 @@ impl Reader {
         self.problems.push(Problem::new(location, key, message).maybe_help(help));
     }
 
-    /// A name, with the indices of a repetition filled in. What names a place may be a direction of a node, `node.direction`.
+    /// Reads a name and fills in the indices of a repetition.
+    ///
+    /// The name of a place may be a direction of a node, `node.direction`.
     fn name(&mut self, key: &str, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
         let problem = match self.turn().name(text) {
             Ok(name) if is_identifier(&name) => return Some(name),
-            // of a disk's next sector likewise
+            // a place of the next sector of a disk is allowed too
             Ok(name) if !matches!(key, "name" | "directions") && is_place(name.strip_prefix(NEXT).unwrap_or(&name)) => {
                 return Some(name);
             }
@@ -287,7 +291,7 @@ impl Reader {
         None
     }
 
-    /// The name of a row, or its number, with the indices of a repetition filled in.
+    /// Reads the name or number of a row, and fills in the indices of a repetition.
     fn row(&mut self, key: &Key, node: &Node) -> Option<String> {
         match &node.value {
             Content::Text { text, inner } => self.filled(key, text, *inner, &node.location),
@@ -296,7 +300,7 @@ impl Reader {
         }
     }
 
-    /// Rows with their weights.
+    /// Reads rows with their weights.
     fn weights(&mut self, key: &Key, table: &Table) -> Option<Weights> {
         let one = |entry: &Entry| {
             let name = self.filled(key, &entry.key, None, &entry.key_location)?;
@@ -342,7 +346,7 @@ impl Reader {
         quantity
     }
 
-    /// The two quantities of `14 Hz to 19 Hz`, and of what else people write for it.
+    /// Splits `14 Hz to 19 Hz`, or other spellings of a range, into its two quantities.
     fn two_quantities<'a>(&self, text: &'a str) -> Option<(&'a str, &'a str)> {
         [" to ", "...", "..", "…", "–", " - ", "; "].iter().find_map(|word| {
             let (from, to) = text.split_once(word)?;
@@ -419,7 +423,7 @@ impl Reader {
     }
 }
 
-/// In which range the frequencies lie that a range with these keys may have.
+/// Returns the limits of the frequencies in a range with these keys.
 fn within(keys: &[Key]) -> Within {
     let first = keys.iter().find(|key| key.name == "from").map(|key| key.takes);
     if let Some(Takes::Quantity(_, within)) = first { within } else { Within::Positive }

@@ -1,24 +1,28 @@
-//! Designs: where in the unit cube the draws of a sample stand.
+//! Designs: the points of the draws of a sample in the unit cube.
 //!
-//! Every coordinate of every draw is a function of the seed, its number and its dimension alone, made of whole numbers: the same on every machine,
-//! and no draw needs those before it.
+//! Every coordinate of a draw is a function of the seed, its number and its dimension alone,
+//! computed in integers. The draws are the same on every machine, and a draw does not need the
+//! previous ones.
 //!
-//! Sources: Steele, Lea, Flood (2014), Fast splittable pseudorandom number generators (the mixing function, variant 13 of Stafford); McKay, Beckman,
-//! Conover (1979) for Latin hypercubes; Joe, Kuo (2008), Constructing Sobol sequences with better two-dimensional projections, and their table
-//! `new-joe-kuo-6.21201` for the direction numbers; Owen (1995) for the scrambling, which keeps the order of a net and makes each draw uniform.
+//! Sources: Steele, Lea, Flood (2014), Fast splittable pseudorandom number generators (the
+//! mixing function, variant 13 of Stafford); McKay, Beckman, Conover (1979) for Latin
+//! hypercubes; Joe, Kuo (2008), Constructing Sobol sequences with better two-dimensional
+//! projections, and their table `new-joe-kuo-6.21201` for the direction numbers; Owen (1995)
+//! for the scrambling, which preserves the net property and makes each draw uniform.
 
-/// How draws are spread.
+/// The distribution of draws in the unit cube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Design {
-    /// Independent of each other.
+    /// Independent draws.
     Random,
-    /// In each dimension one draw in each of as many equal steps as there are draws.
+    /// Latin hypercube: each dimension has as many equal intervals as draws, with one draw in
+    /// each.
     LatinHypercube,
     /// A scrambled Sobol sequence.
     Sobol,
 }
 
-/// Name of each design in study files, and what it is.
+/// Names of the designs in study files, and their descriptions.
 pub(crate) const DESIGNS: [(&str, &str, Design); 3] = [
     ("random", "draws that are independent of each other", Design::Random),
     (
@@ -29,31 +33,33 @@ pub(crate) const DESIGNS: [(&str, &str, Design); 3] = [
     ("sobol", "a scrambled Sobol sequence: evenly in all parameters together; best with a power of two", Design::Sobol),
 ];
 
-/// Dimensions of the Sobol sequence.
+/// Largest number of dimensions of the Sobol sequence.
 pub(crate) const MOST_SOBOL: usize = DIRECTIONS.len() + 1;
 
-/// A number of 64 bits whose every bit depends on every bit of `z`.
+/// Mixes 64 bits: every bit of the result depends on every bit of `z`.
 fn mixed(z: u64) -> u64 {
     let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ z >> 31
 }
 
-/// The step of the generator, odd: 2⁶⁴ by the golden ratio.
+/// Increment of the generator, odd: 2⁶⁴ divided by the golden ratio.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// The hash of numbers.
+/// Returns a hash of several numbers.
 fn hash(numbers: &[u64]) -> u64 {
     numbers.iter().fold(0, |hash, number| mixed(hash.wrapping_add(STEP) ^ mixed(number.wrapping_add(STEP))))
 }
 
-/// The middle of one of 2⁵³ equal parts of the interval from zero to one: never an end.
+/// Returns the middle of one of 2⁵³ equal parts of the interval from zero to one, so never an
+/// end.
 fn unit(bits: u64) -> f64 {
     ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
 }
 
 impl Design {
-    /// Coordinate `dimension` of draw `index` of `count`: more than zero, less than one.
+    /// Returns coordinate `dimension` of draw `index` of `count`, strictly between zero and
+    /// one.
     pub fn coordinate(self, seed: u64, index: usize, count: usize, dimension: usize) -> f64 {
         let (index, dimension) = (index as u64, dimension as u64);
         match self {
@@ -61,7 +67,7 @@ impl Design {
             Design::LatinHypercube => {
                 let part = permuted(index, count as u64, hash(&[seed, dimension, u64::MAX]));
                 let value = (part as f64 + unit(hash(&[seed, dimension, index]))) / count as f64;
-                // the rounding of the last part could reach the end
+                // rounding in the last part could give the end of the interval
                 value.min(1.0 - f64::EPSILON / 2.0)
             }
             Design::Sobol => {
@@ -72,8 +78,10 @@ impl Design {
     }
 }
 
-/// Where `index` goes in a permutation of `0..count`: a Feistel network on the even number of bits that hold `count`, walked until it comes back
-/// into the range.
+/// Returns the image of `index` in a permutation of `0..count`.
+///
+/// A Feistel network on an even number of bits that hold `count` is applied until the result is
+/// below `count` (cycle walking).
 fn permuted(index: u64, count: u64, key: u64) -> u64 {
     let half = (u64::BITS - count.saturating_sub(1).leading_zeros()).div_ceil(2).max(1);
     let mask = (1u64 << half) - 1;
@@ -84,23 +92,23 @@ fn permuted(index: u64, count: u64, key: u64) -> u64 {
             (left, right) = (right, left ^ hash(&[key, round, right]) & mask);
         }
         at = left << half | right;
-        // a permutation of at most four times as many numbers comes back soon
+        // the permutation has at most four times as many numbers, so the walk is short
         if at < count {
             return at;
         }
     }
 }
 
-/// Rounds of the network: four make it look random, and small ones need a few more.
+/// Rounds of the network: four give a random appearance, and small networks need a few more.
 const ROUNDS: u64 = 8;
 
-/// Coordinate of the Sobol sequence, 32 bits: element `index` in the order of Gray's code.
+/// Returns a coordinate of the Sobol sequence, 32 bits: element `index` in Gray code order.
 fn sobol(index: u32, dimension: usize) -> u32 {
     let gray = index ^ index >> 1;
     (0..u32::BITS).filter(|bit| gray >> bit & 1 == 1).fold(0, |value, bit| value ^ direction(dimension, bit as usize))
 }
 
-/// Direction number `k` of a dimension, with its point before the first of 32 bits.
+/// Returns direction number `k` of a dimension, as a binary fraction of 32 bits.
 fn direction(dimension: usize, k: usize) -> u32 {
     let Some((coefficients, first)) = dimension.checked_sub(1).map(|at| DIRECTIONS[at]) else {
         return 1 << (31 - k);
@@ -120,17 +128,18 @@ fn direction(dimension: usize, k: usize) -> u32 {
     (m[k] << (31 - k)) as u32
 }
 
-/// Each bit turned or not by the bits before it.
+/// Scrambles bits: each bit is flipped or not, depending on the bits before it.
 fn scrambled(bits: u32, key: u64) -> u32 {
     let turned = |level: u32| {
-        // with a one before, so that prefixes of different length differ
+        // the leading one makes prefixes of different length distinct
         let prefix = 1u64 << level | u64::from(bits) >> (32 - level);
         (hash(&[key, prefix]) & 1) as u32
     };
     (0..u32::BITS).fold(bits, |value, level| value ^ turned(level) << (31 - level))
 }
 
-/// Of the dimensions after the first: the inner coefficients of the primitive polynomial, and the first direction numbers.
+/// For each dimension after the first: inner coefficients of the primitive polynomial, and
+/// initial direction numbers.
 const DIRECTIONS: [(u32, &[u32]); 49] = [
     (0, &[1]),
     (1, &[1, 3]),
@@ -188,7 +197,8 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// Draws of SciPy 1.16, `qmc.Sobol(d=50, scramble=False, bits=32)`, whose table is that of Joe and Kuo.
+    /// Draws of SciPy 1.16, `qmc.Sobol(d=50, scramble=False, bits=32)`, with the table of Joe
+    /// and Kuo.
     #[test]
     fn the_sequence_is_that_of_joe_and_kuo() {
         for (index, expected) in [
@@ -204,8 +214,9 @@ mod tests {
         }
     }
 
-    /// Of 2^m draws each of 2^m parts of every dimension has one, scrambled or not, and each box of a pair of the first dimensions, which are a
-    /// net of quality zero.
+    /// With 2^m draws, scrambled or not, each of 2^m intervals of every dimension has one draw.
+    ///
+    /// The first two dimensions form a net of quality zero: each box has one draw.
     #[test]
     fn scrambling_keeps_the_net() {
         for seed in [1, 2, 77] {
@@ -231,13 +242,13 @@ mod tests {
                 assert_eq!(parts.len(), count, "{count} draws, dimension {dimension}");
             }
         }
-        // and the dimensions have orders of their own
+        // the dimensions have different orders
         let order = |dimension: usize| (0..50).map(move |i| permuted(i, 50, hash(&[1, dimension as u64, u64::MAX])));
         assert!(!order(0).eq(order(1)));
     }
 
-    /// Moments of independent uniform draws, within five deviations of their own: mean 1/2, variance 1/12, no correlation of neighbours, of
-    /// dimensions, or of seeds.
+    /// Moments of independent uniform draws, within five standard deviations: mean 1/2,
+    /// variance 1/12, no correlation of successive draws, dimensions, or seeds.
     #[test]
     fn random_draws_are_uniform_and_independent() {
         let count = 100_000;
@@ -258,7 +269,8 @@ mod tests {
         ] {
             assert!(value < bound(1.0 / 144.0), "{what}: {value}");
         }
-        // 100 parts: chi squared of 99 degrees of freedom, beyond 180 one time in a million
+        // 100 parts: chi squared of 99 degrees of freedom exceeds 180 with a probability of one
+        // in a million
         let mut parts = [0f64; 100];
         a.iter().for_each(|x| parts[((x + 0.5) * 100.0) as usize] += 1.0);
         let chi: f64 = parts.iter().map(|n| (n - 1000.0) * (n - 1000.0) / 1000.0).sum();

@@ -1,8 +1,10 @@
-//! Distributions of uncertain parameters, by their quantiles: one number between zero and one makes one value.
+//! Distributions of uncertain parameters by their quantiles: a number between zero and one
+//! gives a value.
 //!
-//! Logarithms and exponentials are those of `libm`, not of the machine: the same bits everywhere.
+//! Logarithms and exponentials come from `libm`, not from the machine, so the bits are the same
+//! everywhere.
 //!
-//! Source of the normal quantile: Wichura (1988), Algorithm AS 241, `PPND16`, of 16 digits.
+//! Source of the normal quantile: Wichura (1988), Algorithm AS 241, `PPND16`, with 16 digits.
 
 use std::f64::consts::SQRT_2;
 
@@ -11,7 +13,7 @@ use std::f64::consts::SQRT_2;
 pub(crate) enum Distribution {
     /// Mean and standard deviation.
     Normal([f64; 2]),
-    /// Mean and standard deviation of the quantity itself, not of its logarithm.
+    /// Mean and standard deviation of the quantity, not of its logarithm.
     Lognormal([f64; 2]),
     /// From, to.
     Uniform([f64; 2]),
@@ -19,11 +21,11 @@ pub(crate) enum Distribution {
     Loguniform([f64; 2]),
     /// From, most likely, to.
     Triangular([f64; 3]),
-    /// One of these, each as likely.
+    /// One of these values with equal probability.
     Values(Vec<f64>),
 }
 
-/// Names of distributions in study files, their numbers, and what they are.
+/// Names of distributions in study files, their numbers, and their descriptions.
 pub(crate) const DISTRIBUTIONS: [(&str, &str, &str); 6] = [
     ("normal", "mean, deviation", "the normal distribution, which has negative values too"),
     ("lognormal", "mean, deviation", "the lognormal distribution with this mean and deviation of the quantity itself"),
@@ -33,14 +35,14 @@ pub(crate) const DISTRIBUTIONS: [(&str, &str, &str); 6] = [
     ("values", "any number of them", "one of these values, each as likely"),
 ];
 
-/// What bounds a distribution beside its own numbers: the least and the largest value.
+/// The key of the bounds of a distribution: the least and the largest value.
 pub(crate) const WITHIN: &str = "within";
 
 impl Distribution {
-    /// The distribution of this name.
+    /// Returns the distribution of this name.
     ///
     /// # Errors
-    /// Which number is wrong, from 0, and what it must be.
+    /// Returns the index of the wrong number, from 0, and the requirement.
     pub fn new(name: &str, numbers: &[f64]) -> Result<Distribution, (usize, String)> {
         let count = |expected: &str| Err((0, format!("`{name}` takes {expected}, found {} of them", numbers.len())));
         let rising = |at: usize| match numbers[at - 1] < numbers[at] {
@@ -87,12 +89,12 @@ impl Distribution {
         }
     }
 
-    /// Whether it can be bounded from outside.
+    /// Returns true if the distribution is unbounded, so that `within` can bound it.
     pub fn has_tails(&self) -> bool {
         matches!(self, Distribution::Normal(_) | Distribution::Lognormal(_))
     }
 
-    /// The value below which a share `p` of all lie, `0 < p < 1`.
+    /// Returns the value below which the share `p` lies, `0 < p < 1`.
     pub fn quantile(&self, p: f64) -> f64 {
         match self {
             Distribution::Normal([mean, deviation]) => mean + deviation * normal_quantile(p),
@@ -117,10 +119,11 @@ impl Distribution {
         }
     }
 
-    /// The same of the part between `least` and `most`; `None` if nothing lies there.
+    /// Returns the quantile of the distribution restricted to `least` and `most`; `None` if the
+    /// part is empty.
     pub fn quantile_within(&self, p: f64, [least, most]: [f64; 2]) -> Option<f64> {
         let (a, b) = (self.standard(least), self.standard(most));
-        // from the side of the nearer tail, where differences of shares keep their digits
+        // from the side of the nearer tail, to avoid cancellation
         let value = if a > 0.0 {
             let (above_a, above_b) = (share_below(-a), share_below(-b));
             let above = above_a - (above_a - above_b) * p;
@@ -133,7 +136,7 @@ impl Distribution {
         value.map(|value| value.clamp(least, most))
     }
 
-    /// The standard normal number of a value of a distribution with tails.
+    /// Returns the standard normal number of a value of a distribution with tails.
     fn standard(&self, value: f64) -> f64 {
         match self {
             Distribution::Lognormal(_) if value <= 0.0 => f64::NEG_INFINITY,
@@ -158,19 +161,20 @@ impl Distribution {
     }
 }
 
-/// Mean and deviation of the logarithm of a lognormal quantity of this mean and deviation.
+/// Returns mean and deviation of the logarithm of a lognormal quantity with this mean and
+/// deviation.
 fn of_logarithm([mean, deviation]: &[f64; 2]) -> [f64; 2] {
     let ratio = deviation / mean;
     let variance = libm::log1p(ratio * ratio);
     [libm::log(*mean) - variance / 2.0, variance.sqrt()]
 }
 
-/// The share of a standard normal quantity below `z`.
+/// Returns the share of a standard normal quantity below `z`.
 fn share_below(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
-/// Ends of the middle part, and of the nearer tails (of the square root of the logarithm).
+/// Limits of the central part in `p - 0.5`, and of the near tail in `√(-ln p)`.
 const MIDDLE: f64 = 0.425;
 const NEAR: f64 = 5.0;
 /// Numerators and denominators of the three parts, lowest power first.
@@ -241,7 +245,7 @@ const FAR_TAIL: [[f64; 8]; 2] = [
     ],
 ];
 
-/// The standard normal quantity below which a share `p` lies.
+/// Returns the standard normal quantile of `p`.
 fn normal_quantile(p: f64) -> f64 {
     let rational = |[above, below]: &[[f64; 8]; 2], r: f64| {
         let power = |terms: &[f64; 8]| terms.iter().rev().fold(0.0, |sum, term| sum * r + term);
@@ -282,7 +286,8 @@ mod tests {
         }
     }
 
-    /// Moments of the values at the middles of 200,000 equal shares, against the closed forms.
+    /// Moments of the values at the middles of 200,000 equal shares, compared with closed
+    /// forms.
     #[test]
     fn distributions_have_the_moments_that_they_say() {
         let moments = |distribution: &Distribution| {
@@ -302,7 +307,7 @@ mod tests {
             ("values", vec![1.0, 2.0, 6.0], 3.0, (14.0 / 3.0f64).sqrt()),
         ] {
             let (found, spread) = moments(&Distribution::new(name, &numbers).unwrap());
-            // the sum misses a little of the tails
+            // the sum omits a small part of the tails
             assert!((found - mean).abs() < 1e-4 && (spread - deviation).abs() < 2e-3, "{name}: {found} {spread}");
         }
     }
@@ -317,7 +322,8 @@ mod tests {
                     let value = distribution.quantile_within(p, bounds).unwrap();
                     assert!(last <= value && value <= bounds[1], "{distribution:?} {bounds:?} {p}: {value}");
                     last = value;
-                    // the share below the value, of what lies between the bounds, from the shares above
+                    // the share below the value, relative to the share between the bounds, from
+                    // the shares above
                     let above = |z: f64| share_below(-z);
                     let share = (above(a) - above(distribution.standard(value))) / (above(a) - above(b));
                     assert!((share - p).abs() < 1e-9, "{distribution:?} {bounds:?}: {share} {p}");

@@ -1,4 +1,4 @@
-//! `[sample]`: uncertain parameters, drawn instead of listed.
+//! `[sample]`: uncertain parameters, drawn at random.
 
 mod design;
 mod distribution;
@@ -11,7 +11,7 @@ use crate::expression::Value;
 use crate::statement::{Environment, Quantity};
 use stickslip::dimension::Dimension;
 
-/// How a study is sampled.
+/// The sampling of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Sample {
     pub count: usize,
@@ -23,7 +23,7 @@ pub(crate) struct Sample {
 #[derive(Debug, Clone)]
 pub(crate) struct Drawn {
     pub sample: Sample,
-    /// Which coordinate of the draws it takes.
+    /// Index of its coordinate in the draws.
     pub coordinate: usize,
     /// The distribution, a name of [`DISTRIBUTIONS`], and its numbers.
     pub distribution: &'static str,
@@ -32,12 +32,12 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
-    /// Everything that it is made of.
+    /// Iterates over its numbers and bounds.
     pub fn quantities(&self) -> impl Iterator<Item = &Quantity> {
         self.numbers.iter().chain(self.within.iter().flatten())
     }
 
-    /// The value of the parameter `name` in draw `index`.
+    /// Returns the value of the parameter `name` in draw `index`.
     pub fn value(
         &self,
         name: &str,

@@ -4,10 +4,11 @@ use crate::expression::displayed;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Body, Model, ROTATIONS};
 
-/// Bodies that are listed.
+/// Largest number of listed bodies.
 const LISTED: usize = 6;
 
-/// Every body; of a disk those of one sector; of many the first.
+/// Returns a line for every body; for a disk those of one sector. Only the first bodies are
+/// listed.
 pub(super) fn described(model: &Model) -> Vec<String> {
     let sectors = model.ring.map_or(1, |ring| ring.sectors.max(1));
     let own = &model.bodies[..model.bodies.len() / sectors];

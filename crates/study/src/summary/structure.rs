@@ -1,4 +1,4 @@
-//! What is known of a structure by its matrices: its size, what was made of it, its lowest frequencies.
+//! Summary of a structure given by matrices: its size, its reduction, its lowest frequencies.
 
 use crate::study::Study;
 use crate::survey::Surveyed;
@@ -8,43 +8,46 @@ use std::f64::consts::TAU;
 use stickslip::model::{ReductionEvidence, Substructure};
 use stickslip_numerics::sparse::Matrix;
 
-/// Frequencies that are listed.
+/// Largest number of listed frequencies.
 const LISTED: usize = 6;
 
-/// Directions along which a mass is told.
+/// Directions for which the mass is stated.
 pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
-/// Masses along several directions that differ by less than this share are told as one: of a held structure they differ by what is held.
+/// Masses along several directions that differ by less than this share are stated once. The
+/// constrained rows of a structure cause small differences.
 const SAME: f64 = 1e-3;
 
-/// A structure by its matrices.
+/// A structure given by matrices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureSummary {
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Rows of the files that are constrained, and left out.
+    /// Number of constrained rows of the files, which are left out.
     pub left_out: usize,
-    /// Entries of stiffness and mass that are not zero.
+    /// Numbers of nonzero entries of stiffness and mass.
     pub entries: [usize; 2],
-    /// What it weighs along x, y and z without its constrained rows, kg: `None` along a direction that no row is called by.
+    /// Mass along x, y and z without the constrained rows, kg; `None` along a direction that no
+    /// row name has.
     pub mass: [Option<f64>; 3],
-    /// What a reduction left out that made the files.
+    /// Error of an earlier reduction that produced the files.
     pub earlier: Option<ReductionEvidence>,
-    /// What it was reduced to; none where all its rows are degrees of freedom.
+    /// The reduced model; `None` if all rows are degrees of freedom.
     pub reduced: Option<ReducedSummary>,
 }
 
-/// A structure in few coordinates.
+/// A reduced model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReducedSummary {
-    /// Coordinates.
+    /// Number of coordinates.
     pub coordinates: usize,
-    /// What they are.
+    /// Type of the coordinates.
     pub kind: String,
-    /// The largest relative error of what the places see.
+    /// Largest relative error at the places.
     pub error: f64,
-    /// Up to there, rad/s.
+    /// Frequency limit of the error, rad/s.
     pub up_to: f64,
-    /// Free motions of the whole; of a sector `None`, as those of the disk are no multiple of its own.
+    /// Number of rigid-body motions of the whole structure; `None` for a sector, because the
+    /// disk has a different number.
     pub free: Option<usize>,
     /// Its lowest elastic frequencies, rad/s.
     pub frequencies: Vec<f64>,
@@ -72,7 +75,7 @@ impl StructureSummary {
         })
     }
 
-    /// For a terminal: a name and a text for each line.
+    /// Returns the lines for a terminal: a name and a text each.
     pub(super) fn lines(&self) -> Vec<(&'static str, String)> {
         let Self { rows, left_out, entries: [stiffness, mass], .. } = self;
         let mut text = format!(
@@ -103,7 +106,8 @@ impl StructureSummary {
         lines
     }
 
-    /// What it weighs, which tells wrong `units` where frequencies cannot: mass and stiffness are wrong by the same factor then.
+    /// States the mass, which reveals wrong `units` if mass and stiffness are wrong by the same
+    /// factor.
     fn mass_words(&self) -> String {
         let known: Vec<(&str, f64)> =
             DIRECTIONS.iter().zip(self.mass).filter_map(|(along, mass)| Some((*along, mass?))).collect();
@@ -124,7 +128,7 @@ impl StructureSummary {
         format!("{text}, of what is not held; if that is not what it weighs, `units` are wrong")
     }
 
-    /// For the record of a run, SI but for the frequencies in Hz.
+    /// Returns the entry of the run record, SI, with frequencies in Hz.
     pub(super) fn to_json(&self) -> Json {
         let reduced = self.reduced.as_ref().map(|reduced| {
             json!({
@@ -150,7 +154,10 @@ impl StructureSummary {
     }
 }
 
-/// The mass that moves where all rows of one direction move by one, in the units of the matrix; `None` where no row is called by it (`449.x`).
+/// Returns the mass in a unit translation along `along`, in the units of the matrix.
+///
+/// All rows of that direction (`449.x`) move by one. Returns `None` if no row name has the
+/// direction.
 pub fn mass_along(rows: &[String], mass: &Matrix, along: &str) -> Option<f64> {
     let moves = |name: &String| f64::from(name.rsplit_once('.').is_some_and(|(_, direction)| direction == along));
     let motion: Vec<f64> = rows.iter().map(moves).collect();

@@ -7,9 +7,9 @@ use std::f64::consts::TAU;
 use std::fmt;
 use stickslip::model::{LinearMode, Modes};
 
-/// Modes and joints that are listed.
+/// Largest number of listed modes and joints.
 const LISTED: usize = 10;
-/// Stretches of slip that are listed for a joint.
+/// Largest number of listed frequency ranges with slip per joint.
 const STRETCHES: usize = 3;
 /// Width of the first column.
 const WIDTH: usize = 14;
@@ -22,7 +22,7 @@ impl ModelSummary {
         let mut order: Vec<&LinearMode> = modes.elastic.iter().collect();
         let count = order.len();
         if let Some((from, to)) = self.range.filter(|_| count > LISTED) {
-            // the nearest to the range, in their order
+            // the modes nearest to the range, by ascending frequency
             let distance = |omega: f64| if omega < from { from / omega } else { (omega / to).max(1.0) };
             order.sort_by(|a, b| distance(a.omega).total_cmp(&distance(b.omega)));
         }
@@ -113,20 +113,21 @@ impl ModelSummary {
     }
 }
 
-/// The joint that a direction belongs to.
+/// Returns the joint of a direction.
 fn whole(name: &str) -> &str {
     name.split('.').next().unwrap_or(name)
 }
 
-/// A load to the digits that tell two apart: joints that symmetry makes alike keep their order, whatever rounding says.
+/// Rounds a load to the significant digits, so that joints that are equal by symmetry keep
+/// their order.
 fn equalised(load: f64) -> f64 {
     format!("{load:.4e}").parse().unwrap_or(load)
 }
 
-/// Share of a preload that the structure takes, below which it is none.
+/// Relative change of a preload by the structure below which it is ignored.
 const GIVEN_WAY: f64 = 1e-3;
 
-/// What a preload leaves at rest.
+/// Describes the normal load at rest that a preload produces.
 fn pressed(preload: f64, at_rest: Option<f64>) -> String {
     let newtons = |force: f64| quantity(force, "N");
     match at_rest {
@@ -157,7 +158,7 @@ fn pressed(preload: f64, at_rest: Option<f64>) -> String {
 
 impl fmt::Display for ModelSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // of nodes each direction has a line of its own
+        // each direction of a joint has a line
         let names: BTreeSet<&str> = self.joints.iter().map(|joint| whole(&joint.name)).collect();
         let joints = names.len();
         let dofs =
@@ -177,7 +178,8 @@ impl fmt::Display for ModelSummary {
                 line("joints stuck", &self.modes(&self.stuck))?;
             }
         }
-        // those that the excitation loads most come first where there are many, each with all its directions
+        // with many joints, those with the largest load come first, each with all its
+        // directions
         let mut order: Vec<&JointSummary> = self.joints.iter().collect();
         let lines = self.joints.len();
         if lines > LISTED {

@@ -1,4 +1,4 @@
-//! What looks like a mistake and is none to the reader: sentences that begin with `warning: `.
+//! Warnings about valid studies that look like mistakes: sentences that begin with `warning: `.
 
 use crate::expression::displayed;
 use crate::linear::Reference;
@@ -13,10 +13,10 @@ use stickslip::dimension::Dimension;
 use stickslip::model::{Axis, FirstSlip, Loose, Modes};
 use stickslip::structure::ReducedComponent;
 
-/// Names that a warning lists; of more it gives the number.
+/// Largest number of names that a warning lists; for more it states the number.
 const NAMED: usize = 6;
 
-/// All warnings: those of the study's kind, and of every study.
+/// Returns all warnings: those of the kind, and those of every study.
 pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Vec<String> {
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
@@ -33,7 +33,7 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Ve
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
 }
 
-/// Names in a sentence: `a, b and 3 more`.
+/// Lists names in a sentence: `a, b and 3 more`.
 fn listed(names: &[String]) -> String {
     let shown: Vec<String> = names.iter().take(NAMED).map(|name| format!("`{name}`")).collect();
     match names.len().checked_sub(NAMED) {
@@ -55,7 +55,8 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
             format!("nothing holds {names}: no spring and no joint ties {them} to `ground`")
         }
     };
-    // what stands on faces that are pressed is no mistake, and what lies between faces that nothing presses has a reason of its own
+    // bodies on preloaded faces are correct; bodies between unloaded faces have a separate
+    // warning
     let survey = &cases[0].survey;
     let between = |loose: &&Loose| !loose.held_by_friction && !loose.faces.is_empty();
     let unpressed: Vec<&Loose> = survey.loose().iter().filter(between).collect();
@@ -76,7 +77,7 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
     others.take(NAMED).map(one).chain(open).chain(preloaded(cases)).collect()
 }
 
-/// A preload that no constant force balances, in the first case that has one.
+/// Warns of a preload that no constant force balances, for the first such case.
 fn preloaded(cases: &[Surveyed]) -> Option<String> {
     let (case, found) = cases.iter().find_map(|case| Some((case, case.survey.unpressed()?)))?;
     let pushed = case.survey.loose().iter().filter(|one| one.contacts.iter().any(|name| found.joints.contains(name)));
@@ -93,7 +94,7 @@ fn preloaded(cases: &[Surveyed]) -> Option<String> {
     ))
 }
 
-/// A model of which no part has a mass.
+/// Warns of a model without mass.
 fn massless(one: &Surveyed) -> Option<String> {
     let (model, structure) = (&one.case.model, one.survey.system().structure());
     let none = model.substructure.is_none() && model.masses.iter().all(|mass| mass.mass == 0.0);
@@ -107,7 +108,7 @@ fn massless(one: &Surveyed) -> Option<String> {
     })
 }
 
-/// A stiffness that makes a frequency as no structure has it.
+/// Warns of a stiffness that gives an implausible frequency.
 fn overstiff(one: &Surveyed) -> Option<String> {
     let (model, survey) = (&one.case.model, &one.survey);
     if model.substructure.is_some() || survey.is_too_large() {
@@ -143,7 +144,7 @@ fn overstiff(one: &Surveyed) -> Option<String> {
     })
 }
 
-/// Joints between places that are the same: of the same rows, or both held.
+/// Warns of joints between equal places: both use the same rows, or both are fixed.
 fn still(case: &Surveyed) -> Option<String> {
     let moves = |axis: &Axis| {
         let mut weights: HashMap<usize, (f64, f64)> = HashMap::new();
@@ -164,15 +165,16 @@ fn still(case: &Surveyed) -> Option<String> {
     (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", listed(&names)))
 }
 
-/// Weights of a row that cancel to this share of them do so but for rounding.
+/// Relative rounding below which the weights of a row cancel.
 const SAME: f64 = 1e-12;
 
-/// Frequencies that a structure of the size of a machine has, Hz: outside of these the units are mistaken, which moves them by powers of ten.
+/// Plausible frequencies of a structure of machine size, Hz. Mistaken units shift frequencies
+/// by powers of ten, beyond these limits.
 const USUAL: (f64, f64) = (0.1, 2e5);
-/// Error of a reduction above which it shows in a response.
+/// Error of a reduction above which it is visible in a response.
 const REDUCTION_ERROR: f64 = 1e-3;
 
-/// What looks like a mistake in a structure by its matrices.
+/// Warns of probable mistakes in a structure given by matrices.
 fn structure(case: &Surveyed) -> Vec<String> {
     let system = case.survey.system();
     let mut found = system.reduced().map_or_else(Vec::new, coordinates);
@@ -197,7 +199,7 @@ fn structure(case: &Surveyed) -> Vec<String> {
     found
 }
 
-/// What looks like a mistake in the frequencies of a structure in few coordinates.
+/// Warns of implausible frequencies of a reduced model.
 fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
     let mut found = Vec::new();
     let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
@@ -242,7 +244,7 @@ fn unused(study: &Study) -> Option<String> {
     }
 }
 
-/// The parameters that a value of the model, of the study or of the method depends on.
+/// Returns the parameters on which a value of the model, the study or the method depends.
 fn used_parameters(study: &Study) -> BTreeSet<usize> {
     let mut open: Vec<usize> = Vec::new();
     let mut from = |table: &StatedTable| {
@@ -270,7 +272,8 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
     used
 }
 
-/// That a reference curve which the figure asks for does not exist; the first case stands for all.
+/// Warns of a missing reference curve that the figure requests; the first case represents all
+/// cases.
 fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
     if !study.asks_for_references() {
         return Vec::new();
@@ -283,11 +286,14 @@ fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
     Reference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
 }
 
-/// A bare length from here on, m, was probably meant in millimetres: gaps and imposed motions of machines are tenths of these.
+/// A bare length from this value on, m, was probably meant in millimetres: gaps and imposed
+/// motions of machines are tenths of a millimetre.
 const LONG: f64 = 0.01;
 
-/// What a bare number of a dimension counts as, where people easily mean another unit: its unit, another one, and the value in that. What was
-/// computed with pi is meant in radians.
+/// Returns the assumed unit of an easily mistaken bare number, another unit, and the value in
+/// that unit.
+///
+/// A number computed with pi is in radians.
 fn easily_meant(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
     match dimension? {
         Dimension::ANGLE if si != 0.0 && !with_pi => Some(("rad", "deg", si * 180.0 / PI)),
@@ -296,14 +302,15 @@ fn easily_meant(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<
     }
 }
 
-/// The parameters of the first case.
+/// Returns the parameters of the first case.
 fn first_values(study: &Study) -> Option<Environment<'_>> {
     let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
     let values = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]).ok()?;
     Some(Environment { names: &study.names, values })
 }
 
-/// Parameters that are bare numbers, of more than a turn in radians, and stand in `sin`, `cos` or `tan`: they are degrees.
+/// Warns of bare parameters in `sin`, `cos` or `tan` that exceed a turn in radians: they are
+/// probably degrees.
 fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let mut turned: BTreeSet<usize> =
         study.parameters.iter().flat_map(|parameter| parameter.quantity.expression.angles()).collect();
@@ -324,7 +331,8 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     turned.into_iter().filter(bare).take(NAMED).map(sentence).collect()
 }
 
-/// Bare numbers whose unit is easily mistaken: angles count as radians, lengths as metres.
+/// Warns of bare numbers whose unit is easily mistaken: angles count as radians, lengths as
+/// metres.
 fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let mut found: Vec<(String, String, usize)> = Vec::new();
     let lists = &study.structure.lists;

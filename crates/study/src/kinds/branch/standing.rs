@@ -1,23 +1,26 @@
-//! Which tops of a branch are peaks of their own: those that stand out by more than the error of its rows.
+//! Peaks of a branch whose prominence exceeds the error of its rows.
 //!
-//! A top stands out by its height above the higher one of the two valleys over which higher ground is reached (its prominence). What is less than the
-//! estimated error of the rows from there to the top may be a ripple that a longer series has not.
+//! The prominence of a top is its height above the higher of the two valleys that separate it
+//! from higher points. A prominence below the estimated error of the rows between the valley
+//! and the top may be a ripple that more harmonics remove.
 
 /// A top of the branch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Top {
-    /// The row that is next to it.
+    /// The nearest row.
     pub row: usize,
-    /// Its height, no less than that of its row.
+    /// Its height, at least that of its row.
     pub height: f64,
 }
 
-/// Whether each of these tops, in the order of their rows, stands out; rows have heights and relative errors, NaN where an error is not known.
+/// Returns for each top, in row order, whether it is a peak.
+///
+/// `heights` and relative `errors` belong to the rows; an unknown error is NaN.
 pub(super) fn out(tops: &[Top], heights: &[f64], errors: &[f64]) -> Vec<bool> {
     let mut ground = heights.to_vec();
     tops.iter().for_each(|top| ground[top.row] = ground[top.row].max(top.height));
     let stands = |top: &Top| {
-        // of two equal tops the first is the higher ground
+        // the first of two equal tops counts as the higher point
         let before = valley((0..top.row).rev(), &ground, errors, &|height| height >= top.height);
         let behind = valley(top.row + 1..ground.len(), &ground, errors, &|height| height > top.height);
         let higher = |a: Valley, b: Valley| if b.height > a.height { b } else { a };
@@ -27,14 +30,14 @@ pub(super) fn out(tops: &[Top], heights: &[f64], errors: &[f64]) -> Vec<bool> {
     tops.iter().map(stands).collect()
 }
 
-/// The way to higher ground: its lowest height, and the largest error on it.
+/// The rows up to the next higher point: lowest height and largest error.
 #[derive(Clone, Copy)]
 struct Valley {
     height: f64,
     error: f64,
 }
 
-/// The valley on these rows before the first that is higher; `None` if none is.
+/// Returns the valley before the first higher row; `None` without a higher row.
 fn valley(
     rows: impl Iterator<Item = usize>,
     ground: &[f64],
@@ -65,21 +68,22 @@ mod tests {
 
     #[test]
     fn a_ripple_below_the_error_is_no_peak() {
-        // two resonances, the second with a ripple of 2e-3 on its top, and a low one that stands out
+        // two resonances, the second with a ripple of 2e-3 on its top, and a low one with
+        // enough prominence
         let heights = [0.1, 0.5, 0.2, 0.99, 0.998, 1.0, 0.3, 0.301, 0.1];
         let rippled = [0.1, 0.5, 0.2, 0.99, 1.0, 0.998, 0.999, 0.3, 0.31, 0.1];
         assert_eq!(standing(&heights, 1e-4), [1, 5, 7]);
         assert_eq!(standing(&heights, 1e-2), [1, 5]);
         assert_eq!(standing(&rippled, 1e-4), [1, 4, 6, 8]);
         assert_eq!(standing(&rippled, 2e-3), [1, 4, 8]);
-        // unknown errors take nothing away; of twins one stays
+        // unknown errors remove no peak; one of two equal tops remains
         assert_eq!(standing(&rippled, f64::NAN), [1, 4, 6, 8]);
         assert_eq!(standing(&[0.0, 1.0, 0.999, 1.0, 0.0], 2e-3), [1]);
-        // on the flank towards an end that is higher
+        // a ripple on the flank below a higher end
         assert_eq!(standing(&[0.0, 0.5, 0.4999, 0.8, 1.0], 1e-3), [0usize; 0]);
     }
 
-    /// A refined top between two rows counts with its own height.
+    /// A refined top between two rows counts with its refined height.
     #[test]
     fn a_refined_top_is_ground_for_others() {
         let tops = [Top { row: 1, height: 1.1 }, Top { row: 3, height: 1.05 }];

@@ -1,4 +1,4 @@
-//! The tables of hysteresis loops: their names and columns, said once, and what they hold as typed values.
+//! The tables of hysteresis loops: names, columns, and their content as typed values.
 
 use crate::columns::FREQUENCY;
 use crate::dataset::{Dataset, Table};
@@ -7,13 +7,13 @@ use crate::study::{Study, VariedValue};
 use crate::values::hertz;
 use std::ops::Range;
 
-/// The kind.
+/// Name of the kind.
 pub(super) const NAME: &str = "hysteresis";
 /// One row per instant.
 pub(super) const LOOPS: &str = "loops";
 /// One row per loop.
 pub(super) const SUMMARY: &str = "loops_summary";
-/// The joint or moved place whose loop it is.
+/// The joint or moved place of the loop.
 pub(super) const JOINT: &str = "joint";
 /// Instant, s.
 pub(super) const TIME: &str = "time_s";
@@ -33,11 +33,11 @@ pub(super) const DAMPING: &str = "equivalent_damping_kg_per_s";
 pub struct Loop {
     /// The varied parameters of its case.
     pub varied: Vec<VariedValue>,
-    /// Drive frequency, Hz.
+    /// Excitation frequency, Hz.
     pub frequency: f64,
-    /// The joint or moved place whose loop it is; of a sum all its joints, `a + b`.
+    /// The joint or moved place of the loop; for a sum all its joints, `a + b`.
     pub joint: String,
-    /// Instants, s; both ends of the period are there.
+    /// Instants, s, including both ends of the period.
     pub time: Vec<f64>,
     /// Displacement, m.
     pub displacement: Vec<f64>,
@@ -51,8 +51,10 @@ pub struct Loop {
     pub equivalent_damping: f64,
 }
 
-/// Some rows of the table of loops, cut into single loops: another joint or frequency, or time that begins anew. Of a table from elsewhere
-/// that lacks a column, that column cuts nothing.
+/// Divides rows of the loop table into single loops.
+///
+/// A loop begins at a new joint, a new frequency, or where time restarts. A missing column of a
+/// table from another source is ignored.
 pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
     let (joints, frequencies, times) = (table.texts(JOINT), table.numbers(FREQUENCY), table.numbers(TIME));
     let goes_on = |a: usize, b: usize| {
@@ -70,10 +72,13 @@ pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
     loops
 }
 
-/// The loops of a hysteresis study in the order of its tables: by case, frequency and joint. Where no orbit was found there is none.
+/// Returns the loops of a hysteresis study in table order: by case, frequency and joint.
+///
+/// Points without an orbit have no loop.
 ///
 /// # Errors
-/// [`ResultsError`]: the dataset is of another kind, or not what [`run`](crate::run::run()) returned for this study.
+/// Returns a [`ResultsError`] if the dataset is of another kind or is not the result of
+/// [`run`](crate::run::run()) for this study.
 ///
 /// # Example
 /// ```
@@ -94,7 +99,7 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
     let (stiffness, damping) = (summary.numbers(STIFFNESS)?, summary.numbers(DAMPING)?);
     let mut loops = Vec::new();
     for stretch in results.stretches(&points, study.varied().len())? {
-        // a study of one frequency has no column of it
+        // a study of one frequency has no frequency column
         let only = || study.case(stretch.case).ok()?.frequencies?.get(0).map(hertz);
         for rows in single(points.table, stretch.rows) {
             let row = loops.len();
@@ -123,7 +128,8 @@ mod tests {
     use super::*;
     use crate::dataset::{Column, Values};
 
-    /// Loops end where joint, frequency or period do, even where the next loop is the same one again.
+    /// A loop ends where joint, frequency or period end, even if the next loop has equal
+    /// values.
     #[test]
     fn rows_are_cut_into_single_loops() {
         let column = |name: &str, values| Column { name: name.to_owned(), values };

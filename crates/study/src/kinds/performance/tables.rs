@@ -1,17 +1,17 @@
-//! The tables of performance curves: their names and columns, said once, and what they hold as typed values.
+//! The tables of performance curves: names, columns, and their content as typed values.
 
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
 use crate::dataset::Dataset;
 use crate::results::{Peak, Results, ResultsError};
 use crate::study::{Study, VariedValue};
 
-/// The kind.
+/// Name of the kind.
 pub(super) const NAME: &str = "performance";
 /// One row per value of the parameter.
 pub(super) const PERFORMANCE: &str = "performance";
 /// One row per curve.
 pub(super) const OPTIMUM: &str = "optimum";
-/// Orbits on the grid of frequencies that were not found.
+/// Number of orbits on the frequency grid that were not found.
 pub(super) const FAILED: &str = "failed_orbits";
 
 /// The resonance peak over a parameter, the last one of `vary`.
@@ -19,37 +19,40 @@ pub(super) const FAILED: &str = "failed_orbits";
 pub struct Curve {
     /// The peak at each value of the parameter.
     pub points: Vec<Point>,
-    /// Its lowest point, refined between the values; `None` if that stands at an end of them.
+    /// Its lowest point, refined between the values; `None` without an optimum between them.
     pub optimum: Option<Optimum>,
 }
 
 /// The resonance peak at one value of the parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// The varied parameters of the case; the last one is that of the curve.
+    /// The varied parameters of the case; the last one is the parameter of the curve.
     pub varied: Vec<VariedValue>,
     /// The peak; `None` if no orbit was found.
     pub peak: Option<Peak>,
-    /// Orbits on the grid of frequencies that were not found.
+    /// Number of orbits on the frequency grid that were not found.
     pub failed_orbits: u64,
 }
 
-/// The value of the parameter that makes the peak lowest.
+/// The value of the parameter with the lowest peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Optimum {
-    /// The value in the unit of its column: SI, but hertz and degrees, as in [`VariedValue::column`].
+    /// The value in the unit of its column: SI, but hertz and degrees, as in
+    /// [`VariedValue::column`].
     pub value: f64,
-    /// Where the peak stands, Hz.
+    /// Frequency of the peak, Hz.
     pub frequency: f64,
     /// The peak, m.
     pub amplitude: f64,
 }
 
-/// The curves of a performance study, one for each combination of the outer parameters. Curves that an interrupted run did not reach are
-/// absent.
+/// Returns the curves of a performance study, one for each combination of the outer parameters.
+///
+/// Curves that an interrupted run did not reach are absent.
 ///
 /// # Errors
-/// [`ResultsError`]: the dataset is of another kind, or not what [`run`](crate::run::run()) returned for this study.
+/// Returns a [`ResultsError`] if the dataset is of another kind or is not the result of
+/// [`run`](crate::run::run()) for this study.
 ///
 /// # Example
 /// ```

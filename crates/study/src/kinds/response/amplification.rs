@@ -1,4 +1,5 @@
-//! Amplification: the largest amplitude of a mistuned disk over that of the same disk tuned, each at its own peak.
+//! Amplification: the largest amplitude of a mistuned disk over that of the tuned disk, each at
+//! its peak.
 
 use super::super::peak_of::{displacements, named_places, worst};
 use super::peaks::Found;
@@ -20,7 +21,7 @@ use stickslip::method::advised;
 use stickslip::model::Model;
 use stickslip::orbit::Orbit;
 
-/// The key.
+/// The key `amplification`.
 pub(super) const KEY: Key = default(
     "amplification",
     Takes::Flag,
@@ -29,7 +30,7 @@ pub(super) const KEY: Key = default(
     "true",
 );
 
-/// What it needs.
+/// Checks the requirements of the key.
 pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     if values.flag(KEY.name) != Some(true) {
         return Ok(());
@@ -47,7 +48,7 @@ pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     Err(Complaint::new(KEY.name, message, help))
 }
 
-/// That no blade differs, in any case: all amplifications are one then.
+/// Warns if no blade differs in any case, so that every amplification is one.
 pub(super) fn none(cases: &[Surveyed]) -> Option<String> {
     let asked = cases.iter().any(|one| one.case.values.flag(KEY.name) == Some(true));
     let tuned = cases.iter().all(|one| one.case.model.ring.is_some_and(|ring| ring.equal));
@@ -56,7 +57,7 @@ pub(super) fn none(cases: &[Surveyed]) -> Option<String> {
     })
 }
 
-/// The row of a case whose peaks are `found`; and why it has none.
+/// Writes the row of a case with the peaks `found`; returns the reason if there is no row.
 pub(super) fn row(work: &Work<'_>, found: &[Found], rows: &mut Rows) -> Result<(), String> {
     let (prepared, largest) = (work.case(), |a: &&Found, b: &&Found| a.peak.value.total_cmp(&b.peak.value));
     let highest = found.iter().max_by(largest).ok_or("no peak was found")?;
@@ -74,7 +75,7 @@ pub(super) fn row(work: &Work<'_>, found: &[Found], rows: &mut Rows) -> Result<(
     Ok(())
 }
 
-/// The highest peak of the case without its mistuning, over the same frequencies.
+/// Returns the highest peak of the case without mistuning, at the same frequencies.
 fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
     let prepared = work.case();
     let case = work.study.tuned().case(prepared.case.index).map_err(|error| error.to_string())?;
@@ -113,7 +114,9 @@ fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
     Ok(inner.into_iter().map(|peak| peak.peak).chain(ends).max_by(|a, b| a.value.total_cmp(&b.value)))
 }
 
-/// Of many disks how often each amplification is; draws, or the values of the last parameter of `vary`, make one histogram.
+/// Draws histograms of the amplification of many disks.
+///
+/// Draws, or the values of the last parameter of `vary`, form one histogram.
 pub(super) fn panels(drawing: &Drawing<'_>) -> Vec<Panel> {
     let Some(table) = drawing.table(tables::AMPLIFICATION) else { return Vec::new() };
     let stretches = drawing.stretches(table);

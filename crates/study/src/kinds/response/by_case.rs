@@ -1,4 +1,5 @@
-//! Panels of a response case by case: the curves of places, sectors of a disk, forces and shares of joints.
+//! Panels of a response case by case: curves of places, sectors of a disk, forces and contact
+//! states of joints.
 
 use super::super::shares;
 use super::super::wheel::{self, Around};
@@ -8,20 +9,25 @@ use crate::dataset::{Axis, Panel, Series, Style};
 use crate::drawing::{MOST_PANELS, Stretch, join, numbers};
 use crate::words::significant;
 
-/// A mass below this share of the heaviest is drawn dashed, like the paper's contact masses.
+/// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
+/// paper.
 const LIGHT: f64 = 0.5;
-/// The colour of crosses where no place has a value: the last of the palette.
+/// Colour of crosses at points without an orbit: the last of the palette.
 const MISSING: usize = 6;
-/// Bars of a panel that still tell one from the next: two for each of 60 blades.
+/// Largest number of bars that remain distinct in a panel: two for each of 60 blades.
 const BARS: usize = 120;
-/// Bars whose heights differ by no more than this share are those of equal sectors.
+/// Bars whose heights differ by at most this share belong to equal sectors.
 const ALIKE: f64 = 1e-5;
-/// Masses that are drawn behind the largest of them, those with the highest peaks: the curves of thousands would be one grey area in megabytes.
+/// Largest number of places drawn behind the curve of the largest amplitude; thousands of
+/// curves would form one grey area of several megabytes.
 const BEHIND: usize = 100;
 
 impl Drawn<'_> {
-    /// The panels of each case: the curves of every place, of a disk its sectors, the forces and the shares of joints. Where not all cases have
-    /// room, the first ones have, and it is said.
+    /// Returns the panels of each case.
+    ///
+    /// A case has the curves of every place, the sectors of a disk, and the forces and contact
+    /// states of joints. If the figure is full, the first cases are drawn, and the title states
+    /// this.
     pub(super) fn by_case(&self, stretches: &[Stretch]) -> Vec<Panel> {
         let each = self.panels_of_a_case().max(1);
         let room = (MOST_PANELS / each).clamp(1, stretches.len().max(1));
@@ -56,19 +62,22 @@ impl Drawn<'_> {
         panels
     }
 
-    /// Panels that each case has, the shape of a disk not counted, which is left out where there is no room.
+    /// Returns the number of panels per case.
+    ///
+    /// The shape of a disk is not counted, because it is left out if the figure is full.
     pub(super) fn panels_of_a_case(&self) -> usize {
         let shares = if self.faces.is_empty() { 0 } else { shares::count(self.curve, &self.faces) };
         usize::from(!self.shown.is_empty()) + usize::from(self.ring()) + usize::from(!self.joints.is_empty()) + shares
     }
 
-    /// The masses of one case: each, or the largest of them before all others.
+    /// Draws the places of one case: each of them, or the largest amplitude in front of all
+    /// others.
     fn masses_of(&self, stretch: &Stretch) -> Panel {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names, &[(0, stretch)]));
         panel.series.extend(self.missing(stretch, 1, MISSING));
         if self.single() {
-            // of a place that is no mass nobody knows how heavy it is
+            // the mass is known only for a place that is one row of the structure
             let mass = |place: usize| match self.system.seen()[place].rows() {
                 [(row, _)] => self.system.structure().own_mass(*row),
                 _ => f64::INFINITY,
@@ -105,7 +114,8 @@ impl Drawn<'_> {
         panel
     }
 
-    /// So many of the shown masses at most, those with the largest amplitudes, in their own order.
+    /// Returns at most `most` of the shown places, those with the largest amplitudes, in model
+    /// order.
     fn highest(&self, stretch: &Stretch, most: usize) -> Vec<&str> {
         let names = self.names();
         let height = |name: &str| self.amplitudes(name, stretch.rows.clone()).into_iter().fold(0.0, f64::max);
@@ -116,8 +126,11 @@ impl Drawn<'_> {
         by_height.into_iter().map(|(index, _)| names[index]).collect()
     }
 
-    /// Of a disk a bar for every sector, at the frequency where the largest amplitude is, and its shape there, in colours from `first` on; of the places
-    /// that move most, each in one colour in both.
+    /// Draws a bar for every sector of a disk at the frequency of the largest amplitude, and
+    /// the shape there.
+    ///
+    /// Both panels show the places that move most, each in one colour, beginning with colour
+    /// `first`.
     fn sectors_of(&self, stretch: &Stretch, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
         let (frequency, shape) = self.at_the_highest(stretch)?;
@@ -135,7 +148,7 @@ impl Drawn<'_> {
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
-        // bars of one height, those of a tuned disk, say nothing
+        // bars of equal height, as for a tuned disk, are left out
         let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > ALIKE * bars.y[0].abs());
         let differ = series.iter().any(differ);
         let title = join([stretch.label(), format!("at {} Hz", significant(frequency, 6))]);

@@ -1,4 +1,5 @@
-//! Panels of a response place by place and joint by joint, with a curve for every case, or with percentiles of many draws.
+//! Panels of a response place by place and joint by joint: a curve for every case, or
+//! percentiles of draws.
 
 use super::super::shares::{self, State};
 use super::drawn::{Drawn, SINGLE};
@@ -8,12 +9,15 @@ use crate::drawing::{MOST_CURVES, MOST_PANELS, Stretch, join, numbers, thinned};
 use crate::percentiles::percentiles;
 use crate::study::varied_text;
 
-/// x and y of one draw.
+/// Returns x and y of one draw.
 type CurveOf<'a> = &'a dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>);
 
 impl Drawn<'_> {
-    /// A panel for every mass (or for the largest of them), with a curve for every case, and then for every joint the same. The last varied
-    /// parameter tells the curves of one panel apart, the others the panels.
+    /// Returns a panel for every place, or for the largest amplitude, and a panel for every
+    /// joint.
+    ///
+    /// Each panel has a curve for every case. The last varied parameter distinguishes the
+    /// curves of a panel, the other parameters the panels.
     pub(super) fn by_mass(&self, stretches: &[Stretch]) -> Vec<Panel> {
         if self.drawing.study.draws().is_some() {
             return self.by_percentiles(stretches);
@@ -38,8 +42,7 @@ impl Drawn<'_> {
         of_masses.chain(of_joints).chain(of_faces).take(MOST_PANELS).collect()
     }
 
-    /// Of many draws a panel for every mass (or for the largest of them) and for every joint, with their percentiles for each combination of
-    /// `vary`.
+    /// Returns the same panels with percentiles of the draws for each combination of `vary`.
     fn by_percentiles(&self, stretches: &[Stretch]) -> Vec<Panel> {
         let groups = self.drawing.by_listed(stretches);
         let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
@@ -65,7 +68,7 @@ impl Drawn<'_> {
             }
         } else {
             let name = format!("largest of {} places", self.shown.len());
-            // without peaks, which stand elsewhere in every draw: between its points a curve of a draw is lower than its own peak
+            // without peaks: their frequencies differ between draws
             panels.push(panel(self.panel(String::new()), &name, &|stretch| self.largest(stretch)));
         }
         for (name, joints) in self.pulling() {
@@ -81,7 +84,8 @@ impl Drawn<'_> {
         panels
     }
 
-    /// The cases of a group, for one mass of so many panels, or for the largest amplitude of all.
+    /// Draws the cases of a group for one place, or for the largest amplitude of all; the
+    /// figure has `panels` such panels.
     fn cases_of_mass(&self, mass: Option<&str>, group: &[Stretch], outer: &str, panels: usize) -> Panel {
         let named = mass.filter(|_| panels > 1).map(str::to_owned);
         let thinned_out = match group.len() > MOST_CURVES {
@@ -96,7 +100,7 @@ impl Drawn<'_> {
         }
         let cases: Vec<(usize, &Stretch)> = thinned(group, MOST_CURVES).into_iter().enumerate().collect();
         panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass]), &cases));
-        // a row of crosses for each case, while there are few
+        // each case has its row of crosses if few cases have failures
         let failing = cases.iter().filter(|(_, stretch)| !self.without_orbit(stretch).is_empty()).count();
         let mut row = 0;
         for (colour, stretch) in cases {
@@ -124,7 +128,8 @@ impl Drawn<'_> {
         panel
     }
 
-    /// The cases of a group, for the force of one joint, or the largest of several; one case has the colour `alone`.
+    /// Draws the cases of a group for the force of one joint, or the largest of several; a
+    /// single case has colour `alone`.
     fn cases_of_joint(
         &self,
         (joint, all): &(String, Vec<String>),
@@ -142,7 +147,10 @@ impl Drawn<'_> {
         panel
     }
 
-    /// The cases of a group, for the slip of a joint, or of all, and where it leaves its face for that; one case has the colour `alone`.
+    /// Draws the cases of a group for the slip of one joint or the mean of several, and for
+    /// separation if it occurs.
+    ///
+    /// A single case has colour `alone`.
     fn shares_in_cases(
         &self,
         named: &(String, Vec<String>),
@@ -161,7 +169,7 @@ impl Drawn<'_> {
             panel
         };
         let occurs = |state: State| shares::occurs_in(self.curve, joints, state);
-        // of a stop nobody knows whether it slides
+        // the slip of a stop is unknown
         let states: &[State] = match (occurs(State::Slip), occurs(State::Open)) {
             (_, false) => &[State::Slip],
             (true, true) => &[State::Slip, State::Open],
@@ -171,7 +179,8 @@ impl Drawn<'_> {
     }
 }
 
-/// The curve of a case among others, called by its last varied parameter, or `alone` where nothing is varied.
+/// Returns the curve of a case with the label of its last varied parameter, or `alone` without
+/// one.
 fn of_case(stretch: &Stretch, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
     let last = stretch.varied.last();
     let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());

@@ -1,4 +1,4 @@
-//! What the figure of a response draws: curves of places and joints, read off its tables.
+//! Data of a response figure: curves of places and joints, read from the tables.
 
 use super::super::shares::{self, State};
 use super::super::wheel::{self, of_sector};
@@ -10,67 +10,69 @@ use std::ops::Range;
 use stickslip::model::System;
 use stickslip_numerics::leading::{EQUAL, leading};
 
-/// Masses that are drawn one by one; of more the largest amplitude is, with the single ones pale behind it.
+/// Largest number of places drawn one by one. For more places, the largest amplitude is drawn,
+/// with pale curves behind it.
 pub(super) const SINGLE: usize = 7;
 
-/// Colours that the curves of many masses take: the single ones and the largest of them.
+/// Number of colours for the curves of many places: the single curves and the largest
+/// amplitude.
 const MANY: usize = 2;
 
-/// Names of places with amplitude (m) and phase (degrees) of each.
+/// Names of places with amplitude (m) and phase (degrees).
 pub(super) type Shape<'a> = Vec<(&'a str, f64, f64)>;
 
-/// A peak of a mass in a case.
+/// A peak of a place in a case.
 #[derive(Debug, Clone)]
 pub(super) struct PeakOf {
     pub(super) case: usize,
     pub(super) mass: String,
     /// Frequency (Hz) and amplitude (m).
     pub(super) at: (f64, f64),
-    /// Whether only the way back has it.
+    /// True if only the reverse sweep has the peak.
     pub(super) way_back: bool,
 }
 
-/// What is drawn.
+/// The data of the figure.
 pub(super) struct Drawn<'a> {
     pub(super) drawing: &'a Drawing<'a>,
     pub(super) curve: &'a Table,
-    /// Its columns by name.
+    /// Columns of the curve table by name.
     pub(super) index: HashMap<&'a str, &'a Column>,
-    /// Names of the masses that are shown, and their numbers.
+    /// Names and indices of the shown places.
     pub(super) shown: Vec<(String, usize)>,
-    /// The orbits of the way back where they are others, and the rows of each case.
+    /// Other orbits of the reverse sweep, and the rows of each case.
     pub(super) way_back: Option<(&'a Table, Vec<Stretch>)>,
-    /// The linear structures, and the rows of each case that has its own.
+    /// The linear references, and the rows of each case that has different ones.
     pub(super) references: Option<(&'a Table, Vec<Stretch>)>,
-    /// Those inside the range.
+    /// The peaks inside the frequency range.
     pub(super) peaks: Vec<PeakOf>,
-    /// What a disk does at its peaks, and the rows of each case.
+    /// Shapes of a disk at its peaks, and the rows of each case.
     pub(super) shapes: Option<(&'a Table, Vec<Stretch>)>,
     /// Names of the joints whose forces are shown.
     pub(super) joints: Vec<String>,
-    /// Names of the joints whose shares of stick and slip are shown.
+    /// Names of the joints whose contact states are shown.
     pub(super) faces: Vec<String>,
-    /// The first case's; the others differ in numbers only.
+    /// The system of the first case; the other cases differ in numbers only.
     pub(super) system: &'a System,
     pub(super) axes: (Axis, Axis),
     pub(super) force_axis: Axis,
-    /// From the values of tables to those on the axes.
+    /// Factors from table values to axis values.
     pub(super) factor: (f64, f64),
     pub(super) force_factor: f64,
-    /// Points without an orbit among all that are drawn.
+    /// Number of points without an orbit among all drawn points.
     pub(super) failed: usize,
-    /// How many of the cases are shown, if not all.
+    /// States how many of the cases are shown, if not all.
     pub(super) left_out: Option<String>,
 }
 
 impl Drawn<'_> {
-    /// Amplitudes of one mass in some rows; NaN where there are none.
+    /// Returns the amplitudes of one place in some rows; NaN without such a column.
     pub(super) fn amplitudes(&self, name: &str, rows: Range<usize>) -> Vec<f64> {
         let column = self.index.get(&*column_name(&amplitude_of(name))).and_then(|column| column.as_numbers());
         column.map_or_else(|| vec![f64::NAN; rows.len()], |values| values[rows.clone()].to_vec())
     }
 
-    /// The curve of one mass in one case, with its peaks among its points.
+    /// Returns the curve of one place in one case, with its peaks inserted.
     pub(super) fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let y = self.amplitudes(name, stretch.rows.clone());
@@ -79,7 +81,10 @@ impl Drawn<'_> {
         )
     }
 
-    /// The curves of the way back where it has other orbits: of one mass with its peaks, or the largest of several; in the same colour, none in most figures.
+    /// Returns the curve of the reverse sweep if it has other orbits.
+    ///
+    /// The curve belongs to one place with its peaks, or to the largest of several, in the same
+    /// colour. Most figures have no such curve.
     pub(super) fn way_back(&self, stretch: &Stretch, names: &[&str], colour: usize) -> Option<Series> {
         let (table, stretches) = self.way_back.as_ref()?;
         let rows = stretches.iter().find(|of| of.case == stretch.case)?.rows.clone();
@@ -88,7 +93,7 @@ impl Drawn<'_> {
         let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
         let points = (0..x.len()).map(|i| (x[i], largest(i))).collect();
         let mut points = self.with_peaks(stretch, points, &|peak| peak.way_back && names == [peak.mass.as_str()]);
-        // where both ways have the same orbits, the line has a gap
+        // the line has a gap at frequencies at which both sweeps have the same orbit
         let there = numbers(self.curve, DRIVE, stretch.rows.clone());
         let alike: Vec<f64> = there.into_iter().filter(|omega| !x.contains(omega)).collect();
         let within = points.first().map_or(0.0, |first| first.0)..points.last().map_or(0.0, |last| last.0);
@@ -98,19 +103,20 @@ impl Drawn<'_> {
         Some(Series { style: Style::Dotted, ..Series::line("way back", x, y, colour) })
     }
 
-    /// The largest amplitude over the shown masses at the frequencies of the curve.
+    /// Returns the largest amplitude of the shown places at the frequencies of the curve.
     pub(super) fn largest(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>) {
         self.scaled(self.largest_at(stretch, &self.all(stretch)))
     }
 
-    /// The same with its peaks among the points, and which mass has the largest of all in words.
+    /// Returns the largest amplitude with the peaks inserted, and states which place has the
+    /// maximum.
     pub(super) fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
         let all = self.all(stretch);
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut heights: Vec<f64> = all.iter().map(|values| highest(values)).collect();
         let alike = leading(heights.iter().copied())
             .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - EQUAL) * heights[worst]));
-        // between the points of the curve another one may be higher
+        // a refined peak may be higher than all points of the curve
         for peak in self.peaks_of(stretch).filter(|peak| !peak.way_back) {
             if let Some(i) = self.shown.iter().position(|(name, _)| *name == peak.mass) {
                 heights[i] = heights[i].max(peak.at.1);
@@ -123,31 +129,33 @@ impl Drawn<'_> {
             let ((x0, y0), (x1, y1)) = (points[at - 1], points[at]);
             y0 + (omega - x0) / (x1 - x0) * (y1 - y0)
         };
-        // a peak of one mass below another one is none of the envelope
+        // a peak of one place below the curve of another place is not on the envelope
         let counts = |peak: &PeakOf| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
         let (x, y) = self.scaled(self.with_peaks(stretch, points.clone(), &counts));
         (x, y, worst.map_or_else(|| "all are alike".to_owned(), |worst| format!("worst is {}", self.shown[worst].0)))
     }
 
-    /// Amplitudes of every shown mass.
+    /// Returns the amplitudes of every shown place.
     fn all(&self, stretch: &Stretch) -> Vec<Vec<f64>> {
         self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect()
     }
 
-    /// The largest of several amplitudes over the frequency.
+    /// Returns the largest of several amplitudes over the frequency.
     fn largest_at(&self, stretch: &Stretch, all: &[Vec<f64>]) -> Vec<(f64, f64)> {
         let largest = |i: usize| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max);
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         x.into_iter().enumerate().map(|(i, x)| (x, largest(i))).collect()
     }
 
-    /// Points as they stand on the axes.
+    /// Scales points to the axes.
     fn scaled(&self, points: Vec<(f64, f64)>) -> (Vec<f64>, Vec<f64>) {
         points.into_iter().map(|(x, y)| (x * self.factor.0, y * self.factor.1)).unzip()
     }
 
-    /// Where the largest of all amplitudes is, Hz, and amplitude (m) and phase (degrees) of every shown place there: at a peak, which lies between the
-    /// points of the curve, or where there is none at a point.
+    /// Returns the frequency (Hz) of the largest amplitude, and amplitude (m) and phase
+    /// (degrees) of every shown place there.
+    ///
+    /// The maximum is a refined peak, or a point of the curve without a higher peak.
     pub(super) fn at_the_highest(&self, stretch: &Stretch) -> Option<(f64, Shape<'_>)> {
         let peaks = self.shapes.as_ref().and_then(|(table, stretches)| {
             Some((*table, stretches.iter().find(|of| of.case == stretch.case)?.rows.clone()))
@@ -188,18 +196,20 @@ impl Drawn<'_> {
         points
     }
 
-    /// Marks at the peaks of one mass.
+    /// Returns marks at the peaks of one place.
     pub(super) fn marks(&self, stretch: &Stretch, name: &str, colour: usize) -> impl Iterator<Item = Series> {
         self.peaks_of(stretch).filter(move |peak| peak.mass == name).map(move |PeakOf { at: (x, y), .. }| {
             Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour)
         })
     }
 
-    /// Curves of the linear structures of some cases, each with its colour: of one mass, or the largest over the shown ones. Those that all cases share are grey;
-    /// where they differ each has the colour of its case, of many cases the first and the last have theirs.
+    /// Returns the curves of the linear references, for one place or for the largest amplitude.
+    ///
+    /// Curves that all cases share are grey. Otherwise each curve has the colour of its case;
+    /// of many cases only the first and the last are drawn.
     pub(super) fn references(&self, names: &[&str], cases: &[(usize, &Stretch)]) -> Vec<Series> {
         let Some((table, known)) = &self.references else { return Vec::new() };
-        // a case without rows has those of the case before
+        // a case without rows has the references of the previous case
         let of = |case: usize| known.iter().rev().find(|own| own.case <= case);
         let mut own: Vec<(usize, &Stretch, &Stretch)> = Vec::new();
         for (colour, stretch) in cases {
@@ -216,7 +226,7 @@ impl Drawn<'_> {
         let mut lines: Vec<Series> = Vec::new();
         for (colour, stretch, reference) in own {
             for line in self.reference(table, reference, names) {
-                // curves of one parameter that does not change them stand once
+                // a parameter that does not change a curve gives it once
                 if lines.iter().any(|known| (&known.x, &known.y) == (&line.x, &line.y)) {
                     continue;
                 }
@@ -233,7 +243,7 @@ impl Drawn<'_> {
         lines
     }
 
-    /// Crosses where a case has no orbit, in this row from below.
+    /// Returns crosses at the points of a case without an orbit, in this row from below.
     pub(super) fn missing(&self, stretch: &Stretch, row: usize, colour: usize) -> Option<Series> {
         let x = self.without_orbit(stretch);
         let count = self.failed;
@@ -241,7 +251,7 @@ impl Drawn<'_> {
         (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
     }
 
-    /// Frequencies, on the axis, at which a case has no orbit.
+    /// Returns the frequencies, on the axis, at which a case has no orbit.
     pub(super) fn without_orbit(&self, stretch: &Stretch) -> Vec<f64> {
         let all = self.all(stretch);
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
@@ -249,7 +259,7 @@ impl Drawn<'_> {
         (0..x.len()).filter(failed).map(|i| x[i] * self.factor.0).collect()
     }
 
-    /// The two curves of one case.
+    /// Returns the two reference curves of one case.
     fn reference(&self, table: &Table, stretch: &Stretch, names: &[&str]) -> Vec<Series> {
         let rows = stretch.rows.clone();
         let x: Vec<f64> = numbers(table, DRIVE, rows.clone()).iter().map(|x| x * self.factor.0).collect();
@@ -260,7 +270,7 @@ impl Drawn<'_> {
             let of = if names.len() > 1 { ", largest" } else { "" };
             Series { style, ..Series::line(format!("all joints {what}{of}"), x.clone(), y.collect(), 0) }
         };
-        // why one is absent stands in the notes
+        // the notes state why a reference is missing
         let lines = [("free", Style::Dashed), ("stuck", Style::Dotted)].into_iter().map(line);
         lines.filter(|line| line.y.iter().any(|y| y.is_finite())).collect()
     }
@@ -273,20 +283,21 @@ impl Drawn<'_> {
         Panel { y: self.force_axis.clone(), ..self.panel(title) }
     }
 
-    /// A panel of the share in which a joint, or the mean of several, is in one state.
+    /// Returns a panel of the share of one state, for one joint or the mean of several.
     pub(super) fn share_panel(&self, (name, joints): &(String, Vec<String>), state: State, more: String) -> Panel {
         let words = state.words();
         let title = if joints.len() == 1 { format!("{name} {words}") } else { format!("{name}, {words}") };
         Panel { y: shares::axis("share of the period"), ..self.panel(join([title, more])) }
     }
 
-    /// The share in which joints are in one state, slip for example.
+    /// Returns the share of the period of one state, for example slip, as the mean of the
+    /// joints.
     pub(super) fn share_line(&self, stretch: &Stretch, joints: &[String], state: State) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
         (x, shares::mean(self.curve, joints, &stretch.rows, state))
     }
 
-    /// The force of a joint, or the largest of several.
+    /// Returns the force of a joint, or the largest of several.
     pub(super) fn force_line(&self, stretch: &Stretch, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
         let of = |column: &str, factor: f64| -> Vec<f64> {
             numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
@@ -296,7 +307,10 @@ impl Drawn<'_> {
         (of(DRIVE, self.factor.0), (0..stretch.rows.len()).map(largest).collect())
     }
 
-    /// The joints whose forces are drawn as one line, with its name: each for itself, of many those that are one joint in a sector.
+    /// Groups the joints whose forces are drawn as one line, with its name.
+    ///
+    /// Each of a few joints is one group. Of many joints, those with the same name in every
+    /// sector form a group.
     pub(super) fn pulling(&self) -> Vec<(String, Vec<String>)> {
         if self.joints.len() <= SINGLE {
             return self.joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect();
@@ -313,7 +327,9 @@ impl Drawn<'_> {
         groups.into_iter().map(named).collect()
     }
 
-    /// The colour of a place that is drawn by itself: in all figures the same, as long as there are colours for all places of the model.
+    /// Returns the colour of a single place.
+    ///
+    /// It is the same in all figures if the palette has a colour for every place of the model.
     pub(super) fn colour_of(&self, name: &str, place: usize) -> usize {
         if self.system.places().len() <= SINGLE {
             return place;
@@ -321,7 +337,8 @@ impl Drawn<'_> {
         self.shown.iter().position(|(shown, _)| shown == name).unwrap_or(place)
     }
 
-    /// The first colours of what is drawn in turn, so that no two names have one: of places in a sector, of joints' forces, of joints' shares.
+    /// Returns the first colours for places in a sector, joint forces and contact states, so
+    /// that no colour is used twice.
     pub(super) fn colours(&self) -> [usize; 3] {
         let places = match self.single() {
             true => self.shown.len().max(self.system.places().len().min(SINGLE)),
@@ -333,12 +350,12 @@ impl Drawn<'_> {
         [places, joints, joints + if self.joints.is_empty() { 0 } else { self.pulling().len() }]
     }
 
-    /// Whether the sectors of a disk are drawn side by side.
+    /// Returns true if the model is a disk, whose sectors are compared in a panel.
     pub(super) fn ring(&self) -> bool {
         self.drawing.study.case(0).is_ok_and(|case| case.model.ring.is_some())
     }
 
-    /// Whether the masses are drawn one by one.
+    /// Returns true if the places are drawn one by one.
     pub(super) fn single(&self) -> bool {
         self.shown.len() <= SINGLE
     }
@@ -348,7 +365,7 @@ impl Drawn<'_> {
     }
 }
 
-/// The column of a joint's force.
+/// Returns the column name of the force of a joint.
 pub(super) fn force(joint: &str) -> String {
     format!("{joint}_force_amplitude_N")
 }

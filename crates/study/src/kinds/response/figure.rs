@@ -42,7 +42,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
         factor: (x_factor, y_factor),
         force_factor,
         axes: (x, y),
-        // a force between nothing and its limit needs no decades
+        // a force between zero and its limit needs no logarithmic axis
         force_axis: Axis::new("joint force", unit),
         system: &system,
         shown,
@@ -54,7 +54,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
     let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
         Layout::Cases => {
-            // colours are those of maps: the curves of one panel have names
+            // the colour scale belongs to maps; the curves of one panel have names
             let varied = (!drawn.faces.is_empty()).then(|| shares::axis("share of the period"));
             Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
         }
@@ -71,7 +71,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     figure
 }
 
-/// Of many draws how high their largest peak is.
+/// Draws histograms of the largest peak of many draws.
 fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
     let (Some(table), Some(_)) = (drawn.drawing.table(tables::PEAKS), drawn.drawing.study.draws()) else {
         return Vec::new();
@@ -89,7 +89,9 @@ fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
     drawn.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
 }
 
-/// The rows of the linear structures case by case. Results of before have those of the first case alone, and no varied parameters beside them.
+/// Returns the rows of the linear references case by case.
+///
+/// Results of earlier versions have only those of the first case, without varied parameters.
 fn references_by_case(drawing: &Drawing<'_>, table: &Table) -> Vec<Stretch> {
     let varied = drawing.study.varied_values(0).unwrap_or_default();
     if table.columns.first().is_some_and(|column| column.name == DRIVE) {
@@ -98,13 +100,13 @@ fn references_by_case(drawing: &Drawing<'_>, table: &Table) -> Vec<Stretch> {
     drawing.stretches(table)
 }
 
-/// The peaks inside the range.
+/// Returns the peaks inside the frequency range.
 fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<PeakOf> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
     let way_back = table.flags(WAY_BACK).unwrap_or_default();
     let masses = words(table, tables::MASS);
-    // a table from elsewhere may lack columns
+    // a table from another source may lack columns
     if masses.len() != table.rows() {
         return Vec::new();
     }

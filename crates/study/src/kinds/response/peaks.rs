@@ -1,4 +1,4 @@
-//! The peaks of a stretch of a response curve.
+//! The peaks of a range of a response curve.
 
 use super::super::peak_of::{named_places, worst};
 use crate::work::{Prepared, Work};
@@ -11,20 +11,24 @@ use stickslip_numerics::leading::leading;
 
 /// Amplitudes below this share of the largest are rounding.
 const ROUNDING: f64 = 1e-10;
-/// Two points before a peak that differ from it by less than this share are level with it: more than the rounding of an orbit, and less
-/// than a resonance falls between two points of any curve that can be drawn.
+/// Largest relative difference of two points before a peak that counts as level.
+///
+/// It is above the rounding of an orbit, and below the fall of a resonance between two points
+/// of any curve that can be drawn.
 const LEVEL: f64 = 1e-8;
 
-/// Two peaks between the same frequencies of both ways that differ by less than this share are one: searches on a level top end where their first points
-/// lead them.
+/// Largest relative difference of two peaks of both sweeps, between the same frequencies, that
+/// count as one.
+///
+/// Searches on a level top end at points that depend on the warm start.
 const SAME: f64 = 1e-2;
 
-/// What is read off an orbit where peaks are sought.
+/// The quantities of an orbit for the peak search.
 pub(super) struct Sought {
-    /// The places of which the worst counts; none if each does.
+    /// The places whose largest amplitude counts; empty if each place has separate peaks.
     named: Vec<usize>,
     places: usize,
-    /// Whether the shape at the peaks is kept: that of a disk.
+    /// True if the shape at the peaks is kept, for a disk.
     shapes: bool,
 }
 
@@ -34,41 +38,44 @@ impl Sought {
         Sought { named: named_places(prepared), places: prepared.system.places().len(), shapes }
     }
 
-    /// The amplitudes whose peaks are sought: of every mass, or the largest of the named ones and then each of these.
+    /// Returns the amplitudes for the peak search.
+    ///
+    /// These are the amplitudes of every place, or the largest of the named places followed by
+    /// each of them.
     pub(super) fn amplitudes(&self, orbit: &Orbit) -> Vec<f64> {
         let Self { named, .. } = self;
         if named.is_empty() {
-            // a rotation has no height among lengths: no peak of it is sought
+            // rotations have no peaks, because they are not lengths
             let height = |place: &PlaceMotion| if place.radius.is_some() { 0.0 } else { place.amplitude() };
             return orbit.places.iter().map(height).collect();
         }
         std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
     }
 
-    /// Amplitude and phase (degrees) of every place; none where no shape is kept.
+    /// Returns amplitude and phase (degrees) of every place; empty if no shape is kept.
     pub(super) fn shape(&self, orbit: &Orbit) -> Vec<f64> {
         let places = orbit.places.iter().filter(|_| self.shapes);
         places.flat_map(|place| [place.amplitude(), place.phase_deg()]).collect()
     }
 
-    /// These amplitudes and then the shape.
+    /// Returns the amplitudes followed by the shape.
     pub(super) fn quantities(&self, orbit: &Orbit) -> Vec<f64> {
         let mut quantities = self.amplitudes(orbit);
         quantities.extend(self.shape(orbit));
         quantities
     }
 
-    /// How many amplitudes there are.
+    /// Returns the number of amplitudes.
     fn amplitudes_count(&self) -> usize {
         if self.named.is_empty() { self.places } else { 1 + self.named.len() }
     }
 
-    /// The quantity of which something is a peak.
+    /// Returns the index of the quantity of a peak.
     fn quantity(&self, found: &Found) -> usize {
         if self.named.is_empty() { found.mass } else { 0 }
     }
 
-    /// The mass that has the peak of a quantity.
+    /// Returns the place that has the peak of a quantity.
     fn mass(&self, quantity: usize, values: &[f64]) -> usize {
         let amplitudes = &values[..self.amplitudes_count()];
         let worst = || leading(amplitudes.iter().skip(1).copied()).unwrap_or(0);
@@ -76,18 +83,18 @@ impl Sought {
     }
 }
 
-/// A peak and the mass that has it.
+/// A peak and its place.
 pub(super) struct Found {
     pub(super) mass: usize,
     pub(super) peak: Peak,
-    /// Amplitude (m) and phase (degrees) of every place, of a disk at a refined peak.
+    /// Amplitude (m) and phase (degrees) of every place, for a refined peak of a disk.
     pub(super) shape: Vec<f64>,
-    /// Whether only the way back has it.
+    /// True if only the reverse sweep has the peak.
     pub(super) way_back: bool,
 }
 
 impl Found {
-    /// Whether no place moves more there; of those that move alike the first does.
+    /// Returns true if no place moves more at the peak; the first of equal places counts.
     pub(super) fn leads(&self, system: &System) -> bool {
         let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
         leading(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
@@ -95,7 +102,8 @@ impl Found {
     }
 }
 
-/// The peaks of a curve and those that only the way back has, whose orbits are `others`, by frequency.
+/// Returns the peaks of both sweeps by frequency; `others` are the other orbits of the reverse
+/// sweep.
 pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<Found>, MethodError> {
     let mut of_others = Vec::new();
     for stretch in stretches(&points, others) {
@@ -120,15 +128,18 @@ pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Resu
     Ok(all)
 }
 
-/// Whether two peaks, of the way there and of the way back, are one.
+/// Returns true if a peak of the forward sweep and a peak of the reverse sweep are the same.
 fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
     let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
     let (a, b) = (&there.peak, &back.peak);
     !there.way_back && there.mass == back.mass && below(a) == below(b) && (a.value - b.value).abs() <= SAME * a.value
 }
 
-/// Whether a peak of the way back is only where it jumps to the orbits of the way there: nearer to these at the closest frequency than to its own, and no
-/// higher.
+/// Returns true if a peak of the reverse sweep is only its jump to the orbits of the forward
+/// sweep.
+///
+/// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
+/// than to that of the reverse sweep, and not higher.
 fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought: &Sought) -> bool {
     let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
@@ -138,7 +149,8 @@ fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought
     there >= found.peak.value && there - found.peak.value < (own - found.peak.value).abs()
 }
 
-/// Whether a peak, between two of the frequencies, is only where the way there jumps onto a branch that the way back follows on to something higher.
+/// Returns true if a peak is only the jump of the forward sweep to a branch on which the
+/// reverse sweep reaches a higher amplitude.
 fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> bool {
     let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
@@ -147,8 +159,9 @@ fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> 
         && other.values.get(quantity).is_some_and(|value| *value >= found.peak.value)
 }
 
-/// The peaks of a stretch of a curve, by frequency. The ends of the whole curve count as peaks at the end of the range if it falls away
-/// from them.
+/// Returns the peaks of a range of a curve by frequency.
+///
+/// An end of the whole curve is a peak at the range end if the curve falls from it.
 fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
     let prepared = work.case();
     let sought = Sought::new(prepared);
@@ -180,7 +193,7 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
     {
         last = at_end(end, neighbour);
     }
-    // a place that friction holds moves by rounding only
+    // the amplitude of a place held by friction is rounding only
     let largest = points.iter().flat_map(|point| point.values.iter().take(count)).fold(0.0f64, |a, b| a.max(*b));
     let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
@@ -193,7 +206,9 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
     Ok(first.into_iter().chain(inner).chain(last).filter(|found| moves(&found.peak)).collect())
 }
 
-/// Whether a peak is only where a level stretch ends: a mass that rides along with what moves it until a joint breaks loose.
+/// Returns true if a peak is only the end of a level range.
+///
+/// An example is a mass that moves with its support until a joint slips.
 fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
     let at = points.partition_point(|point| point.omega < peak.omega);
     let as_high = |point: &Point| {

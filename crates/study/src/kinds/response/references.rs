@@ -1,4 +1,5 @@
-//! The linear references of a response: the same structure with all joints free, and with all joints stuck.
+//! The linear references of a response: the same structure with all joints free, and with all
+//! joints stuck.
 
 use crate::columns::{FREQUENCY as DRIVE, amplitude_in};
 use crate::linear::Reference;
@@ -11,10 +12,12 @@ use stickslip::method::{self, MethodError, Options, Solver};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
 
-/// Points of the linear references between two points of the curve: their peaks are sharper than that of any damped curve.
+/// Points of the linear references per interval of the curve; their peaks are sharper than
+/// those of damped curves.
 pub(super) const REFERENCE_POINTS: usize = 4;
 
-/// Whether the case before has the same references: nothing of the linear structures, their excitation and the frequencies differs.
+/// Returns true if the previous case has the same references: linear structures, excitation and
+/// frequencies are equal.
 pub(super) fn are_known(study: &Study, case: &Case) -> bool {
     let before = case.index.checked_sub(1).and_then(|index| study.case(index).ok());
     before.is_some_and(|before| {
@@ -26,10 +29,11 @@ pub(super) fn are_known(study: &Study, case: &Case) -> bool {
     })
 }
 
-/// Cases that are looked at for their number.
+/// Number of cases examined to estimate the number of references.
 const LOOKED_AT: usize = 9;
 
-/// About how many cases have references of their own, by some of them; none if none are asked for.
+/// Estimates the number of cases with different references, from some of the cases; zero if
+/// none are requested.
 pub(super) fn others(study: &Study) -> f64 {
     if !study.wants_references() {
         return 0.0;
@@ -40,7 +44,10 @@ pub(super) fn others(study: &Study) -> f64 {
     own as f64 * cases as f64 / looked as f64
 }
 
-/// A solver of a linear reference: its joints have other laws than those for which the method was chosen, so that any may do.
+/// Returns a solver of a linear reference.
+///
+/// Its joints have other laws than those for which the method was chosen. If that method does
+/// not support them, the first method that does is used.
 fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
         let others = method::ways(system).methods.into_iter().filter_map(method::find);
@@ -49,7 +56,8 @@ fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver 
     })
 }
 
-/// The responses of the same structure with all joints free and with all joints stuck, and why one of them is absent.
+/// Returns the responses with all joints free and with all joints stuck, and the reasons for
+/// missing ones.
 pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
     let prepared = work.case();
     let between = omegas.windows(2).flat_map(|pair| {
@@ -57,10 +65,10 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
     });
     let omegas: Vec<f64> = between.chain(omegas.last().copied()).collect();
     let mut absent = Vec::new();
-    // an orbit of many places fills megabytes, of which a row needs the amplitudes
+    // only the amplitudes are kept: an orbit with many places takes megabytes
     let amplitudes = |orbit: Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
     let mut follow = |reference: Reference| -> Option<Vec<Option<Vec<f64>>>> {
-        // what the laws have no reference for was said when the study was checked
+        // the check of the study reports laws without a reference
         let model = reference.model(&prepared.case.model).ok()?;
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;

@@ -1,11 +1,11 @@
-//! The tables of a response: their names and columns, said once, and what they hold as typed values.
+//! The tables of a response: names, columns, and their content as typed values.
 
 use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY, amplitude_of};
 use crate::dataset::Dataset;
 use crate::results::{Peak, Results, ResultsError};
 use crate::study::{Study, VariedValue};
 
-/// The kind.
+/// Name of the kind.
 pub(super) const NAME: &str = "response";
 /// One row per orbit.
 pub(super) const CURVE: &str = "curve";
@@ -15,15 +15,15 @@ pub(super) const PEAKS: &str = "peaks";
 pub(super) const REFERENCES: &str = "references";
 /// One row per case of a mistuned disk.
 pub(super) const AMPLIFICATION: &str = "amplification";
-/// One row per peak of a disk at which no place moves more, with the shape there.
+/// One row per peak of a disk at which no other place moves more, with the shape there.
 pub(super) const SHAPES: &str = "peak_shapes";
-/// One row per orbit that the curve has when it is followed from its last frequency to its first, and does not have the other way.
+/// One row per orbit that only the reverse sweep finds.
 pub(super) const WAY_BACK: &str = "way_back";
-/// The peak of the tuned disk.
+/// Frequency of the peak of the tuned disk.
 pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";
-/// Its height.
+/// Amplitude of that peak.
 pub(super) const TUNED_AMPLITUDE: &str = "tuned_amplitude_m";
-/// The largest amplitude over that.
+/// Largest amplitude over that of the tuned disk.
 pub(super) const RATIO: &str = "amplification";
 /// The mass that has a peak.
 pub(super) const MASS: &str = "mass";
@@ -33,9 +33,10 @@ pub(super) const MASS: &str = "mass";
 pub struct Curve {
     /// The varied parameters of the case.
     pub varied: Vec<VariedValue>,
-    /// Drive frequencies, Hz, in the order of the table.
+    /// Excitation frequencies, Hz, in table order.
     pub frequency: Vec<f64>,
-    /// What every place with a displacement does, in the order of the model; rotations of bodies are in the table.
+    /// Curves of every place with a displacement, in model order; the table has the rotations
+    /// of bodies.
     pub masses: Vec<MassCurve>,
 }
 
@@ -44,23 +45,27 @@ pub struct Curve {
 pub struct MassCurve {
     /// Name of the mass.
     pub mass: String,
-    /// Half of peak to peak at every frequency, m; NaN where no orbit was found.
+    /// Half of peak to peak at every frequency, m; NaN without an orbit.
     pub amplitude: Vec<f64>,
-    /// Its refined peaks by frequency; with `peak_of` only those where it is the worst mass, none if peaks were not asked for.
+    /// Its refined peaks by frequency. With `peak_of` only those at which it has the largest
+    /// amplitude; empty if peaks were not requested.
     pub peaks: Vec<Peak>,
 }
 
 impl MassCurve {
-    /// The highest of its peaks; of equal ones the last.
+    /// Returns the highest of its peaks; of equal ones the last.
     pub fn highest_peak(&self) -> Option<Peak> {
         self.peaks.iter().copied().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
     }
 }
 
-/// The curves of a response study, case by case. Cases that an interrupted run did not reach are absent.
+/// Returns the curves of a response study, case by case.
+///
+/// Cases that an interrupted run did not reach are absent.
 ///
 /// # Errors
-/// [`ResultsError`]: the dataset is of another kind, or not what [`run`](crate::run::run()) returned for this study.
+/// Returns a [`ResultsError`] if the dataset is of another kind or is not the result of
+/// [`run`](crate::run::run()) for this study.
 ///
 /// # Example
 /// ```
