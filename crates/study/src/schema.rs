@@ -654,7 +654,7 @@ pub fn described(takes: &Takes) -> String {
     }
 }
 
-// ---------------------------------------------------------------------------------------------- JSON Schema
+// ------------------------------------------------------------------------------ JSON Schema
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 const NAME_PATTERN: &str = "^[A-Za-z][A-Za-z0-9_.]*$";

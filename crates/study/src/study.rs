@@ -188,7 +188,7 @@ fn rounded(value: f64) -> f64 {
 pub struct Case {
     /// Its number, from 0; the first varied parameter changes slowest.
     pub index: usize,
-    /// The varied parameters, in the order of the file.
+    /// The varied parameters, in the order of [`Study::varied`].
     pub varied: Vec<VariedValue>,
     /// Value and dimension of every parameter. The value is in SI; without a unit it is the
     /// number as written.
@@ -532,7 +532,7 @@ impl Study {
         })
     }
 
-    // ------------------------------------------------------------------------------------------ one case
+    // ------------------------------------------------------------------------------ one case
 
     /// Checks all cases. The first one is assembled; the others differ from it only in numbers.
     pub(crate) fn check(&self) -> Result<(), StudyError> {

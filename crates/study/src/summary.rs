@@ -143,7 +143,8 @@ impl ModelSummary {
     /// Summarizes a study.
     ///
     /// # Errors
-    /// [`StudyError`]: a case cannot be resolved. The cases of a study that was read have been checked.
+    /// [`StudyError`]: a case cannot be resolved. The cases of a study that was read have been
+    /// checked.
     ///
     /// # Example
     /// ```

@@ -235,7 +235,7 @@ pub struct Work<'a> {
     pub cases: Vec<Arc<Prepared>>,
     /// Its frequencies by number.
     pub points: Range<usize>,
-    /// How the study is run.
+    /// Settings of the run.
     pub context: &'a Context,
 }
 
