@@ -4,10 +4,11 @@ use crate::dataset::{Series, Style};
 
 /// Ends of the band and the line in it, as fractions.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
-/// Fraction of the curves with any value that must have a value at an abscissa, or the band has
-/// a gap there. Where curves end at different abscissae, the remaining ones are not a sample of
-/// all. With this fraction the median of the remaining ones is that of all to 2.5 percentage
-/// points.
+/// Minimum fraction of the curves that must have a value at an abscissa; below it the band has a
+/// gap. Curves without any value do not count.
+///
+/// If curves end at different abscissae, the remaining ones are not a sample of all. With this
+/// fraction their median is that of all to 2.5 percentage points.
 const MOST_OF_THEM: f64 = 0.95;
 /// Relative distance of abscissae that differ by rounding only, such as computed amplitudes at
 /// which a curve begins.

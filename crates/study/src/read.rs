@@ -7,6 +7,7 @@
 //! - `disk`: `[disk]` and the pattern file that it names;
 //! - `lists`: the lists of a model, and repeated entries;
 //! - `parameters`: `[parameters]`, `vary`, and overrides;
+//! - `structure`: `[structure]` and its files;
 //! - `template`: the model of a template.
 
 mod disk;

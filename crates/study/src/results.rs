@@ -95,7 +95,8 @@ pub(crate) struct Results<'a> {
 impl<'a> Results<'a> {
     /// Pairs a study with its dataset.
     ///
-    /// # Errors The study or the dataset is of another kind.
+    /// # Errors
+    /// The study or the dataset is of another kind.
     pub fn of(kind: &'static str, study: &'a Study, dataset: &'a Dataset) -> Result<Self, ResultsError> {
         match [study.kind().name, &dataset.kind].into_iter().find(|found| *found != kind) {
             Some(found) => {

@@ -168,6 +168,7 @@ impl Checked {
     /// If the run is stopped, `take` also gets the unfinished units, with their points marked
     /// [`NOT_REACHED`].
     ///
+    /// # Errors
     /// A [`StudyError`]: the range has no such units, or a search between the cases met a model
     /// that the method refuses. An error that `take` returns ends the computation and is
     /// returned.

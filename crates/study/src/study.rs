@@ -58,7 +58,7 @@ pub(crate) struct Parameter {
     pub dimension: Option<Dimension>,
 }
 
-/// A parameter of `vary`.
+/// A parameter of `vary` or `[sample]`.
 #[derive(Debug, Clone)]
 pub(crate) struct Varied {
     pub index: usize,
@@ -371,8 +371,8 @@ impl Study {
     /// Returns case `index` with the parameter `name` at another value (SI), for searches
     /// between the cases.
     ///
-    /// # Errors [`StudyError`]: there is no such case or parameter, or the model cannot have
-    /// this value.
+    /// # Errors
+    /// [`StudyError`]: there is no such case or parameter, or the model cannot have this value.
     pub fn case_with(&self, index: usize, name: &str, si: f64) -> Result<Case, StudyError> {
         match self.names.iter().position(|n| n == name) {
             Some(parameter) => self.case_where(index, Some((parameter, si))),

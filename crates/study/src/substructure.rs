@@ -26,8 +26,8 @@ const MODES_OF_HARMONICS: usize = 60;
 ///
 /// A reduced model lacks modes that harmonics of friction meet: a chain of 80 masses with a
 /// stiff slider was wrong by 3 to 8 %. All rows are kept only if all laws are exact. Methods
-/// that integrate pay for every fast mode: 60 rows with `bouc-wen` took 4.3 s instead of 0.07
-/// s.
+/// that integrate in time pay for every fast mode: 60 rows with `bouc-wen` took 4.3 s instead of
+/// 0.07 s.
 ///
 /// Seconds per point, for chains of 60, 80, 100, 150 and 200 rows:
 /// - reduced, event-driven: 0.015; with ten joints 0.03 and up to 0.25;

@@ -18,7 +18,7 @@ use stickslip::dimension::Dimension;
 pub struct Fault {
     /// Byte range of the text that is wrong; empty at a place where something is missing.
     pub span: Range<usize>,
-    /// The error and the expected text.
+    /// Description of the error, and the expected text.
     pub message: String,
     /// Advice for the user.
     pub help: Option<String>,

@@ -5,10 +5,13 @@
 //! Bounded quantities, such as the amplification of a disk, have maxima of this distribution
 //! (the third type of Fisher and Tippett). A few hundred disks are therefore enough for the
 //! 99.9th percentile. The fit maximizes the likelihood. For every λ, the other two parameters
-//! follow from one equation; a search finds the best λ. Source: Castanier, Pierre, Using
-//! intentional mistuning in the design of turbomachinery rotors, AIAA J. 40 (2002) 2077-2086;
-//! Smith, Maximum likelihood estimation in a class of nonregular cases, Biometrika 72 (1985)
-//! 67-90.
+//! follow from one equation; a search finds the best λ.
+//!
+//! Sources:
+//! - Castanier, Pierre, Using intentional mistuning in the design of turbomachinery rotors, AIAA
+//!   J. 40 (2002) 2077-2086;
+//! - Smith, Maximum likelihood estimation in a class of nonregular cases, Biometrika 72 (1985)
+//!   67-90.
 
 use std::convert::Infallible;
 use stickslip_numerics::maximum::maximum;

@@ -36,7 +36,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// A run without a progress display or a way to stop it.
+    /// Settings of a run without progress reports.
     pub fn unwatched(threads: usize) -> Self {
         Context { threads, stop: Arc::new(AtomicBool::new(false)), finished: Arc::new(|| ()) }
     }
