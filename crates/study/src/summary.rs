@@ -130,7 +130,8 @@ const LONG_RUN: f64 = 3600.0;
 const LARGE: usize = 60;
 
 /// Factor on the excitation above which the first slip is due to rounding. Symmetry keeps the
-/// load from some joints, but rounding errors of the other loads remain.
+/// load from some joints, but rounding errors of the other loads remain. A load above this
+/// multiple of the slip limit comes from an undamped resonance, which has no bound.
 const UNLOADED: f64 = 1e6;
 
 /// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
