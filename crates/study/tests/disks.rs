@@ -543,7 +543,7 @@ fn coordinates_tell_a_wrong_sector() {
     let named = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"");
     assert_eq!(frequencies("sectors = 6\naxis = \"z\"\nnodes = \"nodes.csv\"\nboundary = \"right.csv\""), named);
     assert_eq!(frequencies("sectors = 6\naxis = \"z\"\nnodes = \"nodes.csv\""), named);
-    // the matrices alone do not show the mistake
+    // the matrices alone do not reveal exchanged sides: the frequencies are wrong
     let exchanged = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"swapped.csv\"");
     assert!(exchanged.iter().zip(&named).any(|(a, b)| (a / b - 1.0).abs() > 1e-3), "{exchanged:?} {named:?}");
     let refused = |disk: &str| {

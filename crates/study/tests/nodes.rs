@@ -243,7 +243,7 @@ fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
 }
 
 /// The normal direction does not depend on the order in which nodes are named: nodes of
-/// different orders are refused. Amplitudes without a quadratic form are refused, too.
+/// different orders are refused. An excitation amplitude whose square underflows is refused, too.
 #[test]
 fn normals_and_sizes_that_mislead_are_refused() {
     let study = "[study]\nkind = \"orbit\"\nfrequency = \"1 Hz\"\n";

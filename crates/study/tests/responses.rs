@@ -503,7 +503,8 @@ fn axes_take_every_unit_of_their_quantity() {
     }
 }
 
-/// An undamped structure has no peak below the force that friction can bound.
+/// Without damping, friction with a small limit does not bound the resonance, so the curve has
+/// no peak. With damping it has one.
 #[test]
 fn a_peak_without_neighbours_is_none() {
     let text = r#"

@@ -294,8 +294,8 @@ fn the_worst_evidence_is_the_largest() {
     assert_eq!(worst_evidence(&dataset).residual, None);
 }
 
-/// A transient of rigid joints in a triangle breaks down within its first period, because their
-/// forces become undetermined. The rows until then exist, and their summary covers them.
+/// Rigid joints in a triangle become indistinguishable within the first period, and the transient
+/// breaks down. The rows until then exist, and their summary covers them.
 #[test]
 fn a_transient_that_breaks_down_keeps_what_it_has() {
     let text = r#"

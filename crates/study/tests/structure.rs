@@ -303,8 +303,8 @@ fn parameters_of_a_structure_are_drawn() {
     }
 }
 
-/// A lumped mass on a spring to the ground, connected to the blade, and a mass attached to a
-/// row of it.
+/// A lumped mass with a spring to the blade and another one to the ground equals a dense
+/// solution.
 #[test]
 fn masses_and_springs_are_added_at_places() {
     let brick = blade();
@@ -886,8 +886,8 @@ fn write_chain(folder: &Path, masses: usize) {
     }
 }
 
-/// Harmonics of a joint meet modes far above the excitation, here the seventh one. The default
-/// reduced model contains these modes. A small structure is not reduced.
+/// Harmonics of a joint meet modes far above the excitation, here the seventh harmonic. The
+/// default frequency range contains these modes. This small structure is not reduced by default.
 #[test]
 fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
     let folder = tempfile::tempdir().unwrap();
