@@ -1,4 +1,5 @@
-//! Keys of the tables of a study file: what one takes, whether it must stand there, and what stands for it if not.
+//! Keys of the tables of a study file: the values that a key takes, its presence and its
+//! default.
 
 use stickslip::dimension::Dimension;
 use stickslip::law;
@@ -6,43 +7,44 @@ use stickslip::law;
 /// The schema version that this program reads.
 pub const VERSION: i64 = 1;
 
-/// Most masses, repetitions counted. Measured: a ring of 20,000 masses and joints is read and checked in 1.2 s of processor time, and the time
-/// grows with their number.
+/// Largest number of masses, repetitions included. Measured: a ring of 20,000 masses and joints
+/// is read and checked in 1.2 s of processor time. The time grows with their number.
 pub const MOST_MASSES: usize = 20_000;
 
-/// Most points of a study: cases times frequencies.
+/// Largest number of points of a study: cases times frequencies.
 pub const MOST_POINTS: usize = 100_000_000;
 
-/// Most cases of a study: each is resolved and assembled once before anything is computed.
+/// Largest number of cases of a study. Each case is resolved and assembled once before anything
+/// is computed.
 pub const MOST_CASES: usize = 1_000_000;
 
 /// One key of a table.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
-    /// The key.
+    /// Name of the key.
     pub name: &'static str,
-    /// What it takes.
+    /// The values that it takes.
     pub takes: Takes,
-    /// Whether it must stand there, or what happens without it.
+    /// Presence: required, optional, or optional with a default.
     pub presence: Presence,
-    /// One line of what it is.
+    /// One line that describes it.
     pub doc: &'static str,
     /// An example of the value, as TOML.
     pub example: &'static str,
 }
 
-/// Whether a key must stand in its table.
+/// Presence of a key in its table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Presence {
-    /// It must.
+    /// The key is required.
     Required,
-    /// It may be absent, and then nothing stands for it.
+    /// The key may be absent and has no default.
     Optional,
-    /// It may be absent, and this (as the content of a TOML string, or a bare value) stands for it.
+    /// The key may be absent. The default is the content of a TOML string, or a bare value.
     Default(&'static str),
 }
 
-/// What a key takes.
+/// The values that a key takes.
 #[derive(Debug, Clone, Copy)]
 pub enum Takes {
     /// Any text.
@@ -63,17 +65,17 @@ pub enum Takes {
     Frequencies(&'static [Key]),
     /// A table from a name to a quantity: `{ blade1 = "1 mm" }`.
     ByName(Dimension),
-    /// A table of its own with these keys.
+    /// A subtable with these keys.
     Table(&'static [Key]),
     /// A friction law: `{ kind = …, … }`.
     Law,
-    /// One of the words that the function lists, each with a line of what it is.
+    /// One of the words that the function lists, each with a line that describes it.
     Choice(fn() -> Vec<(&'static str, &'static str)>),
     /// `[parameters]`: quantities by name.
     Parameters,
     /// `vary`: lists of quantities, or ranges, by parameter.
     Vary,
-    /// `[sample]`: how many draws, and of what.
+    /// `[sample]`: the number of draws and the distributions.
     Sample,
     /// `of` in `[sample]`: distributions by parameter.
     Distributions,
@@ -81,7 +83,7 @@ pub enum Takes {
     Method,
     /// `[study]`: `kind`, `vary` and the keys of that kind.
     Study,
-    /// `repeat`: indices, each with how often, or from where to where.
+    /// `repeat`: indices, each with a count or with a first and a last value.
     Repeat,
     /// A list of tables with these keys: `[[mass]]`.
     List(&'static [Key]),
@@ -93,13 +95,14 @@ pub enum Takes {
     Row,
     /// A list of rows, or of nodes.
     Rows,
-    /// A table from rows to weights, or a list of such.
+    /// A table from rows to weights, or a list of such tables.
     Weights,
-    /// Three numbers, or quantities of a dimension.
+    /// Three numbers, or three quantities of a dimension.
     Vector(Dimension),
-    /// A quantity, or a list of such.
+    /// A quantity, or a list of quantities.
     Quantities(Dimension, Within),
-    /// Nothing, and why: what is looked for under this name cannot be stated. The key's line says what to do instead.
+    /// No value, with the reason: a user may look for this key, but the study file has no such
+    /// key. The key's `doc` says what to do instead.
     Refused(&'static str),
 }
 
@@ -114,7 +117,8 @@ pub enum Within {
     Positive,
 }
 
-/// The range of a law's parameter as far as a reader can tell without the law, which checks the rest itself.
+/// Returns the range of a law's parameter for the reader. The law itself checks the exact
+/// bounds.
 pub(crate) fn within(range: law::Range) -> Within {
     match range {
         law::Range::Positive | law::Range::Count(_) => Within::Positive,
@@ -124,7 +128,7 @@ pub(crate) fn within(range: law::Range) -> Within {
 }
 
 impl Within {
-    /// Whether the number is in the range.
+    /// Returns whether the number is in the range.
     pub fn holds(self, value: f64) -> bool {
         value.is_finite()
             && match self {
@@ -134,7 +138,7 @@ impl Within {
             }
     }
 
-    /// In words.
+    /// Describes the range in words.
     pub fn described(self) -> &'static str {
         match self {
             Within::Finite => "a finite number",
@@ -145,21 +149,21 @@ impl Within {
 }
 
 impl Key {
-    /// Whether it takes anything.
+    /// Returns whether the key takes a value.
     pub fn is_taken(&self) -> bool {
         !matches!(self.takes, Takes::Refused(_))
     }
 }
 
-/// The key of a damping as a share of the critical one.
+/// The key of a damping ratio, relative to critical damping.
 pub(crate) const RATIO: &str = "damping_ratio";
 
-/// A key that is looked for and cannot be: why, and what to do instead.
+/// A key that users look for but that does not exist, with the reason and the alternative.
 pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {
     Key { name, takes: Takes::Refused(why), presence: Presence::Optional, doc: instead, example: "" }
 }
 
-/// A key that must be there.
+/// A required key.
 pub const fn required(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
     Key { name, takes, presence: Presence::Required, doc, example }
 }
@@ -169,7 +173,7 @@ pub const fn optional(name: &'static str, takes: Takes, doc: &'static str, examp
     Key { name, takes, presence: Presence::Optional, doc, example }
 }
 
-/// A key that may be absent, and what then stands for it.
+/// A key that may be absent, with its default.
 pub const fn default(
     name: &'static str,
     takes: Takes,
@@ -186,24 +190,24 @@ const TO: Key = required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Pos
 const POINTS: Key =
     required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241");
 
-/// Keys of the range of a frequency.
+/// Keys of a range of frequencies.
 pub const RANGE: &[Key] = &[FROM, TO, POINTS];
 
-/// Keys of the range of a speed, which may begin at rest.
+/// Keys of a range of speeds, which may begin at zero.
 pub const SPEEDS: &[Key] = &[
     required("from", Takes::Quantity(Dimension::FREQUENCY, Within::AtLeastZero), "first value", "\"0 rpm\""),
     TO,
     POINTS,
 ];
 
-/// Keys of a range of frequencies of which the ends count.
+/// Keys of a range of frequencies of which only the two ends matter.
 pub const ENDS: &[Key] = &[
     FROM,
     TO,
     default("points", Takes::Count(2, MOST_POINTS as i64), "2", "of a range whose ends alone count, any number", "2"),
 ];
 
-/// Keys of a range of frequencies whose points lie where the curve bends.
+/// Keys of a range of frequencies whose points are placed by the curvature of the response.
 pub const ADAPTIVE: &[Key] = &[
     FROM,
     TO,

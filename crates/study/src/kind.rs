@@ -1,4 +1,4 @@
-//! A study kind: what it says of itself, and how its studies are cut, computed and drawn.
+//! A study kind: its description, and how its studies are divided, computed and drawn.
 
 use crate::cost::{Cost, Costing};
 use crate::dataset::Figure;
@@ -11,16 +11,17 @@ use crate::work::{Computed, Grain, Work};
 /// A row of the table of study kinds.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind {
-    /// What it says of itself.
+    /// Description of the kind.
     pub info: KindInfo,
-    /// How its studies are cut into units of work.
+    /// Divides its studies into units of work.
     pub grain: fn(&Study) -> Grain,
-    /// How much its studies hold, and what they take; too much rather than too little.
+    /// Estimate of the size and the time of its studies; errs on the high side.
     pub cost: fn(&Costing<'_>) -> Cost,
-    /// What looks like a mistake in a study of this kind, as sentences; cases that are spread over all of it.
+    /// Likely mistakes in a study of this kind, as sentences. The argument is a sample of
+    /// cases, spread over the study.
     pub warnings: fn(&[Surveyed]) -> Vec<String>,
-    /// Computes one unit: rows of its tables.
+    /// Computes one unit: the rows of its tables.
     pub compute: fn(&Work<'_>) -> Computed,
-    /// Draws the figure of finished tables; the title is the study's.
+    /// Draws the figure of finished tables. The caller sets the title.
     pub draw: fn(&Drawing<'_>) -> Figure,
 }

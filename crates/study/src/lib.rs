@@ -1,7 +1,9 @@
-//! Study files of Stickslip: what a TOML file asks for, read, checked and run.
+//! Study files of Stickslip: reads, checks and runs a study stated in TOML.
 //!
-//! [`read_study`] turns a text into a [`Study`]: tree ([`toml`]), statements (every expression compiled, every place known), then every
-//! case once, so that whatever is wrong is found before anything is written. [`schema`] describes all tables and keys as data.
+//! [`read_study`] turns a text into a [`Study`] in three stages. The text becomes a tree
+//! ([`toml`]). The tree becomes statements: every expression is compiled and every location is
+//! known. Then every case is resolved once, so that all errors are found before anything is
+//! written. [`schema`] describes all tables and keys as data.
 
 pub mod block;
 pub mod book;

@@ -13,10 +13,10 @@ pub(crate) enum Reference {
 }
 
 impl Reference {
-    /// Both.
+    /// Both references.
     pub const ALL: [Reference; 2] = [Reference::Free, Reference::Stuck];
 
-    /// What its joints are.
+    /// Returns the state of its joints as a word.
     pub fn name(self) -> &'static str {
         match self {
             Reference::Free => "free",
@@ -24,7 +24,8 @@ impl Reference {
         }
     }
 
-    /// The same model with every joint so, or a sentence that says why there is none.
+    /// Returns the model with every joint in this state, or a sentence that says why this is
+    /// impossible.
     pub fn model(self, model: &Model) -> Result<Model, String> {
         let mut model = model.clone();
         for joint in &mut model.joints {
@@ -40,7 +41,7 @@ impl Reference {
         Ok(model)
     }
 
-    /// The sentence that says why there is none.
+    /// Returns the sentence that says why there is no such reference curve.
     pub fn missing(self, why: &str) -> String {
         format!("there is no reference curve with all joints {}: {why}", self.name())
     }

@@ -1,14 +1,15 @@
-//! Memory that a run may take.
+//! Memory limit of a run.
 
-/// Memory that a run may take unless it is told otherwise, bytes. What the machine has free may be less.
+/// Default memory limit of a run, bytes. The limit is lower if the machine has less free
+/// memory.
 pub const MEMORY_LIMIT: u64 = 2_000_000_000;
 
-/// What may be used when nobody says: [`MEMORY_LIMIT`], or what the machine has if that is less.
+/// Returns the default limit: [`MEMORY_LIMIT`], or the machine's free memory if that is less.
 pub(crate) fn default_limit() -> u64 {
     MEMORY_LIMIT.min(available().unwrap_or(MEMORY_LIMIT))
 }
 
-/// Memory that the machine can give, where Linux tells it.
+/// Returns the available memory of the machine, bytes; `None` if the system is not Linux.
 fn available() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;

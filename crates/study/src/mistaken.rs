@@ -1,4 +1,5 @@
-//! What a quantity of another dimension than expected was probably meant as, and what to write instead.
+//! Advice for a quantity of the wrong dimension: its probable meaning, and the correct way to
+//! write it.
 
 use stickslip::dimension::Dimension;
 
@@ -9,7 +10,7 @@ const fn dimension(kg: i8, m: i8, s: i8, rad: i8) -> Dimension {
 const PRESSURE: Dimension = dimension(1, -1, -2, 0);
 const ACCELERATION: Dimension = dimension(0, 1, -2, 0);
 
-/// What is expected, and what of a model of rotation is found there.
+/// Pairs of the expected dimension and the dimension that a model of rotation has there.
 const OF_ROTATION: [(Dimension, Dimension); 9] = [
     (Dimension::MASS, dimension(1, 2, 0, 0)),
     (Dimension::STIFFNESS, dimension(1, 2, -2, -1)),
@@ -25,7 +26,8 @@ const OF_ROTATION: [(Dimension, Dimension); 9] = [
 const TORSION: &str = "this is a quantity of rotation, and places move in metres; state a torsional model by the same numbers: kg m^2 as kg, N m/rad \
                        as N/m, N m s/rad as N s/m, N m as N; results in metres are then radians";
 
-/// Advice for a quantity of dimension `found` where `expected` is expected; `text` is what was written.
+/// Returns advice for a quantity of dimension `found` where `expected` is required; `text` is
+/// the user's text.
 pub(crate) fn advice(expected: Dimension, found: Dimension, text: &str) -> Option<String> {
     let said = match (expected, found) {
         _ if OF_ROTATION.contains(&(expected, found)) => TORSION,
@@ -57,7 +59,7 @@ pub(crate) fn advice(expected: Dimension, found: Dimension, text: &str) -> Optio
     Some(said.to_owned())
 }
 
-/// Whether a number is in grams, which accelerations of gravity are mistaken for.
+/// Returns whether a number is in grams. Users write `g` for the acceleration of gravity.
 fn is_grams(text: &str) -> bool {
     let unit = text.trim().trim_start_matches(|c: char| c.is_ascii_digit() || "+-.eE ".contains(c));
     unit == "g" && !text.contains('*')
@@ -87,11 +89,11 @@ mod tests {
         ] {
             assert!(said(text, expected).contains(words), "{text}: {}", said(text, expected));
         }
-        // a mass in grams where a stiffness is expected is no acceleration
+        // a mass in grams where a stiffness is expected is not mistaken for an acceleration
         assert_eq!(said("2 g", Dimension::STIFFNESS), "");
     }
 
-    /// What is advised can be written.
+    /// The quantities in the advice are valid and have the expected dimension.
     #[test]
     fn advised_quantities_have_the_dimension() {
         for (text, dimension) in [
@@ -103,7 +105,7 @@ mod tests {
         ] {
             assert!(quantity(text, dimension).is_ok(), "{text}");
         }
-        // 2 g at 50 Hz are 0.2 mm: 2 * 9.80665 / (2 pi 50)^2
+        // 2 g at 50 Hz is 0.2 mm: 2 * 9.80665 / (2 pi 50)^2
         let amplitude = quantity("2*9.80665 m/s^2/(50 Hz)^2 * (1 rad)^2", Dimension::LENGTH).unwrap();
         assert!((amplitude / 1.9872428e-04 - 1.0).abs() < 1e-6, "{amplitude}");
     }

@@ -1,21 +1,25 @@
-//! The names of a model in the values of a key: of places, of joints, of moved places. A node stands for all its directions, a joint of nodes
-//! likewise, and on a disk what a sector calls it for all sectors; where a key takes one place, it is refused with its directions named.
+//! Names of the model's places and joints that the value of a key may use.
+//!
+//! The name of a node stands for all its directions, and so does the name of a joint between
+//! nodes. On a disk, a name of the sector stands for that element in all sectors. A key that
+//! takes one place refuses such a name and lists the directions.
 
 use crate::info::Complaint;
 use crate::near::{nearest, one_of, shown};
 use std::collections::BTreeSet;
 use stickslip::model::Model;
 
-/// Names that a message lists.
+/// Largest number of names that a message lists.
 const LISTED: usize = 12;
 
-/// The names that a key may take, and what each stands for.
+/// The names that a key may take, each with the labels that it stands for.
 #[derive(Debug, Default)]
 pub(crate) struct Names {
     known: Vec<(String, Vec<String>)>,
 }
 
-/// `a` itself, or under its name every one of several labels.
+/// Returns one entry per label. If no label equals `name`, adds `name` as an entry for all of
+/// them.
 fn entries(name: &str, labels: Vec<String>) -> Vec<(String, Vec<String>)> {
     let mut entries: Vec<_> = labels.iter().map(|label| (label.clone(), vec![label.clone()])).collect();
     if labels.iter().all(|label| label != name) {
@@ -33,7 +37,7 @@ fn of_masses(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
 }
 
 impl Names {
-    /// The places of the structure and of all masses, and their nodes.
+    /// The places of the structure, of masses and of bodies, and their nodes.
     pub fn of_places(model: &Model) -> Names {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
         let mut names = Names { known: places.chain(of_masses(model)).chain(of_bodies(model)).collect() };
@@ -43,7 +47,8 @@ impl Names {
         names
     }
 
-    /// What is called `blade` in a sector stands for those of all sectors. `all` are the elements of the ring in their order.
+    /// Adds the sector's names: `blade` stands for the blades of all sectors. `all` are the
+    /// elements of the ring, in order.
     fn around(&mut self, model: &Model, all: Vec<(&str, Vec<String>)>) {
         let Some(ring) = model.ring else { return };
         let each = all.len() / ring.sectors.max(1);
@@ -61,7 +66,7 @@ impl Names {
         }
     }
 
-    /// The places with a displacement, without rotations: those whose amplitudes are compared.
+    /// The places that are displacements, not rotations: their amplitudes can be compared.
     pub fn of_displacements(model: &Model) -> Names {
         let mut names = Names::of_places(model);
         names.known.iter_mut().for_each(|(_, places)| places.retain(|place| !model.is_rotation(place)));
@@ -69,7 +74,7 @@ impl Names {
         names
     }
 
-    /// Those of masses and bodies whose motion is not imposed.
+    /// The displacements of masses and bodies whose motion is not imposed.
     pub fn of_free_masses(model: &Model) -> Names {
         let displacements = of_bodies(model).map(|(name, mut places)| {
             places.retain(|place| !model.is_rotation(place));
@@ -82,7 +87,7 @@ impl Names {
         names
     }
 
-    /// The joints too, with their directions.
+    /// Adds the joints and their directions.
     #[must_use]
     pub fn and_joints(mut self, model: &Model) -> Names {
         let labels = model.joint_labels();
@@ -92,7 +97,7 @@ impl Names {
         self
     }
 
-    /// The places with an imposed motion too, but for rotations.
+    /// Adds the places with an imposed motion, except rotations.
     #[must_use]
     pub fn and_moved(mut self, model: &Model) -> Names {
         let moved = model.motions.iter().filter(|motion| !model.is_rotation(&motion.on));
@@ -100,12 +105,13 @@ impl Names {
         self
     }
 
-    /// Whether there are any.
+    /// Returns whether there are no names.
     pub fn is_empty(&self) -> bool {
         self.known.is_empty()
     }
 
-    /// What a name stands for: itself, or all its directions. `what` says what it should be, for the message.
+    /// Returns the labels that a name stands for: itself, or all its directions. `what` names
+    /// the expected object for the message.
     pub fn all(&self, key: &'static str, what: &str, name: &str) -> Result<&[String], Complaint> {
         let found = self.known.iter().find(|(known, _)| known == name).map(|(_, labels)| labels.as_slice());
         found.ok_or_else(|| {
@@ -122,7 +128,7 @@ impl Names {
         })
     }
 
-    /// The one place or joint that a name stands for.
+    /// Returns the one place or joint that a name stands for.
     pub fn one(&self, key: &'static str, what: &str, name: &str) -> Result<&str, Complaint> {
         match self.all(key, what, name)? {
             [one] => Ok(one),
@@ -131,7 +137,7 @@ impl Names {
                     several.iter().all(|label| label.strip_prefix(name).is_some_and(|rest| rest.starts_with('.')));
                 let message = match of_node {
                     true => format!("`{name}` has several directions, and one is needed"),
-                    // of a disk, what has this name in every sector
+                    // on a disk: the places with this name in every sector
                     false => format!("`{name}` stands for {} places, and one is needed", several.len()),
                 };
                 let help = format!("say {}", one_of(several.iter().take(LISTED).map(String::as_str)));
@@ -140,14 +146,15 @@ impl Names {
         }
     }
 
-    /// The directions that there are, of a name with one that there is not: those of `tip` for `tip.y`.
+    /// Returns the existing directions of a node for a name with an unknown direction: those of
+    /// `tip` for `tip.y`.
     pub fn directions_of(&self, name: &str) -> Option<&[String]> {
         let (node, _) = name.split_once('.')?;
         let (_, labels) = self.known.iter().find(|(known, labels)| known == node && labels.len() > 1)?;
         Some(labels)
     }
 
-    /// That a name is none of them.
+    /// Returns the message that a name is unknown.
     pub fn missing(&self, what: &str, name: &str) -> String {
         let none = format!("there is no {what} `{}`", shown(name));
         match name.split_once('.').filter(|_| self.directions_of(name).is_some()) {

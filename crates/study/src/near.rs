@@ -1,8 +1,9 @@
-//! Near misses: the word that was probably meant.
+//! Suggestions for misspelled words.
 
-/// The candidate nearest to `word`, if one is near enough to be worth a question.
+/// Returns the candidate that is most similar to `word`, if one is similar enough.
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // words from a file can be megabytes long, and the distance costs the product of the lengths; of numbers none is near another
+    // Words from a file can be megabytes long, and the distance costs the product of the
+    // lengths. Numbers get no suggestion.
     if word.len() > 64 || word.starts_with(|first: char| first.is_ascii_digit()) {
         return None;
     }
@@ -13,10 +14,11 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
             let other = candidate.to_lowercase();
             let distance = strsim::damerau_levenshtein(&lower, &other);
             let length = lower.chars().count().max(other.chars().count());
-            // one slip in a short word, a third of a long one; or an abbreviation such as `freq`
+            // one typing error in a short word, a third of the letters in a long one; or an
+            // abbreviation such as `freq`
             let near = distance <= (length / 3).max(usize::from(length > 1));
             let abbreviation = lower.chars().count() >= 3 && other.starts_with(&lower);
-            // `frequency response`, `nonlinear modes`
+            // one word of several, as in `frequency response` or `nonlinear modes`
             let parts = || lower.split(|c: char| !c.is_alphanumeric());
             let within = other.chars().count() >= 3 && parts().any(|part| part == other);
             (near || abbreviation || within).then_some((distance, candidate))
@@ -25,7 +27,7 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
         .map(|(_, candidate)| candidate)
 }
 
-/// `` `a`, `b` or `c` ``.
+/// Formats a list as `` `a`, `b` or `c` ``.
 pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     let words: Vec<String> = words.into_iter().map(|word| format!("`{word}`")).collect();
     match words.split_last() {
@@ -35,7 +37,8 @@ pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     }
 }
 
-/// A word of the file as it can be shown in one line of a message: no control characters, not too long.
+/// Makes a word of the file fit for one line of a message: replaces control characters and cuts
+/// it to 60 characters.
 pub(crate) fn shown(word: &str) -> String {
     const LONGEST: usize = 60;
     let mut text: String =

@@ -1,4 +1,5 @@
-//! What a reader of the results must know, in sentences. Notes of one sort from several units become one sentence.
+//! Notes for the reader of the results, as sentences. Notes of one kind from several units
+//! become one sentence.
 
 use crate::expression::displayed;
 use crate::farther::Slipping;
@@ -11,20 +12,23 @@ use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, JointMotion, Orbit};
 use stickslip::structure::Reduction;
 
-/// How a note begins that is a warning.
+/// Prefix of a note that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
-/// Cases that a sentence about several names; of more it gives the number.
+/// Largest number of cases that a note names. If it applies to more cases, it gives their
+/// number.
 const MOST_NAMED: usize = 3;
 
-/// Cases that are named one by one because a joint sticks in them: as many as are read. Of the others the points are counted together.
+/// Largest number of cases with a permanently stuck joint that are named one by one. The points
+/// of all other such cases are counted together.
 const MOST_STUCK: usize = 4;
 
-/// Which orbit of a continuum is shown.
+/// Says which orbit of a continuum is reported.
 const SHOWN: &str = "Reported: the solution that begins at static equilibrium under the constant loads, applied as one ramp. A rigid joint sticks where the \
     search found it, and method `transient` reports what its run led to.";
 
-/// Change of amplitudes with the history above which it is told: the tolerance of harmonic balance.
+/// Relative change of the amplitudes with the history above which it is reported: the tolerance
+/// of harmonic balance.
 const SPREAD: f64 = 1e-3;
 
 /// A note.
@@ -32,83 +36,92 @@ const SPREAD: f64 = 1e-3;
 pub enum Note {
     /// A sentence about the whole study.
     Said(String),
-    /// A sentence about one case or several.
+    /// A sentence about one or several cases.
     Of {
-        /// How many.
+        /// Number of cases.
         cases: usize,
-        /// The first of them, up to [`MOST_NAMED`].
+        /// The first cases, at most [`MOST_NAMED`].
         named: Vec<String>,
-        /// What is said of them; it begins with [`WARNING`] if it is one.
+        /// The sentence. It begins with [`WARNING`] if it is a warning.
         text: String,
     },
-    /// Points whose series is too short, and the largest estimated error.
+    /// Number of points whose series is too short, and the largest estimated error.
     Truncated(usize, f64),
-    /// Points whose amplitudes depend on the history of a joint that sticks, and the largest change.
+    /// Number of points whose amplitudes depend on the history of a stuck joint, and the
+    /// largest relative change.
     HistorySpread(usize, f64),
-    /// The same on a branch, whose harmonics are given, and which has no other method.
+    /// Like `Truncated`, on a branch: its harmonics are given, and it has no other method.
     TruncatedOnBranch(usize, f64),
-    /// Points whose series was not compared with a longer one.
+    /// Number of points whose series was not compared with a longer one.
     Unchecked(usize),
-    /// Points whose orbit is unstable, and those of them whose motion repeats after fewer periods than were asked for.
+    /// Number of points whose orbit is unstable. The second number counts those of them whose
+    /// orbit repeats after fewer periods than requested.
     Unstable(usize, usize),
-    /// Points at which something sticks all the time in a motion that is not its own mirror image.
+    /// Number of points with a permanently stuck part of a joint in a motion without
+    /// half-period symmetry.
     History(usize),
-    /// The same beside a joint whose force depends on where the bodies are, and the names of both at the first.
+    /// Like `History`, with another joint whose force depends on the positions of the bodies.
+    /// The names are those of the first point.
     Several {
-        /// How many.
+        /// Number of points.
         points: usize,
-        /// The one that sticks.
+        /// The stuck joint.
         stuck: String,
-        /// The one that knows where.
+        /// The joint whose force depends on the positions.
         knows: String,
     },
-    /// Points of a curve at which it has another orbit when it is followed the other way.
+    /// Points of a curve that has another orbit there when it is followed in the other
+    /// direction.
     OtherOrbit {
-        /// How many.
+        /// Number of points.
         points: usize,
-        /// The lowest and the highest drive frequency of these, rad/s.
+        /// Lowest excitation frequency of these points, rad/s.
         from: f64,
-        /// See `from`.
+        /// Highest excitation frequency of these points, rad/s.
         to: f64,
-        /// Largest amplitude of the other orbit over that of the one in the table: where it is lowest, and where it is highest.
+        /// Smallest and largest ratio of the other orbit's largest amplitude to that of the
+        /// orbit in the table.
         ratios: [f64; 2],
     },
-    /// Points at which the method that `auto` had chosen found no orbit and another one did.
+    /// Points at which the method chosen by `auto` found no orbit and another method did.
     Instead {
-        /// How many.
+        /// Number of points.
         points: usize,
-        /// The one that was chosen.
+        /// The chosen method.
         chosen: String,
-        /// The one that found them.
+        /// The method that found the orbits.
         found: String,
     },
-    /// Points at which nothing is known of the stability of an orbit with friction that falls with velocity.
+    /// Number of points with unknown stability: the friction falls with velocity.
     Unjudged(usize),
-    /// Motions in time in few coordinates, whose error is known of harmonic forces up to this frequency, rad/s.
+    /// Time histories on a reduced model. Its error is known for harmonic forces up to this
+    /// frequency, rad/s.
     InTime(f64),
-    /// Points at which joints slip on a structure in few coordinates.
+    /// Points at which joints slip on a reduced model.
     Slipping(Slipping),
-    /// Of one case (its varied parameters in words): points at which a joint sticks for the whole period, of so many.
+    /// Points of one case at which a joint is permanently stuck.
     Stuck {
-        /// The case.
+        /// The varied parameters of the case, in words.
         case: String,
-        /// Points that stick.
+        /// Number of points with a stuck joint.
         points: usize,
-        /// All points.
+        /// Number of all points.
         of: usize,
     },
-    /// Points that stick in further cases, beyond [`MOST_STUCK`].
+    /// Number of points with a stuck joint in the cases beyond [`MOST_STUCK`].
     StuckElsewhere(usize),
 }
 
 impl Note {
-    /// What is said of one case, or of a point of it: both in words that are empty where there is only one. It begins with [`WARNING`] if it is one.
+    /// A sentence about one case or one of its points. `case` is empty if there is only one.
+    /// The text begins with [`WARNING`] if it is a warning.
     pub(crate) fn of_case(case: &str, text: impl Into<String>) -> Note {
         Note::Of { cases: 1, named: vec![case.to_owned()], text: text.into() }
     }
 
-    /// What an orbit asks for: which method found it instead of the chosen one, that it is unstable, if that is known (see [`Orbit::is_stable`]), how accurate its series is, that it is one of
-    /// many, and what its `reduction_error` leaves out.
+    /// Returns the notes of one orbit. They state a method that replaced the chosen one, and
+    /// instability if it is known ([`Orbit::is_stable`]). They also state the accuracy of the
+    /// series, other possible orbits and the limits of the reduced model.
     pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
         let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
@@ -130,7 +143,8 @@ impl Note {
         said.chain(Note::history(model, orbit)).chain(range).chain(Note::slipping(model, orbit)).collect()
     }
 
-    /// That friction makes harmonics above those that the coordinates were chosen for.
+    /// Returns a note if friction produces harmonics above the frequency range of the reduced
+    /// model.
     fn slipping(model: &Model, orbit: &Orbit) -> Option<Note> {
         let up_to = match model.substructure.as_ref()?.reduction {
             Reduction::UpTo { up_to, .. } | Reduction::Modes { up_to, .. } => up_to,
@@ -139,14 +153,16 @@ impl Note {
         Slipping::of(orbit, up_to).map(Note::Slipping)
     }
 
-    /// That the orbit is one of many, and whether the others may have other amplitudes: that is so where a joint has another stiffness elsewhere.
+    /// Returns a note if the orbit is one of several. Their amplitudes differ if the stiffness
+    /// of another joint depends on the positions of the bodies.
     fn history(model: &Model, orbit: &Orbit) -> Option<Note> {
         let stuck = orbit.evidence.history.first()?.clone();
         let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
         let is_rigid = |piece: &Piece| matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
         let holds = |joint: &Joint| joint.law.pieces().unwrap_or_default().iter().any(is_rigid);
         let rigid = orbit.evidence.stuck.iter().any(|name| joint_of(name).is_some_and(holds));
-        // behind a spring what sticks is relaxed near the mean of the motion, and what is always closed there has one stiffness
+        // An elastic stuck joint relaxes near the mean of the motion. A contact that stays
+        // closed has a constant stiffness there.
         let knows = orbit.joints.iter().find(|motion| {
             joint_of(&motion.name).is_some_and(|joint| match joint.law.normal() {
                 Some(_) => rigid || motion.open_fraction > 0.0,
@@ -157,7 +173,7 @@ impl Note {
         Some(Note::Several { points: 1, stuck, knows })
     }
 
-    /// The same where the orbit is one of a branch.
+    /// Changes the note to its form for an orbit of a branch.
     pub(crate) fn on_branch(self) -> Note {
         match self {
             Note::Truncated(points, largest) => Note::TruncatedOnBranch(points, largest),
@@ -165,14 +181,17 @@ impl Note {
         }
     }
 
-    /// Adds it to `notes`, to one of its sort if there is one. However notes are joined first with their neighbours, the whole is the same.
+    /// Adds the note to `notes`, to one of its kind if there is one. The result does not depend
+    /// on the order of grouping.
     pub(crate) fn join(self, notes: &mut Vec<Note>) {
         let Some(note) = self.stuck_joined(notes) else { return };
         note.joined(notes);
     }
 
-    /// The cases follow each other, so that only the last one of the list can go on. One at which nothing sticks is let go then, but not the
-    /// first of the list: it may go on with the last one of another.
+    /// Joins a note of stuck points. Cases follow each other, so only the last stuck note of
+    /// the list can continue. A last note without stuck points is removed when another case
+    /// begins. The first note of the list stays, because it may continue the last note of
+    /// another list.
     fn stuck_joined(self, notes: &mut Vec<Note>) -> Option<Note> {
         let Note::Stuck { case, points, of } = self else { return Some(self) };
         let is_stuck = |note: &Note| matches!(note, Note::Stuck { .. });
@@ -260,7 +279,7 @@ impl Note {
         notes.push(self);
     }
 
-    /// The sentence; none if there is nothing to be said.
+    /// Returns the sentence, or `None` if there is nothing to report.
     pub(crate) fn text(&self) -> Option<String> {
         let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
         match self {
@@ -374,7 +393,7 @@ impl Note {
     }
 }
 
-/// Whether a law without memory has another stiffness where it is stretched farther.
+/// Returns whether a law without memory has another stiffness at a larger amplitude.
 fn is_curved(joint: &Joint, motion: &JointMotion) -> bool {
     let is_elastic = joint.law.rate().is_some_and(|rate| rate.states() == 0) && joint.law.scale().is_infinite();
     let (low, high) = motion.displacement.first().copied().unwrap_or_default();
@@ -435,7 +454,8 @@ mod tests {
         );
     }
 
-    /// What is true of many cases is a line, not a page: a warning of 16 draws stood there 16 times.
+    /// A note that is true of many cases is one line: a warning of 16 draws once appeared 16
+    /// times.
     #[test]
     fn what_is_said_of_many_cases_is_said_once() {
         let texts = |cases: usize| {
@@ -453,11 +473,11 @@ mod tests {
         let many = texts(16);
         assert_eq!(many[0], "warning: 16 cases (k = 1 N/m; k = 2 N/m; k = 3 N/m and 13 more): it moves too fast");
         assert_eq!((many.len(), many[2].as_str()), (3, general));
-        // the one case of a study has no name
+        // the only case of a study has no name
         assert_eq!(Note::of_case("", "warning: it moves too fast").text().unwrap(), "warning: it moves too fast");
     }
 
-    /// A branch takes no other method: its note names its own keys alone.
+    /// A branch takes no other method, so its note names only its own keys.
     #[test]
     fn what_helps_a_branch_is_said_of_a_branch() {
         let mut notes = Vec::new();
@@ -476,7 +496,8 @@ mod tests {
 
     #[test]
     fn however_notes_are_joined_first_the_whole_is_the_same() {
-        // stretches of three units a case; a joint sticks in most cases, and in some not at first
+        // blocks of three units per case; a joint sticks in most cases, in some of them not at
+        // first
         let all: Vec<Note> = (0..3 * MOST_STUCK)
             .flat_map(|unit| {
                 let (case, points) = (format!("case {}", unit / 3), if unit % 7 < 2 { 0 } else { unit % 5 });

@@ -1,17 +1,24 @@
-//! Percentiles of the curves of many draws, as a band with its median.
+//! Percentiles of the curves of many draws: a band with its median.
 
 use crate::dataset::{Series, Style};
 
-/// The ends of the band and the line in it, as shares.
+/// Ends of the band and the line in it, as fractions.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
-/// Of the curves that have values at all those that must have one at an abscissa, where a band is drawn. Where the ranges of curves end one after the
-/// other, those that go on are no sample of all: with this share the median of them is that of all to 2.5 percentage points.
+/// Minimum fraction of the curves that must have a value at an abscissa; below it the band has a
+/// gap. Curves without any value do not count.
+///
+/// If curves end at different abscissae, the remaining ones are not a sample of all. With this
+/// fraction their median is that of all to 2.5 percentage points.
 const MOST_OF_THEM: f64 = 0.95;
-/// Relative distance of abscissae that are the same but for rounding: amplitudes that were computed, at which a curve begins.
+/// Relative distance of abscissae that differ by rounding only, such as computed amplitudes at
+/// which a curve begins.
 const SAME: f64 = 1e-9;
 
-/// Median and band of curves `(x, y)` over the abscissae of the first one with the most points. A curve may lack a point, because it failed or lies
-/// outside; where so many do that the others are no sample of all, there is a gap, and at the ends nothing.
+/// Returns the median and the band of curves `(x, y)`, over the abscissae of the first curve
+/// with the most points.
+///
+/// A curve may lack a point, because it failed or lies outside. Where too many curves lack a
+/// point, the band has a gap, and at the ends it stops.
 pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: usize) -> Vec<Series> {
     let Some(grid) = curves.iter().map(|(x, _)| x).reduce(|a, b| if b.len() > a.len() { b } else { a }) else {
         return Vec::new();
@@ -41,7 +48,8 @@ pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: 
     ]
 }
 
-/// The value of a share of rising values, between two of them in proportion (definition 7 of Hyndman and Fan, 1996).
+/// Returns a quantile of rising values by linear interpolation (definition 7 of Hyndman and
+/// Fan, 1996).
 fn quantile(values: &[f64], share: f64) -> f64 {
     let Some(last) = values.len().checked_sub(1) else { return f64::NAN };
     let at = share * last as f64;
@@ -49,12 +57,12 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     below + (above - below) * at.fract()
 }
 
-/// Whether two abscissae differ by rounding only.
+/// Returns whether two abscissae differ by rounding only.
 fn same(one: f64, other: f64) -> bool {
     (one - other).abs() <= SAME * one.abs().max(other.abs())
 }
 
-/// A curve at other abscissae, in straight lines between its points; nothing outside.
+/// Returns a curve at other abscissae by linear interpolation; NaN outside its range.
 fn over(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
     if grid == x {
         return y.to_vec();
@@ -76,7 +84,7 @@ fn over(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// NumPy 2: `np.percentile([1, 2, 4, 8, 16], [5, 50, 95])` is 1.2, 4, 14.4.
+    /// Reference: NumPy 2, `np.percentile([1, 2, 4, 8, 16], [5, 50, 95])` is 1.2, 4, 14.4.
     #[test]
     fn bands_are_percentiles_at_every_abscissa() {
         let x = vec![1.0, 2.0, 3.0];
@@ -90,20 +98,20 @@ mod tests {
         near(&series[0].y, [14.4, 28.8, 7.0]);
         near(&series[1].y, [4.0, 8.0, 7.0]);
         assert_eq!((series[0].style, series[1].label.as_str()), (Style::Band, "blade1, median"));
-        // four of five are too few to stand for all: a gap, and at the end nothing
+        // four of five curves are too few: a gap inside, and no band at the end
         curves[4].1[1] = f64::NAN;
         assert!(percentiles(&curves, "", 0)[1].y[1].is_nan());
         curves[0].1[2] = f64::NAN;
         assert_eq!(percentiles(&curves, "", 0)[0].x, [1.0]);
-        // 19 of 20 are enough, and one that has no value at all is none of them
+        // 19 of 20 are enough; a curve without any value does not count
         let lacks = |i: usize| [[1.0, f64::NAN, 1.0], [f64::NAN; 3]].get(i).copied().unwrap_or([1.0; 3]).to_vec();
         let most: Vec<(Vec<f64>, Vec<f64>)> = (0..21).map(|i| (x.clone(), lacks(i))).collect();
         assert_eq!(percentiles(&most, "", 0)[1].y, [1.0; 3]);
-        // one that begins a rounding later has its first point all the same
+        // a curve whose first abscissa differs by rounding keeps its first point
         let later = (vec![1.0 + 1e-15, 2.0], vec![3.0, 5.0]);
         let series = percentiles(&[(vec![1.0, 2.0], vec![1.0, 5.0]), later], "", 0);
         assert_eq!(series[1].y, [2.0, 5.0]);
-        // a curve with other points counts between them, and not beyond
+        // a curve with other abscissae counts between its points, not outside
         let other = (vec![1.0, 3.0], vec![10.0, 30.0]);
         let series = percentiles(&[(vec![0.0, 2.0], vec![5.0, 20.0]), other], "", 0);
         assert_eq!((&series[1].x[..], &series[1].y[..]), (&[2.0][..], &[20.0][..]));

@@ -1,4 +1,4 @@
-//! What a table keeps of one orbit, or of its failure.
+//! Table row of one orbit, or of a failed point.
 
 use crate::columns;
 use crate::extra;
@@ -8,18 +8,18 @@ use crate::work::Prepared;
 use stickslip::method::OrbitError;
 use stickslip::orbit::{Orbit, Symmetry};
 
-/// The place of a point in words: the varied parameters and the frequency.
+/// Describes a point in words: the varied parameters and the frequency.
 pub(crate) fn location_of(case: &Case, omega: f64) -> String {
     let frequency = format!("frequency = {:.6} Hz", omega / std::f64::consts::TAU);
     if case.varied.is_empty() { frequency } else { format!("{}, {frequency}", case.label()) }
 }
 
-/// One number per place and joint, and the evidence.
+/// Numbers that a table keeps of one orbit, with its evidence.
 #[derive(Debug, Clone)]
 pub(crate) struct Summary {
-    /// Amplitude, mean, phase per mass.
+    /// Amplitude, mean and phase (degrees) of every place.
     pub places: Vec<[f64; 3]>,
-    /// Dissipation, slip fraction per joint.
+    /// Dissipation and slip fraction of every joint.
     pub joints: Vec<[f64; 2]>,
     pub stable: Option<bool>,
     pub residual: f64,
@@ -32,7 +32,7 @@ pub(crate) struct Summary {
     pub status: String,
     pub failure: Option<String>,
     pub stuck: bool,
-    /// What `output` asks for.
+    /// The columns that `output` requests.
     pub extra: Vec<f64>,
 }
 
@@ -48,7 +48,7 @@ impl Summary {
         }
     }
 
-    /// Of an orbit whose stability was looked at before.
+    /// The row of an orbit whose stability is known already.
     pub fn of(prepared: &Prepared, orbit: &Orbit, stable: Option<bool>) -> Self {
         Summary {
             places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
@@ -67,7 +67,7 @@ impl Summary {
         }
     }
 
-    /// A point without a result.
+    /// The row of a point without a result.
     pub fn missing(prepared: &Prepared, status: &str) -> Self {
         let system = &prepared.system;
         Summary {
@@ -87,7 +87,7 @@ impl Summary {
         }
     }
 
-    /// The cells of the row, after the varied parameters and the frequency.
+    /// Writes the cells of the row that follow the varied parameters and the frequency.
     pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
         let system = &prepared.system;
         for ((place, along), [amplitude, mean, phase]) in system.places().iter().zip(system.seen()).zip(&self.places) {

@@ -1,11 +1,13 @@
-//! Reads a study file: text to tree to statements, then every case once, so that nothing wrong is found later.
+//! Reads a study file: text to tree to statements, then resolves every case once, so that no
+//! error is found later.
 //!
-//! - `reader`: what is known while a file is read;
+//! - `reader`: state of the reader while it reads a file;
 //! - `values`: from a node of the tree to a stated value;
-//! - `kinds`: tables whose `kind` says which keys they have;
-//! - `disk`: `[disk]`, and the pattern that it names;
-//! - `lists`: the lists of a model, and entries that are repeated;
-//! - `parameters`: `[parameters]`, `vary`, and values from outside;
+//! - `kinds`: tables whose `kind` determines their keys;
+//! - `disk`: `[disk]` and the pattern file that it names;
+//! - `lists`: the lists of a model, and repeated entries;
+//! - `parameters`: `[parameters]`, `vary`, and overrides;
+//! - `structure`: `[structure]` and its files;
 //! - `template`: the model of a template.
 
 mod disk;
@@ -37,7 +39,8 @@ use template::{TemplateFile, named_template};
 /// Reads the study at `path`; `overrides` are parameters and their new values, as in `--set Ft=3N`.
 ///
 /// # Errors
-/// [`StudyError`]: the file is not there, is a folder, is too big, or what [`read_bytes`] refuses.
+/// [`StudyError`]: the file does not exist, is a folder or is too big, or [`read_bytes`]
+/// refuses it.
 pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, StudyError> {
     let name = path.display().to_string();
     let refuse = |message: String, help: Option<String>| StudyError::file(&name, message, help);
@@ -59,7 +62,7 @@ pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, S
     read_bytes(&name, &bytes, overrides)
 }
 
-/// The ends of the names of results, and what such a file is.
+/// File name extensions of results, with a description of such a file.
 const RESULTS: [(&str, &str); 7] = [
     ("csv", "a table of numbers"),
     ("parquet", "a table of numbers"),
@@ -70,7 +73,7 @@ const RESULTS: [(&str, &str); 7] = [
     ("html", "a page"),
 ];
 
-/// What a file is that its name says to be no study, and what to do with it.
+/// Returns what a file is if its extension rules out a study, and what to do with it.
 fn no_study(path: &Path) -> Option<(&'static str, String)> {
     let end = path.extension()?.to_str()?.to_lowercase();
     if let Some((_, what)) = RESULTS.iter().find(|(known, _)| *known == end) {
@@ -89,12 +92,12 @@ fn no_study(path: &Path) -> Option<(&'static str, String)> {
     })
 }
 
-/// Whether a folder holds the results of a run.
+/// Returns whether a folder holds the results of a run.
 fn is_results(folder: &Path) -> bool {
     folder.join("record.json").is_file()
 }
 
-/// A file beside `path` whose name is like it.
+/// Suggests a file in the same folder with a name similar to that of `path`.
 fn sibling(path: &Path) -> Option<String> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let names: Vec<String> = std::fs::read_dir(folder)
@@ -107,10 +110,11 @@ fn sibling(path: &Path) -> Option<String> {
     Some(format!("did you mean `{}`?", folder.join(near).display()))
 }
 
-/// Reads a study from the bytes of a file; `name` is the file's name for messages and for the study's own name.
+/// Reads a study from the bytes of a file. `name` is the file's name, for messages and for the
+/// study's name.
 ///
 /// # Errors
-/// [`StudyError`]: the bytes are not UTF-8, or what [`read_study`] refuses.
+/// [`StudyError`]: the bytes are not UTF-8, or [`read_study`] refuses the text.
 pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> Result<Study, StudyError> {
     too_big(name, bytes.len())?;
     match std::str::from_utf8(bytes) {
@@ -137,10 +141,11 @@ fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
 
 /// Reads a study from its text. Every case is checked: a study that is returned can be run.
 ///
-/// `name` is the file's name (its stem becomes the name of the study), `overrides` are parameters and their new values.
+/// `name` is the file's name; its stem becomes the name of the study. `overrides` are
+/// parameters and their new values.
 ///
 /// # Errors
-/// [`StudyError`] with the first error in the order of the file, and others behind it.
+/// [`StudyError`] with the first error in the order of the file, followed by the others.
 ///
 /// # Example
 /// ```
@@ -158,11 +163,13 @@ pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Res
     read(name, text, overrides, Reader::default())
 }
 
-/// Reads the study of stored results, for its names alone: the files that its text names need not be there any more, and a structure by its
-/// matrices is none that could be run.
+/// Reads the study of stored results, for names only.
+///
+/// The files that its text names may be missing. A study with `[structure]` that was read this
+/// way cannot be run.
 ///
 /// # Errors
-/// As [`read_study`].
+/// Those of [`read_study`].
 pub fn read_stored(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
     read(name, text, overrides, Reader { without_files: true, ..Reader::default() })
 }
@@ -181,11 +188,14 @@ fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Read
     }
 }
 
-/// Reads a study from a document that another program holds: a table of tables, lists, texts, numbers and truth values, keyed as a study file is.
-/// Errors are placed in the TOML text that it makes.
+/// Reads a study from a document of another program.
+///
+/// The document is a table of tables, lists, texts, numbers and truth values, with the keys of
+/// a study file. Errors are located in the TOML text of the document.
 ///
 /// # Errors
-/// [`StudyError`]: what [`read_study`] refuses, or a value that TOML has not, such as null.
+/// [`StudyError`]: [`read_study`] refuses the text, or a value does not exist in TOML, such as
+/// null.
 ///
 /// # Example
 /// ```
@@ -297,7 +307,7 @@ impl Reader {
         })
     }
 
-    /// A model that the file states itself.
+    /// Reads the model that the file states itself, without a template.
     fn own_model(&mut self, root: &Table, file: &str) -> Option<ModelStatement> {
         let lists = self.lists(root)?;
         let matrices = match root.get("structure").map(|entry| &entry.node) {

@@ -1,12 +1,14 @@
-//! Repetition: one entry of a list states many, once for every value of an index.
+//! Repetition: one entry of a list states several elements, one for every value of an index.
 //!
-//! `repeat = { i = 12 }` states the entry for i = 1, 2 … 12. In its names `{i}` stands for the value, `{i+1}` for the next one, in its expressions
-//! `i` is a bare number. Several indices make a grid, the first one slowest.
+//! `repeat = { i = 12 }` states the entry for i = 1, 2 … 12. In its names, `{i}` stands for the
+//! value and `{i+1}` for the next one. In its expressions, `i` is a bare number. Several
+//! indices make a grid; the first one changes slowest.
 
 use crate::expression::Expression;
 use crate::units::Fault;
 
-/// The index of a repetition, its first and last value, and whether values beyond them in names begin anew.
+/// The index of a repetition: its first and last value, and whether values beyond them wrap
+/// around in names.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Index {
     pub name: String,
@@ -22,13 +24,13 @@ pub(crate) struct Repetition {
 }
 
 impl Repetition {
-    /// How many entries it states; one without an index.
+    /// Returns the number of elements that the entry states; one without an index.
     pub fn count(&self) -> usize {
         let count = |index: &Index| usize::try_from(index.to - index.from + 1).unwrap_or(0);
         self.indices.iter().map(count).fold(1, usize::saturating_mul)
     }
 
-    /// The entry with this number, from 0.
+    /// Returns the element with this number, from 0.
     pub fn turn(&self, number: usize) -> Turn<'_> {
         let mut rest = number as i64;
         let mut values = vec![0; self.indices.len()];
@@ -41,7 +43,7 @@ impl Repetition {
     }
 }
 
-/// One of the entries that a repetition states: what its indices are.
+/// One element of a repetition: the values of its indices.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Turn<'a> {
     indices: &'a [Index],
@@ -49,27 +51,27 @@ pub(crate) struct Turn<'a> {
 }
 
 impl Turn<'_> {
-    /// The value of an index.
+    /// Returns the value of an index.
     pub fn value(&self, name: &str) -> Option<f64> {
         let at = self.indices.iter().position(|index| index.name == name)?;
         Some(self.values[at] as f64)
     }
 
-    /// The names of the indices.
+    /// Returns the names of the indices.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.indices.iter().map(|index| index.name.as_str())
     }
 
-    /// In words: `i = 3, j = 1`; empty without an index.
+    /// Describes the indices in words: `i = 3, j = 1`; empty without an index.
     pub fn words(&self) -> String {
         let words = self.indices.iter().zip(&self.values).map(|(index, value)| format!("{} = {value}", index.name));
         words.collect::<Vec<_>>().join(", ")
     }
 
-    /// A name with its braces filled in.
+    /// Replaces the braces in a name by their values.
     ///
     /// # Errors
-    /// [`Fault`] with the bytes of `text` that are wrong.
+    /// [`Fault`] with the byte range of `text` that is wrong.
     pub fn name(&self, text: &str) -> Result<String, Fault> {
         let mut name = String::new();
         let mut at = 0;
@@ -92,7 +94,7 @@ impl Turn<'_> {
         Ok(name)
     }
 
-    /// The whole number that stands in braces.
+    /// Evaluates the whole number inside braces.
     fn whole(&self, inner: &str) -> Result<i64, Fault> {
         let names: Vec<&str> = self.names().collect();
         let expression = Expression::compile_with(inner, &|_| None, &|name| self.value(name), &names)?;

@@ -1,16 +1,18 @@
-//! Results as typed values: what the kinds need to read back what they wrote.
+//! Results as typed values: the helpers by which study kinds read back the tables that they
+//! wrote.
 //!
-//! Each kind that offers its results so has a function beside it, for example [`response::curves`](crate::kinds::response::curves).
+//! A kind that offers typed results has a function for them, such as
+//! [`response::curves`](crate::kinds::response::curves).
 
 use crate::columns::{ENERGY_GAP, RESIDUAL};
 use crate::dataset::{Dataset, Table, Values as Cells};
 use crate::drawing::{Drawing, Stretch};
 use crate::study::Study;
 
-/// Why a dataset cannot be read as the results of a study.
+/// Reason why a dataset cannot be read as the results of a study.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ResultsError {
-    /// It is of another kind.
+    /// The dataset is of another kind.
     #[error(
         "`{dataset}` is of the kind `{found}`, and results of a `{expected}` were asked for: use the function of its kind"
     )]
@@ -19,10 +21,11 @@ pub enum ResultsError {
         dataset: String,
         /// Its kind.
         found: String,
-        /// The kind that was asked for.
+        /// The requested kind.
         expected: &'static str,
     },
-    /// A column that the kind always writes is absent, or as long as no other.
+    /// A column that the kind always writes is absent, or has another length than the other
+    /// columns.
     #[error("the table `{table}` of `{dataset}` has no whole column `{column}`: take the dataset as `run` returns it")]
     Column {
         /// Name of the dataset.
@@ -32,7 +35,7 @@ pub enum ResultsError {
         /// Name of the column.
         column: String,
     },
-    /// Rows belong to no case of the study, or two tables do not fit each other.
+    /// Rows belong to no case of the study, or two tables do not match.
     #[error("the table `{table}` of `{dataset}` has rows of another study: hand over the study that was run")]
     Rows {
         /// Name of the dataset.
@@ -45,24 +48,26 @@ pub enum ResultsError {
 /// A resonance peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Where it stands, Hz.
+    /// Frequency of the peak, Hz.
     pub frequency: f64,
-    /// Half of peak to peak of the motion, m.
+    /// Half of the peak-to-peak value of the motion, m.
     pub amplitude: f64,
-    /// Whether it is only the end of the range of frequencies, so that the real peak lies outside.
+    /// True if the peak is only the end of the frequency range, so that the real peak lies
+    /// outside.
     pub at_range_end: bool,
 }
 
-/// The worst evidence over all orbits of a dataset; `None` where its kind keeps none.
+/// The worst evidence over all orbits of a dataset; a field is `None` if the kind does not
+/// record it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
     /// Largest defect of the return map, as in [`stickslip::orbit::Evidence`].
     pub residual: Option<f64>,
-    /// Largest relative gap between work put in and energy lost.
+    /// Largest relative gap between work input and energy dissipated.
     pub energy_gap: Option<f64>,
 }
 
-/// The worst evidence over all orbits of a dataset of any kind.
+/// Returns the worst evidence over all orbits of a dataset of any kind.
 ///
 /// # Example
 /// ```
@@ -80,7 +85,7 @@ pub fn worst_evidence(dataset: &Dataset) -> Evidence {
     Evidence { residual: worst(RESIDUAL), energy_gap: worst(ENERGY_GAP) }
 }
 
-/// The tables of a dataset and the study that it is of.
+/// A dataset with its study.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Results<'a> {
     pub study: &'a Study,
@@ -88,6 +93,8 @@ pub(crate) struct Results<'a> {
 }
 
 impl<'a> Results<'a> {
+    /// Pairs a study with its dataset.
+    ///
     /// # Errors
     /// The study or the dataset is of another kind.
     pub fn of(kind: &'static str, study: &'a Study, dataset: &'a Dataset) -> Result<Self, ResultsError> {
@@ -99,7 +106,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// A table by name; one that nothing was written to is absent.
+    /// Returns a table by name; `None` if it has no rows.
     ///
     /// # Errors
     /// Its columns differ in length.
@@ -114,10 +121,10 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// The rows of a table by the first `keys` varied parameters.
+    /// Returns the rows of a table, grouped by the first `keys` varied parameters.
     ///
     /// # Errors
-    /// There are rows of no case.
+    /// Some rows belong to no case.
     pub fn stretches(&self, written: &Written<'_>, keys: usize) -> Result<Vec<Stretch>, ResultsError> {
         let drawing = Drawing { study: self.study, tables: &self.dataset.tables };
         let stretches = drawing.stretches_of(written.table, keys);
@@ -126,7 +133,7 @@ impl<'a> Results<'a> {
     }
 }
 
-/// A table whose columns must be there.
+/// A table that provides columns by name and type, or an error.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Written<'a> {
     dataset: &'a Dataset,
@@ -159,7 +166,7 @@ impl<'a> Written<'a> {
         ResultsError::Column { dataset, table, column: column.to_owned() }
     }
 
-    /// The error of rows that do not belong to the study.
+    /// The error for rows that do not belong to the study.
     pub fn other_rows(&self) -> ResultsError {
         ResultsError::Rows { dataset: self.dataset.name.clone(), table: self.table.name.clone() }
     }

@@ -1,18 +1,19 @@
-//! Tables that grow row by row. A row may lack what others have: its cell has no value.
+//! Tables that grow row by row. If a row lacks a column of other rows, its cell there has no
+//! value.
 
 use crate::columns::REDUCTION_ERROR;
 use crate::dataset::{Column, Table, Values as Cells, column_name};
 use crate::study::Case;
 use stickslip::model::ReductionEvidence;
 
-/// Columns that grow row by row, in an order that all rows keep.
+/// Columns that grow row by row. All rows write their columns in the same order.
 #[derive(Debug, Default)]
 pub struct Rows {
     columns: Vec<Column>,
     next: usize,
-    /// Rows that have ended.
+    /// Number of finished rows.
     ended: usize,
-    /// Whether they are of linear motions, which have no harmonics of joints.
+    /// True if the motions are linear, so that joints produce no harmonics.
     linear: bool,
 }
 
@@ -33,35 +34,35 @@ impl Rows {
         &mut self.columns[self.next - 1].values
     }
 
-    /// A real number.
+    /// Adds a real number.
     pub fn number(&mut self, name: &str, value: f64) {
         if let Cells::Number(v) = self.cells(name, Cells::Number(Vec::new())) {
             v.push(value);
         }
     }
 
-    /// A count.
+    /// Adds a count.
     pub fn integer(&mut self, name: &str, value: u64) {
         if let Cells::Integer(v) = self.cells(name, Cells::Integer(Vec::new())) {
             v.push(value);
         }
     }
 
-    /// A word.
+    /// Adds a word.
     pub fn text(&mut self, name: &str, value: &str) {
         if let Cells::Text(v) = self.cells(name, Cells::Text(Vec::new())) {
             v.push(value.to_owned());
         }
     }
 
-    /// True, false, or unknown.
+    /// Adds true, false or unknown.
     pub fn flag(&mut self, name: &str, value: Option<bool>) {
         if let Cells::Flag(v) = self.cells(name, Cells::Flag(Vec::new())) {
             v.push(value);
         }
     }
 
-    /// The varied parameters of a case.
+    /// Adds the varied parameters of a case.
     pub fn varied(&mut self, case: &Case) {
         for varied in &case.varied {
             let (name, value) = varied.column();
@@ -69,14 +70,16 @@ impl Rows {
         }
     }
 
-    /// How far what the places see is from the whole structure, in a row that has an orbit or a frequency; nothing where no structure was reduced.
+    /// Adds the error of the reduced model at the places, for a row with an orbit or a
+    /// frequency. Without a reduction it adds nothing.
     pub fn reduced(&mut self, reduction: Option<ReductionEvidence>) {
         if let Some(ReductionEvidence { error, .. }) = reduction {
             self.number(REDUCTION_ERROR, error);
         }
     }
 
-    /// Their reduction errs by no less than this, unless they are linear.
+    /// Raises the reduction error of all rows to at least `error`, unless the motions are
+    /// linear.
     pub fn err(&mut self, error: f64) {
         let known = self.columns.iter_mut().filter(|column| column.name == REDUCTION_ERROR && !self.linear);
         for column in known {
@@ -86,7 +89,7 @@ impl Rows {
         }
     }
 
-    /// Ends a row.
+    /// Ends a row: columns that the row did not write get an empty cell.
     pub fn end(&mut self) {
         self.next = 0;
         for column in self.columns.iter_mut().filter(|column| column.values.len() == self.ended) {
@@ -95,7 +98,7 @@ impl Rows {
         self.ended += 1;
     }
 
-    /// The table.
+    /// Returns the finished table.
     pub fn table(self, name: &str) -> Table {
         Table { name: name.to_owned(), columns: self.columns }
     }

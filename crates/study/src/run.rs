@@ -1,5 +1,8 @@
-//! Runs a study: checks every case (so that what a method cannot take is found before anything is computed), computes its units on all
-//! threads, joins their parts in order, lets the kind draw its figure, and adds the record.
+//! Runs a study.
+//!
+//! The run first checks every case, so that a refusal by a method is found before anything is
+//! computed. It computes the units of work on all threads, joins their parts in order, lets the
+//! kind draw the figure, and adds the record.
 
 use crate::block::{Block, Tally};
 use crate::dataset::{Dataset, Figure, Record, Table};
@@ -25,8 +28,9 @@ pub use crate::work::{CONVERGED, Context, NOT_REACHED, Prepared};
 /// Runs a study.
 ///
 /// # Errors
-/// [`StudyError`]: the method cannot take the model, or too much memory would be needed; nothing was computed. Points that do not converge are no error: they are in the
-/// dataset, as failures.
+/// [`StudyError`]: the method refuses the model, or the study needs too much memory; then
+/// nothing was computed. Points that do not converge are not an error: the dataset lists them
+/// as failures.
 ///
 /// # Example
 /// ```
@@ -41,23 +45,27 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
     check(study)?.run(context)
 }
 
-/// A study that can be run: it was surveyed, every case was prepared once, and it fits into memory.
+/// A study that was checked: it was surveyed, every case was prepared once, and it fits into
+/// memory.
 #[derive(Debug)]
 pub struct Checked {
     study: Study,
     summary: ModelSummary,
-    /// What finds the orbits of the cases, in words, each once.
+    /// The methods that find the orbits of the cases, in words, each once.
     methods: Vec<String>,
-    /// The first case, if it is kept: in many studies, large ones above all, it is the only one.
+    /// The first case, if it is kept. Many studies, in particular large ones, have only this
+    /// case.
     first: Option<Arc<Prepared>>,
-    /// What the check took.
+    /// Duration of the check.
     time: Duration,
 }
 
-/// Prepares every case and computes nothing: whether the study can be run, and what is known of it before.
+/// Prepares every case without computing it: checks that the study can be run, and summarizes
+/// the model.
 ///
 /// # Errors
-/// [`StudyError`]: the method cannot take the model of a case, or the study needs more memory than it may take.
+/// [`StudyError`]: the method refuses the model of a case, or the study needs more memory than
+/// its limit.
 ///
 /// # Example
 /// ```
@@ -89,32 +97,34 @@ pub fn check(study: &Study) -> Result<Checked, StudyError> {
 }
 
 impl Checked {
-    /// The study.
+    /// Returns the study.
     pub fn study(&self) -> &Study {
         &self.study
     }
 
-    /// What is known of it before it is run.
+    /// Returns the summary of the model, known before the run.
     pub fn summary(&self) -> &ModelSummary {
         &self.summary
     }
 
-    /// The same without its first case, for who holds many studies: of 2000 masses it has 0.1 GB, and a run prepares it again.
+    /// Returns the checked study without its prepared first case, for callers that hold many
+    /// studies. A first case of 2000 masses takes 0.1 GB. A run prepares it again.
     #[must_use]
     pub fn lean(self) -> Checked {
         Checked { first: None, ..self }
     }
 
-    /// Number of its units of work, which know nothing of each other.
+    /// Returns the number of its units of work, which are independent of each other.
     pub fn units(&self) -> usize {
         units(&self.study)
     }
 
-    /// Computes it, with all of its tables in memory.
+    /// Computes the study with all tables in memory.
     ///
     /// # Errors
-    /// [`StudyError`]: the tables need more memory than a run may take, or a search between the cases met a model that the method cannot
-    /// take. Points that do not converge are no error: they are in the dataset, as failures.
+    /// [`StudyError`]: the tables need more memory than the limit, or a search between the
+    /// cases met a model that the method refuses. Points that do not converge are not an error:
+    /// the dataset lists them as failures.
     pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
         let start = Instant::now();
         if let Some(error) = self.summary.size.refusal(&self.study, self.summary.size.whole) {
@@ -125,10 +135,11 @@ impl Checked {
         Ok(self.outline(context.threads).completed(tables, figure, tally, start.elapsed()))
     }
 
-    /// Computes the units of a range, with what they yield in memory.
+    /// Computes the units of a range and keeps their results in memory.
     ///
     /// # Errors
-    /// [`StudyError`]: there are no such units, or a search between the cases met a model that the method cannot take.
+    /// [`StudyError`]: the range has no such units, or a search between the cases met a model
+    /// that the method refuses.
     ///
     /// # Example
     /// ```
@@ -139,7 +150,8 @@ impl Checked {
     /// let mut block = checked.block(0..3, &context).unwrap();
     /// block.append(checked.block(3..checked.units(), &context).unwrap());
     /// let whole = checked.block(0..checked.units(), &context).unwrap();
-    /// assert_eq!(format!("{:?}", block.tables), format!("{:?}", whole.tables)); // what was not computed is no number
+    /// // compared as text, because missing values are NaN
+    /// assert_eq!(format!("{:?}", block.tables), format!("{:?}", whole.tables));
     /// ```
     pub fn block(&self, range: Range<usize>, context: &Context) -> Result<Block, StudyError> {
         let mut whole = Block::empty(self.study.kind(), range.start);
@@ -150,12 +162,16 @@ impl Checked {
         Ok(whole)
     }
 
-    /// Computes the units of a range on all threads, and hands what each yields to `take`, one after the other in their order. Of a run
-    /// that is stopped the units that were not finished come too, with their points as [`NOT_REACHED`].
+    /// Computes the units of a range on all threads and passes the block of each one to `take`,
+    /// in order.
+    ///
+    /// If the run is stopped, `take` also gets the unfinished units, with their points marked
+    /// [`NOT_REACHED`].
     ///
     /// # Errors
-    /// A [`StudyError`]: there are no such units, or a search between the cases met a model that the method cannot take; or what `take`
-    /// returns, after which nothing more is computed.
+    /// A [`StudyError`]: the range has no such units, or a search between the cases met a model
+    /// that the method refuses. An error that `take` returns ends the computation and is
+    /// returned.
     pub fn each<E: From<StudyError>>(
         &self,
         range: Range<usize>,
@@ -175,7 +191,8 @@ impl Checked {
         parts(&self.study, &first, range, context, &mut |unit, part| take(Block::of(kind, unit, part)))
     }
 
-    /// What is known of the results before anything is computed; see [`Dataset::completed`].
+    /// Returns the dataset without its results, as known before the computation; see
+    /// [`Dataset::completed`].
     pub fn outline(&self, threads: usize) -> Dataset {
         let Checked { study, summary, methods, .. } = self;
         let mut notes = summary.warnings.clone();
@@ -204,10 +221,10 @@ impl Checked {
 }
 
 impl Dataset {
-    /// An outline with its results: the tables, their figure, and what is to be said.
+    /// Adds the results to an outline: the tables, their figure, the notes and the failures.
     #[must_use]
     pub fn completed(mut self, tables: Vec<Table>, figure: Figure, tally: Tally, time: Duration) -> Dataset {
-        // a table that nothing was ever written to has no columns either
+        // a table without any rows has no columns
         self.tables = tables.into_iter().filter(|table| !table.columns.is_empty()).collect();
         self.figure = figure;
         self.notes.extend(tally.notes());
@@ -219,7 +236,8 @@ impl Dataset {
     }
 }
 
-/// The figure of finished tables, computed just now or read from a disk. Tables that are none of this study have an empty figure.
+/// Draws the figure of finished tables, just computed or read from a disk. Tables of another
+/// study give an empty figure.
 pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
     let rows: Vec<(&str, usize)> = tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
     let mut thinning = Thinning::new(study, &rows);
@@ -230,37 +248,38 @@ pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
     drawn(study, &thinning.tables())
 }
 
-/// The figure of the rows that a [`Thinning`] has kept.
+/// Draws the figure of the rows that a [`Thinning`] has kept.
 pub fn drawn(study: &Study, tables: &[Table]) -> Figure {
     Figure { title: study.title().to_owned(), ..(kinds::of(study).draw)(&Drawing { study, tables }) }
 }
 
-/// The study as it was understood, and its summary.
+/// Returns the study as it was understood, with its summary.
 fn recorded(study: &Study, summary: &ModelSummary) -> serde_json::Value {
     let mut record = study.resolved();
     record["summary"] = summary.to_json();
     record
 }
 
-/// Number of the units of work of a study, checked or not.
+/// Returns the number of units of work of a study, checked or not.
 pub fn units(study: &Study) -> usize {
     cut(study).len()
 }
 
-/// The units of a study.
+/// Divides a study into its units.
 fn cut(study: &Study) -> Units {
     Units::of(study, (kinds::of(study).grain)(study))
 }
 
-/// How often a run looks whether it is to stop.
+/// Interval at which a run checks for a stop request.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long an interrupted run waits for what is under way, which ends with the orbit that it is at: less than the second that a user
-/// waits gladly.
+/// Time that an interrupted run waits for the units in progress. Each of them ends after its
+/// current orbit. Users accept a wait of less than a second.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// Computes the units of a range and hands on their parts in order.
+/// Computes the units of a range and passes their parts on in order.
 ///
-/// Units run as tasks of the pool that own what they need, so that an interrupted run can leave behind one that does not end.
+/// Units run as tasks of the pool that own their data. An interrupted run can therefore return
+/// before a slow unit ends.
 fn parts<E: From<StudyError>>(
     study: &Study,
     first: &Arc<Prepared>,
@@ -282,7 +301,7 @@ fn parts<E: From<StudyError>>(
             let (study, first, context) = (shared.clone(), first.clone(), context.clone());
             let (send, index) = (send.clone(), begun);
             rayon::spawn_fifo(move || {
-                // nobody listens any more if the run was left
+                // the receiver is gone if the run has ended early
                 let part = catch_unwind(AssertUnwindSafe(|| compute(&study, &first, index, &context)));
                 let _ = send.send((index, part));
             });
@@ -290,7 +309,7 @@ fn parts<E: From<StudyError>>(
         }
         match next(&receive) {
             Some((index, part)) => {
-                // a bug in a unit is one of the run
+                // a panic in a unit becomes a panic of the run
                 waiting.insert(index, part.unwrap_or_else(|panic| resume_unwind(panic))?);
             }
             None if deadline.is_some_and(|deadline| Instant::now() >= deadline) => break,
@@ -300,7 +319,7 @@ fn parts<E: From<StudyError>>(
             take(joined, part)?;
             joined += 1;
         }
-        // what has not begun does not begin any more
+        // after a stop no unit begins, so the run ends when all begun units are joined
         if deadline.is_some() && joined == begun {
             break;
         }
@@ -313,7 +332,8 @@ fn parts<E: From<StudyError>>(
 
 type Finished = (usize, std::thread::Result<Result<Part, StudyError>>);
 
-/// The next finished unit, or `None` after a while. A thread of the pool works meanwhile instead of waiting for itself.
+/// Returns the next finished unit, or `None` after a while. A thread of the pool executes other
+/// tasks meanwhile, because it must not wait for itself.
 fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     if rayon::current_thread_index().is_none() {
         return receive.recv_timeout(LOOK).ok();
@@ -344,7 +364,7 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
     {
         solve_again(&work, index, part);
     }
-    // kinds look in many places whether they are to stop
+    // kinds check for a stop in many places
     part.map(|part| Part { cut: context.stopped(), ..part }).map_err(|(index, error)| {
         match work.cases.iter().find(|prepared| prepared.case.index == index) {
             Some(prepared) => refused(study, &prepared.case, &error),
@@ -353,7 +373,8 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
     })
 }
 
-/// Where joints slip on a structure in few coordinates: what these leave out of the harmonics that they make.
+/// If joints slip on a reduced model, solves some points again with more modes and records the
+/// difference.
 fn solve_again(work: &Work<'_>, index: usize, part: &mut Part) {
     let (study, prepared) = (work.study, work.case());
     let points = part.points.values().sum::<u64>() as usize;

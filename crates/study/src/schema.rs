@@ -1,7 +1,8 @@
-//! The study file, schema 1: every table and key, once, as data.
+//! Schema 1 of the study file: every table and key, once, as data.
 //!
-//! The reader checks files against this table, and the documentation and the JSON Schema for editors are generated from it. Laws and
-//! methods come from [`stickslip::law::TABLE`] and [`stickslip::method::TABLE`], study kinds from [`crate::kinds::TABLE`].
+//! The reader checks files against this table. The documentation and the JSON Schema for
+//! editors are generated from it. Laws come from [`stickslip::law::TABLE`], methods from
+//! [`stickslip::method::TABLE`] and study kinds from [`crate::kinds::TABLE`].
 
 use crate::key::RATIO;
 use crate::kind::Kind;
@@ -17,13 +18,13 @@ pub use crate::key::{
     optional, refused, required,
 };
 
-/// Most elements in one list (`[[spring]]`, …), repetitions counted.
+/// Largest number of elements in one list (`[[spring]]`, …), repetitions included.
 pub const MOST_ELEMENTS: usize = 40_000;
 
-/// Most bytes of a study file.
+/// Largest size of a study file, bytes.
 pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
 
-/// The keys at the top of the file.
+/// The top-level keys of the file.
 pub const FILE: &[Key] = &[
     required("schema", Takes::Count(VERSION, VERSION), "version of the file format", "1"),
     optional(
@@ -175,7 +176,8 @@ pub const STRUCTURE: &[Key] = &[
     ),
 ];
 
-/// The keys of a file that has several matrices, or none of the formats that are found by content.
+/// The keys of an entry for a file that has several matrices, or a format that is not
+/// recognized by content.
 pub(crate) const FILE_KEYS: &[Key] = &[
     required("file", Takes::Text, "its path", "\"blade.mat\""),
     optional("name", Takes::Text, "which matrix in it, if it has several", "\"K\""),
@@ -199,7 +201,7 @@ fn format_names() -> Vec<(&'static str, &'static str)> {
     stickslip_formats::TABLE.iter().map(|format| (format.name, format.summary)).collect()
 }
 
-/// 1/s, which is no frequency: a rate of decay.
+/// 1/s, the dimension of a decay rate, which is not a frequency.
 const RATE: Dimension = Dimension { kg: 0, m: 0, s: -1, rad: 0 };
 
 const RAYLEIGH: &[Key] = &[
@@ -542,7 +544,7 @@ const MOTION: &[Key] = &[
     REPEAT,
 ];
 
-/// The keys of `[study]` that every kind has.
+/// The keys of `[study]` that all kinds share.
 pub const STUDY: &[Key] = &[
     required("kind", Takes::Choice(kind_names), "what is computed", "\"response\""),
     optional(
@@ -582,7 +584,7 @@ fn design_names() -> Vec<(&'static str, &'static str)> {
     DESIGNS.iter().map(|(name, summary, _)| (*name, *summary)).collect()
 }
 
-/// The choice of `kind` in `[method]`.
+/// The values of `kind` in `[method]`.
 pub const METHOD: &[Key] = &[default("kind", Takes::Choice(method_names), "auto", "the method", "\"event-driven\"")];
 
 fn template_names() -> Vec<(&'static str, &'static str)> {
@@ -597,7 +599,7 @@ fn method_names() -> Vec<(&'static str, &'static str)> {
     method::TABLE.iter().map(|row| (row.name, row.summary)).collect()
 }
 
-/// What a key takes, in a few words for messages and for the book.
+/// Describes the values that a key takes in a few words, for messages and for the book.
 pub fn described(takes: &Takes) -> String {
     match takes {
         Takes::Text => "a text in quotes".to_owned(),
@@ -652,14 +654,15 @@ pub fn described(takes: &Takes) -> String {
     }
 }
 
-// ---------------------------------------------------------------------------------------------- JSON Schema
+// ------------------------------------------------------------------------------ JSON Schema
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 const NAME_PATTERN: &str = "^[A-Za-z][A-Za-z0-9_.]*$";
-/// Names in entries that may be repeated, with indices in braces.
+/// Pattern of names in entries that may be repeated, with indices in braces.
 const REPEATED_PATTERN: &str = "^[A-Za-z]([A-Za-z0-9_.]|\\{[^{}]+\\})*$";
 
-/// The JSON Schema (draft 2020-12) of study files, for editors that complete and check TOML.
+/// Returns the JSON Schema (draft 2020-12) of study files, for editors that complete and check
+/// TOML.
 pub fn json_schema() -> Value {
     let mut schema = object(FILE);
     schema["$schema"] = json!(DRAFT);
@@ -786,7 +789,7 @@ fn takes_schema(takes: &Takes) -> Value {
                 schema
             };
             let mut all: Vec<Value> = method::TABLE.iter().map(one).collect();
-            // `kind` may be absent: auto
+            // `kind` may be absent, which means `auto`
             for schema in all.iter_mut().filter(|schema| schema["properties"]["kind"]["const"] == "auto") {
                 schema["required"] = json!([]);
             }

@@ -1,4 +1,5 @@
-//! What the lists state: the model, or one sector of a disk and how its forces go around.
+//! Builds the model from the lists of a study: the whole model, or one sector of a disk with
+//! its excitation pattern.
 
 use crate::error::Problem;
 use crate::key::RATIO;
@@ -12,12 +13,13 @@ use stickslip::model::{
     Around, Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, Spring, with_rotations,
 };
 
-/// The places of the structure by matrices.
+/// Returns the places of the structure given by matrices.
 fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
     lists.place.iter().filter(|table| table.entry("of").is_none())
 }
 
-/// What the lists state, and how its forces and imposed motions go around a disk.
+/// Builds the model that the lists state, and the distribution of its forces and imposed
+/// motions over the sectors.
 pub(crate) fn sector_of(
     structure: &ModelStatement,
     environment: &Environment<'_>,
@@ -34,7 +36,8 @@ pub(crate) fn sector_of(
                 model.places.extend(substructure::place(table, component, environment, problems));
             }
         }
-        // names alone: masses stand for the places
+        // the matrices were not read: masses stand in for the places, and only their names
+        // count
         (Some(_), None) => {
             let values = own(lists).map(|table| (table, table.values(environment, problems)));
             model.masses.extend(values.map(|(table, values)| substructure::stand_in(table, &values)));
@@ -74,7 +77,7 @@ pub(crate) fn sector_of(
         let values = resolve(Element::Body(i), table);
         let stated: Vec<&str> = values.names("directions").unwrap_or_default().iter().map(String::as_str).collect();
         let directions = with_rotations(&stated);
-        // what could not be read has been said
+        // an unreadable value was reported already
         let stated = values.quantities("inertia").map(|stated| inertia(table, &directions, stated));
         let inertia = stated.unwrap_or_else(|| Ok(Default::default())).unwrap_or_else(|problem| {
             wrong.push(problem);
@@ -85,7 +88,7 @@ pub(crate) fn sector_of(
     for (i, table) in lists.place.iter().enumerate().filter(|(_, table)| table.entry("of").is_some()) {
         let values = resolve(Element::Place(i), table);
         if values.entries.len() < table.entries.len() {
-            continue; // what could not be read has been said
+            continue; // an unreadable value was reported already
         }
         match substructure::view(table, &values, &model) {
             Ok(place) => model.places.push(place),
@@ -139,14 +142,14 @@ pub(crate) fn sector_of(
     (model, forces, motions)
 }
 
-/// The inertia matrix of a body with these directions.
+/// Returns the inertia matrix of a body with these directions.
 fn inertia(table: &StatedTable, directions: &[String], stated: &[f64]) -> Result<[[f64; 3]; 3], Problem> {
     let turns = |axis: &usize| directions.iter().any(|along| along == ROTATIONS[*axis]);
     let about: Vec<usize> = (0..ROTATIONS.len()).filter(turns).collect();
     let mut matrix = [[0.0; 3]; 3];
     match (stated, &about[..]) {
         (&[xx, yy, zz, xy, yz, zx], [0, 1, 2]) => return Ok([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]),
-        // that is said of the directions
+        // the check of the directions reports this
         (_, []) => {}
         _ if stated.len() == about.len() => {
             about.iter().zip(stated).for_each(|(axis, moment)| matrix[*axis][*axis] = *moment);
@@ -170,7 +173,8 @@ fn plural(moments: usize) -> String {
     if moments == 1 { "one moment of inertia".to_owned() } else { format!("{moments} moments of inertia") }
 }
 
-/// The critical damping `2 sqrt(k m)` of a spring with the mass at its end, kg/s; of two masses with `m1 m2/(m1 + m2)`. What is missing for that in words.
+/// Returns the critical damping `2 sqrt(k m)` of a spring, kg/s, with `m` the mass at its end.
+/// Between two masses, `m = m1 m2/(m1 + m2)`. The error says in words which value is missing.
 fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f64, String> {
     let node = |name: &str| name.strip_prefix(NEXT).unwrap_or(name).split('.').next().unwrap_or_default().to_owned();
     let moved = |name: &str| {
@@ -194,7 +198,7 @@ fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f
     Ok(2.0 * (spring.stiffness / compliance).sqrt())
 }
 
-/// That a share of the critical damping has no meaning at a spring.
+/// Returns the problem that a damping ratio has no meaning at this spring.
 fn no_ratio(table: &StatedTable, why: &str) -> Problem {
     let message = format!("a share of the critical damping needs a stiffness and a mass, and {why}");
     Problem::new(table.location_of(RATIO, None), RATIO, table.with_turn(&message)).help(
@@ -202,8 +206,8 @@ fn no_ratio(table: &StatedTable, why: &str) -> Problem {
     )
 }
 
-/// A law that leaves its number of tangents open, where the file does too, has those of the nodes that it joins: all their directions but the
-/// normal.
+/// Sets the number of tangents of a law to that of the nodes that the joint connects: all their
+/// directions except the normal. A number in the file takes precedence.
 fn for_nodes(
     law: &SharedLaw,
     joint: &StatedTable,
@@ -221,7 +225,7 @@ fn for_nodes(
     }
 }
 
-/// How an entry of a list is distributed over the sectors.
+/// Returns the distribution of an entry of a list over the sectors.
 pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
     let mut found = Vec::new();
     for key in ["engine_order", "nodal_diameter", "sector"] {
@@ -246,7 +250,7 @@ pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Pr
     }
 }
 
-/// That an entry says how it goes around a disk, where there is none.
+/// Reports an entry that states a distribution over sectors although the study has no disk.
 pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
     for key in ["engine_order", "nodal_diameter", "sector"] {
         if let Some(entry) = table.entry(key) {
@@ -257,10 +261,10 @@ pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
     }
 }
 
-/// Largest whole number that a quantity can be read as.
+/// Largest absolute value that is accepted as a whole number.
 const MOST: f64 = 1e9;
 
-/// A whole number that a key must have.
+/// Returns the value of a key, which must be a whole number; `None` if the key is absent.
 pub(crate) fn whole(table: &StatedTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
     let Some(value) = values.quantity(key) else { return Ok(None) };
     if value.fract() == 0.0 && value.abs() <= MOST {

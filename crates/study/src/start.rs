@@ -1,14 +1,15 @@
-//! Where a transient begins: in static equilibrium, pulled or not, or put somewhere with its joints unloaded.
+//! Initial state of a transient: static equilibrium with some places held, or given
+//! displacements with unloaded joints.
 
 use std::collections::BTreeMap;
 use stickslip::method::StaticEquilibrium;
 use stickslip::model::{Model, Motion, System};
 
-/// The words of the key `begin`.
+/// The values of the key `begin`.
 pub(crate) const EQUILIBRIUM: &str = "equilibrium";
 pub(crate) const UNLOADED: &str = "unloaded";
 
-/// What the words mean.
+/// Returns the values of the key `begin` with their meaning.
 pub(crate) fn beginnings() -> Vec<(&'static str, &'static str)> {
     vec![
         (
@@ -25,21 +26,22 @@ pub(crate) struct Start {
     pub states: Vec<f64>,
 }
 
-/// The row of each named place, which is a degree of freedom of its own, with its value.
+/// Returns the value of each named place by its row. Skips places that are not a degree of
+/// freedom themselves.
 fn rows(system: &System, given: Option<&BTreeMap<String, f64>>) -> BTreeMap<usize, f64> {
     let places = system.places().iter().zip(system.seen());
     let named = places.filter_map(|(place, along)| Some((along.rows(), *given?.get(place)?)));
     named.filter_map(|(rows, value)| if let [(row, _)] = rows { Some((*row, value)) } else { None }).collect()
 }
 
-/// Displacements or velocities as given, zero elsewhere.
+/// Returns displacements or velocities of all degrees of freedom: as given, zero elsewhere.
 pub(crate) fn given(system: &System, given: Option<&BTreeMap<String, f64>>) -> Vec<f64> {
     let mut state = vec![0.0; system.dofs()];
     rows(system, given).into_iter().for_each(|(row, value)| state[row] = value);
     state
 }
 
-/// The structure with its places held where `start` says, in static equilibrium; `None` where none is found.
+/// Returns the static equilibrium with the places of `start` held; `None` if it is not found.
 pub(crate) fn pulled(model: &Model, system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
     let mut held = model.clone();
     for (place, value) in start.into_iter().flatten() {
@@ -48,7 +50,7 @@ pub(crate) fn pulled(model: &Model, system: &System, start: Option<&BTreeMap<Str
     let held = held.assemble().ok()?;
     let fixed = rows(system, start);
     let equilibrium = StaticEquilibrium::of(&held)?;
-    // the same rows without those that are held
+    // restores the held rows, which the equilibrium does not contain
     let mut free = equilibrium.displacement().iter();
     let row = |row: usize| fixed.get(&row).copied().or_else(|| free.next().copied());
     let displacement: Vec<f64> = (0..system.dofs()).map(row).collect::<Option<_>>()?;

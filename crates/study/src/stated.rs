@@ -1,4 +1,5 @@
-//! How a model is stated: the lists, files and template of a study, and where in them a problem of the model is.
+//! The statement of a model: its lists, files and template, and the location of a model error
+//! in them.
 
 use crate::error::{Location, Problem};
 use crate::expression::displayed;
@@ -13,7 +14,7 @@ use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};
 use stickslip::structure::{Component, Node, Reduction, ReductionKind};
 use stickslip_numerics::sparse::Matrix;
 
-/// How the model is stated: in lists, of this file or of a template's.
+/// The statement of a model: lists of the study file or of a template, and matrices.
 #[derive(Debug, Clone)]
 pub(crate) struct ModelStatement {
     pub lists: Lists,
@@ -21,26 +22,27 @@ pub(crate) struct ModelStatement {
     pub matrices: Option<Matrices>,
 }
 
-/// `[structure]`: what was read of its files.
+/// `[structure]`, with the contents of its files.
 #[derive(Debug, Clone)]
 pub(crate) struct Matrices {
     pub table: StatedTable,
-    /// None of a study whose files were not read.
+    /// The structure; `None` if the files were not read.
     pub component: Option<Component>,
-    /// What rotation adds to its stiffness.
+    /// The stiffness that rotation adds.
     pub stiffened: Option<Stiffened>,
-    /// Rows of the files that are constrained, and not in it.
+    /// Number of constrained rows in the files, which the component does not contain.
     pub left_out: usize,
 }
 
 impl Matrices {
-    /// Whether a model made of them turns at a speed that stiffens it.
+    /// Returns whether `model` rotates at a speed that changes its stiffness.
     fn spins(&self, model: &Model) -> bool {
         let (own, of_model) = (self.component.as_ref(), model.substructure.as_ref().map(|own| &own.component));
         own.zip(of_model).is_some_and(|(own, of_model)| own.matrices().2 != of_model.matrices().2)
     }
 
-    /// CRC-32 of the rows' names and of all entries, by which files that changed between two runs are told apart.
+    /// Returns a CRC-32 of the names of rows and of all entries. It detects files that changed
+    /// between two runs.
     pub fn check(&self) -> Option<String> {
         let component = self.component.as_ref()?;
         let mut hasher = crc32fast::Hasher::new();
@@ -61,17 +63,18 @@ impl Matrices {
 /// The template that a study names.
 #[derive(Debug, Clone)]
 pub(crate) struct NamedTemplate {
-    /// `[model]`.
+    /// The table `[model]`.
     pub table: StatedTable,
-    /// Its file among the sources.
+    /// Index of the template's file in the sources.
     pub source: usize,
-    /// Of every parameter the names of those by which it is computed and that the study gives, itself among them.
+    /// For every parameter: the names of the parameters that the study sets and that it depends
+    /// on, itself included.
     pub given: Vec<Vec<String>>,
 }
 
 impl NamedTemplate {
-    /// Rewords a problem in the template's file for a user who has not written it: at the location where the template is
-    /// named.
+    /// Rewords a problem in the template's file for a user who has not written that file. The
+    /// location becomes that of the template's name in the study.
     pub fn reword(&self, element: Element, table: &StatedTable, problem: &mut Problem) {
         if problem.location.source == self.source {
             problem.message = self.blame(element, Some(table), &problem.key, &problem.message);
@@ -79,7 +82,7 @@ impl NamedTemplate {
         }
     }
 
-    /// What is wrong with an element, with the parameters behind what it states of a key.
+    /// Describes an error of an element, with the parameters on which its key `key` depends.
     fn blame(&self, element: Element, table: Option<&StatedTable>, key: &str, message: &str) -> String {
         let (mut own, mut all) = (BTreeSet::new(), BTreeSet::new());
         if let Some(table) = table {
@@ -109,7 +112,7 @@ pub(crate) struct Lists {
     pub joint: Vec<StatedTable>,
     pub force: Vec<StatedTable>,
     pub motion: Vec<StatedTable>,
-    /// The lists state one sector of it.
+    /// `[disk]`; then the lists state one sector.
     pub disk: Option<StatedDisk>,
 }
 
@@ -127,12 +130,12 @@ impl Lists {
         }
     }
 
-    /// All of them, one after the other.
+    /// Returns all lists, in order.
     pub fn all(&self) -> [&Vec<StatedTable>; 7] {
         [&self.place, &self.mass, &self.body, &self.spring, &self.joint, &self.force, &self.motion]
     }
 
-    /// Gives what stands at rotations of bodies the dimensions of moments and angles.
+    /// Gives quantities at rotations of bodies the dimensions of moments and angles.
     pub fn turn(&mut self) {
         let named = self.body.iter().filter_map(|table| match table.entry("name").map(|entry| &entry.value) {
             Some(Stated::Fixed(Given::Text(name))) => Some(name.clone()),
@@ -173,14 +176,14 @@ impl Lists {
     }
 }
 
-/// What a quantity of displacements is for rotations.
+/// Dimensions of one quantity for a displacement and for a rotation.
 struct OfRotation {
     displacement: Dimension,
     rotation: Dimension,
     example: &'static str,
 }
 
-/// All of them.
+/// The pairs of dimensions.
 const OF_ROTATIONS: [OfRotation; 4] = [
     OfRotation { displacement: Dimension::LENGTH, rotation: Dimension::ANGLE, example: "\"0.1 deg\"" },
     OfRotation { displacement: Dimension::FORCE, rotation: Dimension::ENERGY, example: "\"2 N m\"" },
@@ -200,18 +203,18 @@ const OF_ROTATIONS: [OfRotation; 4] = [
 #[derive(Debug, Clone)]
 pub(crate) struct StatedDisk {
     pub table: StatedTable,
-    /// The deviations of a file.
+    /// The deviations in the pattern file.
     pub pattern: Option<Vec<f64>>,
-    /// Nodes of the low and the high side of a sector by its matrices.
+    /// Pairs of nodes on the low and the high side of a sector given by matrices.
     pub boundary: Option<Vec<(String, String)>>,
-    /// Where its nodes stand.
+    /// Coordinates of its nodes.
     pub nodes: Option<Vec<Node>>,
-    /// Nodes of its blade.
+    /// Names of the nodes of its blade.
     pub blade: Option<Vec<String>>,
 }
 
 impl StatedDisk {
-    /// The parameter that differs from sector to sector, if one does.
+    /// Returns the index of the parameter that differs from sector to sector, if there is one.
     pub fn mistuned(&self, names: &[String]) -> Option<usize> {
         let Stated::Table(table) = &self.table.entry("mistuning")?.value else { return None };
         match &table.entry("of")?.value {
@@ -221,11 +224,12 @@ impl StatedDisk {
     }
 }
 
-/// What is wrong with a model, at the location in the file that states it; `model` has the names that there are.
+/// Converts a model error to a problem at its location in the file. `model` provides the
+/// existing names.
 pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: &Model) -> Problem {
     let (list, index) = error.element.entry();
     let whole = Location::default();
-    // where the export at rest is not at fault, its sum with the other is
+    // if the export at rest is valid, the error lies in its sum with the second export
     let softened =
         structure.matrices.as_ref().is_some_and(|matrices| error.key == "stiffness" && matrices.spins(model));
     let key = if softened { "stiffened" } else { error.key };
@@ -270,10 +274,11 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
     Problem::new(location, key, message).maybe_help(help)
 }
 
-/// Lowest frequencies that are shown where a structure cannot be reduced.
+/// Number of lowest frequencies that a message shows if a structure cannot be reduced.
 const LOWEST: usize = 3;
 
-/// What is wrong with a structure of which nothing tells up to which frequency it must be good, and what to do.
+/// Returns the message and the help for a structure without any frequency that limits its
+/// reduction.
 fn without_end(model: &Model) -> Option<(&'static str, &'static str)> {
     match model.substructure.as_ref()?.reduction {
         Reduction::UpTo { up_to, .. } if up_to <= 0.0 => Some((
@@ -289,7 +294,8 @@ fn without_end(model: &Model) -> Option<(&'static str, &'static str)> {
     }
 }
 
-/// What to do where a structure cannot be reduced: units that were mistaken move its frequencies by powers of ten.
+/// Returns advice for a structure that cannot be reduced. Mistaken units shift its frequencies
+/// by powers of ten.
 fn advice_on_reduction(model: &Model) -> Option<String> {
     let substructure = model.substructure.as_ref()?;
     if let Some((_, help)) = without_end(model) {
@@ -313,18 +319,20 @@ fn advice_on_reduction(model: &Model) -> Option<String> {
     Some(format!("its lowest frequencies are {}: {advice}", listed.join(", ")))
 }
 
-/// Frequencies of structures of which somebody has matrices, rad/s: below the first stand oceans, beyond the second crystals.
+/// Limits of plausible frequencies of a structure, rad/s.
 const SLOWEST: f64 = 1e-3 * std::f64::consts::TAU;
 const FASTEST: f64 = 1e8 * std::f64::consts::TAU;
 
-/// The lowest frequencies of a component (rad/s) if they are such as structures have: at least one, and none beyond them.
+/// Returns the lowest frequencies of a component (rad/s) if they are plausible: one within the
+/// limits, none above.
 pub(crate) fn sensible(component: &Component) -> Option<Vec<f64>> {
     let lowest = component.frequencies(LOWEST.min(component.dofs())).ok()?;
     let elastic = |omega: &&f64| (SLOWEST..=FASTEST).contains(*omega);
     (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= FASTEST)).then_some(lowest)
 }
 
-/// What to say where matrices of stiffness and mass are a structure of these frequencies if the other one is taken for each.
+/// Returns the advice to exchange the files of stiffness and mass, with the frequencies that
+/// result.
 pub(crate) fn exchange(frequencies: &[f64]) -> String {
     let listed: Vec<String> = frequencies.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
     format!(

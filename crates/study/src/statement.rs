@@ -1,4 +1,5 @@
-//! What a file states, compiled: every expression parsed, every location known, nothing evaluated yet.
+//! Compiled statements of a study file: expressions are parsed and locations are known, but
+//! nothing is evaluated.
 
 use crate::error::{Location, Problem};
 use crate::expression::{Expression, Value, described, displayed};
@@ -12,7 +13,7 @@ use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Quantity {
     pub location: Location,
-    /// Where its text begins in the source, see [`crate::document::Content::Text`].
+    /// Start of its text in the source, see [`crate::document::Content::Text`].
     pub inner: Option<usize>,
     pub text: String,
     pub expression: Expression,
@@ -21,7 +22,8 @@ pub(crate) struct Quantity {
 #[derive(Debug, Clone)]
 pub(crate) struct StatedTable {
     pub location: Location,
-    /// The indices of the repetition that states it, in words; empty for most.
+    /// The indices of the repetition that states the table, in words; empty without a
+    /// repetition.
     pub turn: String,
     pub entries: Vec<StatedEntry>,
 }
@@ -29,19 +31,19 @@ pub(crate) struct StatedTable {
 #[derive(Debug, Clone)]
 pub(crate) struct StatedEntry {
     pub key: &'static str,
-    /// Its value; the table if it is a default.
+    /// Location of the value; that of the table if the value is a default.
     pub location: Location,
     pub value: Stated,
 }
 
-/// Rows with their weights.
+/// Names of rows with their locations and weights.
 pub(crate) type Weights = Vec<(String, Location, Quantity)>;
 
-/// Which order the ends of a range may have.
+/// Permitted order of the ends of a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
     Rising,
-    /// The second end may lie below the first, but is not the same.
+    /// The second end may lie below the first, but must differ from it.
     Any,
 }
 
@@ -66,12 +68,13 @@ impl StatedTable {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
-    /// A message with the indices of the repetition.
+    /// Appends the indices of the repetition to a message.
     pub fn with_turn(&self, message: &str) -> String {
         if self.turn.is_empty() { message.to_owned() } else { format!("{message} ({})", self.turn) }
     }
 
-    /// Calls `each` with the key, the quantity and its dimension (where the schema tells it) of every quantity in the table.
+    /// Calls `each` with the key, the quantity and its dimension (if the schema defines it) for
+    /// every quantity in the table.
     pub fn each_quantity(&self, each: &mut dyn FnMut(&'static str, &Quantity, Option<Dimension>)) {
         for entry in &self.entries {
             match &entry.value {
@@ -101,7 +104,8 @@ impl StatedTable {
         }
     }
 
-    /// The location of a key's value, or of a name in it; the table's own if there is no such key.
+    /// Returns the location of a key's value, or of a name in it; that of the table if the key
+    /// is absent.
     pub fn location_of(&self, key: &str, name: Option<&str>) -> &Location {
         let Some(entry) = self.entry(key) else { return &self.location };
         let inside = name.and_then(|name| match &entry.value {
@@ -121,14 +125,14 @@ pub(crate) struct Environment<'a> {
 }
 
 impl Quantity {
-    /// The value, of whatever dimension.
+    /// Returns the value, of any dimension.
     pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<Value, Problem> {
         self.expression
             .evaluate(&environment.values)
             .map_err(|fault| Problem::fault(&self.location, self.inner, key, fault))
     }
 
-    /// The value in SI, of this dimension and in this range.
+    /// Returns the value in SI. It must have this dimension and lie in this range.
     pub fn number(
         &self,
         key: &str,
@@ -145,7 +149,7 @@ impl Quantity {
         Err(self.problem(key, message))
     }
 
-    /// `value`, which this quantity has, as a number of this dimension.
+    /// Converts `value`, the value of this quantity, to a number of this dimension.
     pub fn convert(
         &self,
         value: Value,
@@ -172,7 +176,8 @@ impl Quantity {
         Err(self.problem(key, "this is not a finite number"))
     }
 
-    /// The value of the parameter `name` that this is, in the dimension that it must have.
+    /// Returns the value of this quantity for the parameter `name`, in the dimension that the
+    /// parameter must have.
     pub fn settled(
         &self,
         name: &str,
@@ -183,7 +188,8 @@ impl Quantity {
         self.in_dimension(value, name, dimension, environment)
     }
 
-    /// `value`, which this quantity has, in the dimension that the parameter `name` must have.
+    /// Converts `value`, the value of this quantity, to the dimension that the parameter `name`
+    /// must have.
     pub fn in_dimension(
         &self,
         value: Value,
@@ -209,7 +215,7 @@ impl Quantity {
 }
 
 impl StatedTable {
-    /// The values of all keys. What is wrong goes to `problems`, and its key is left out.
+    /// Returns the values of all keys. Errors go to `problems`; their keys are left out.
     pub fn values(&self, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Values {
         let before = problems.len();
         let mut entries = Vec::with_capacity(self.entries.len());
@@ -303,7 +309,8 @@ impl Stated {
     }
 }
 
-/// A law by the values of its table. A parameter whose dimension is raised to the value of another one is read after that.
+/// Builds a law from the values of its table. A parameter whose dimension depends on another
+/// parameter (as an exponent) is read after that one.
 fn law(
     row: &'static LawInfo,
     table: &StatedTable,
@@ -321,14 +328,14 @@ fn law(
             let default = || row.parameters.iter().find(|p| p.key == key)?.default;
             numbers.get(key).copied().or_else(default)
         };
-        // to a power that is not whole: a plain number in SI
+        // with an exponent that is not a whole number: a plain number in SI
         let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
         match quantity.number(parameter.key, (dimension, *within), example, environment) {
             Ok(value) if !parameter.range.has(value) => {
                 let Parameter { key, range, .. } = *parameter;
                 let error = LawError::Value { law: row.name, key, dimension, range, value };
                 problems.push(quantity.problem(key, error.to_string()));
-                // what is raised to it would only be misread
+                // the parameters with this exponent cannot be checked
                 break;
             }
             Ok(value) => {
@@ -338,13 +345,14 @@ fn law(
         }
     }
     if problems.len() > before {
-        // already said; the caller only needs to know that there is no law
+        // The error was reported already. The caller only needs to know that there is no law.
         return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.location, key, "")));
     }
     row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
 }
 
-/// Tolerances of adaptive frequencies: finer ones take more points than they are worth, coarser ones show nothing.
+/// Bounds of the tolerance of adaptive frequencies. A finer tolerance costs too many points, a
+/// coarser one hides the shape of the curve.
 const FINEST: f64 = 1e-5;
 const COARSEST: f64 = 0.5;
 

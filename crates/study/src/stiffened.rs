@@ -1,45 +1,50 @@
-//! A structure by its matrices that rotation stiffens: `K + (Ω/Ω₁)² (K₁ - K)`, of two exports, one of them prestressed at the speed Ω₁.
+//! Stress stiffening of a rotating structure: `K + (Ω/Ω₁)² (K₁ - K)` from two exports, one
+//! prestressed at the speed Ω₁.
 //!
-//! The stress of rotation grows with the square of the speed, and what it adds to the stiffness in proportion to it. So does what rotation takes
-//! away (spin softening), so that one export may have both.
+//! The stress of rotation grows with the square of the speed, and the added stiffness is
+//! proportional to the stress. Spin softening also grows with the square of the speed, so one
+//! export may include both.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use stickslip::structure::{Component, StructureError};
 use stickslip_numerics::sparse::{Matrix, MatrixError};
 
-/// Components at so many speeds are kept: reductions belong to a component, and cases at one speed share it.
+/// Number of components that are kept, one per speed. Reductions belong to a component, and
+/// cases at the same speed share it.
 const KEPT: usize = 16;
 
 /// Both exports of a study's structure.
 #[derive(Debug, Clone)]
 pub struct Exports {
-    /// At rest.
+    /// The structure at rest.
     pub rest: Component,
-    /// The stiffness at a speed, N/m.
+    /// The stiffness at the speed `at`, N/m.
     pub there: Matrix,
-    /// That speed, rad/s.
+    /// The speed of the second export, rad/s.
     pub at: f64,
     /// The speed of the study, as its file states it.
     pub speed: String,
 }
 
-/// What the second export has more.
+/// Difference between the stiffness of the second export and that at rest.
 #[derive(Debug, Clone)]
 pub(crate) struct Stiffened {
     more: Matrix,
-    /// By the bits of the share.
+    /// Components by the bits of their factor `(Ω/Ω₁)²`.
     kept: Arc<Mutex<Vec<(u64, Component)>>>,
 }
 
 impl Stiffened {
-    /// From the stiffness at rest and at the speed of the second export.
+    /// Computes the difference from the stiffness at rest and that at the speed of the second
+    /// export.
     pub fn new(rest: &Matrix, there: &Matrix) -> Result<Self, MatrixError> {
         let less = rest.entries().map(|(row, column, value)| (row, column, -value));
         let more = Matrix::from_triplets(rest.n(), there.entries().chain(less))?;
         Ok(Stiffened { more, kept: Arc::default() })
     }
 
-    /// The component with this share, `(Ω/Ω₁)²`, of what the second export has more.
+    /// Returns the component with `share` times the difference added, where `share` is
+    /// `(Ω/Ω₁)²`.
     pub fn at(&self, component: &Component, share: f64) -> Result<Component, StructureError> {
         if share == 0.0 {
             return Ok(component.clone());
@@ -51,7 +56,7 @@ impl Stiffened {
         }
         let (mass, damping, rest) = component.matrices();
         let more = self.more.entries().map(|(row, column, value)| (row, column, share * value));
-        // entries of both lie inside, and their sums are as finite as the share
+        // both matrices have the same size, so only a factor that is not finite can fail here
         let stiffness = Matrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
         let found = Component::new(component.rows().to_vec(), mass.clone(), damping.cloned(), stiffness)?;
         if kept.len() == KEPT {
@@ -61,7 +66,7 @@ impl Stiffened {
         Ok(found)
     }
 
-    /// The entries that it adds.
+    /// Returns the difference of the two stiffness matrices.
     pub fn more(&self) -> &Matrix {
         &self.more
     }

@@ -1,4 +1,4 @@
-//! A study that has been read: its cases, each with its model and the values of its kind.
+//! A study that was read: its cases, each with its model and the values of its kind.
 
 use crate::cause;
 use crate::disk::{self, Again};
@@ -39,7 +39,7 @@ pub struct Study {
     pub(crate) names: Vec<String>,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) order: Vec<usize>,
-    /// Drawn parameters first, which all change together and slowest.
+    /// Drawn parameters come first; they change together, and slowest.
     pub(crate) varied: Vec<Varied>,
     pub(crate) sample: Option<Sample>,
     pub(crate) replaced: Vec<Replaced>,
@@ -47,18 +47,18 @@ pub struct Study {
     pub(crate) study: StatedTable,
     pub(crate) method: StatedTable,
     pub(crate) figure: StatedTable,
-    /// Memory that a run may take, bytes, if it was said.
+    /// Memory limit of a run, bytes, if the user set one.
     pub(crate) memory: Option<u64>,
 }
 
-/// A parameter: its value as stated, the dimension that it must have (if that is known).
+/// A parameter: its value as stated, and its required dimension if that is known.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameter {
     pub quantity: Quantity,
     pub dimension: Option<Dimension>,
 }
 
-/// A parameter of `vary`.
+/// A parameter of `vary` or `[sample]`.
 #[derive(Debug, Clone)]
 pub(crate) struct Varied {
     pub index: usize,
@@ -66,13 +66,13 @@ pub(crate) struct Varied {
     pub points: VariedPoints,
 }
 
-/// Values of `vary` that a value from outside the file has replaced.
+/// A parameter of `vary` that an override replaced.
 #[derive(Debug, Clone)]
 pub(crate) struct Replaced {
     pub name: String,
     /// The value as it was typed.
     pub text: String,
-    /// How many values stand in the file.
+    /// Number of values in the file.
     pub values: usize,
 }
 
@@ -111,7 +111,7 @@ impl VariedPoints {
 pub struct MethodChoice {
     /// Name, a row of [`stickslip::method::TABLE`].
     pub name: String,
-    /// The options that were given, SI.
+    /// The options that were given, in SI.
     pub options: Options,
 }
 
@@ -120,17 +120,17 @@ pub struct MethodChoice {
 pub struct VariedValue {
     /// Name of the parameter.
     pub name: String,
-    /// Its value in SI; of a parameter without a unit the number as written.
+    /// Its value in SI; for a parameter without a unit, the number as written.
     pub si: f64,
-    /// Its dimension, if the file tells.
+    /// Its dimension, if the file determines it.
     pub dimension: Option<Dimension>,
-    /// The unit in which the file states it, if it has one: `rpm`.
+    /// The unit in which the file states it, such as `rpm`, if it has one.
     pub unit: Option<String>,
     /// For legends: `Ft = 2 N`.
     pub text: String,
 }
 
-/// Names of columns, without their units, that a parameter could have too.
+/// Names of table columns, without units, that a parameter could also have.
 const OF_TABLES: [&str; 12] = [
     "amplitude",
     "frequency",
@@ -147,10 +147,13 @@ const OF_TABLES: [&str; 12] = [
 ];
 
 impl VariedValue {
-    /// Its column in a table: the name with the unit at its end, `Ft_N`, and the value in that unit. SI, but hertz and degrees, which
-    /// come back as they were typed; a parameter of unknown dimension, or without one, has its bare name.
+    /// Returns its column in a table: the name with the unit at its end, `Ft_N`, and the value
+    /// in that unit.
+    ///
+    /// Values are in SI, except hertz and degrees. A parameter without a known dimension has
+    /// its bare name.
     pub fn column(&self) -> (String, f64) {
-        // tables have columns of these names themselves
+        // tables already have columns of these names
         let prefix = if OF_TABLES.contains(&self.name.as_str()) { "parameter_" } else { "" };
         match self.dimension.and_then(|dimension| Some((table_unit(dimension)?, dimension))) {
             Some(((unit, _), dimension)) => {
@@ -160,7 +163,7 @@ impl VariedValue {
         }
     }
 
-    /// The value and its unit as the file states it, for the scale of colours.
+    /// Returns the value and the unit as the file states them, for a colour scale.
     pub fn as_written(&self) -> (f64, String) {
         match self.unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
             Some((name, unit)) => (rounded(self.si / unit.scale("1")), name.to_owned()),
@@ -168,14 +171,14 @@ impl VariedValue {
         }
     }
 
-    /// The value and its unit for the axis of a figure, as in [`VariedValue::column`].
+    /// Returns the value and the unit for the axis of a figure, as in [`VariedValue::column`].
     pub fn on_axis(&self) -> (f64, String) {
         let unit = self.dimension.and_then(table_unit).map_or(String::new(), |(_, unit)| unit);
         (self.column().1, unit)
     }
 }
 
-/// A number without the rounding of a change of units.
+/// Removes the rounding error of a change of units.
 fn rounded(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
 }
@@ -185,71 +188,74 @@ fn rounded(value: f64) -> f64 {
 pub struct Case {
     /// Its number, from 0; the first varied parameter changes slowest.
     pub index: usize,
-    /// The varied parameters, in the order of the file.
+    /// The varied parameters, in the order of [`Study::varied`].
     pub varied: Vec<VariedValue>,
-    /// Every parameter: its value in SI (of one without a unit, the number as written) and its dimension.
+    /// Value and dimension of every parameter. The value is in SI; without a unit it is the
+    /// number as written.
     pub parameters: BTreeMap<String, (f64, Option<Dimension>)>,
-    /// The model; it assembles.
+    /// The model; it was checked to assemble.
     pub model: Model,
     /// The values of the kind's keys of `[study]`.
     pub values: Values,
-    /// The drive frequencies, if the study has any.
+    /// The excitation frequencies, if the study has any.
     pub frequencies: Option<Frequencies>,
     /// The method.
     pub method: MethodChoice,
 }
 
 impl Case {
-    /// The varied parameters in words: `Ft = 2 N, kt = 1000 N/m`; empty if nothing is varied.
+    /// Describes the varied parameters: `Ft = 2 N, kt = 1000 N/m`; empty if nothing is varied.
     pub fn label(&self) -> String {
         varied_text(&self.varied)
     }
 }
 
-/// Varied parameters in words.
+/// Describes varied parameters in words.
 pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
     varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Most cases that [`Study::resolved`] writes out; a run can be repeated from the text in any case.
+/// Largest number of cases that [`Study::resolved`] lists. A run can be repeated from the text
+/// alone.
 const MOST_RESOLVED: usize = 1_000;
 
-/// What to do about a draw that no model can have.
+/// Help for a draw with values that no model can have.
 const IMPOSSIBLE: &str = "of the values that [sample] draws this one cannot be: bound the distribution with `within = [least, most]`, or take one \
                           without such values, such as `lognormal`";
 
 impl Study {
-    /// The stem of the file's name.
+    /// Returns the stem of the file's name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Title; the name if the file gives none.
+    /// Returns the title; the name if the file gives none.
     pub fn title(&self) -> &str {
         &self.title
     }
 
-    /// Where the study comes from, if the file says so.
+    /// Returns the source that the file cites, if any.
     pub fn source(&self) -> Option<&str> {
         self.source.as_deref()
     }
 
-    /// The text of the file.
+    /// Returns the text of the file.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The study kind.
+    /// Returns the study kind.
     pub fn kind(&self) -> &'static KindInfo {
         self.kind
     }
 
-    /// The names of the varied parameters, in the order of the file.
+    /// Returns the names of the varied parameters: drawn ones first, then those of `vary` in
+    /// the order of the file.
     pub fn varied(&self) -> Vec<&str> {
         self.varied.iter().map(|varied| self.names[varied.index].as_str()).collect()
     }
 
-    /// What differs from the file, in sentences for the reader of the results.
+    /// Returns the differences from the file as sentences for the reader of the results.
     pub fn notes(&self) -> Vec<String> {
         let note = |Replaced { name, text, values }: &Replaced| {
             let values = if *values == 1 { "the value".to_owned() } else { format!("the {values} values") };
@@ -258,49 +264,50 @@ impl Study {
         self.replaced.iter().map(note).collect()
     }
 
-    /// Number of cases: the product of the number of draws and the numbers of values in `vary`; 1 if nothing is drawn or varied.
+    /// Returns the number of cases: the product of the number of draws and the numbers of
+    /// values in `vary`; 1 if nothing is drawn or varied.
     pub fn cases(&self) -> usize {
         self.draws().unwrap_or(1) * self.cases_of_a_draw()
     }
 
-    /// How often uncertain parameters are drawn, if any are.
+    /// Returns the number of draws of the uncertain parameters, if there are any.
     pub fn draws(&self) -> Option<usize> {
         self.sample.map(|sample| sample.count)
     }
 
-    /// Cases that have the same draw: the combinations of `vary`.
+    /// Returns the number of cases with the same draw: the combinations of `vary`.
     pub(crate) fn cases_of_a_draw(&self) -> usize {
         self.listed().map(|varied| varied.points.len()).product()
     }
 
-    /// The parameters of `vary`.
+    /// Returns the parameters of `vary`.
     fn listed(&self) -> impl DoubleEndedIterator<Item = &Varied> {
         self.varied.iter().filter(|varied| !varied.points.is_drawn())
     }
 
-    /// Number of parameters that are drawn, the first of [`Study::varied`].
+    /// Returns the number of drawn parameters, which come first in [`Study::varied`].
     pub(crate) fn drawn(&self) -> usize {
         self.varied.len() - self.listed().count()
     }
 
-    /// The seed of the draws, if any are made.
+    /// Returns the seed of the draws, if there are any.
     pub fn seed(&self) -> Option<u64> {
         self.sample.map(|sample| sample.seed)
     }
 
-    /// The same study, which may take so many bytes of memory.
+    /// Sets the memory limit of a run, bytes.
     pub fn with_memory_limit(mut self, bytes: u64) -> Study {
         self.memory = Some(bytes);
         self
     }
 
-    /// Memory that a run may take, bytes: what was said, or [`MEMORY_LIMIT`](memory::MEMORY_LIMIT), or what the machine has
-    /// free if that is less.
+    /// Returns the memory limit of a run, bytes: the limit that was set, or
+    /// [`MEMORY_LIMIT`](memory::MEMORY_LIMIT), or the machine's free memory if that is less.
     pub fn memory_limit(&self) -> u64 {
         self.memory.unwrap_or_else(memory::default_limit)
     }
 
-    /// Number of points: cases times frequencies.
+    /// Returns the number of points: cases times frequencies.
     pub fn points(&self) -> usize {
         let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
             Some(Stated::List(list, _)) => list.len(),
@@ -311,24 +318,28 @@ impl Study {
         self.cases() * frequencies
     }
 
-    /// Number of values of the last varied parameter, the one that changes fastest; 1 if nothing is varied.
+    /// Returns the number of values of the last varied parameter, which changes fastest; 1 if
+    /// nothing is varied.
     pub(crate) fn last_varied(&self) -> usize {
         self.listed().next_back().map_or(1, |varied| varied.points.len())
     }
 
-    /// The varied parameters of the case with this number, without its model; `None` if there is no such case.
+    /// Returns the varied parameters of a case without its model; `None` if there is no such
+    /// case.
     pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
         let choice = self.choice(index);
         let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, &[]).ok()?;
         Some(self.varied_of(&environment, &choice))
     }
 
-    /// Whether the frequencies lie where the curve bends, so that their number is not known before.
+    /// Returns whether the frequencies are adaptive, so that their number is unknown before the
+    /// run.
     pub fn is_adaptive(&self) -> bool {
         matches!(self.study.entry("frequency").map(|entry| &entry.value), Some(Stated::Adaptive { .. }))
     }
 
-    /// Both exports of a structure by its matrices that rotation stiffens (`stiffened`), at the values of the first case.
+    /// Returns both exports of a structure that rotation stiffens (`stiffened`), at the values
+    /// of the first case.
     pub fn stiffened(&self) -> Option<Exports> {
         let Matrices { table, component, stiffened, .. } = self.structure.matrices.as_ref()?;
         let Stated::Table(spin) = &table.entry("stiffened")?.value else { return None };
@@ -341,25 +352,27 @@ impl Study {
         Some(Exports { rest, there, at, speed: speed.text.clone() })
     }
 
-    /// The values of `[figure]`.
+    /// Returns the values of `[figure]`.
     pub(crate) fn figure_values(&self) -> Values {
-        // none of its keys takes a quantity
+        // no key of `[figure]` takes a quantity
         let environment = Environment { names: &self.names, values: Vec::new() };
         self.figure.values(&environment, &mut Vec::new())
     }
 
-    /// The case with this number.
+    /// Returns the case with this number.
     ///
     /// # Errors
-    /// [`StudyError`] if there is no such case. The cases of a study that was read have been checked.
+    /// [`StudyError`] if there is no such case. The cases of a study that was read have been
+    /// checked.
     pub fn case(&self, index: usize) -> Result<Case, StudyError> {
         self.case_where(index, None)
     }
 
-    /// Case `index` with the parameter `name` at a value (SI) that no case needs to have, for searches between the cases.
+    /// Returns case `index` with the parameter `name` at another value (SI), for searches
+    /// between the cases.
     ///
     /// # Errors
-    /// [`StudyError`]: no such case or parameter, or the value is none that the model can have.
+    /// [`StudyError`]: there is no such case or parameter, or the model cannot have this value.
     pub fn case_with(&self, index: usize, name: &str, si: f64) -> Result<Case, StudyError> {
         match self.names.iter().position(|n| n == name) {
             Some(parameter) => self.case_where(index, Some((parameter, si))),
@@ -385,7 +398,7 @@ impl Study {
         }
     }
 
-    /// The same study with another method. Options are kept if the file names this method.
+    /// Returns the study with another method. Options are kept if the file names this method.
     ///
     /// # Errors
     /// [`StudyError`] if there is no such method.
@@ -407,12 +420,12 @@ impl Study {
         Ok(self)
     }
 
-    /// Whether a flag of `[study]` is set.
+    /// Returns whether a flag of `[study]` is set.
     pub(crate) fn wants(&self, key: &str) -> bool {
         matches!(self.study.entry(key).map(|entry| &entry.value), Some(Stated::Fixed(Given::Flag(true))))
     }
 
-    /// The same study without the mistuning of its disk.
+    /// Returns the study without the mistuning of its disk.
     pub(crate) fn tuned(&self) -> Study {
         let mut study = self.clone();
         if let Some(disk) = &mut study.structure.lists.disk {
@@ -422,17 +435,18 @@ impl Study {
         study
     }
 
-    /// Whether `[figure]` asks for reference curves, which a run computes. Behind percentiles of many draws there is none: each draw has its own.
+    /// Returns whether a run must compute the reference curves of `[figure]`. A study with
+    /// draws has none, because each draw has its own references.
     pub fn wants_references(&self) -> bool {
         self.draws().is_none() && self.asks_for_references()
     }
 
-    /// Whether `[figure]` asks for them, drawn or not.
+    /// Returns whether `[figure]` asks for reference curves, with or without draws.
     pub(crate) fn asks_for_references(&self) -> bool {
         self.figure_values().flag("references") == Some(true)
     }
 
-    /// The same study, drawn as another file says: with its title and its `[figure]`.
+    /// Returns the study with the title and the `[figure]` of another study.
     #[must_use]
     pub fn drawn_like(mut self, other: &Study) -> Study {
         self.title.clone_from(&other.title);
@@ -440,8 +454,10 @@ impl Study {
         self
     }
 
-    /// An error that only shows when the study is run, placed at a key of the file: `table` is `study`, `method`, `mass`, `joint`, …,
-    /// `index` the element of a list. The table or the file stands in where the key is absent.
+    /// Builds an error that only appears when the study runs, located at a key of the file.
+    ///
+    /// `table` is `study`, `method`, `mass`, `joint`, …; `index` is the element of a list. If
+    /// the key is absent, the location is the table or the file.
     pub fn error_at(
         &self,
         table: &str,
@@ -457,7 +473,7 @@ impl Study {
             (_, Some(template)) => Some(&template.table),
             ("structure", None) => self.structure.matrices.as_ref().map(|matrices| &matrices.table),
             (_, None) => {
-                // of a ring: that of its sector
+                // on a ring: the element of its sector
                 let list = self.structure.lists.get(table);
                 list.get(if self.structure.lists.disk.is_some() { index % list.len().max(1) } else { index })
             }
@@ -470,7 +486,8 @@ impl Study {
         StudyError::at(&self.sources, Problem::new(location, key, message).maybe_help(help))
     }
 
-    /// What tells the matrices of `[structure]`, and what files say of it as a sector, from others; none of a study without them.
+    /// Returns a checksum of the matrices of `[structure]` and of the sector's files; `None`
+    /// without matrices.
     pub fn matrices_check(&self) -> Option<String> {
         let own = self.structure.matrices.as_ref().and_then(Matrices::check)?;
         let sector = self.structure.lists.disk.as_ref().map_or(0, |disk| {
@@ -480,7 +497,8 @@ impl Study {
         Some(format!("{own}{sector:08x}"))
     }
 
-    /// The study as it was understood, all values in SI, for the record of a run. The text of the file is in it.
+    /// Returns the study as it was understood, for the record of a run. All values are in SI;
+    /// the file's text is included.
     pub fn resolved(&self) -> Json {
         let mut cases = Vec::new();
         for index in 0..self.cases().min(MOST_RESOLVED) {
@@ -514,9 +532,9 @@ impl Study {
         })
     }
 
-    // ------------------------------------------------------------------------------------------ one case
+    // ------------------------------------------------------------------------------ one case
 
-    /// Checks all cases; the first is assembled, the others differ from it in numbers only.
+    /// Checks all cases. The first one is assembled; the others differ from it only in numbers.
     pub(crate) fn check(&self) -> Result<(), StudyError> {
         if self.is_adaptive() && !self.kind.adapts {
             let message = format!("the kind `{}` needs to know its frequencies", self.kind.name);
@@ -546,7 +564,7 @@ impl Study {
     fn parts(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
         let parts = self.resolve(index, look, problems);
         if !problems.is_empty() && self.cases() > 1 {
-            // what is wrong in the first case and in the last is no matter of one case
+            // a problem of both the first and the last case does not depend on the case
             let mut others = Vec::new();
             if index == 0 {
                 self.resolve(self.cases() - 1, look, &mut others);
@@ -561,12 +579,12 @@ impl Study {
         parts
     }
 
-    /// A case in words, with its number among all: `N = 0 N, case 1 of 8`.
+    /// Describes a case with its number: `N = 0 N, case 1 of 8`.
     pub(crate) fn case_words(&self, index: usize) -> String {
         let choice = self.choice(index);
         let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, &[]) {
             Ok(environment) => varied_text(&self.varied_of(&environment, &choice)),
-            // without values: as they stand in the file
+            // without values: the texts of the file
             Err(_) => {
                 let words = self.varied.iter().filter_map(|varied| match (&varied.points, choice.get(&varied.index)) {
                     (VariedPoints::List(list), Some((_, point))) => {
@@ -581,7 +599,7 @@ impl Study {
         if words.is_empty() { number } else { format!("{words}, {number}") }
     }
 
-    /// Which point every varied parameter has in a case.
+    /// Returns the index of the point of every varied parameter in a case.
     fn choice(&self, index: usize) -> HashMap<usize, (&Varied, usize)> {
         let mut remainder = index;
         let mut choice = HashMap::new();
@@ -589,7 +607,7 @@ impl Study {
             choice.insert(varied.index, (varied, remainder % varied.points.len()));
             remainder /= varied.points.len();
         }
-        // all drawn ones are of one draw
+        // all drawn parameters belong to the same draw
         let drawn = self.varied.iter().filter(|varied| varied.points.is_drawn());
         choice.extend(drawn.map(|varied| (varied.index, (varied, remainder))));
         choice
@@ -605,7 +623,7 @@ impl Study {
             };
             let unit = self.written_unit(varied).filter(|(_, dimension)| value.dimension == Some(*dimension));
             let unit = unit.map(|(unit, _)| unit);
-            // as the user wrote it, if that is a number with its unit
+            // the user's text, if it is a number with a unit
             let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
                 Some(quantity)
                     if quantity.text.contains(|c: char| c == '%' || (c.is_alphabetic() && c != 'e' && c != 'E')) =>
@@ -622,14 +640,15 @@ impl Study {
         values.collect()
     }
 
-    /// The unit in which the values of a varied parameter are stated, or else the parameter, with what it measures.
+    /// Returns the unit of the values of a varied parameter, or else of the parameter, with its
+    /// dimension.
     fn written_unit(&self, varied: &Varied) -> Option<(String, Dimension)> {
         let own = &self.parameters[varied.index].quantity;
         let mut all = varied.points.quantities().chain([own]);
         all.find_map(with_unit).map(|(unit, _, dimension)| (unit.to_owned(), dimension))
     }
 
-    /// The units in which the file states what columns of tables have in SI, by column.
+    /// Returns the units of the file for the table columns that are in SI, by column.
     fn written_units(&self) -> serde_json::Map<String, Json> {
         let varied = self.varied_values(0).unwrap_or_default();
         let of_varied = varied.iter().filter_map(|value| Some((value.column().0, Json::from(value.unit.clone()?))));
@@ -719,7 +738,7 @@ impl Study {
 
     fn model_problem(&self, error: &ModelError, model: &Model) -> Problem {
         match model.ring {
-            // as they stand in the file: those of a sector
+            // element numbers of the file: those of one sector
             Some(ring) => {
                 let element = ring.in_sector(error.element, model);
                 problem_of(&self.structure, &ModelError { element, ..error.clone() }, model)
@@ -734,12 +753,13 @@ impl Study {
     }
 }
 
-/// How a case is looked at.
+/// Extent of the check of a case.
 #[derive(Debug, Clone, Copy)]
 enum Look {
-    /// For the first time: the first case is assembled, and the figure looked at. The other cases differ in numbers only.
+    /// First check: the first case is assembled and the figure is checked. The other cases
+    /// differ only in numbers.
     First,
-    /// After that, with a parameter at another value or as it stands: numbers are enough.
+    /// Later: only the numbers are checked. A parameter may have another value.
     Again(Option<(usize, f64)>),
 }
 
@@ -750,8 +770,8 @@ struct Parts {
     method: Values,
 }
 
-/// The values of all parameters, with the choices made for the varied ones; those that are `fixed` have that value,
-/// SI, whatever is stated.
+/// Evaluates all parameters with the chosen points of the varied ones. Parameters in `fixed`
+/// have the given value (SI) instead.
 pub(crate) fn evaluate(
     names: &[String],
     parameters: &[Parameter],
@@ -785,7 +805,7 @@ pub(crate) fn evaluate(
     Ok(environment.values)
 }
 
-/// The parameters as they are stated, with the choices made for the varied ones.
+/// Returns the parameters as stated, with the chosen points of the varied ones.
 pub(crate) fn stated<'a>(
     parameters: &'a [Parameter],
     choice: &HashMap<usize, (&'a Varied, usize)>,
@@ -802,7 +822,8 @@ pub(crate) fn stated<'a>(
     parameters.iter().enumerate().map(one).collect()
 }
 
-/// The model: what the lists state, or the ring of which they state a sector. `again` tells the parameters with some of them changed.
+/// Builds the model that the lists state, or the ring of the sector that they state. `again`
+/// evaluates the parameters with some of them changed.
 pub(crate) fn model_of(
     structure: &ModelStatement,
     environment: &Environment<'_>,
@@ -819,7 +840,8 @@ pub(crate) fn model_of(
     }
 }
 
-/// Whether the numbers of a model are in their ranges; its names are the same in every case.
+/// Returns whether the numbers of a model are in their ranges. Its names are the same in every
+/// case.
 fn numbers_hold(model: &Model) -> bool {
     let not_negative = |value: f64| value.is_finite() && value >= 0.0;
     model.masses.iter().all(|mass| not_negative(mass.mass))

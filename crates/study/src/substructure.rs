@@ -1,4 +1,4 @@
-//! What `[structure]` and `[[place]]` state, as parts of a model.
+//! Converts `[structure]` and `[[place]]` to parts of a model.
 
 use crate::error::Problem;
 use crate::near::{nearest, one_of, shown};
@@ -10,27 +10,39 @@ use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionEvidence, Subst
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
-/// So many harmonics of the highest drive frequency count where the file does not say how far a reduction must reach: of forces alone, with some room.
+/// Default frequency range of a reduced model without joints, in multiples of the highest
+/// excitation frequency. The forces need one multiple; the rest is a margin.
 const HARMONICS: u32 = 5;
-/// The same where joints are. Those of friction fall with the square of their number, and a mode that one of them meets lifts it again by its
-/// amplification: on a chain of 60 masses the seventh met one, and a reach of 5, 9, 15 and 31 harmonics left errors of 9e-3, 1e-3, 5e-5 and 5e-6.
+/// Default range with joints, in the same multiples. The harmonics of friction fall with the
+/// square of their order. A mode near one of them amplifies it again.
+///
+/// Measured on a chain of 60 masses, where a mode meets harmonic 7: ranges of 5, 9, 15 and 31
+/// harmonics left errors of 9e-3, 1e-3, 5e-5 and 5e-6.
 const HARMONICS_OF_JOINTS: u32 = 15;
-/// Modes that a reach beyond that of forces may take: with more of them methods that follow motions in time are slow, and the mesh seldom knows the last.
+/// Largest number of modes when the range is extended for joints. More modes make time
+/// integration slow, and the mesh rarely resolves the highest ones.
 const MODES_OF_HARMONICS: usize = 60;
-/// Rows up to which a structure with joints keeps them all where nothing is said: few coordinates leave out modes that harmonics of friction meet, which
-/// made a chain of 80 masses with a stiff slider wrong by 3 to 8 %. That costs what it may up to here only: seconds a point of chains of 60, 80, 100, 150, 200
-/// rows in few coordinates take 0.015 from event to event, 0.03 with ten joints and up to 0.25; in all rows 0.19, 0.26, 0.26, 3.2, 4.2 with one joint, 0.02,
-/// 0.05, 0.1, 12 and more with ten; by `auto` 0.02 to 0.1. Only where all laws are exact: methods that integrate pay for every fast mode, and took 4.3 instead
-/// of 0.07 for 60 rows with `bouc-wen`.
+/// Largest structure, in rows, that is not reduced by default if it has joints.
+///
+/// A reduced model lacks modes that harmonics of friction meet: a chain of 80 masses with a
+/// stiff slider was wrong by 3 to 8 %. All rows are kept only if all laws are exact. Methods
+/// that integrate in time pay for every fast mode: 60 rows with `bouc-wen` took 4.3 s instead of
+/// 0.07 s.
+///
+/// Seconds per point, for chains of 60, 80, 100, 150 and 200 rows:
+/// - reduced, event-driven: 0.015; with ten joints 0.03 and up to 0.25;
+/// - all rows, event-driven: 0.19, 0.26, 0.26, 3.2, 4.2 with one joint; 0.02, 0.05, 0.1, 12 and
+///   more with ten;
+/// - all rows, `auto`: 0.02 to 0.1.
 const KEPT: usize = 100;
-/// Damping ratio from which a mode creeps.
+/// Critical damping ratio: from here on a mode does not oscillate.
 const CRITICAL: f64 = 1.0;
 /// Names of the directions of a node with a normal.
 const IN_FRAME: [&str; 3] = ["t1", "t2", "n"];
-/// What the rows of a node with a normal are called.
+/// Names of the rows of a node with a normal.
 const CARTESIAN: [&str; 3] = ["x", "y", "z"];
 
-/// The kinds of reduction: name, summary.
+/// The kinds of reduction: name, summary and kind.
 pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
     ("rubin", "free modes and residual flexibility", Some(ReductionKind::Rubin)),
     (
@@ -45,10 +57,11 @@ pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
     ),
 ];
 
-/// All rows; [`settle`] decides up to where modes are damped.
+/// No reduction; [`settle`] sets the frequency up to which modes are damped.
 const WHOLE: Reduction = Reduction::None { up_to: 0.0 };
 
-/// The structure of `[structure]`. Where nothing is said of its reduction, [`settle`] decides.
+/// Builds the structure of `[structure]`. If the file does not state a reduction, [`settle`]
+/// decides later.
 pub(crate) fn of(
     Matrices { table, stiffened, .. }: &Matrices,
     component: &Component,
@@ -128,9 +141,12 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
     }
 }
 
-/// Decides how far the reduction reaches, where the file does not: from the frequencies of the study, `values`. The error of so many modes is that up to
-/// the highest frequency that excites: beyond, where the last of them are, no reduction is good. Of a small structure all rows are kept, where the laws
-/// are followed by the `method` as they are.
+/// Sets the frequency range of the reduction if the file does not, from the frequencies of the
+/// study in `values`.
+///
+/// With a given number of modes, the error is stated up to the highest excited frequency,
+/// because no reduction is accurate near its last modes. A small structure with joints is not
+/// reduced if `method` treats all laws exactly.
 pub(crate) fn settle(model: &mut Model, values: &Values, method: &Values) {
     let harmonic =
         model.forces.iter().map(|force| force.harmonic).chain(model.motions.iter().map(|motion| motion.harmonic));
@@ -154,12 +170,14 @@ pub(crate) fn settle(model: &mut Model, values: &Values, method: &Values) {
     }
 }
 
-/// Whether it is small, and every method takes its rows as they are.
+/// Returns whether the structure is small and has a definite mass matrix, so that every method
+/// accepts all its rows.
 fn keeps_all(component: &Component) -> bool {
     component.dofs() <= KEPT && component.has_definite_mass()
 }
 
-/// Where the odd harmonics end that joints make of a drive up to `excited` and that few coordinates can know, all rad/s.
+/// Returns the upper end of the frequency range with joints, rad/s: the highest odd harmonic of
+/// `excited` (rad/s) up to which the number of modes stays within its limit.
 fn reach(component: &Component, excited: f64) -> f64 {
     let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= MODES_OF_HARMONICS);
     let mut beyond =
@@ -167,7 +185,7 @@ fn reach(component: &Component, excited: f64) -> f64 {
     beyond.find(few).unwrap_or(f64::from(HARMONICS) * excited)
 }
 
-/// A `[[place]]`.
+/// Builds a `[[place]]` of the structure; errors go to `problems`.
 pub(crate) fn place(
     table: &StatedTable,
     component: &Component,
@@ -189,10 +207,10 @@ pub(crate) fn place(
     }
 }
 
-/// Directions of a turned face of a node in a plane.
+/// Names of the directions of a rotated face of a plane node.
 const IN_PLANE: [&str; 2] = ["t", "n"];
 
-/// What a `[[place]]` with `of` is a view of.
+/// The element of which a `[[place]]` with `of` is a point or a face.
 enum Viewed<'a> {
     Mass(&'a Mass),
     Body(&'a Body),
@@ -204,7 +222,8 @@ impl Viewed<'_> {
         model.masses.iter().find(|mass| mass.name == of).map(Viewed::Mass).or_else(body)
     }
 
-    /// Which of x, y, z it moves along, in the order of its directions; none of a mass that moves otherwise, or along one line.
+    /// Returns the indices of x, y, z along which it moves, in the order of its directions.
+    /// Returns `None` for a mass with other directions or with only one.
     fn axes(&self) -> Option<Vec<usize>> {
         let axes: Option<Vec<usize>> = match self {
             Viewed::Mass(mass) => {
@@ -215,7 +234,7 @@ impl Viewed<'_> {
         axes.filter(|axes| axes.len() > 1)
     }
 
-    /// The displacement along a unit vector of the point at an offset.
+    /// Returns the displacement of the point at `offset` along a unit vector, as a row.
     fn row(&self, axes: &[usize], offset: [f64; 3], along: &[f64; 3]) -> Row {
         match self {
             Viewed::Mass(_) => axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect(),
@@ -224,7 +243,9 @@ impl Viewed<'_> {
     }
 }
 
-/// A `[[place]]` that is another view of a node of masses, or a point of a body: its directions are those of the body, or a tangent, or two, and the normal.
+/// Builds a `[[place]]` that is a rotated frame of a mass or a body, or a point of a body.
+///
+/// Its directions are those of the body, or one or two tangents and the normal.
 pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
@@ -277,7 +298,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
             let message = format!("`{of}` does not move along {}, and the normal has a part along it", CARTESIAN[axis]);
             return Err(problem("normal", message).map_help("make that part 0"));
         }
-        // in a plane there is but one: the axis across the plane times the normal
+        // in a plane the tangent is unique: the axis across the plane times the normal
         Some(axis) => {
             let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
             let mut tangent = [0.0; 3];
@@ -302,7 +323,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
     Ok(Place { name, directions, rows, frame: None, of: Some(of.to_owned()) })
 }
 
-/// A point of a body, along the directions in which its points move, or those of them that are named.
+/// Builds a point of a body, with all directions of its points or those that are named.
 fn point(table: &StatedTable, values: &Values, body: &Body, name: &str) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
@@ -327,13 +348,14 @@ fn point(table: &StatedTable, values: &Values, body: &Body, name: &str) -> Resul
     Ok(Place { directions: named.to_vec(), rows, ..point })
 }
 
-/// A mass in the stead of a place, where only names are known.
+/// Returns a mass that stands in for a place if only names are known.
 pub(crate) fn stand_in(table: &StatedTable, values: &Values) -> Mass {
     let (directions, _) = directions(table, values).unwrap_or_default();
     Mass { name: values.text("name").unwrap_or_default().to_owned(), mass: 1.0, directions }
 }
 
-/// Names of the directions of a place, none if it has one displacement; and what the rows of nodes are called.
+/// Returns the names of a place's directions (none if it has one displacement) and the names of
+/// its nodes' rows.
 fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<String>), Box<Problem>> {
     let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let problem = |key: &str, message: String| Box::new(Problem::new(table.location_of(key, None), key, message));
@@ -353,7 +375,7 @@ fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<
         (false, _, _) if values.names("dof").is_some() => stated.unwrap_or_default(),
         (true, None, _) => owned(&IN_FRAME),
         (_, Some(names), _) => names.clone(),
-        // the ends of the names of rows, if they tell the directions apart
+        // the ends of the names of rows, if they are distinct
         (false, None, Some(rows)) => {
             let ends: Vec<&str> = rows.iter().map(|row| row.rsplit_once('.').map_or("", |(_, along)| along)).collect();
             let apart = ends.iter().enumerate().all(|(i, end)| !end.is_empty() && !ends[..i].contains(end));
@@ -467,8 +489,10 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
     Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, of: None })
 }
 
-/// Rows of a node in the order in which a frame takes them, x, y, z: by the ends of their names; as they stand where no end is one of these; none
-/// where some are, and not each once.
+/// Returns the rows of a node in the order x, y, z of a frame, by the ends of their names.
+///
+/// Rows without such ends keep their order. Returns `None` if the ends do not contain each axis
+/// exactly once.
 fn in_space(names: &[String]) -> Option<Vec<&String>> {
     let end =
         |name: &String| CARTESIAN.iter().position(|axis| name.rsplit_once('.').is_some_and(|(_, end)| end == *axis));
@@ -479,7 +503,7 @@ fn in_space(names: &[String]) -> Option<Vec<&String>> {
     (0..CARTESIAN.len()).map(along).collect::<Option<Vec<_>>>().filter(|rows| rows.len() == names.len())
 }
 
-/// A row of a node.
+/// Returns the row of a node along a direction.
 fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
     let name = format!("{node}.{along}");
     component.row(&name).ok_or_else(|| {
@@ -491,12 +515,13 @@ fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) 
     })
 }
 
-/// Rows that a message lists.
+/// Largest number of rows that a message lists.
 const LISTED: usize = 4;
-/// Rows among which a similar name is looked for: each takes a microsecond.
+/// Number of rows that are searched for a similar name; each takes a microsecond.
 const LOOKED_AT: usize = 200_000;
 
-/// What to do about a row that is not there: the rows of the same node, one with a similar name, or the first.
+/// Returns the help for an unknown row: the rows of the same node, a similar name, or the first
+/// rows.
 fn near(component: &Component, name: &str) -> String {
     let rows = component.rows();
     let node = name.rsplit_once('.').map_or(name, |(node, _)| node);

@@ -1,7 +1,7 @@
-//! What a study says of itself before it is run: the linear modes of its model, when its joints first slip, what looks
-//! like a mistake, and how much memory and time it will take.
+//! Summary of a study before its run: linear modes, first slip of the joints, likely mistakes,
+//! memory and time.
 //!
-//! Everything here comes from the linear structure and from counting; no orbit is computed.
+//! All results come from the linear structure and from counting; no orbit is computed.
 
 mod bodies;
 mod structure;
@@ -20,20 +20,21 @@ use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::model::{Modes, Onset, System};
 
-/// What is known of a study before it is run.
+/// Summary of a study before it is run.
 #[derive(Debug, Clone)]
 pub struct ModelSummary {
-    /// The case whose numbers are shown: its varied parameters in words, empty if nothing is varied.
+    /// The case that the summary shows: its varied parameters in words, empty if nothing is
+    /// varied.
     pub case: String,
     /// Number of cases.
     pub cases: usize,
     /// Degrees of freedom.
     pub dofs: usize,
-    /// The structure by its matrices, if there is one.
+    /// The structure given by matrices, if there is one.
     pub structure: Option<StructureSummary>,
-    /// The rigid bodies in words, those of the first sector of a disk.
+    /// The rigid bodies in words; on a disk, those of the first sector.
     pub bodies: Vec<String>,
-    /// Whether these are too many for the modes, which are then absent.
+    /// True if the model has too many degrees of freedom for the modes, which are then absent.
     pub too_large: bool,
     /// Modes with all joints free.
     pub free: Modes,
@@ -41,29 +42,32 @@ pub struct ModelSummary {
     pub stuck: Modes,
     /// The joints, in the order of the model.
     pub joints: Vec<JointSummary>,
-    /// Whether there may be several orbits at one frequency, and why; `None` where the study has no drive or no joint, or the structure is too
-    /// large for a quick answer.
+    /// Number of orbits at one frequency, with the reason if there may be several. `None` if
+    /// the study has no excitation or no joint, or if the structure is too large for a quick
+    /// answer.
     pub orbits: Option<Orbits>,
-    /// The drive frequencies of the study, lowest and highest, rad/s.
+    /// Lowest and highest excitation frequency of the study, rad/s.
     pub range: Option<(f64, f64)>,
-    /// What looks like a mistake: sentences that begin with `warning: `.
+    /// Likely mistakes: sentences that begin with `warning: `.
     pub warnings: Vec<String>,
-    /// What it will hold.
+    /// Size of the results and the memory.
     pub size: Size,
-    /// What it will mostly take on one thread, s; rough.
+    /// Usual time on one thread, s; a rough estimate.
     pub usual_seconds: f64,
-    /// What it takes instead where the results do not ask for all of it, s, and where that is, in words.
+    /// Time without the work that only some results need, s, and the condition for it, in
+    /// words.
     pub spared: Option<(f64, &'static str)>,
-    /// What it may take where orbits are hard to find, s; rough, and rather too long than too short.
+    /// Time if orbits are hard to find, s; a rough estimate on the high side.
     pub seconds: f64,
 }
 
-/// How many orbits there are at one frequency.
+/// Number of orbits at one frequency.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Orbits {
-    /// One, up to offsets that stuck contacts keep: no two motions under the same drive separate.
+    /// One orbit, except for the offsets of stuck contacts: no two motions under the same
+    /// excitation separate.
     One,
-    /// Maybe several, for this reason.
+    /// Possibly several, for this reason.
     Several(String),
 }
 
@@ -73,7 +77,7 @@ impl Orbits {
         let mut of: Vec<String> =
             separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
         if of.is_empty() {
-            // of a large structure the answer takes three factors
+            // on a large structure the answer takes three factorizations
             return match system.structure().is_sparse() {
                 true => None,
                 false if system.contracts() => Some(Orbits::One),
@@ -88,55 +92,60 @@ impl Orbits {
     }
 }
 
-/// Joints that are named as the reason for several orbits.
+/// Number of joints that are named as the reason for several orbits.
 const NAMED: usize = 2;
 
-/// When a joint begins to slip.
+/// State of a joint at rest, and its first slip.
 #[derive(Debug, Clone)]
 pub struct JointSummary {
-    /// Name.
+    /// Name of the joint.
     pub name: String,
     /// Slip limit, N.
     pub limit: f64,
-    /// Relative displacement at which it gives way, m; `None` if it holds rigidly until then.
+    /// Relative displacement at which it begins to slip, m; `None` if it is rigid until then.
     pub displacement: Option<f64>,
-    /// Whether it slips little by little before: micro-slip, and macro-slip at the limit.
+    /// True if it slips gradually before: micro-slip first, macro-slip at the limit.
     pub gradual: bool,
-    /// Of the direction along which faces press on each other: the force with which they do where nothing gives way, N, zero if
-    /// they are apart. `None` along those that slip.
+    /// For the normal direction of a contact: its force if nothing deforms, N, zero if it is
+    /// open. `None` for directions that slip.
     pub pressed: Option<f64>,
-    /// What is left of it at rest, after the structure has given way, N; `None` where nobody knows.
+    /// The normal force at rest, after the structure has deformed, N; `None` if it is unknown.
     pub at_rest: Option<f64>,
-    /// What the excitation does to it while all joints stick; `None` where the study has no drive or the model is too
-    /// large for a quick answer.
+    /// Load by the excitation while all joints stick. `None` if the study has no excitation or
+    /// the model is too large for a quick answer.
     pub onset: Option<Onset>,
 }
 
-/// Cases that are looked at for warnings, evenly spread over all of them: a warning about the model holds for each of
-/// these.
+/// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
+/// the model is true for all of them.
 const LOOKED_AT: usize = 9;
-/// The longest time that a study may take is told if it is longer than what it usually takes by this factor, and not soon over, s.
+/// The summary states the longest time if it exceeds the usual time by the factor [`WIDE`] and
+/// exceeds [`SOON`], s.
 const WIDE: f64 = 3.0;
 const SOON: f64 = 5.0;
-/// A run that takes longer says so at its start, s.
+/// Duration above which a run announces its expected time at the start, s.
 const LONG_RUN: f64 = 3600.0;
-/// Degrees of freedom beyond which only the first case is looked at, so that a summary takes no longer than a second.
+/// Degrees of freedom above which only the first case is checked, so that a summary takes at
+/// most a second.
 const LARGE: usize = 60;
 
-/// Times the excitation, beyond which the first slip is one by rounding: what symmetry keeps from a joint loads it by the last digits of the others. A
-/// share of it below which the load is one by rounding too: that of an undamped resonance has no bound.
+/// Factor on the excitation above which the first slip is due to rounding. Symmetry keeps the
+/// load from some joints, but rounding errors of the other loads remain. A load above this
+/// multiple of the slip limit comes from an undamped resonance, which has no bound.
 const UNLOADED: f64 = 1e6;
 
-/// What the excitation does to a joint as a share of its limit, zero where that is rounding.
+/// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
+/// rounding.
 fn load(onset: &Onset) -> f64 {
     if onset.largest * UNLOADED < 1.0 { 0.0 } else { onset.largest }
 }
 
 impl ModelSummary {
-    /// Summarises a study.
+    /// Summarizes a study.
     ///
     /// # Errors
-    /// [`StudyError`]: a case cannot be resolved. The cases of a study that was read have been checked.
+    /// [`StudyError`]: a case cannot be resolved. The cases of a study that was read have been
+    /// checked.
     ///
     /// # Example
     /// ```
@@ -153,7 +162,8 @@ impl ModelSummary {
         for i in 1..=others {
             cases.push(Surveyed::new(study, last * i / others)?);
         }
-        // a joint whose limit is zero tells nothing: the first case in which most of them hold
+        // the first case in which the most joints have a positive limit: zero limits tell
+        // nothing
         let holds = |one: &Surveyed| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
         let most = cases.iter().map(holds).max().unwrap_or(0);
         let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
@@ -172,7 +182,7 @@ impl ModelSummary {
         let joints = joints.collect();
         let kind = kinds::of(study);
         let costings: Vec<Costing<'_>> = cases.iter().map(|one| Costing::new(study, one)).collect();
-        // each as if all cases were like it
+        // the time of all cases if they were like this one
         let time = |costing: &Costing<'_>| costing.seconds(&(kind.cost)(costing));
         let mean =
             |times: &dyn Fn(&Costing<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
@@ -204,7 +214,8 @@ impl ModelSummary {
         })
     }
 
-    /// That a run takes so long that it should be known before; `None` of short ones. The estimate is rough, and of one thread.
+    /// Returns the announcement of a long run; `None` for a short one. The estimate is rough
+    /// and for one thread.
     pub fn long_run(&self) -> Option<String> {
         (self.seconds >= LONG_RUN).then(|| {
             let time = self.time();
@@ -212,7 +223,7 @@ impl ModelSummary {
         })
     }
 
-    /// How long it will take, in words.
+    /// Describes the expected time in words.
     pub(crate) fn time(&self) -> String {
         let mut usual = format!("{} on one thread", crate::words::about(self.usual_seconds));
         if let Some((seconds, place)) = self.spared
@@ -226,7 +237,7 @@ impl ModelSummary {
         format!("{usual}, up to {} where orbits are hard to find", crate::words::duration(self.seconds))
     }
 
-    /// For the record of a run, SI but for the frequencies in Hz.
+    /// Returns the summary for the record of a run, in SI except frequencies in Hz.
     pub fn to_json(&self) -> Json {
         let modes = |modes: &Modes| {
             json!({

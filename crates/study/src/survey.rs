@@ -1,11 +1,11 @@
-//! A case and what its linear structure tells, before anything is computed.
+//! A case with the survey of its linear structure, known before anything is computed.
 
 use crate::error::StudyError;
 use crate::study::{Case, Study};
 use stickslip::method::StaticEquilibrium;
 use stickslip::model::{Survey, System};
 
-/// A case and what is known of its model.
+/// A case with the survey of its model.
 #[derive(Debug)]
 pub struct Surveyed {
     pub(crate) case: Case,
@@ -13,10 +13,10 @@ pub struct Surveyed {
 }
 
 impl Surveyed {
-    /// Case `index` of a study.
+    /// Surveys case `index` of a study.
     pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
         let case = study.case(index)?;
-        // faces that a constant load presses are pressed
+        // contacts that a constant load closes count as closed
         let forces = |system: &System| Some(StaticEquilibrium::under_load(system)?.forces());
         let survey = case.model.survey_under_load(&forces);
         let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
@@ -24,7 +24,7 @@ impl Surveyed {
     }
 }
 
-/// Lowest and highest drive frequency of a case, rad/s.
+/// Returns the lowest and the highest excitation frequency of a case, rad/s.
 pub(crate) fn range(case: &Case) -> Option<(f64, f64)> {
     if let Some(run_up) = case.values.table("run_up") {
         let (a, b) = (run_up.quantity("from")?, run_up.quantity("to")?);

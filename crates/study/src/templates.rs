@@ -1,17 +1,21 @@
-//! Models that come ready: the paper's, and bladed disks. Each is one file, `templates/NAME.toml`, a whole study to start from; another
-//! study takes its model with `model = { template = "NAME" }` and gives those parameters that it wants otherwise.
+//! Ready models: those of the paper, and bladed disks.
 //!
-//! What is known of a template stands in its file: its first line, a comment, is the summary, `[parameters]` are its
-//! parameters, and the comment behind each is what the book and the lists say of it.
+//! Each template is one file, `templates/NAME.toml`, and a whole study. Another study uses its
+//! model with `model = { template = "NAME" }` and sets the parameters that it wants to change.
 //!
-//! To add one: write its file, then its name in [`TABLE`]. What follows from a file, parameters and models, is computed by the reader.
+//! The file of a template documents itself. Its first line, a comment, is the summary.
+//! `[parameters]` are its parameters, and the comment behind each one describes it in the book
+//! and in the lists.
+//!
+//! To add a template, write its file and add its name to [`TABLE`]. The reader computes the
+//! parameters and the model from the file.
 
 /// A ready model with named parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Template {
     /// Name in study files.
     pub name: &'static str,
-    /// Its file: a whole study, for `stickslip new`.
+    /// Text of its file: a whole study, for `stickslip new`.
     pub study: &'static str,
 }
 
@@ -21,7 +25,7 @@ macro_rules! templates {
     };
 }
 
-/// Every template there is.
+/// All templates.
 pub const TABLE: &[Template] = templates![
     "element",
     "element-with-mass",
@@ -37,12 +41,12 @@ pub const TABLE: &[Template] = templates![
     "under-platform-cylinder",
 ];
 
-/// The template with this name.
+/// Returns the template with this name.
 pub fn find(name: &str) -> Option<&'static Template> {
     TABLE.iter().find(|template| template.name == name)
 }
 
-/// The name of the template that was probably meant by another one.
+/// Returns the name of the template that is most similar to an unknown name.
 ///
 /// # Example
 /// ```
@@ -55,13 +59,13 @@ pub fn nearest(name: &str) -> Option<&'static str> {
 }
 
 impl Template {
-    /// One line of what it is.
+    /// Returns the first line of its file, which describes it.
     pub fn summary(&self) -> &'static str {
         comment_behind(self.study, 0)
     }
 }
 
-/// The comment that is all there is between this byte and the end of its line; empty if there is none.
+/// Returns the comment that fills the rest of the line after byte `at`; empty if there is none.
 pub(crate) fn comment_behind(text: &str, at: usize) -> &str {
     let line = text[at..].lines().next().unwrap_or("");
     line.trim_start().strip_prefix('#').map_or("", str::trim)

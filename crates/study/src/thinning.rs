@@ -1,18 +1,21 @@
-//! What the figure of long tables needs, in the memory of a short one.
+//! Decimation of long tables for their figure, in bounded memory.
 //!
-//! Tables of up to [`MOST_ROWS`] rows are kept as they are. Of longer ones the rows of some cases are kept: of a study that draws its parameters
-//! the first ones, which are a sample themselves, of others cases evenly; figures say how many of how many. Where the rows of these are still
-//! too many, of every stretch of neighbouring rows those with the least and the largest value of each column stay: a curve through them has the
-//! same envelope as the curve through all, and every point of it was computed.
+//! Tables of up to [`MOST_ROWS`] rows are kept whole. A longer table first loses cases. A study
+//! with draws keeps the first cases, which are a sample themselves; other studies keep every
+//! n-th case. Figures state how many cases they show.
+//!
+//! If too many rows remain, every block of neighbouring rows keeps only the rows with the
+//! smallest and the largest value of each column. The curve through them has the same envelope
+//! as the full curve, and all its points were computed.
 
 use crate::dataset::{Column, Table, Values};
 use crate::drawing::MOST_CURVES;
 use crate::study::Study;
 
-/// Rows of a table that are held in memory to draw its figure.
+/// Largest number of rows of a table that are held in memory for its figure.
 pub const MOST_ROWS: usize = 500_000;
 
-/// Takes tables in, block after block, and keeps what their figure shows.
+/// Takes tables block by block and keeps the rows that their figure needs.
 ///
 /// # Example
 /// ```
@@ -32,49 +35,49 @@ pub struct Thinning {
 }
 
 impl Thinning {
-    /// For tables of a study with these names and so many rows.
+    /// For tables of a study with these names and numbers of rows.
     pub fn new(study: &Study, tables: &[(&str, usize)]) -> Thinning {
         Thinning { tables: tables.iter().map(|(name, rows)| Kept::new(study, name, *rows, MOST_ROWS)).collect() }
     }
 
-    /// Whether every row is kept.
+    /// Returns whether every row is kept.
     pub fn keeps_all(&self) -> bool {
         self.tables.iter().all(|table| table.cases == Cases::All && table.bin.is_none())
     }
 
-    /// The next rows of a table.
+    /// Adds the next rows of a table.
     pub fn add(&mut self, table: Table) {
         if let Some(known) = self.tables.iter_mut().find(|known| known.rows.name == table.name) {
             known.add(table);
         }
     }
 
-    /// What is kept.
+    /// Returns the kept rows.
     pub fn tables(self) -> Vec<Table> {
         self.tables.into_iter().map(Kept::finished).collect()
     }
 }
 
-/// Which cases of a table are kept.
+/// The cases of a table that are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cases {
     All,
-    /// So many.
+    /// The first cases, up to this number.
     First(usize),
-    /// Every one of so many.
+    /// Every n-th case.
     Each(usize),
 }
 
-/// What is kept of a table.
+/// The kept rows of a table.
 #[derive(Debug)]
 struct Kept {
     rows: Table,
     cases: Cases,
-    /// Neighbouring rows of which only the extremes stay.
+    /// Number of neighbouring rows in a bin, of which only the extremes stay.
     bin: Option<usize>,
-    /// Columns that tell the cases apart, the first ones.
+    /// Number of leading columns that identify a case.
     keys: usize,
-    /// The case that is being taken in: its key and its number.
+    /// Key and number of the current case.
     now: Option<(Vec<u64>, usize)>,
     open: Table,
 }
@@ -95,7 +98,7 @@ impl Kept {
                 cases = Cases::Each(each);
                 study.cases().div_ceil(each)
             };
-            // a bin keeps two rows for every column at most: a few dozen
+            // a bin keeps at most two rows for every column: a few dozen
             bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * EXTREMES);
         }
         Kept { rows: empty.clone(), cases, bin, keys, now: None, open: empty }
@@ -135,7 +138,7 @@ impl Kept {
         }
     }
 
-    /// Keeps what is open: all of it, or its extremes.
+    /// Closes the open bin: keeps all its rows, or its extremes.
     fn close(&mut self) {
         let open = Table { name: self.open.name.clone(), columns: std::mem::take(&mut self.open.columns) };
         if open.rows() == 0 {
@@ -148,7 +151,7 @@ impl Kept {
         for column in &open.columns {
             if let Values::Number(values) = &column.values {
                 let by = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
-                // a gap in a curve stays one
+                // a gap in a curve stays a gap
                 let (there, gaps): (Vec<usize>, Vec<usize>) = (0..values.len()).partition(|row| !values[*row].is_nan());
                 kept.extend(there.iter().min_by(by).into_iter().chain(there.iter().max_by(by)).chain(gaps.first()));
             }
@@ -164,7 +167,8 @@ impl Kept {
     }
 }
 
-/// Rows that a bin keeps, more or less: a table has a dozen columns whose extremes stand at different rows.
+/// Approximate number of rows that a bin keeps: a table has about a dozen columns with extremes
+/// at different rows.
 const EXTREMES: usize = 24;
 
 fn key(table: &Table, row: usize, keys: usize) -> Vec<u64> {
@@ -179,7 +183,7 @@ fn key_differs(table: &Table, row: usize, key: &[u64]) -> bool {
     })
 }
 
-/// Some rows of a table.
+/// Returns the selected rows of a table.
 fn rows(table: &Table, which: &[usize]) -> Table {
     let column = |column: &Column| Column {
         name: column.name.clone(),
@@ -226,7 +230,8 @@ mod tests {
         kept.finished()
     }
 
-    /// The least and the largest value of every column in every stretch of bins stay, at their places; the memory is bounded.
+    /// Every block keeps the smallest and the largest value of every column at their places, in
+    /// bounded memory.
     #[test]
     fn a_long_curve_keeps_its_envelope() {
         let (study, most) = (study("vary = { Ft = [\"2 N\"] }"), 5000);
@@ -236,7 +241,7 @@ mod tests {
         let (x, y) = (kept.numbers("x").unwrap(), kept.numbers("y").unwrap());
         assert!(x.is_sorted_by(|a, b| a < b));
         let all = table.numbers("y").unwrap();
-        // ten stretches of the figure: the same heights as all points have
+        // ten parts of the figure: each has the same height as with all points
         for part in 0..10 {
             let within = |x: f64| (part * 40_000..(part + 1) * 40_000).contains(&(x as usize));
             let highest = |points: &mut dyn Iterator<Item = (f64, f64)>| {
@@ -248,7 +253,7 @@ mod tests {
         assert!(y.contains(&all[400_000 / 3]));
         let gaps = kept.numbers("z").unwrap().iter().filter(|value| value.is_nan()).count();
         assert_eq!(gaps, 4);
-        // however the rows come
+        // the result does not depend on the size of the blocks
         let other = fed(Kept::new(&study, "curve", table.rows(), most), &table, 70_001);
         assert!(format!("{other:?}") == format!("{kept:?}"));
     }
@@ -261,10 +266,10 @@ mod tests {
         let cases = kept.numbers("Ft_N").unwrap();
         assert!(cases.iter().all(|case| (*case as usize).is_multiple_of(3)), "every third");
         assert_eq!(kept.rows(), 334 * 20);
-        // of draws the first ones
+        // of draws, the first ones
         let drawn = study("[sample]\ncount = 1000\nof = { Ft = { uniform = [\"1 N\", \"9 N\"] } }");
         let kept = fed(Kept::new(&drawn, "curve", table.rows(), 10_000), &table, 33);
-        // with numbers that do not exist
+        // compared as text, because of the NaN values
         assert!(format!("{kept:?}") == format!("{:?}", rows(&table, &(0..10_000).collect::<Vec<_>>())));
     }
 }

@@ -1,11 +1,12 @@
-//! Consistent sets of units of finite-element programs: what one unit of mass, length and time, and so of stiffness, is in SI.
+//! Consistent unit sets of finite-element programs: their units of mass, time, stiffness and
+//! damping in SI.
 
 /// A consistent set of units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnitSet {
     /// Its name in study files: length, mass, time.
     pub name: &'static str,
-    /// One line of what it is.
+    /// One line that describes it.
     pub summary: &'static str,
     /// Its unit of mass, kg.
     pub mass: f64,
@@ -14,25 +15,25 @@ pub struct UnitSet {
 }
 
 impl UnitSet {
-    /// Its unit of stiffness, mass per time squared, N/m.
+    /// Returns its unit of stiffness, mass per time squared, N/m.
     pub fn stiffness(&self) -> f64 {
         self.mass / (self.time * self.time)
     }
 
-    /// Its unit of damping, mass per time, kg/s.
+    /// Returns its unit of damping, mass per time, kg/s.
     pub fn damping(&self) -> f64 {
         self.mass / self.time
     }
 }
 
-/// The pound of force, N: exact by definition, 0.45359237 kg times 9.80665 m/s².
+/// The pound-force, N: exact by definition, 0.45359237 kg times 9.80665 m/s².
 const POUND: f64 = 4.4482216152605;
 /// The inch, m.
 const INCH: f64 = 0.0254;
 /// The foot, m.
 const FOOT: f64 = 0.3048;
 
-/// All sets.
+/// All unit sets.
 pub const TABLE: &[UnitSet] = &[
     UnitSet { name: "m-kg-s", summary: "SI: metre, kilogram, second, newton, pascal", mass: 1.0, time: 1.0 },
     UnitSet {
@@ -74,7 +75,7 @@ pub const TABLE: &[UnitSet] = &[
     },
 ];
 
-/// The set of that name.
+/// Returns the unit set with this name.
 pub fn find(name: &str) -> Option<&'static UnitSet> {
     TABLE.iter().find(|set| set.name == name)
 }
@@ -83,7 +84,7 @@ pub fn find(name: &str) -> Option<&'static UnitSet> {
 mod tests {
     use super::*;
 
-    /// A force of one unit is a unit of stiffness times a unit of length.
+    /// One unit of force is one unit of stiffness times one unit of length.
     #[test]
     fn units_of_force() {
         for (name, length, force) in [

@@ -1,23 +1,26 @@
-//! Units: from `N s/m` to a factor and a dimension.
+//! Units: converts a text such as `N s/m` to a factor and a dimension.
 //!
-//! A factor is kept as a fraction times a power of ten times a power of π, and meets the number while that is still decimal text:
-//! `25 s/mm` is exactly 25000, `0.1 mm` is the f64 nearest to 0.0001. The radian is a base unit, so `1 Hz` is `2π rad/s`.
+//! A factor is a fraction times a power of ten times a power of π. It is applied to the number
+//! as decimal text: `25 s/mm` is exactly 25000, and `0.1 mm` is the f64 nearest to 0.0001. The
+//! radian is a base unit, so `1 Hz` is `2π rad/s`.
 //!
-//! A unit follows a number. After it, `*`, `·`, `/` or a space go on with the unit as long as a known unit follows; `^2`, `^-1` and
-//! `²` are powers. `N s/m` is `(N s)/m`; a space after a `/` (`N/m s`) is refused, because readers disagree on it.
+//! A unit follows a number. After it, `*`, `·`, `/` or a space continue the unit if a known
+//! unit follows; `^2`, `^-1` and `²` are powers. `N s/m` is `(N s)/m`. A space after a `/`
+//! (`N/m s`) is refused, because readers disagree on its meaning.
 
 use crate::near::{nearest, shown};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 
-/// What is wrong in a quantity or an expression: where (bytes of the text), what, and what to do.
+/// An error in a quantity or an expression: its place in the text, what is wrong, and what to
+/// do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
-    /// Bytes of the text that are wrong; empty at a place where something is missing.
+    /// Byte range of the text that is wrong; empty at a place where something is missing.
     pub span: Range<usize>,
-    /// What is wrong and what was expected.
+    /// Description of the error, and the expected text.
     pub message: String,
-    /// What to do.
+    /// Advice for the user.
     pub help: Option<String>,
 }
 
@@ -39,13 +42,13 @@ pub struct Unit {
     denominator: u64,
     exponent: i32,
     pi: i32,
-    /// What it measures.
+    /// The dimension that it measures.
     pub dimension: Dimension,
 }
 
 const ONE: Unit = Unit { numerator: 1, denominator: 1, exponent: 0, pi: 0, dimension: Dimension::NONE };
 
-/// A named unit, whether prefixes go with it, and what it is.
+/// A named unit, and whether it takes prefixes.
 struct Named {
     name: &'static str,
     prefixes: bool,
@@ -87,7 +90,8 @@ const UNITS: &[Named] = &[
     named("%", false, (1, 1, -2, 0), (0, 0, 0, 0)),
 ];
 
-/// What people write for a unit that has another name here, in small letters, and what to write instead.
+/// Common spellings of units that have another name here, in lower case, and what to write
+/// instead.
 const SPELT_OTHERWISE: &[(&[&str], &str)] = &[
     (&["lbs", "pound", "pounds", "lbm"], "write `lb` for a mass, `lbf` for a force"),
     (&["kgf", "kp"], "a kilogram-force is 9.80665 N"),
@@ -127,7 +131,7 @@ const PREFIXES: &[(&str, i32)] = &[
     ("G", 9),
 ];
 
-/// The unit with this name, prefix included.
+/// Returns the unit with this name, prefix included.
 pub(crate) fn find(name: &str) -> Option<Unit> {
     if let Some(row) = UNITS.iter().find(|row| row.name == name) {
         return Some(row.unit);
@@ -139,13 +143,14 @@ pub(crate) fn find(name: &str) -> Option<Unit> {
     })
 }
 
-/// The unit that a whole text is: `mm`, `rad/s`, `kN/mm`.
+/// Reads a text that is a unit as a whole: `mm`, `rad/s`, `kN/mm`.
 pub(crate) fn parse(text: &str) -> Option<Unit> {
     let names = Names { parameter: &|_| false, function: &|_| false };
     read(text, 0, &names).ok().filter(|(_, end)| *end == text.len()).map(|(unit, _)| unit)
 }
 
-/// A unit that was probably meant by `name`: one that differs by case or a slip, or two units written together (`Nm`).
+/// Suggests a unit for `name`: one that differs by case or a typing error, or two joined units
+/// (`Nm`).
 pub(crate) fn nearest_unit(name: &str) -> Option<String> {
     let cut = name.char_indices().skip(1).map(|(i, _)| name.split_at(i));
     if let Some((a, b)) = cut.take(8).find(|(a, b)| find(a).is_some() && find(b).is_some()) {
@@ -159,7 +164,8 @@ pub(crate) fn nearest_unit(name: &str) -> Option<String> {
     same.cloned().or_else(|| nearest(name, all.iter().map(String::as_str)).map(str::to_owned))
 }
 
-/// How many of the unit `to` one of the unit `from` is; `None` if they measure different things, or one is no unit that is known.
+/// Returns the factor from the unit `from` to the unit `to`. Returns `None` if their dimensions
+/// differ or a unit is unknown.
 pub fn ratio(from: &str, to: &str) -> Option<f64> {
     if from == to {
         return Some(1.0);
@@ -194,10 +200,11 @@ impl Unit {
         (0..exponent.unsigned_abs()).try_fold(ONE, |product, _| product.times(base))
     }
 
-    /// The value in SI of `literal` (digits, a point, an exponent) in this unit; one rounding if no fraction and no π is in it.
+    /// Returns the SI value of `literal` (digits, a point, an exponent) in this unit. The
+    /// result is rounded once if the unit has no fraction and no π.
     pub(crate) fn scale(&self, literal: &str) -> f64 {
         let (mantissa, exponent) = literal.split_once(['e', 'E']).unwrap_or((literal, "0"));
-        // out of the range of i32 is out of the range of f64 by far
+        // an exponent out of the range of i32 is far out of the range of f64
         let clamped = if exponent.starts_with('-') { -100_000 } else { 100_000 };
         let exponent = exponent.parse::<i32>().unwrap_or(clamped).clamp(-100_000, 100_000);
         let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
@@ -215,7 +222,7 @@ impl Unit {
 }
 
 impl Unit {
-    /// [`Unit::scale`] of a number that may have a sign.
+    /// Like [`Unit::scale`], for a number with an optional minus sign.
     pub(crate) fn scale_signed(&self, literal: &str) -> f64 {
         match literal.strip_prefix('-') {
             Some(positive) => -self.scale(positive),
@@ -224,7 +231,7 @@ impl Unit {
     }
 }
 
-/// Product of two dimensions; `None` beyond what exponents can hold.
+/// Returns the product of two dimensions; `None` if an exponent overflows.
 pub(crate) fn times(a: Dimension, b: Dimension) -> Option<Dimension> {
     Some(Dimension {
         kg: a.kg.checked_add(b.kg)?,
@@ -234,7 +241,7 @@ pub(crate) fn times(a: Dimension, b: Dimension) -> Option<Dimension> {
     })
 }
 
-/// Power of a dimension; `None` if an exponent is not whole or too large.
+/// Returns the power of a dimension; `None` if an exponent is not a whole number or too large.
 pub(crate) fn power(a: Dimension, exponent: f64) -> Option<Dimension> {
     let part = |base: i8| {
         let value = f64::from(base) * exponent;
@@ -245,33 +252,36 @@ pub(crate) fn power(a: Dimension, exponent: f64) -> Option<Dimension> {
     Some(Dimension { kg: part(a.kg)?, m: part(a.m)?, s: part(a.s)?, rad: part(a.rad)? })
 }
 
-/// Whether a unit's name can hold this character.
+/// Returns whether a unit's name can contain this character.
 pub(crate) fn is_unit_char(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_' || c == '°' || c == '%' || (!c.is_ascii() && c.is_alphabetic())
 }
 
-/// Whether a unit's name can start with this character.
+/// Returns whether a unit's name can start with this character.
 pub(crate) fn starts_unit(c: char) -> bool {
     is_unit_char(c) && !c.is_ascii_digit()
 }
 
-/// What the reader of units must know about names.
+/// Names that the reader of units must distinguish from units.
 pub(crate) struct Names<'a> {
-    /// Whether this is the name of a parameter.
+    /// Returns whether this is the name of a parameter.
     pub parameter: &'a dyn Fn(&str) -> bool,
-    /// Whether this is the name of a function.
+    /// Returns whether this is the name of a function.
     pub function: &'a dyn Fn(&str) -> bool,
 }
 
-/// Whether a text that begins with `/` goes on with a unit and nothing that could be meant instead: `/m`, `/s`.
+/// Returns whether a text that begins with `/` continues with a unit that cannot be a
+/// parameter: `/m`, `/s`.
 pub(crate) fn divides(text: &str, names: &Names<'_>) -> bool {
     let Some(after) = text.strip_prefix('/') else { return false };
     let reader = Reader { text: after.trim_start(), at: 0, names, depth: 0 };
     reader.unit_here() && !(names.parameter)(reader.word())
 }
 
-/// Reads the unit that starts at byte `start` of `text` (a character for which [`starts_unit`] holds, or where it [`divides`]).
-/// Returns it with the byte after it.
+/// Reads the unit that starts at byte `start` of `text`, and returns it with the byte position
+/// after it.
+///
+/// The text at `start` must satisfy [`starts_unit`] or [`divides`].
 pub(crate) fn read(text: &str, start: usize, names: &Names<'_>) -> Result<(Unit, usize), Fault> {
     let mut reader = Reader { text, at: start, names, depth: 0 };
     let unit = reader.product(false)?;
@@ -285,9 +295,9 @@ struct Reader<'a> {
     depth: usize,
 }
 
-/// Parentheses in a unit.
+/// Maximum depth of parentheses in a unit.
 const DEEPEST: usize = 8;
-/// Power of a unit.
+/// Maximum power of a unit.
 const HIGHEST_POWER: i32 = 9;
 
 impl Reader<'_> {
@@ -310,7 +320,8 @@ impl Reader<'_> {
         &rest[..rest.find(|c| !is_unit_char(c)).unwrap_or(rest.len())]
     }
 
-    /// Whether a unit is here: a known name that is not called as a function.
+    /// Returns whether a unit is at the current position: a known name that is not a function
+    /// call.
     fn unit_here(&self) -> bool {
         let word = self.word();
         find(word).is_some()
@@ -360,7 +371,7 @@ impl Reader<'_> {
                         }
                     }
                     Some(_) if group => return Err(self.unknown()),
-                    // an operator of the expression, not of the unit
+                    // the operator belongs to the expression, not to the unit
                     Some(_) => {
                         self.at = before;
                         break;
@@ -385,7 +396,7 @@ impl Reader<'_> {
         Ok(unit)
     }
 
-    /// Whether the parenthesis here holds a unit and nothing else.
+    /// Returns whether the parenthesis at the current position contains only a unit.
     fn group_here(&self) -> bool {
         let mut trial = Reader { text: self.text, at: self.at, names: self.names, depth: self.depth };
         trial.factor().is_ok()
@@ -487,7 +498,7 @@ impl Reader<'_> {
     }
 }
 
-/// What can be written as a unit, for the documentation: (name, whether it takes prefixes).
+/// Lists all units for the documentation: (name, whether it takes prefixes).
 pub fn list() -> Vec<(&'static str, bool)> {
     UNITS.iter().map(|row| (row.name, row.prefixes)).collect()
 }
@@ -551,7 +562,7 @@ mod tests {
         assert!(all.contains(words), "{text}: {all}");
     }
 
-    /// No word that is explained is a unit, and units that are proposed are units.
+    /// No explained spelling is a unit, and every proposed unit exists.
     #[test]
     fn other_spellings_lead_to_units() {
         for (words, advice) in SPELT_OTHERWISE {

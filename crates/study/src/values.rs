@@ -1,4 +1,4 @@
-//! The values of a table of the file, resolved for one case: SI, checked.
+//! Values of a table of the study file, resolved for one case: checked, in SI.
 
 use crate::expression::displayed;
 use crate::units;
@@ -9,8 +9,11 @@ use stickslip::curve::adaptive;
 use stickslip::dimension::Dimension;
 use stickslip::law::SharedLaw;
 
-/// The unit in which tables give quantities of this dimension: its name, as the end of a column's name, and the unit as it is written in a study
-/// file. SI, but hertz and degrees, which people type; `None` for a pure number.
+/// Returns the unit in which tables give quantities of this dimension: as the end of a column's
+/// name, and as text for a study file.
+///
+/// The unit is SI, except hertz and degrees, which users type. Returns `None` for a pure
+/// number.
 pub(crate) fn table_unit(dimension: Dimension) -> Option<(String, String)> {
     let unit = match dimension {
         Dimension::NONE => return None,
@@ -26,8 +29,11 @@ pub(crate) fn table_unit(dimension: Dimension) -> Option<(String, String)> {
     Some((name, unit))
 }
 
-/// The number in the unit of [`table_unit`] whose value in SI is `si`: the shortest that a user could have typed for it, where there
-/// is one, so that 119.5 Hz stays 119.5 and does not become 119.49999999999999 by way of rad/s.
+/// Converts `si` to the unit of [`table_unit`].
+///
+/// The result is the shortest number that a user could have typed for this SI value, if there
+/// is one. 119.5 Hz stays 119.5 and does not become 119.49999999999999 after the conversion to
+/// rad/s and back.
 pub(crate) fn in_table_unit(si: f64, dimension: Dimension) -> f64 {
     let unit = match dimension {
         Dimension::FREQUENCY | Dimension::SWEEP_RATE => "Hz",
@@ -42,30 +48,34 @@ pub(crate) fn in_table_unit(si: f64, dimension: Dimension) -> f64 {
     }
     let Some(unit) = units::find(unit).filter(|_| si.is_finite()) else { return si };
     let near = si / unit.scale("1");
-    // 17 digits tell any two numbers apart; 15 are what a double keeps of any decimal number
+    // 17 digits distinguish all doubles; 15 digits of any decimal number survive in a double
     let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.scale_signed(text) == si);
     typed.and_then(|text| text.parse().ok()).unwrap_or(near)
 }
 
-/// Cycles as radians, with the rounding that a study file's `Hz` has.
+/// Converts cycles to radians with the rounding of the unit `Hz` in a study file.
 fn radians(cycles: f64) -> f64 {
     2.0 * cycles * PI
 }
 
-/// Decimals after the point of a number of this size that has 15 digits, as many as a double keeps of any decimal number.
+/// Returns the number of decimals that gives a number of this size 15 digits, which a double
+/// preserves.
 fn decimals(size: f64) -> i32 {
-    14i32.saturating_sub(size.abs().log10().floor() as i32) // of zero the logarithm is infinite
+    14i32.saturating_sub(size.abs().log10().floor() as i32) // the logarithm of zero is infinite
 }
 
-/// The decimal number with so many decimals that is nearest to `value`; `None` where it takes more than one rounding.
+/// Returns the decimal number with `decimals` decimals nearest to `value`; `None` if it needs
+/// more than one rounding.
 fn decimal(value: f64, decimals: i32) -> Option<f64> {
-    // these powers of ten, and whole numbers of 15 digits, are exact: the quotient is the double nearest to the decimal number
+    // These powers of ten and whole numbers of 15 digits are exact, so the quotient is the
+    // double nearest to the decimal number.
     let power = (0..=22).contains(&decimals).then(|| 10f64.powi(decimals))?;
     let whole = (value * power).round();
     (whole.abs() <= 1e15).then(|| whole / power)
 }
 
-/// A frequency in rad/s as the hertz that a user would have typed for it, see the tables' column `frequency_Hz`.
+/// Converts a frequency in rad/s to the hertz that a user would have typed; see the column
+/// `frequency_Hz` of the tables.
 ///
 /// # Example
 /// ```
@@ -79,35 +89,39 @@ pub fn hertz(omega: f64) -> f64 {
     in_table_unit(omega, Dimension::FREQUENCY)
 }
 
-/// Drive frequencies, rad/s. A range is computed on demand, so that its number of points costs no memory.
+/// Excitation frequencies, rad/s. A range is computed on demand, so its number of points costs
+/// no memory.
 ///
-/// The points of a range are equally spaced in hertz, as decimal numbers: 119 Hz to 123 Hz in 41 points has 119.3 Hz.
+/// The points of a range are equally spaced decimal numbers in hertz: 119 Hz to 123 Hz in 41
+/// points contains 119.3 Hz.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Frequencies {
-    /// As listed in the file.
+    /// The frequencies listed in the file.
     List(Vec<f64>),
     /// Equally spaced, both ends included.
     Range {
-        /// First, rad/s.
+        /// First frequency, rad/s.
         from: f64,
-        /// Last, rad/s.
+        /// Last frequency, rad/s.
         to: f64,
-        /// How many, two or more.
+        /// Number of points, two or more.
         points: usize,
     },
-    /// Where the curve bends; how many is not known before.
+    /// Placed by the curvature of the response; their number is not known before the run.
     Adaptive {
-        /// First, rad/s.
+        /// First frequency, rad/s.
         from: f64,
-        /// Last, rad/s.
+        /// Last frequency, rad/s.
         to: f64,
-        /// Distance of the curve from the straight lines between its points, relative to its largest amplitude.
+        /// Distance of the curve from the straight lines between its points, relative to its
+        /// largest amplitude.
         tolerance: f64,
     },
 }
 
 impl Frequencies {
-    /// How many; of adaptive ones those to begin with, which are equally spaced.
+    /// Returns the number of frequencies. Adaptive frequencies count their equally spaced
+    /// initial points.
     pub fn len(&self) -> usize {
         match self {
             Frequencies::Adaptive { .. } => adaptive::FIRST + 1,
@@ -116,12 +130,12 @@ impl Frequencies {
         }
     }
 
-    /// Whether there is none.
+    /// Returns whether there are no frequencies.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The frequency at `index`, rad/s.
+    /// Returns the frequency at `index`, rad/s.
     pub fn get(&self, index: usize) -> Option<f64> {
         match self {
             Frequencies::List(list) => list.get(index).copied(),
@@ -135,12 +149,12 @@ impl Frequencies {
         }
     }
 
-    /// The frequency at `index`, Hz, as a user would have typed it.
+    /// Returns the frequency at `index`, Hz, as a user would have typed it.
     pub fn hertz(&self, index: usize) -> Option<f64> {
         self.get(index).map(hertz)
     }
 
-    /// The lowest, rad/s.
+    /// Returns the lowest frequency, rad/s.
     pub fn lowest(&self) -> Option<f64> {
         match self {
             Frequencies::List(list) => list.iter().copied().reduce(f64::min),
@@ -148,7 +162,7 @@ impl Frequencies {
         }
     }
 
-    /// The highest, rad/s.
+    /// Returns the highest frequency, rad/s.
     pub fn highest(&self) -> Option<f64> {
         match self {
             Frequencies::List(list) => list.iter().copied().reduce(f64::max),
@@ -156,7 +170,7 @@ impl Frequencies {
         }
     }
 
-    /// Whether none is below the one before it: that of a range is told by its ends.
+    /// Returns whether no frequency is below the one before it. For a range, its ends decide.
     pub fn is_rising(&self) -> bool {
         match self {
             Frequencies::List(list) => list.is_sorted(),
@@ -164,7 +178,7 @@ impl Frequencies {
         }
     }
 
-    /// How many of rising ones lie below a frequency, rad/s.
+    /// Returns the number of frequencies below `omega`, rad/s, if they are rising.
     pub(crate) fn count_below(&self, omega: f64) -> usize {
         let (mut low, mut high) = (0, self.len());
         while low < high {
@@ -177,14 +191,16 @@ impl Frequencies {
         low
     }
 
-    /// All of them, rad/s.
+    /// Returns all frequencies, rad/s.
     pub fn iter(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.len()).filter_map(|index| self.get(index))
     }
 }
 
-/// Point `index` of `points` from `from` to `to` (SI of this dimension); both ends are exact, and the points between are the decimal
-/// numbers that were meant, in the unit of the tables: 0.1 to 0.7 in seven points has 0.3, not 0.30000000000000004.
+/// Returns point `index` of `points` points from `from` to `to` (SI of this dimension).
+///
+/// Both ends are exact. The points between are the intended decimal numbers in the unit of the
+/// tables: 0.1 to 0.7 in seven points contains 0.3, not 0.30000000000000004.
 pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: usize, points: usize) -> f64 {
     if index == 0 || index + 1 >= points {
         return if index == 0 { from } else { to };
@@ -192,7 +208,7 @@ pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: u
     let dimension = dimension.unwrap_or(Dimension::NONE);
     let (start, end) = (in_table_unit(from, dimension), in_table_unit(to, dimension));
     let value = start + (end - start) * (index as f64 / (points - 1) as f64);
-    // 15 digits of the larger end: below the rounding of the sum, and beyond what anybody types
+    // 15 digits of the larger end: less than the rounding of the sum, and more than users type
     let digits = decimals(start.abs().max(end.abs()));
     let cycles = matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE);
     if let Some(value) = decimal(value, digits).filter(|_| dimension != Dimension::ANGLE) {
@@ -209,7 +225,8 @@ pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: u
     }
 }
 
-/// Decimals beyond which a value is left as it is computed: it is far below 1 in its unit.
+/// Largest number of decimals. A value that needs more is far below 1 in its unit and stays as
+/// computed.
 const MOST_DECIMALS: usize = 300;
 
 /// One resolved value.
@@ -229,9 +246,9 @@ pub(crate) enum Given {
     Table(Values),
 }
 
-/// The values of a table by key; a key that is absent and has a default is here with its default.
+/// The values of a table by key. An absent key with a default has its default here.
 ///
-/// Every accessor gives `None` if the key is absent or takes something else.
+/// Every accessor returns `None` if the key is absent or has a value of another type.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Values {
     pub(crate) entries: Vec<(&'static str, Given)>,
@@ -265,7 +282,7 @@ accessors! {
     by_name -> &BTreeMap<String, f64> { Given::ByName(table, _) => table }
     /// Three numbers.
     vector -> [f64; 3] { Given::Vector(vector) => *vector }
-    /// One quantity or several, in SI.
+    /// One or several quantities, in SI.
     quantities -> &[f64] { Given::Quantities(list, _) => list }
     /// Weighted sums of rows.
     sums -> &[Vec<(String, f64)>] { Given::Sums(sums) => sums }
@@ -280,7 +297,8 @@ impl Values {
         self.entries.iter().find(|(name, _)| *name == key).map(|(_, given)| given)
     }
 
-    /// As JSON; a quantity is its number in SI with its reading beside it.
+    /// Converts the values to JSON. A quantity has its number in SI and its reading with a
+    /// unit.
     pub fn to_json(&self) -> Json {
         Json::Object(self.entries.iter().map(|(key, given)| ((*key).to_owned(), given.to_json())).collect())
     }
@@ -316,7 +334,7 @@ impl Given {
     }
 }
 
-/// `{ "si": 0.182, "reads": "0.182 kg" }`.
+/// Formats a quantity as `{ "si": 0.182, "reads": "0.182 kg" }`.
 pub(crate) fn quantity_json(si: f64, dimension: Option<Dimension>) -> Json {
     let mut object = Map::new();
     object.insert("si".to_owned(), json!(si));
@@ -352,14 +370,15 @@ mod tests {
             let si = units::find("deg").unwrap().scale_signed(text);
             assert_eq!(in_table_unit(si, Dimension::ANGLE), text.parse::<f64>().unwrap(), "{i}");
         }
-        // the short way and the unit agree bit by bit, also beyond the powers of ten that are exact
+        // the fast path and the unit agree bitwise, also beyond the powers of ten that are
+        // exact
         for i in 1..2_000 {
             for text in [format!("{}", f64::from(i) / 40.0), format!("{i}e-20"), format!("{i}e30")] {
                 let typed: f64 = text.parse().unwrap();
                 assert_eq!((radians(typed), hertz(omega(&text))), (omega(&text), typed), "{text}");
             }
         }
-        // what nobody typed in hertz is the quotient
+        // a frequency that is not a short number in hertz is the quotient
         assert_eq!(hertz(760.0), 760.0 / TAU);
         assert!(hertz(f64::NAN).is_nan() && hertz(0.0) == 0.0);
     }
@@ -374,13 +393,14 @@ mod tests {
             assert_eq!(range.hertz(i as usize), Some(typed));
             assert_eq!(range.get(i as usize), Some(typed * TAU), "typed alone it is the same frequency");
         }
-        // many of them take no time
+        // many points take little time
         let start = std::time::Instant::now();
         let range = Frequencies::Range { from: 119.5 * TAU, to: 760.0, points: 100_000 };
         let sum: f64 = range.iter().map(hertz).sum();
         assert!((sum / 1e5 - 0.5 * (119.5 + 760.0 / TAU)).abs() < 1e-6, "{sum}");
         assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
-        // far from 1, through zero, and where the ends are no decimal numbers
+        // very large and very small ends, a range through zero, and ends that are not decimal
+        // numbers
         assert_eq!(between(1e-320, 3e-320, None, 1, 3), 2e-320);
         assert_eq!(between(1e300, 3e300, None, 1, 3), 2e300);
         assert_eq!(between(-0.3, 0.3, None, 3, 7), 0.0);
@@ -388,7 +408,7 @@ mod tests {
         assert!((third - 0.5).abs() < 1e-15);
     }
 
-    /// What units of a run and `check` ask of a range does not go over its points: one at a time these would take hours.
+    /// Queries on a range do not visit its points: for this range, that would take hours.
     #[test]
     fn ends_order_and_places_of_a_range_take_no_time() {
         let most = 1_000_000_000_000;

@@ -1,4 +1,4 @@
-//! What looks like a mistake in the studies of some kinds: each names those that concern it.
+//! Warnings about likely mistakes in a study. Each study kind selects those that concern it.
 
 use crate::key::MOST_POINTS;
 use crate::survey::{Surveyed, range};
@@ -8,22 +8,23 @@ use std::f64::consts::TAU;
 use stickslip::curve::modes::unit;
 use stickslip::model::{Cyclic, LinearMode, Modes};
 
-/// Of a kind that needs something to drive the motion.
+/// Warnings of a kind that needs an excitation.
 pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
     no_excitation(cases, false).into_iter().collect()
 }
 
-/// Of a kind that needs something to set the structure in motion: a drive, or a state to start from.
+/// Warnings of a kind that needs an excitation or an initial state.
 pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
     no_excitation(cases, true).into_iter().collect()
 }
 
-/// Of a kind that looks for resonances in a range of frequencies.
+/// Warnings of a kind that looks for resonances in a range of frequencies.
 pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
     no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
 }
 
-/// Of a kind that takes its frequencies as they are: the same, and whether they lie close enough for the resonances.
+/// Warnings of a kind with given frequencies: those of `resonant`, and frequencies too far
+/// apart for a resonance.
 pub(crate) fn sampled(cases: &[Surveyed]) -> Vec<String> {
     resonant(cases).into_iter().chain(coarse(cases)).collect()
 }
@@ -52,14 +53,14 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
     })
 }
 
-/// A resonance within the range that nothing damps but the joints. A kind that looks for the best joint compares peaks, and the
-/// undamped structure is the textbook case of it.
+/// Warns of a resonance within the range that only the joints damp. Kinds that search for the
+/// best joint compare peaks; for them an undamped structure is a textbook case.
 pub(crate) fn undamped(cases: &[Surveyed]) -> Option<String> {
     let found = |one: &Surveyed| {
         let (from, to) = range(&one.case)?;
         one.survey.undamped(from, to).first().copied()
     };
-    // what is said holds for every case
+    // the warning must be true for every case
     let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
     let hertz = significant(all.first()? / TAU, 6);
     let advice = "give a spring `damping`, or damping_ratio = \"0.5 %\"";
@@ -77,16 +78,17 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
     for one in cases {
         let harmonics = one.survey.harmonics();
         if harmonics.is_empty() {
-            return None; // that is said elsewhere
+            return None; // `no_excitation` reports this
         }
         let (free, stuck) = (one.survey.free(), one.survey.stuck());
         if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
-            return None; // not known
+            return None; // the modes are unknown
         }
         if one.survey.system().joints().iter().any(|joint| joint.law().scale().is_infinite()) {
-            return None; // a force without a bound moves resonances beyond those of small motion
+            return None; // a force without a bound shifts resonances beyond those of small motion
         }
-        // friction puts the resonance between the free frequency of a mode and its stuck one
+        // friction puts the resonance between the frequencies of a mode with the joint free and
+        // stuck
         let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
         let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
         let single = |modes: &Modes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
@@ -106,28 +108,33 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
         }
     }
     let hertz = |omega: f64| significant(omega / TAU, 6);
-    // a model without any is one that no spring holds, which is said elsewhere, or has no mass
+    // A model without any frequency has no mass, or no spring holds it, which another warning
+    // reports.
     let (_, omega, name) = nearest?;
     let (from, to, omega) = (hertz(from), hertz(to), hertz(omega));
     Some(format!("no resonance lies between {from} and {to} Hz: the nearest is at {omega} Hz with all joints {name}"))
 }
 
-/// A resonance of the linear structure that is narrower than the steps of a range of frequencies.
+/// A resonance of the linear structure that is narrower than the steps of a range of
+/// frequencies.
 struct Narrow {
-    /// Drive frequency and width of the resonance, rad/s.
+    /// Excitation frequency and width of the resonance, rad/s.
     at: f64,
     width: f64,
-    /// Points of the range whose steps are no wider.
+    /// Number of points of the range whose steps are no wider.
     points: f64,
 }
 
-/// Of frequencies that lie further apart than a resonance is wide. The width is that at half of the power, twice damping times frequency, and
-/// of joints free or stuck the larger one: friction only adds to it.
+/// Warns of frequencies that lie further apart than the width of a resonance.
+///
+/// The width is that at half power, twice damping times frequency, with joints free or stuck,
+/// the larger one. Friction only adds to it.
 fn coarse(cases: &[Surveyed]) -> Option<String> {
     let Some(Frequencies::Range { points, .. }) = cases[0].case.frequencies else { return None };
-    // what is said holds for every case
+    // the warning must be true for every case
     let narrow = cases.iter().map(narrowest).collect::<Option<Vec<Narrow>>>()?;
-    // modes by nodal diameter take time, so that they are sought where something is to be said
+    // modes by nodal diameter take time, so they are only computed if there is a warning
+    // without them
     let narrow = match cases.iter().any(|one| one.case.model.ring.is_some_and(|ring| ring.order.is_some())) {
         true => cases.iter().map(narrowest_met).collect::<Option<Vec<Narrow>>>()?,
         false => narrow,
@@ -149,18 +156,20 @@ fn coarse(cases: &[Surveyed]) -> Option<String> {
     ))
 }
 
-/// The narrowest resonance between two frequencies of a case, if it is narrower than their distance.
+/// Returns the narrowest resonance in the range of a case, if it is narrower than the step of
+/// the frequencies.
 fn narrowest(one: &Surveyed) -> Option<Narrow> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let (free, stuck) = (one.survey.free(), one.survey.stuck());
     if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
-        return None; // not known
+        return None; // the modes are unknown
     }
     let all = one.survey.harmonics().into_iter().flat_map(|harmonic| resonances(free, stuck, harmonic));
     narrowest_of(all, (from, to, points))
 }
 
-/// The same of a tuned disk in a travelling wave, where each harmonic of the excitation meets the modes of one nodal diameter.
+/// Like [`narrowest`], for a tuned disk in a travelling wave. Each harmonic of the excitation
+/// meets the modes of one nodal diameter.
 fn narrowest_met(one: &Surveyed) -> Option<Narrow> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let ring = one.case.model.ring.filter(|ring| ring.equal);
@@ -180,7 +189,8 @@ fn narrowest_met(one: &Surveyed) -> Option<Narrow> {
     narrowest_of(harmonics.iter().filter_map(|harmonic| of(*harmonic)).flatten(), (from, to, points))
 }
 
-/// The drive frequencies at which a harmonic meets the modes, joints free and stuck in their order, the lower and the higher one with the width, rad/s.
+/// Returns the excitation frequencies at which a harmonic meets each mode: the lower and the
+/// higher one (joints free and stuck), and the width, rad/s.
 fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)> {
     let width = |mode: &LinearMode| 2.0 * mode.damping * mode.omega;
     let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
@@ -192,9 +202,11 @@ fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)
     paired.map(between).collect()
 }
 
-/// The narrowest of these within a range of frequencies, if it is narrower than their distance.
+/// Returns the narrowest resonance within a range of frequencies, if it is narrower than their
+/// step.
 fn narrowest_of(all: impl Iterator<Item = (f64, f64, f64)>, (from, to, points): (f64, f64, usize)) -> Option<Narrow> {
-    // without damping there is no width, and where friction bounds the motion it is that of friction
+    // without damping there is no width; where friction bounds the motion, friction determines
+    // it
     let inside = all.filter(|(low, high, width)| *low >= from && *high <= to && *width > 0.0);
     let (at, _, width) = inside.min_by(|a, b| a.2.total_cmp(&b.2))?;
     ((to - from) / (points - 1) as f64 > width).then(|| Narrow {
@@ -204,19 +216,21 @@ fn narrowest_of(all: impl Iterator<Item = (f64, f64, f64)>, (from, to, points): 
     })
 }
 
-/// A range of amplitudes that ends below this share of the first slip shows a linear mode only.
+/// Fraction of the first slip below which a range of amplitudes shows a linear mode only.
 const STICKS: f64 = 0.99;
 
-/// Times the largest amplitude that is asked for, beyond which the first slip is one by rounding: nothing swings so far, and a mode of a symmetric structure
-/// that leaves its joints alone loads them by the last digits of its shape.
+/// Multiple of the largest requested amplitude above which the first slip is due to rounding. A
+/// mode of a symmetric structure that does not move its joints still loads them by the rounding
+/// errors of its shape.
 const UNLOADED: f64 = 1e6;
 
-/// Of a nonlinear mode whose amplitudes end before any joint slips, or which is asked of a structure that a constant force displaces.
+/// Warnings of a nonlinear mode: its amplitudes end before any joint slips, or a constant force
+/// acts on the structure.
 pub(crate) fn of_mode(cases: &[Surveyed]) -> Vec<String> {
     sticks(cases).into_iter().chain(displaced(cases)).collect()
 }
 
-/// A mode is a motion without forces, constant ones included.
+/// Warns of constant forces: a mode is a motion without any forces.
 fn displaced(cases: &[Surveyed]) -> Option<String> {
     let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
     let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
@@ -233,7 +247,7 @@ fn sticks(cases: &[Surveyed]) -> Option<String> {
         let values = &one.case.values;
         let number = values.count("mode").unwrap_or(1) as usize - 1;
         let to = values.table("amplitude")?.quantity("to")?;
-        // the range is of the place that moves most in the mode of the structure without its joints
+        // the range is that of the place with the largest motion in the mode without joints
         let slip = one.survey.slip_amplitude(number)? / unit(one.survey.system(), number).ok()??;
         if slip * STICKS <= to {
             return None;

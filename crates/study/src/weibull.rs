@@ -1,53 +1,65 @@
-//! The Weibull distribution of maxima, as it is fitted to the largest amplification of mistuned disks:
+//! Weibull distribution of maxima, fitted to the largest amplification of mistuned disks.
 //!
 //! `F(x) = exp(-((λ - x)/δ)^β)` below the bound λ, with the scale δ and the shape β.
 //!
-//! What is bounded, as the amplification of a disk is, has maxima of this kind (Fisher and Tippett's third), so that some hundred disks tell the
-//! 99.9th percentile. By maximum likelihood: for every λ two parameters follow from one equation, and the best λ is searched.
-//! Source: Castanier, Pierre, Using intentional mistuning in the design of turbomachinery rotors, AIAA J. 40 (2002) 2077-2086;
-//! Smith, Maximum likelihood estimation in a class of nonregular cases, Biometrika 72 (1985) 67-90.
+//! Bounded quantities, such as the amplification of a disk, have maxima of this distribution
+//! (the third type of Fisher and Tippett). A few hundred disks are therefore enough for the
+//! 99.9th percentile. The fit maximizes the likelihood. For every λ, the other two parameters
+//! follow from one equation; a search finds the best λ.
+//!
+//! Sources:
+//! - Castanier, Pierre, Using intentional mistuning in the design of turbomachinery rotors, AIAA
+//!   J. 40 (2002) 2077-2086;
+//! - Smith, Maximum likelihood estimation in a class of nonregular cases, Biometrika 72 (1985)
+//!   67-90.
 
 use std::convert::Infallible;
 use stickslip_numerics::maximum::maximum;
 
-/// The distribution that fits some values best.
+/// The distribution of maxima with the largest likelihood for some values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Maxima {
-    /// λ, which no value exceeds.
+    /// λ, the upper bound of all values.
     pub bound: f64,
-    /// δ
+    /// δ.
     pub scale: f64,
-    /// β
+    /// β.
     pub shape: f64,
     /// Covariance of shape, scale and bound.
     covariance: [[f64; 3]; 3],
 }
 
-/// Fewer values say nothing of three parameters.
+/// Minimum number of values for a fit of three parameters.
 const LEAST: usize = 20;
-/// The bound is sought from this share of the range of the values above the largest of them …
+/// Lower end of the search for the bound: its distance above the largest value, relative to the
+/// range of the values.
 const NEAR: f64 = 1e-4;
-/// … to so many ranges: from there on the distribution is that of Gumbel, which has none, to a thousandth of its shape.
+/// Upper end of the search for the bound. From here on the distribution equals that of Gumbel,
+/// which has no bound, to a thousandth of its shape.
 const FAR: f64 = 1e3;
-/// Steps by which the bound is sought, in equal ratios.
+/// Number of steps of the search for the bound, in equal ratios.
 const STEPS: usize = 48;
-/// Relative change of the bound's distance to which it is then located.
+/// Relative tolerance of the bound's distance.
 const LOCATED: f64 = 1e-10;
-/// Iterations of the equation of the shape: Newton's method takes half a dozen, and bisection keeps it inside.
+/// Maximum number of iterations for the shape. Newton's method takes about six; bisection keeps
+/// it within its bounds.
 const ITERATIONS: usize = 80;
-/// Where the shape does not change by more than this share it is found.
+/// Relative change of the shape at which the iteration ends.
 const FOUND: f64 = 1e-13;
-/// Below this shape the density ends at the bound with a peak or a step, and the likeliest bound is the largest value itself.
+/// Below this shape the density has a peak or a step at the bound, and the likeliest bound is
+/// the largest value itself.
 const PEAKED: f64 = 1.0;
-/// Above this shape likelihood tells the bound as it tells everything else (Smith 1985).
+/// Above this shape the likelihood is regular in the bound, too (Smith 1985).
 const REGULAR: f64 = 2.0;
-/// Distance of the distribution from that of the values, times the root of their number, from which on it is not theirs: of one value in a hundred
-/// sets if the parameters were known, which lie nearer as they are fitted (Kolmogorov 1933).
+/// Kolmogorov-Smirnov distance times the square root of the number of values above which the
+/// fit is rejected. One in a hundred samples exceeds it if the parameters are known, fewer if
+/// they are fitted (Kolmogorov 1933).
 const STRANGE: f64 = 1.63;
-/// Standard deviations on both sides that hold 95 % of a normal distribution.
+/// Half width, in standard deviations, of the interval that contains 95 % of a normal
+/// distribution.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
-/// Scale, shape and log-likelihood of the best distribution with one bound.
+/// Scale, shape and log-likelihood of the best distribution with a given bound.
 struct Profile {
     scale: f64,
     shape: f64,
@@ -55,8 +67,10 @@ struct Profile {
 }
 
 impl Maxima {
-    /// The likeliest distribution. `None` of fewer than 20 values, of equal ones, and where likelihood has no maximum: values that crowd at
-    /// their end.
+    /// Fits the distribution by maximum likelihood.
+    ///
+    /// Returns `None` for fewer than 20 values, for equal values, and if the likelihood has no
+    /// maximum because the values crowd at their upper end.
     pub fn fit(values: &[f64]) -> Option<Maxima> {
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let range = high - low;
@@ -75,18 +89,19 @@ impl Maxima {
         let Ok((s, _)) = maximum(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
         let Profile { scale, shape, .. } = profile(s)?;
         let found = Maxima { bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
-        // at the far end, and where the bound is no regular parameter, it counts as known
+        // the bound counts as known at the far end, and if the likelihood is not regular in it
         let known = best == STEPS || shape <= REGULAR;
         Some(Maxima { covariance: found.covariance(values, known)?, ..found })
     }
 
-    /// Share of all that do not exceed a value.
+    /// Returns the probability that a value is not exceeded.
     fn share(&self, value: f64) -> f64 {
         libm::exp(-libm::pow(((self.bound - value) / self.scale).max(0.0), self.shape))
     }
 
-    /// Whether the values are spread as it says, and not as a mixture of two kinds: by the largest difference of shares (Kolmogorov and
-    /// Smirnov).
+    /// Returns whether the values follow the distribution, rather than a mixture of two
+    /// distributions. The test uses the largest difference of the cumulative distributions
+    /// (Kolmogorov and Smirnov).
     pub fn is_of(&self, values: &[f64]) -> bool {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -98,12 +113,13 @@ impl Maxima {
         apart.fold(0.0, f64::max) * count.sqrt() <= STRANGE
     }
 
-    /// The value that a share of all do not exceed.
+    /// Returns the value that is not exceeded with the probability `share`.
     pub fn quantile(&self, share: f64) -> f64 {
         self.bound - self.scale * libm::pow(-libm::log(share), 1.0 / self.shape)
     }
 
-    /// The ends between which this quantile lies with 95 % confidence, from the curvature of the likelihood.
+    /// Returns the ends of the 95 % confidence interval of this quantile, from the curvature of
+    /// the likelihood.
     pub fn interval(&self, share: f64) -> (f64, f64) {
         let depth = -libm::log(share);
         let power = libm::pow(depth, 1.0 / self.shape);
@@ -114,7 +130,7 @@ impl Maxima {
         (middle - reach, middle + reach)
     }
 
-    /// Probability per unit of the value.
+    /// Returns the probability density at a value.
     pub fn density(&self, value: f64) -> f64 {
         let depth = (self.bound - value) / self.scale;
         if depth <= 0.0 {
@@ -124,7 +140,8 @@ impl Maxima {
         self.shape / self.scale * power / depth * libm::exp(-power)
     }
 
-    /// The inverse of the observed information, without the bound's part if that is known; `None` if the likelihood is no hill here.
+    /// Returns the inverse of the observed information, without the bound if that is `known`.
+    /// Returns `None` if the likelihood has no maximum here.
     fn covariance(&self, values: &[f64], known: bool) -> Option<[[f64; 3]; 3]> {
         let (shape, scale) = (self.shape, self.scale);
         let mut information = [[0.0; 3]; 3];
@@ -153,8 +170,8 @@ impl Maxima {
     }
 }
 
-/// The inverse of the leading part of a symmetric positive definite matrix, of which the upper triangle is read, by Cholesky's method; zeros
-/// beyond that part.
+/// Returns the inverse of the leading `size` rows of a symmetric positive definite matrix by
+/// Cholesky factorization. Reads the upper triangle; the other entries of the result are zero.
 fn inverse(matrix: &[[f64; 3]; 3], size: usize) -> Option<[[f64; 3]; 3]> {
     let mut lower = [[0.0; 3]; 3];
     for column in 0..size {
@@ -184,13 +201,13 @@ fn inverse(matrix: &[[f64; 3]; 3], size: usize) -> Option<[[f64; 3]; 3]> {
 }
 
 impl Profile {
-    /// `1/β = Σ y^β ln y / Σ y^β - mean ln y` and `δ^β = mean y^β`, with `y = λ - x`.
+    /// Solves `1/β = Σ y^β ln y / Σ y^β - mean ln y` and `δ^β = mean y^β`, with `y = λ - x`.
     fn of(values: &[f64], bound: f64) -> Option<Profile> {
         let count = values.len() as f64;
         let logs: Vec<f64> = values.iter().map(|value| libm::log(bound - value)).collect();
         let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mean = logs.iter().map(|log| log - highest).sum::<f64>() / count;
-        // sums of y^β, and of that times the first and second power of ln y; y in measures of the largest one
+        // sums of y^β, and of y^β times ln y and (ln y)², with y relative to the largest one
         let sums = |shape: f64| {
             logs.iter().fold([0.0; 3], |[a, b, c], log| {
                 let log = log - highest;
@@ -234,7 +251,7 @@ impl Profile {
 mod tests {
     use super::*;
 
-    /// Sixty values about quantiles of λ = 1.9, δ = 0.5, β = 2.6.
+    /// Sixty values near quantiles of λ = 1.9, δ = 0.5, β = 2.6.
     fn values() -> Vec<f64> {
         [
             9868, 15326, 13377, 16656, 14564, 11967, 15588, 13675, 17252, 14954, 12886, 16242, 14281, 10750, 15285,
@@ -246,7 +263,8 @@ mod tests {
         .to_vec()
     }
 
-    /// SciPy 1.17: `weibull_min` of `-x`, its likelihood by `minimize(…, method="Nelder-Mead")` to 1e-14, the deviations of the quantiles by
+    /// Reference: SciPy 1.17, `weibull_min` of `-x`. Its likelihood is maximized by
+    /// `minimize(…, method="Nelder-Mead")` to 1e-14. The deviations of the quantiles come from
     /// differences of that likelihood.
     #[test]
     fn the_fit_is_that_of_scipy() {
@@ -263,13 +281,14 @@ mod tests {
             let (low, high) = fit.interval(share);
             near("interval", (high - low) / (2.0 * TWO_SIDED), deviation, 1e-4);
         }
-        // the density is the slope of the distribution
+        // the density is the derivative of the distribution
         near("density", fit.density(1.4), (fit.share(1.4 + 1e-5) - fit.share(1.4 - 1e-5)) / 2e-5, 1e-8);
         near("share", fit.share(fit.quantile(0.3)), 0.3, 1e-12);
         assert_eq!(fit.density(fit.bound + 0.1), 0.0);
     }
 
-    /// Two families of peaks are no Weibull distribution; draws from one are, in nearly all sets.
+    /// A mixture of two families of peaks is rejected; draws from one distribution are accepted
+    /// in nearly all sets.
     #[test]
     fn a_mixture_is_told_from_a_distribution() {
         let draw =
@@ -283,7 +302,8 @@ mod tests {
         assert!(!Maxima::fit(&two).unwrap().is_of(&two));
     }
 
-    /// The 99th percentile of 100 values lies in its interval about as often as that says, over many sets of draws.
+    /// The 99th percentile lies in its interval about as often as stated, over many sets of 100
+    /// draws.
     #[test]
     fn intervals_hold_what_they_say() {
         let (bound, scale, shape) = (2.0, 0.6, 3.0);
@@ -295,7 +315,7 @@ mod tests {
             let (low, high) = Maxima::fit(&(0..100).map(draw).collect::<Vec<_>>()).unwrap().interval(0.99);
             (low..=high).contains(&truth)
         });
-        // 95 % of a hundred, and what skewness of the bound and chance take from it
+        // 95 % of a hundred sets, less the effect of chance and of the skewness of the bound
         assert!((84..=100).contains(&held.count()));
     }
 
@@ -303,7 +323,7 @@ mod tests {
     fn what_has_no_such_distribution_has_no_fit() {
         assert_eq!(Maxima::fit(&values()[..19]), None);
         assert_eq!(Maxima::fit(&[1.5; 40]), None);
-        // the further above, the rarer: Gumbel's, as no bound is the best
+        // the values of a Gumbel distribution, for which the best bound is very large
         let rising: Vec<f64> = (1..100).map(|i| -(-(f64::from(i) / 100.0).ln()).ln()).collect();
         let fit = Maxima::fit(&rising).unwrap();
         assert!((fit.quantile(0.99) - 4.6).abs() < 0.5 && fit.bound > 10.0, "{fit:?}");

@@ -1,11 +1,11 @@
-//! Numbers, quantities and times for people.
+//! Formats numbers, quantities and times for readers.
 
-/// The end of a noun that is counted.
+/// Returns the plural ending of a counted noun.
 pub(crate) fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-/// A number with so many significant digits, without zeros at its end.
+/// Formats a number with this number of significant digits, without trailing zeros.
 pub(crate) fn significant(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -18,7 +18,7 @@ pub(crate) fn significant(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// A quantity with the prefix that suits its size.
+/// Formats a quantity with the prefix that suits its size.
 pub(crate) fn quantity(value: f64, si: &str) -> String {
     if value >= 1e4 {
         return format!("{:.3e} {si}", value);
@@ -27,13 +27,14 @@ pub(crate) fn quantity(value: f64, si: &str) -> String {
     format!("{} {unit}", significant(value * factor, 4))
 }
 
-/// A frequency in a title or legend, to a microhertz: `80 Hz`.
+/// Formats a frequency for a title or legend, to a microhertz: `80 Hz`.
 pub(crate) fn shown_hertz(frequency: f64) -> String {
     let text = format!("{frequency:.6}");
     format!("{} Hz", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor from SI.
+/// Returns the unit in which `largest` (SI) lies between 0.5 and 500: its name and the factor
+/// from SI.
 pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
     for (prefix, factor) in [("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)] {
         if largest * factor >= 0.5 {
@@ -43,7 +44,7 @@ pub(crate) fn display_unit(largest: f64, si: &str) -> (String, f64) {
     (si.to_owned(), 1.0)
 }
 
-/// A number of bytes for people: `4.2 GB`.
+/// Formats a number of bytes: `4.2 GB`.
 pub fn bytes_text(bytes: u64) -> String {
     let value = bytes as f64;
     for (size, unit) in [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")] {
@@ -55,12 +56,12 @@ pub fn bytes_text(bytes: u64) -> String {
     format!("{bytes} B")
 }
 
-/// A time for people, rounded as roughly as it is known.
+/// Formats an estimated time, rounded to one digit.
 pub(crate) fn about(seconds: f64) -> String {
     if seconds < 1.0 { "below a second".to_owned() } else { format!("about {}", duration(seconds)) }
 }
 
-/// A time in the unit that it is counted in.
+/// Formats a time in seconds, minutes, hours or days.
 pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 100.0 => format!("{} s", significant(s, 1)),

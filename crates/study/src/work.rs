@@ -1,8 +1,9 @@
-//! Work: what a study consists of, and what one piece of it yields.
+//! Units of work of a study, and the results of one unit.
 //!
-//! A study is cut into units that know nothing of each other: a stretch of frequencies of one case, a case, or the cases that make one
-//! curve. Units are computed in any order and on any thread, and their parts are joined in the order of the units, so that the tables
-//! are the same bit for bit however the work was divided.
+//! A study is divided into units that are independent of each other: a block of frequencies of
+//! one case, a case, or the cases of one curve. Units are computed in any order and on any
+//! thread. Their parts are joined in the order of the units, so the tables are bitwise the same
+//! for every division of the work.
 
 use crate::error::StudyError;
 use crate::expression::displayed;
@@ -19,27 +20,28 @@ use stickslip::dimension::Dimension;
 use stickslip::method::{self, Method, MethodError, Options, Refusal, WIDTH, Ways};
 use stickslip::model::System;
 
-/// Units that may be under way or waiting for their turn, per thread: enough that none waits for a long one, few enough to keep little.
+/// Units per thread that may be in progress or wait to be joined. The number keeps all threads
+/// busy behind a slow unit and bounds the memory.
 pub(crate) const AHEAD: usize = 8;
 
-/// How a study is run.
+/// Settings of one run.
 #[derive(Clone)]
 pub struct Context {
-    /// Threads that the run may use, for the record; the caller sets up the pool.
+    /// Number of threads of the run, for the record. The caller sets up the pool.
     pub threads: usize,
-    /// When true the run ends early with the points that are finished.
+    /// Set to true to end the run early with the finished points.
     pub stop: Arc<AtomicBool>,
     /// Called once per finished point, from any thread.
     pub finished: Arc<dyn Fn() + Send + Sync>,
 }
 
 impl Context {
-    /// A run that nobody watches.
+    /// Settings of a run without progress reports.
     pub fn unwatched(threads: usize) -> Self {
         Context { threads, stop: Arc::new(AtomicBool::new(false)), finished: Arc::new(|| ()) }
     }
 
-    /// Whether the run is to end early.
+    /// Returns whether the run must end early.
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
@@ -54,7 +56,7 @@ impl fmt::Debug for Context {
 /// A case that is ready to be computed.
 #[derive(Debug)]
 pub struct Prepared {
-    /// What the file says.
+    /// The case of the study.
     pub case: Case,
     /// The assembled model.
     pub system: System,
@@ -63,10 +65,10 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Case `index` of a study.
+    /// Prepares case `index` of a study.
     ///
     /// # Errors
-    /// [`StudyError`]: the method cannot take the model of the case.
+    /// [`StudyError`]: the method refuses the model of the case.
     pub fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
         let case = study.case(index)?;
         let row = method::find(&case.method.name).ok_or_else(|| {
@@ -84,10 +86,10 @@ impl Prepared {
     }
 }
 
-/// A method's refusal, at the place in the file that it is about.
+/// Converts the refusal of a method to an error at its location in the file.
 pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyError {
     let model = &case.model;
-    // a method looks at the first case first: what it refuses later is a matter of that case
+    // the first case is prepared first, so a later refusal depends on the case and names it
     let refusal = error.clone().alone();
     let message = match case.index {
         0 => refusal.to_string(),
@@ -107,7 +109,7 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
                 None => study.error_at("structure", 0, "mass", message, help),
             }
         }
-        // a kind that needs no method has the method's options among its own keys
+        // a kind without a method has the method's options among its own keys
         Refusal::Option { key, .. } => {
             let table = if study.kind().uses_method { "method" } else { "study" };
             study.error_at(table, 0, key, message, None)
@@ -116,10 +118,10 @@ pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyE
     }
 }
 
-/// A velocity, m/s, over which laws are smoothed to see whether that would help.
+/// Velocity, m/s, over which laws are smoothed to test whether smoothing would help.
 const ANY_WIDTH: f64 = 1e-3;
 
-/// What to do about a refused model: a kind that uses no method knows no way but its own.
+/// Returns the advice for a refused model. A kind that uses no method cannot take another one.
 fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
     let kind = study.kind();
     if kind.uses_method || !ways.any() {
@@ -141,14 +143,14 @@ fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
     }
 }
 
-/// How a kind cuts its studies into units.
+/// Size of the units of a study kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grain {
-    /// Stretches of at most [`BLOCK`] frequencies of one case.
+    /// Blocks of at most [`BLOCK`] frequencies of one case.
     Frequencies,
     /// One case with all its frequencies.
     Case,
-    /// The cases that differ in the last parameter of `vary` only.
+    /// The cases that differ only in the last parameter of `vary`.
     Curve,
 }
 
@@ -162,42 +164,42 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Points of the study in this unit.
+    /// Returns the number of points of the study in this unit.
     pub fn len(&self) -> usize {
         self.cases.len() * self.points.len()
     }
 
-    /// Whether it has none.
+    /// Returns whether the unit has no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// The units of a study, in order; made on demand, so that their number costs no memory.
+/// The units of a study, in order. They are made on demand, so their number costs no memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Units {
     grain: Grain,
     cases: usize,
-    /// Frequencies of every case.
+    /// Number of frequencies of every case.
     points: usize,
-    /// Cases of a curve.
+    /// Number of cases of a curve.
     curve: usize,
 }
 
 impl Units {
-    /// The units of `study`, cut in this way.
+    /// Divides `study` into units of this size.
     pub fn of(study: &Study, grain: Grain) -> Self {
         let cases = study.cases();
         let points = (study.points() / cases.max(1)).max(1);
         Units { grain, cases, points, curve: study.last_varied().max(1) }
     }
 
-    /// Stretches of frequencies of one case.
+    /// Returns the number of blocks of frequencies of one case.
     fn stretches(&self) -> usize {
         self.points.div_ceil(BLOCK)
     }
 
-    /// How many.
+    /// Returns the number of units.
     pub fn len(&self) -> usize {
         match self.grain {
             Grain::Frequencies => self.cases * self.stretches(),
@@ -206,12 +208,12 @@ impl Units {
         }
     }
 
-    /// Whether there is none.
+    /// Returns whether there are no units.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The unit with this number, below [`Units::len`].
+    /// Returns the unit with this number, below [`Units::len`].
     pub fn get(&self, index: usize) -> Unit {
         match self.grain {
             Grain::Frequencies => {
@@ -233,52 +235,55 @@ pub struct Work<'a> {
     pub cases: Vec<Arc<Prepared>>,
     /// Its frequencies by number.
     pub points: Range<usize>,
-    /// How the study is run.
+    /// Settings of the run.
     pub context: &'a Context,
 }
 
 impl Work<'_> {
-    /// The first of the cases.
+    /// Returns the first of the cases.
     pub fn case(&self) -> &Prepared {
         &self.cases[0]
     }
 
-    /// Frequency number `index` of the first case, rad/s.
+    /// Returns frequency number `index` of the first case, rad/s.
     pub fn omega(&self, index: usize) -> f64 {
         self.case().case.frequencies.as_ref().and_then(|f| f.get(index)).unwrap_or(f64::NAN)
     }
 
-    /// Whether the study has several frequencies, so that tables must tell them apart.
+    /// Returns whether the study has several frequencies, so that tables need a column for
+    /// them.
     pub fn several_frequencies(&self) -> bool {
         self.case().case.frequencies.as_ref().is_some_and(|f| f.len() > 1)
     }
 }
 
-/// What a unit yields, or the index of a case and why its model cannot be taken.
+/// Results of a unit, or the index of a case and the reason why its model is refused.
 pub type Computed = Result<Part, (usize, MethodError)>;
 
-/// What a unit yields.
+/// Results of a unit.
 #[derive(Debug, Default)]
 pub struct Part {
     /// Rows of the tables of the kind, in its order.
     pub tables: Vec<Rows>,
-    /// What a reader of the results must know.
+    /// Notes for the reader of the results.
     pub notes: Vec<Note>,
     /// Points without a result: where, and why.
     pub failures: Vec<crate::dataset::Failure>,
-    /// Points by status.
+    /// Number of points by status.
     pub points: BTreeMap<String, u64>,
-    /// Whether the run was stopped before it was finished: what follows its points, such as peaks, may be missing though all of them are there.
+    /// True if the run was stopped before the unit was finished. Results after the points, such
+    /// as peaks, may then be missing even if all points are present.
     pub cut: bool,
 }
 
-/// The status of a point that converged, [`Accuracy::Converged`](stickslip::orbit::Accuracy::Converged).
+/// Status of a point that converged,
+/// [`Accuracy::Converged`](stickslip::orbit::Accuracy::Converged).
 pub const CONVERGED: &str = "converged";
-/// The status of a point that an interrupted run did not reach.
+/// Status of a point that an interrupted run did not reach.
 pub const NOT_REACHED: &str = "not-reached";
 
 impl Part {
-    /// Counts a point and keeps its failure.
+    /// Counts a point, and records its failure if there is one.
     pub(crate) fn count(&mut self, at: impl FnOnce() -> String, status: &str, failure: Option<String>) {
         *self.points.entry(status.to_owned()).or_default() += 1;
         if let Some(reason) = failure {
@@ -286,7 +291,7 @@ impl Part {
         }
     }
 
-    /// A unit that an interrupted run did not reach.
+    /// The part of a unit that an interrupted run did not reach.
     pub(crate) fn not_reached(points: usize) -> Self {
         Part { points: BTreeMap::from([(NOT_REACHED.to_owned(), points as u64)]), ..Part::default() }
     }

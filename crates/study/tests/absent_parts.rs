@@ -1,12 +1,13 @@
-//! Random studies in which parts of a model are absent, every place is moved, a node has one
-//! direction, or something is stated twice: `check` and `run`
-//! refuse them with words, or run to the end with whole results.
+//! Random studies with absent parts: `check` and `run` refuse them with a message, or run to
+//! complete results.
 //!
-//! `STICKSLIP_ABSENT_PARTS=2000` runs more of them, `STICKSLIP_RANDOM_SEED=…` others.
+//! Parts of the model are absent, every place has an imposed motion, a node has one direction,
+//! or an entry occurs twice. `STICKSLIP_ABSENT_PARTS=2000` runs more studies,
+//! `STICKSLIP_RANDOM_SEED=…` others.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print their measurements
 
-#[allow(dead_code)] // the studies of that file are those of another test
+#[allow(dead_code)] // another test uses the studies of that file
 mod random;
 
 use random::Chance;
@@ -19,26 +20,26 @@ use stickslip_study::read_study;
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::summary::ModelSummary;
 
-/// Studies of a usual run, and the first seed.
+/// Number of studies of a normal run, and the first seed.
 const STUDIES: u64 = 200;
 const SEED: u64 = 1;
-/// What a study may take, s: it has a few masses and points.
+/// Time limit of a study, s; the studies have few masses and points.
 const LONGEST: u64 = 120;
 
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// What the other parts of a study name.
+/// Names of the model that the rest of the study uses.
 #[derive(Default)]
 struct Named {
-    /// Nodes with their directions, and masses with one direction and no name for it.
+    /// Nodes with their directions. A mass with one unnamed direction has an empty list.
     nodes: Vec<(String, Vec<&'static str>)>,
     joints: Vec<String>,
 }
 
 impl Named {
-    /// Every place of the nodes.
+    /// Returns every place of the nodes.
     fn places(&self) -> Vec<String> {
         let of_node = |(node, directions): &(String, Vec<&str>)| -> Vec<String> {
             match directions.is_empty() {
@@ -50,7 +51,7 @@ impl Named {
     }
 }
 
-/// Writes an entry, now and then twice.
+/// Writes an entry, sometimes twice.
 fn stated(chance: &mut Chance, text: &mut String, entry: &str) {
     let times = if chance.one_in(40) { 2 } else { 1 };
     (0..times).for_each(|_| text.push_str(entry));
@@ -203,7 +204,7 @@ fn study(chance: &mut Chance, text: &mut String, named: &Named) {
     let _ = writeln!(text, "[study]\nkind = \"{kind}\"\n{keys}");
 }
 
-/// A study whose parts may be absent.
+/// Generates a study whose parts may be absent.
 fn study_text(chance: &mut Chance) -> String {
     let mut text = "schema = 1\n[parameters]\nF = \"1 N\"\n".to_owned();
     let mut named = masses(chance, &mut text);
@@ -215,15 +216,15 @@ fn study_text(chance: &mut Chance) -> String {
     text
 }
 
-/// How a study ends.
+/// Outcome of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Ending {
     Refused,
-    /// With a whole dataset.
+    /// The run ended with a complete dataset.
     Ran,
 }
 
-/// What a dataset lacks.
+/// Returns what a dataset lacks.
 fn lacks(dataset: &Dataset) -> Option<String> {
     if dataset.record.points.values().sum::<u64>() == 0 {
         return Some("it has no points".to_owned());
@@ -249,7 +250,7 @@ fn one(text: &str) -> Result<Ending, String> {
     lacks(&dataset).map_or(Ok(Ending::Ran), Err)
 }
 
-/// The same on a thread of its own: a panic, and what does not end, are faults of the study.
+/// Runs [`one`] on another thread. A panic or a timeout is an error of the study.
 fn watched(text: &str) -> Result<Ending, String> {
     let (told, outcome) = channel();
     let of_thread = text.to_owned();
@@ -286,8 +287,8 @@ fn studies_with_absent_parts_end_whole_or_are_refused() {
     assert!(2 * ran >= count, "{ran} of {count} run to the end");
 }
 
-/// A loop of a contact with a preload whose two directions are imposed, so that nothing is free to
-/// move.
+/// A contact with a preload whose two directions are imposed, so that nothing can move freely,
+/// has its loop.
 #[test]
 fn a_contact_that_is_moved_alone_has_its_loop() {
     let text = r#"
@@ -315,7 +316,8 @@ frequency = "100 Hz"
     let found = run(&study, &Context::unwatched(1)).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     let work: f64 = found.tables.iter().find_map(|table| table.numbers("dissipation_J")).unwrap().iter().sum();
-    // a slider whose limit is 0.4 of the normal force, in 200,000 steps of a period in Python
+    // reference: 200,000 steps of a period in Python, for a slider whose limit is 0.4 of the
+    // normal force
     let expected = 2.733_375e-3;
     assert!((work / expected - 1.0).abs() < 1e-3, "{work} J instead of {expected} J");
 }

@@ -1,4 +1,5 @@
-//! Study files that must be refused: where, about which key, in which words. And: no input makes the reader panic.
+//! Study files that must be refused, with location, key and words of the message. No input
+//! makes the reader panic.
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use proptest::prelude::*;
@@ -6,14 +7,15 @@ use stickslip_study::{StudyError, read_bytes, read_file, read_study, templates};
 
 const EXAMPLE: &str = include_str!("design_example.toml");
 
-/// Everything that a reader of the error sees.
+/// Returns the text of the error as a user sees it.
 fn rendered(error: &StudyError) -> String {
     let mut text = String::new();
     GraphicalReportHandler::new_themed(GraphicalTheme::none()).render_report(&mut text, error).unwrap();
     text
 }
 
-/// The example with `from` replaced by `to` is refused at line and column, about this key, in these words.
+/// The example with `from` replaced by `to` is refused at this line and column, for this key,
+/// in these words.
 fn check(from: &str, to: &str, (line, column): (usize, usize), key: &str, words: &[&str]) {
     assert!(EXAMPLE.contains(from), "{from}");
     let error = read_study("bad.toml", &EXAMPLE.replacen(from, to, 1), &[]).map(|_| to).unwrap_err();
@@ -178,12 +180,13 @@ fn frequencies() {
     check(&format!("frequency = {range}\n"), "", (44, 1), "frequency", &["`frequency` is missing"]);
 }
 
-/// A belt is looked for under `velocity`: the words say why there is none and what to do.
+/// Users look for a belt under `velocity`: the message says why there is no such key and what
+/// to do.
 #[test]
 fn a_velocity_is_no_motion() {
     let belt = "[[motion]]\non = \"belt\"\namplitude = \"1 m\"\nvelocity = \"50 mm/s\"\n[[force]]";
     check("[[force]]", belt, (43, 12), "velocity", &["constant velocity, such as a belt", "transient", "v/A"]);
-    // no list of keys names it
+    // lists of keys do not contain it
     check(
         "[[force]]",
         &belt.replace("velocity", "speed"),
@@ -193,7 +196,7 @@ fn a_velocity_is_no_motion() {
     );
 }
 
-/// A key in the wrong table: the message says which table has it.
+/// A key in the wrong table: the message names the right table.
 #[test]
 fn a_key_in_another_table() {
     check(
@@ -210,7 +213,7 @@ fn a_key_in_another_table() {
         "stiffness",
         &["a key of [structure] and of [[spring]]"],
     );
-    // kinds of study have different keys: one that this kind has not is in no other table
+    // study kinds have different keys, so another table is not suggested
     check("[study]\n", "[study]\npoints = 3\n", (45, 1), "points", &["the keys of a study of kind `response` are"]);
 }
 
@@ -260,7 +263,7 @@ fn templates_and_lists_exclude_each_other() {
     assert!(error.message().contains("joint 1") && error.message().contains("`limit`"), "{error}");
 }
 
-/// What a method refuses in one case only names that case.
+/// A refusal by a method in one case only names that case.
 #[test]
 fn a_refusal_of_one_case_names_it() {
     let text = EXAMPLE.replace("vary = {", "vary = { m1 = [\"2 g\", \"0 g\"],");
@@ -269,7 +272,8 @@ fn a_refusal_of_one_case_names_it() {
     assert_eq!(error.line(), Some(18), "{error}");
 }
 
-/// A stiffness beside which inertia is lost in double precision, `m Ω² < ε k`, stands for something rigid: it took seconds to minutes.
+/// A stiffness with `m Ω² < ε k`, where inertia is lost in double precision, is refused. Such
+/// studies took up to minutes.
 #[test]
 fn masses_that_cannot_move_are_refused() {
     let omega = 119.5 * std::f64::consts::TAU;
@@ -280,7 +284,7 @@ fn masses_that_cannot_move_are_refused() {
     assert_eq!((error.line(), error.key()), (Some(25), Some("stiffness")), "{error}");
     assert!(error.message().contains("`blade1` does not move at 119.5 Hz"), "{error}");
     assert!(with(1e28).is_err());
-    // a joint, in one case of two
+    // in one of two cases, a joint has such a stiffness
     let law = "{ kind = \"jenkins\", limit = \"Ft\", stiffness = \"s\" }";
     let text = EXAMPLE
         .replace("{ kind = \"coulomb\", limit = \"Ft\" }", law)
@@ -289,12 +293,13 @@ fn masses_that_cannot_move_are_refused() {
     let error = read_study("a.toml", &text, &[]).unwrap_err();
     assert_eq!((error.line(), error.key()), (Some(39), Some("law")), "{error}");
     assert!(error.message().contains("(s = 1e20 N/mm, Ft = 2 N, case 5 of 8)"), "{error}");
-    // one that carries nothing holds nothing
+    // a joint with limit zero holds nothing
     let text = text.replace("Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "Ft = [\"0 N\"]");
     assert!(read_study("a.toml", &text, &[]).is_ok());
 }
 
-/// A stiffness that is lost beside inertia, `ε √(m Ω²/k) > 1e-6`: rounding took a tenth of the motion of 1e30 kg.
+/// A stiffness that is lost relative to inertia, `ε √(m Ω²/k) > 1e-6`, is refused: rounding
+/// took a tenth of the motion of a mass of 1e30 kg.
 #[test]
 fn springs_that_do_nothing_are_refused() {
     let omega = 122.5 * std::f64::consts::TAU;
@@ -307,7 +312,8 @@ fn springs_that_do_nothing_are_refused() {
     assert!(with(0.0).is_ok());
 }
 
-/// A drive so slow that no mass has inertia is a matter of the frequency, and what is named instead is taken.
+/// An excitation so slow that no mass has inertia is an error of the frequency; the frequency
+/// of the help is accepted.
 #[test]
 fn drives_without_inertia_are_refused() {
     let text = |frequency: &str| {
@@ -331,13 +337,13 @@ frequency = "{frequency}"
     };
     let error = read_study("a.toml", &text("1e-6 Hz"), &[]).unwrap_err();
     assert_eq!((error.line(), error.key()), (Some(14), Some("frequency")), "{error}");
-    // the frequency of the mass by itself is √(100 N/mm / 0.2 kg) / 2π
+    // the frequency of the mass alone is √(100 N/mm / 0.2 kg) / 2π
     assert!(error.message().contains("1e-6 Hz") && error.message().contains("112.5"), "{error}");
     assert!(error.help_text().unwrap().starts_with("from 0.0001 Hz on"), "{error:?}");
     assert!(read_study("a.toml", &text("1e-4 Hz"), &[]).is_ok());
 }
 
-/// An error that every case has is no matter of the first.
+/// An error of all cases does not name the first one.
 #[test]
 fn an_error_of_all_cases_names_none() {
     let error = read_study("bad.toml", &EXAMPLE.replace("stiffness = \"k\"", "stiffness = \"2 s\""), &[]).unwrap_err();
@@ -397,7 +403,7 @@ fn files_that_are_no_studies() {
     assert!(error.message().contains("too big"), "{error}");
 }
 
-/// Reads; if the study is refused, shows the error in both forms.
+/// Reads a text; if it is refused, formats the error in both forms.
 fn survives(text: &str) {
     match read_study("any.toml", text, &[]) {
         Ok(study) => {
@@ -469,13 +475,13 @@ fn large_files_are_read_in_reasonable_time() {
     survives(&text);
     survives(&text.replace("p0 = \"1 g\"", "p0 = \"p19999\""));
     survives(&text.replace("p0 = \"1 g\"", "p0 = \"p19998\""));
-    // as many cases as are allowed
+    // the maximum number of cases
     survives(
         &EXAMPLE
             .replace("points = 241", "points = 2")
             .replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "{ from = \"1 N\", to = \"2 N\", points = 100_000 }"),
     );
-    // as many masses as are allowed, and more
+    // the maximum number of masses, and more
     for masses in [19_997, 19_998] {
         let more: String = (0..masses).map(|i| format!("[[mass]]\nname = \"x{i}\"\nmass = 1\n")).collect();
         let result = read_study(
@@ -511,12 +517,12 @@ fn what_is_wrong_in_a_template_names_the_values_of_the_user() {
     let set = [("a1".to_owned(), "-30 deg".to_owned())];
     let found = read_study("wedge.toml", &study("mu = 0.2", ""), &set).unwrap_err();
     assert_eq!(found.file_name(), "--set a1", "{found}");
-    // an element of it: what its key is computed by
+    // an element of the template: the message names the parameter of its key
     let found = error(study("m = \"-5 g\"\nmu = 0.2\nspeed = \"5000 rpm\"", ""));
     assert!(found.message().starts_with("the value of `m` makes"), "{found}");
 }
 
-/// A mass on a spring with a joint, some lines of it replaced.
+/// A mass on a spring with a joint, with some lines replaced.
 fn oscillator(edits: &[(&str, &str)]) -> String {
     let text = r#"schema = 1
 [parameters]
@@ -545,7 +551,7 @@ frequency = { from = "14 Hz", to = "19 Hz", points = 11 }
     })
 }
 
-/// The oscillator with these edits is refused, about this key, in these words.
+/// The oscillator with these edits is refused, for this key, in these words.
 fn refused(edits: &[(&str, &str)], key: &str, words: &[&str]) {
     let error = read_study("bad.toml", &oscillator(edits), &[]).map(|_| edits).unwrap_err();
     let all: Vec<&StudyError> = std::iter::once(&error).chain(error.others()).collect();
@@ -583,7 +589,7 @@ fn a_normal_load_of_a_law_without_one() {
     let friction = "mu = 0.3, normal = \"10 N\"";
     refused(&[(law, friction)], "mu", &["`jenkins` takes `stiffness` and `limit`", "0.3 * 10 N", "`friction-contact`"]);
     refused(&[(law, friction)], "normal", &["`jenkins` takes `stiffness` and `limit`", "`friction-contact`"]);
-    // what another law has is said of it
+    // a parameter of another law: the message names that law
     refused(&[(law, "limit = \"1 N\", chi = -0.5")], "chi", &["`chi` is a parameter of `iwan`"]);
 }
 
@@ -605,7 +611,8 @@ fn words_that_hold_the_right_one_lead_to_it() {
     }
 }
 
-/// A bare number is SI, which beside quantities in another unit is a trap: 1200 would be 72,000 rpm.
+/// A bare number next to quantities in another unit is refused: it counts in SI, so 1200 would
+/// be 72,000 rpm.
 #[test]
 fn bare_numbers_beside_other_units() {
     let study = "points = 11 }";
@@ -618,10 +625,10 @@ fn bare_numbers_beside_other_units() {
         );
     }
     refused(&[("{ from = \"14 Hz\", to = \"19 Hz\", points = 11 }", "[\"840 rpm\", 900]")], "frequency", &["900 Hz"]);
-    // from outside as well
+    // also for an override
     let error = read_study("n.toml", &oscillator(&[]), &[("n".to_owned(), "1200".to_owned())]).unwrap_err();
     assert!(error.to_string().contains("1200 counts as 1200 Hz"), "{error}");
-    // where both are the same, and zero in any unit, nothing is said
+    // accepted if both readings agree, and for zero
     for values in ["[\"18 Hz\", 20]", "[\"1100 rpm\", 0]"] {
         let edits = [(study, &*vary(values)), ("n = \"1000 rpm\"", "n = \"17 Hz\"")];
         let edits = if values.contains("rpm") { &edits[..1] } else { &edits[..] };
@@ -629,7 +636,7 @@ fn bare_numbers_beside_other_units() {
     }
 }
 
-/// Zeta of a spring and the mass at its end is c = 2 zeta sqrt(k m).
+/// The damping ratio ζ of a spring with the mass at its end gives c = 2 ζ sqrt(k m).
 #[test]
 fn damping_as_a_share_of_the_critical_one() {
     let spring = |damping: &str| {

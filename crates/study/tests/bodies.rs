@@ -1,4 +1,5 @@
-//! Rigid bodies in study files: their columns and units, closed forms, an assembly by hand, and what is refused.
+//! Rigid bodies in study files: columns and units, closed forms, an assembly by hand, and
+//! refusals.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -7,7 +8,7 @@ use stickslip_study::run::{Context, run};
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{read_study, templates};
 
-/// A bar in the plane x, z on two springs at its ends, pushed beside its middle.
+/// A bar in the plane x, z on two springs at its ends, with a force off its middle.
 const BAR: &str = r#"
 schema = 1
 [[body]]
@@ -81,7 +82,8 @@ fn cramer(a: [[Complex64; 3]; 3], b: [Complex64; 3]) -> [Complex64; 3] {
     })
 }
 
-/// `(K + jωC - ω²M) (x, z, θ) = f`, with rows written out by hand: a point at (a, 0, c) moves by `x + c θ` and `z - a θ`.
+/// Compares a bar with `(K + jωC - ω²M) (x, z, θ) = f`. Its rows are written by hand: a point
+/// at (a, 0, c) moves by `x + c θ` and `z - a θ`.
 #[test]
 fn a_bar_moves_as_its_three_equations_say() {
     let found = dataset(BAR);
@@ -123,7 +125,8 @@ fn a_bar_moves_as_its_three_equations_say() {
     assert!(!masses.is_empty() && masses.iter().all(|mass| mass != "bar.ry"), "{masses:?}");
 }
 
-/// A disc that an imposed rotation of another turns through a shaft: `a k/(k - J ω²)`, without anything else.
+/// A disc that an imposed rotation of another body turns through a shaft has the amplitude
+/// `a k/(k - J ω²)`.
 #[test]
 fn a_shaft_passes_an_imposed_rotation_on() {
     let text = r#"
@@ -160,8 +163,8 @@ frequency = "40 Hz"
     near("rim", numbers(&found, "curve", "rim_y_amplitude_m")[0], 0.05 * expected.abs(), 1e-12);
 }
 
-/// A body in space that a point beside its axes pushes: the static motion by hand, with a product of inertia that does not count at rest, and rows of a face
-/// that is turned.
+/// A body in space under a force off its axes: static motion by hand. The product of inertia
+/// has no effect at rest, and a face is rotated.
 #[test]
 fn a_body_in_space_has_six_directions_and_turned_faces() {
     let spring =
@@ -204,7 +207,8 @@ frequency = "1e-3 Hz"
     near("face", at("face_n_amplitude_m"), own / 2.0, 1e-6);
 }
 
-/// A cylinder between a floor that holds it and a spring at its centre: 3/2 m while it rolls, and a disk of such: the frequencies that `check` says.
+/// `check` describes a cylinder between a floor and a spring at its centre. While the cylinder
+/// rolls, its effective mass is 3/2 m.
 #[test]
 fn check_says_what_a_body_is_and_how_it_rolls() {
     let text = r#"
@@ -253,7 +257,8 @@ frequency = "60 Hz"
     near("turns", numbers(&found, "curve", "roller_ry_amplitude_rad")[0], expected / 3e-3, 1e-9);
 }
 
-/// Two platforms on springs of a ring of sectors, tied by springs at offsets, in a travelling wave: one sector, by hand.
+/// A ring of sectors with two platforms on springs, connected by springs at offsets, in a
+/// travelling wave: one sector, by hand.
 #[test]
 fn bodies_are_parts_of_sectors() {
     let text = r#"
@@ -415,7 +420,7 @@ fn what_is_wrong_is_said_where_it_stands() {
     refused(figure, &format!("{figure}\n[figure]\nonly = \"bar.ry\""), "only", &["`bar.ry` is a rotation"]);
 }
 
-/// The dampers under the platforms that turn begin as studies of bodies.
+/// The templates of dampers under rotating platforms contain bodies.
 #[test]
 fn the_templates_of_dampers_have_bodies() {
     for name in ["under-platform-cylinder", "under-platform-rocking-wedge"] {

@@ -1,7 +1,9 @@
-//! The book under `docs/` and the README: what is generated is up to date, and every study in them reads and checks.
+//! The book under `docs/` and the README: generated parts are up to date, and every study reads
+//! and checks.
 //!
-//! After a change of the schema, a law, a method, a template or a study kind, write the generated parts anew:
-//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book`
+//! A change of the schema, a law, a method, a template or a study kind changes the generated
+//! parts. This command writes them again:
+//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -21,7 +23,7 @@ fn text_of(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Holds a file against what it should be, or writes it when asked to.
+/// Compares a file with its expected text, or writes the text if the variable is set.
 fn up_to_date(path: &Path, expected: &str) {
     if std::env::var_os(UPDATE).is_some() {
         fs::write(path, expected).unwrap();
@@ -30,7 +32,7 @@ fn up_to_date(path: &Path, expected: &str) {
     }
 }
 
-/// Every page with studies.
+/// Returns every page with studies.
 fn pages() -> Vec<PathBuf> {
     let folder = root().join("docs/src");
     let mut pages: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -40,7 +42,7 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// The TOML blocks of a page, each with the line where it begins.
+/// Returns the TOML blocks of a page, each with its first line.
 fn blocks(text: &str) -> Vec<(usize, String)> {
     let mut blocks = Vec::new();
     let mut open: Option<(usize, String)> = None;
@@ -56,7 +58,8 @@ fn blocks(text: &str) -> Vec<(usize, String)> {
     blocks
 }
 
-/// A block that states a schema version is a whole study and must read and check; any other is a part and must be TOML.
+/// A block with a schema version is a whole study and must read and check. Any other block must
+/// be TOML.
 #[test]
 fn every_study_in_the_book_checks() {
     let mut studies = 0;
@@ -88,7 +91,7 @@ fn the_reference_of_keys_is_up_to_date() {
 const METHODS_BY_LAWS: [&str; 2] =
     ["<!-- begin generated: methods x laws -->\n", "<!-- end generated: methods x laws -->"];
 
-/// A mass on a spring that rubs on the ground with this law, along all directions of the law.
+/// A mass on a spring with a joint of this law to the ground, along all directions of the law.
 fn rubbing(law: law::SharedLaw) -> System {
     let directions = if law.directions() > 1 { &["x", "y", "z"][..law.directions()] } else { &[] };
     let mass = Mass::new("body", 1.0).along(directions);
@@ -104,7 +107,7 @@ fn rubbing(law: law::SharedLaw) -> System {
     .unwrap()
 }
 
-/// Which method takes which law, asked of the methods.
+/// Builds the table of laws that each method accepts, by asking the methods.
 fn methods_by_laws() -> String {
     let mut table = "| law |".to_owned();
     table.extend(method::TABLE.iter().map(|row| format!(" `{}` |", row.name)));
@@ -129,13 +132,14 @@ fn methods_by_laws() -> String {
     table + "\n"
 }
 
-/// Every law in a row: what it says of itself.
+/// Builds the table of the laws with their descriptions.
 fn laws() -> String {
     let mut table = "| law | what it is | directions | says to methods |\n| --- | --- | --- | --- |\n".to_owned();
     for row in law::TABLE {
         let law = row.sample();
         let (name, summary) = (row.name, row.summary.replace('|', "\\|"));
-        // as few and as many tangents as a law that leaves them open can have
+        // the smallest and the largest number of tangents that a law without a fixed number can
+        // have
         let directions: BTreeSet<_> = [1.0, 2.0]
             .iter()
             .map(|count| law.with(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
@@ -157,7 +161,7 @@ fn laws() -> String {
     table
 }
 
-/// The page with what stands between two lines replaced.
+/// Replaces the text between two lines of a page.
 fn with_generated(page: &str, [begin, end]: [&str; 2], generated: &str) -> String {
     let from = page.find(begin).unwrap_or_else(|| panic!("no `{begin}`")) + begin.len();
     let to = from + page[from..].find(end).unwrap_or_else(|| panic!("no `{end}`"));
@@ -166,7 +170,8 @@ fn with_generated(page: &str, [begin, end]: [&str; 2], generated: &str) -> Strin
 
 const LAWS: [&str; 2] = ["<!-- begin generated: laws -->\n", "<!-- end generated: laws -->"];
 
-/// The table is generated, and a law without a section gets one of its summary, to be written out by who knows more.
+/// The table is generated. A law without a section gets one with its summary, to be completed
+/// by an author.
 #[test]
 fn the_page_of_laws_has_every_law() {
     let path = root().join("docs/src/laws.md");
@@ -187,7 +192,8 @@ fn the_table_of_methods_and_laws_is_up_to_date() {
     }
 }
 
-/// Every page of the summary exists, every page is in the summary, and links between pages lead somewhere.
+/// Every page of the summary exists, every page is in the summary, and every link between pages
+/// has a target.
 #[test]
 fn every_page_is_in_the_summary_and_every_link_leads_to_a_file() {
     let folder = root().join("docs/src");

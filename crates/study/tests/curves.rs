@@ -1,4 +1,4 @@
-//! Kinds that follow something: performance curves, nonlinear modes, branches, as a study file asks for them.
+//! Studies with continuation or search: performance curves, nonlinear modes and branches.
 
 use stickslip_study::dataset::{Dataset, Style, Table};
 use stickslip_study::{
@@ -47,7 +47,7 @@ amplitude = "F0"
     )
 }
 
-/// Theory 6.6 in a study: the slip limit that makes the peak of blade 1 lowest.
+/// Theory 6.6 in a study: the slip limit that minimizes the peak of blade 1.
 #[test]
 fn performance_finds_the_best_slip_limit() {
     let text = r#"
@@ -65,13 +65,14 @@ vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
     let best = table(&found, "optimum");
     assert!((best.numbers("Ft_N").unwrap()[0] - 6.684).abs() < 0.01);
     assert!((best.numbers("amplitude_m").unwrap()[0] - 0.019_747).abs() < 1e-6);
-    // the same with a series that is too short does not look converged
+    // a series that is too short does not look converged
     let short = dataset(&(text.to_owned() + "[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n"));
     assert_eq!(short.record.points.get("truncated"), Some(&3), "{:?}", short.record.points);
     assert!(short.notes.iter().any(|note| note.contains("too short")), "{:?}", short.notes);
 }
 
-/// A slider that holds more than the force never lets the mass move: then no limit is the best, and where only some hold, none of these is.
+/// A slider with a limit above the force keeps the mass at rest. Then no limit is the best, and
+/// if only some limits do so, none of these is.
 #[test]
 fn no_value_is_the_best_where_nothing_moves() {
     let found = |limits: &str| {
@@ -108,8 +109,8 @@ fn modes_go_from_stuck_to_free() {
     assert!(damping[0].abs() < 1e-9 && damping[20] < 1e-3 && damping.iter().any(|zeta| *zeta > 0.025), "{damping:?}");
 }
 
-/// The main numbers of a mode, (10.3): both ends, and the largest damping `Im k/(2 (1 + Re k))` over amplitudes of the complex stiffness of
-/// the slider.
+/// Summary of a mode, (10.3): both ends, and the largest damping `Im k/(2 (1 + Re k))` over the
+/// amplitudes, with the complex stiffness k of the slider.
 #[test]
 fn modes_are_summarised() {
     let law = r#"{ kind = "jenkins", stiffness = "0.2 N/m", limit = "1 N" }"#;
@@ -133,7 +134,7 @@ fn modes_are_summarised() {
     assert!((value("amplitude_there_m") / at - 1.0).abs() < 2e-3, "{summary:?} {at}");
 }
 
-/// Where two modes nearly become one, the run says so at that amplitude and does not look like success.
+/// If two modes nearly merge, the run reports that amplitude and does not look like a success.
 #[test]
 fn merging_modes_are_told() {
     let study = |points: u32| {
@@ -162,7 +163,7 @@ amplitude = {{ from = "0.01 mm", to = "100 mm", points = {points} }}
     assert!((largest(&coarse) / largest(&fine) - 1.0).abs() < 1e-6 && largest(&fine) > 0.05);
 }
 
-/// A range in which nothing slips is a linear mode, and the reader is told.
+/// A range of amplitudes without slip gives a linear mode, and a note says it.
 #[test]
 fn a_mode_that_never_slips_is_told() {
     let law = r#"{ kind = "jenkins", stiffness = "0.2 N/m", limit = "1 N" }"#;
@@ -172,7 +173,8 @@ fn a_mode_that_never_slips_is_told() {
     assert!(told("4.9") && !told("6"));
 }
 
-/// A branch along a force that turns twice: two turns in its table, and an unstable stretch in its figure.
+/// A branch along a force with two folds: two turns in its table, and an unstable part in its
+/// figure.
 #[test]
 fn a_branch_turns() {
     let study = r#"kind = "branch"
@@ -184,7 +186,8 @@ tolerance = 0.3"#;
     let found = oscillator("-0.03 kg/s", r#"{ kind = "coulomb", limit = "1 N" }"#, study);
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     let turns = table(&found, "turns").numbers("F0_N").unwrap();
-    // the first where (0.1 a)² + (4/π - 0.03 ω a)² is least, up to the higher harmonics; the second above the force of stick
+    // the first where (0.1 a)² + (4/π - 0.03 ω a)² is least, up to the higher harmonics; the
+    // second above the sticking force
     assert!(turns.len() == 2 && (turns[0] - 1.21).abs() < 0.05 && turns[1] > turns[0], "{turns:?}");
     let values = table(&found, "branch").numbers("F0_N").unwrap();
     assert_eq!((values[0], *values.last().unwrap()), (2.0, 0.5));
@@ -195,7 +198,8 @@ tolerance = 0.3"#;
     assert!(found.notes.iter().any(|note| note.starts_with(&warning)), "{warning}: {:?}", found.notes);
 }
 
-/// Along frequency a branch ends where its range does, and its peak is that of the response curve.
+/// Along the frequency a branch ends at the ends of its range, and its peak is that of the
+/// response curve.
 #[test]
 fn a_branch_along_frequency_has_the_peak_of_the_curve() {
     let text = r#"
@@ -214,7 +218,8 @@ vary = { Ft = ["2 N", "4 N"] }
     let peaks = table(&branch, "peaks").numbers("amplitude_m").unwrap();
     let of_curve = table(&curve, "peaks");
     let (limits, heights) = (of_curve.numbers("Ft_N").unwrap(), of_curve.numbers("amplitude_m").unwrap());
-    // the highest of the curve's peaks is that of blade 1; fifteen harmonics are within 3e-5 of the exact curve
+    // the highest peak of the curve is that of blade 1; 15 harmonics are within 3e-5 of the
+    // exact curve
     assert_eq!(peaks.len(), 2);
     for (peak, limit) in peaks.iter().zip([2.0, 4.0]) {
         let all = (0..of_curve.rows()).filter(|&row| limits[row] == limit).map(|row| heights[row]);
@@ -223,8 +228,8 @@ vary = { Ft = ["2 N", "4 N"] }
     }
 }
 
-/// The amplitudes of a branch where it passes a frequency (rad/s), in its order, on the line
-/// between its points.
+/// Returns the amplitudes at which a branch passes a frequency (rad/s), in order, interpolated
+/// linearly.
 fn passed(branch: &Dataset, omega: f64) -> Vec<f64> {
     let rows = table(branch, "branch");
     let at: Vec<f64> = rows.numbers("frequency_Hz").unwrap().iter().map(|f| f * std::f64::consts::TAU).collect();
@@ -247,10 +252,11 @@ fn near(found: &[f64], expected: &[f64]) {
     assert!(all, "{found:?} instead of {expected:?}");
 }
 
-/// `x'' + 0.02 x' + x - 0.05 x³ = 0.05 cos ωt`, in twentieths of x, which softens: three orbits
-/// between 0.805663 and 0.957875 rad/s. A range that begins
-/// there has them all, whatever its direction. The values are those of a harmonic balance of its
-/// own with arc length, 15 harmonics, in NumPy.
+/// `x'' + 0.02 x' + x - 0.05 x³ = 0.05 cos ωt`, in twentieths of x, softens: it has three
+/// orbits between 0.805663 and 0.957875 rad/s. A range that begins there contains all of them,
+/// in both directions.
+///
+/// Reference: an independent harmonic balance with arc length, 15 harmonics, in NumPy.
 #[test]
 fn a_branch_that_begins_between_folds_covers_its_range() {
     let soft = |frequency: &str| {
@@ -275,7 +281,7 @@ fn a_branch_that_begins_between_folds_covers_its_range() {
         near(&passed(&branch, 0.9), &from_below(&[0.265_614, 2.154_925_5, 2.307_118_1]));
         near(&passed(&branch, 1.0), &times(&[1.063_259]));
         near(&passed(&branch, 1.1), &times(&[0.234_504_7]));
-        // the curve is interrupted where it runs outside of the range
+        // the curve is interrupted where it leaves the range
         assert!(branch.figure.panels[0].series.len() >= 3);
         let turns = table(&branch, "turns").numbers("frequency_Hz").unwrap();
         assert!(turns.len() == 1 && (turns[0] - 0.152_448_6).abs() < 1e-4, "{turns:?}");
@@ -287,8 +293,8 @@ fn a_branch_that_begins_between_folds_covers_its_range() {
     }
 }
 
-/// The same oscillator with a spring that hardens: three orbits between 1.040154 and 1.094317
-/// rad/s, and the peak above where the range begins.
+/// The oscillator above with a hardening spring: three orbits between 1.040154 and 1.094317
+/// rad/s, and the peak above the start of the range.
 #[test]
 fn a_branch_that_begins_between_folds_has_the_peak_of_its_range() {
     let study = "kind = \"branch\"\nfrequency = { from = \"1.06 rad/s\", to = \"1.3 rad/s\" }";
@@ -301,7 +307,7 @@ fn a_branch_that_begins_between_folds_has_the_peak_of_its_range() {
     near(table(&branch, "peaks").numbers("frequency_Hz").unwrap(), &[1.093_993_2 / std::f64::consts::TAU]);
 }
 
-/// A branch without a range says what it needs.
+/// A branch without a range is refused with the reason.
 #[test]
 fn a_branch_without_a_range_fails_with_words() {
     let law = r#"{ kind = "coulomb", limit = "1 N" }"#;
@@ -314,16 +320,16 @@ fn a_branch_without_a_range_fails_with_words() {
     refused("\"1 rad/s\"");
     refused("[\"1 rad/s\", \"2 rad/s\", \"1 rad/s\"]");
     refused("\"1 rad/s\"\nvary = { F0 = \"1 N\" }");
-    // with two values of a parameter, which are equal all the same
+    // also with two values of a parameter that are equal
     let same = oscillator("0.1 kg/s", law, "kind = \"branch\"\nfrequency = 0.1\nvary = { F0 = [\"2 N\", \"2 N\"] }");
     assert!(same.failures[0].reason.contains("a branch needs a range"), "{:?}", same.failures);
 }
 
-/// A mass of 1 kg on 2 N/m and bristles of 1e5 N/m: friction of 1 N holds it until it has no
-/// vibration left between 10 µm and half a metre. Its mode is followed
-/// from small amplitudes. Frequencies and damping ratios are those of free modes of 9 and 15
-/// harmonics in SciPy, which agree to 5e-6; at rest `lugre` has
-/// `(s1 + s2)/(2 √((s0 + k) m))` = 0.500628 at 50.3297 Hz.
+/// A mass of 1 kg on 2 N/m and bristles of 1e5 N/m. Friction of 1 N overdamps its vibration at
+/// amplitudes between 10 µm and half a metre. The study follows the mode from small amplitudes.
+///
+/// Reference: free modes of 9 and 15 harmonics in SciPy, which agree to 5e-6. At rest `lugre`
+/// has the damping ratio `(s1 + s2)/(2 √((s0 + k) m))` = 0.500628 at 50.3297 Hz.
 #[test]
 fn stiff_bristles_on_a_soft_spring_have_their_mode() {
     let lugre = r#"{ kind = "lugre", stiffness = "1e5 N/m", damping = "316.2278 N s/m", viscous = "0.4 N s/m", limit = "1 N", static_limit = "1.5 N", velocity = "0.001 m/s" }"#;
@@ -358,7 +364,8 @@ fn stiff_bristles_on_a_soft_spring_have_their_mode() {
     check(&found, &[(1e-6, 50.23725, 0.021_215_9), (1e-5, 43.1561, 0.208_170)]);
 }
 
-/// Where the limit of every joint is zero the mode is the linear one: ω = √(k/m), and the damping ratio c/(2 √(k m)).
+/// With the limit zero in every joint the mode is linear: ω = √(k/m), with the damping ratio
+/// c/(2 √(k m)).
 #[test]
 fn a_mode_without_friction_is_linear() {
     let study = r#"kind = "modes"
@@ -376,7 +383,7 @@ amplitude = { from = "1 mm", to = "1 m", points = 5 }"#;
     }
 }
 
-/// A list of values in any order has the same optimum, and its rows as they are listed.
+/// A list of values has the same optimum in any order, and its rows keep the order of the list.
 #[test]
 fn performance_takes_values_in_any_order() {
     let of = |limits: &str| {
@@ -395,7 +402,8 @@ fn performance_takes_values_in_any_order() {
     assert_eq!(listed, [0.1, 4.0, 0.5, 1.0]);
 }
 
-/// Curves of a performance study tell the value of their outer parameter, so that many of them can have a colour bar.
+/// Curves of a performance study carry the value of their outer parameter, so that a figure of
+/// many curves has a colour bar.
 #[test]
 fn performance_curves_tell_their_parameter() {
     let law = r#"{ kind = "coulomb", limit = "Ft" }"#;
@@ -410,7 +418,7 @@ vary = { F0 = ["1 N", "2 N"], Ft = ["0.2 N", "0.4 N", "0.6 N"] }"#;
     assert_eq!(curves.map(|series| series.value).collect::<Vec<_>>(), [Some(1.0), Some(2.0)]);
 }
 
-/// Options that only the model shows to be wrong are shown where they stand.
+/// Invalid options that depend on the model are reported at their place in the file.
 #[test]
 fn harmonics_below_the_excitation_are_refused_in_their_place() {
     let text = r#"
@@ -437,8 +445,8 @@ harmonics = 3
     assert_eq!(error.line(), Some(17), "{error}");
 }
 
-/// A cubic spring that stiffens: `branch` turns twice, where the one-term formula `F² = ((k + ¾ k₃ a² - ω²)² + c² ω²) a²` does, and the orbits
-/// between the two turns are unstable.
+/// A hardening cubic spring: `branch` turns twice, as does the one-term formula
+/// `F² = ((k + ¾ k₃ a² - ω²)² + c² ω²) a²`. The orbits between the two turns are unstable.
 #[test]
 fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
     let text = oscillating("0.1 kg/s", r#"{ kind = "cubic", stiffness = "1 N/m^3" }"#, "").replace("1 N\"", "0.3 N\"");
@@ -446,7 +454,8 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
         + "[method]\nkind = \"harmonic-balance\"\nharmonics = 9\n[study]\nkind = \"branch\"\n\
            frequency = { from = \"0.1 Hz\", to = \"0.4 Hz\", points = 151 }\n";
     let dataset = dataset(&text);
-    // ω² of both sides of the backbone by amplitude; where ω turns along the curve
+    // ω² of both sides of the backbone by amplitude, and the turning points of ω along the
+    // curve
     let omega = |a: f64, side: f64| {
         let (spring, c2, f2) = (1.0 + 0.75 * a * a, 0.01, 0.09);
         let middle = spring - 0.5 * c2;
@@ -467,7 +476,7 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
     for (i, (omega, a)) in [highest, lower].into_iter().enumerate() {
         let hertz = omega / std::f64::consts::TAU;
         assert!((frequency[i] / hertz - 1.0).abs() < 0.01, "{i}: {} {hertz}", frequency[i]);
-        // higher harmonics raise the largest displacement by some hundredths
+        // higher harmonics raise the largest displacement by a few percent
         assert!((amplitude[i] / a - 1.0).abs() < 0.05, "{i}: {} {a}", amplitude[i]);
     }
     let branch = table(&dataset, "branch");
@@ -478,8 +487,9 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
     assert!(stable[first..=last].iter().all(|s| *s == Some(false)), "the unstable orbits are one piece");
 }
 
-/// A block on a belt sticks until its spring pulls with the static limit, and then slides about the stretch of the dynamic one, with the
-/// velocity of the belt to begin with. The belt is a slow and long motion, as the book advises.
+/// A block on a belt sticks until its spring pulls with the static limit. Then it slides about
+/// the deflection of the dynamic limit, initially with the velocity of the belt. The belt is a
+/// slow and long imposed motion, as the book advises.
 #[test]
 fn a_long_motion_is_a_belt() {
     let book = include_str!("../../../docs/src/laws.md");
@@ -497,7 +507,7 @@ fn a_long_motion_is_a_belt() {
     assert!((high - fc / k - slide).abs() < missed && (low - fc / k + slide).abs() < missed, "{low} {high} {slide}");
 }
 
-/// A node begins where the study says, direction by direction; its name alone does not say where.
+/// A node begins at the given displacements, direction by direction; its name alone is refused.
 #[test]
 fn a_node_begins_along_its_directions() {
     let text = |start: &str| {

@@ -1,5 +1,5 @@
-//! The ready models of dampers against closed forms: loads at rest, frequencies by nodal diameter with joints free and stuck, where slip begins,
-//! what slipping takes.
+//! The templates of dampers against closed forms: loads at rest, frequencies by nodal diameter
+//! with joints free and stuck, the onset of slip, and the energy loss.
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -7,7 +7,7 @@ use stickslip_study::dataset::{Dataset, Table};
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
-/// A study of a ready model with other parameters.
+/// A study of a template with other parameters.
 fn study(template: &str, parameters: &[(&str, String)], study: &str) -> Dataset {
     let parameters: String = parameters.iter().map(|(name, value)| format!("{name} = \"{value}\"\n")).collect();
     let text = format!("schema = 1\nmodel = {{ template = \"{template}\" }}\n[parameters]\n{parameters}\n{study}");
@@ -26,7 +26,8 @@ fn near(what: &str, found: f64, expected: f64, share: f64) {
     assert!((found - expected).abs() <= share * expected.abs(), "{what}: {found} instead of {expected}");
 }
 
-/// The lowest frequencies (rad/s) of the joints in one state, as `expected` has them for the angle between two sectors.
+/// Checks the lowest frequencies (rad/s) of the joints in one state against `expected`, a
+/// function of the angle between two sectors.
 fn frequencies(
     (template, sectors, modes): (&str, usize, usize),
     parameters: &[(&str, String)],
@@ -54,7 +55,8 @@ fn frequencies(
     assert_eq!(seen, table.rows());
 }
 
-/// The wedge alone: both loads from its balance along and across the radius, by Cramer's rule; no place moves from where the loads are stated.
+/// The wedge at rest: both loads from its balance along and across the radius, by Cramer's
+/// rule. No place moves from its reference position.
 #[test]
 fn a_wedge_is_pressed_by_its_balance() {
     for (a1, a2, rpm) in
@@ -92,8 +94,9 @@ fn a_wedge_is_pressed_by_its_balance() {
     }
 }
 
-/// The flexibilities of both faces in series, `D = Σ t tᵀ/kt + n nᵀ/kn`, couple neighbours by `kc = (D⁻¹)ₓₓ` where the wedge has next to no mass and
-/// platforms do not move outwards: `m ω² = k + 2 kc (1 - cos θ)`.
+/// With a nearly massless wedge and platforms that do not move outwards,
+/// `m ω² = k + 2 kc (1 - cos θ)`. The flexibilities of both faces act in series,
+/// `D = Σ t tᵀ/kt + n nᵀ/kn`, and couple neighbours by `kc = (D⁻¹)ₓₓ`.
 #[test]
 fn a_stuck_wedge_is_two_springs_at_angles() {
     let (mass, k, kt, kn): (f64, f64, f64, f64) = (0.4, 250e3, 40e3, 50e3);
@@ -120,16 +123,17 @@ fn a_stuck_wedge_is_two_springs_at_angles() {
     }
 }
 
-/// A spring along which a point of a damper is tied to a platform.
+/// A spring between a point of a damper and a platform.
 struct Tie {
-    /// What it is stretched by `(x, z, ry)` of the damper.
+    /// Elongation by `(x, z, ry)` of the damper.
     row: [f64; 3],
     stiffness: f64,
-    /// Whether it is that of the first platform, which moves by one along x; the other stands.
+    /// True for the first platform, which moves by one along x; the second one is fixed.
     first: bool,
 }
 
-/// Points of two faces at these angles, seen from the centre: `(distance, edge)` along the normal and across it, with `1/share` of the stiffnesses at each.
+/// Returns the ties of points on two faces at these angles. A point is `(distance, edge)` from
+/// the centre along the normal and across it, and has `1/share` of the stiffnesses.
 fn ties(angles: [f64; 2], points: &[(f64, f64)], [kt, kn]: [f64; 2]) -> Vec<Tie> {
     let share = points.len() as f64;
     let mut ties = Vec::new();
@@ -145,7 +149,8 @@ fn ties(angles: [f64; 2], points: &[(f64, f64)], [kt, kn]: [f64; 2]) -> Vec<Tie>
     ties
 }
 
-/// The spring that a damper without mass is between the platforms, by condensing its three motions, and how it turns with the first of them, rad/m.
+/// Condenses the three motions of a massless damper. Returns its stiffness between the
+/// platforms, and its rotation per motion of the first platform, rad/m.
 fn condensed(ties: &[Tie]) -> (f64, f64) {
     let (mut own, mut pull, mut held) = ([[0.0; 3]; 3], [0.0; 3], 0.0);
     for Tie { row, stiffness, first } in ties {
@@ -169,7 +174,8 @@ fn condensed(ties: &[Tie]) -> (f64, f64) {
     (held - (0..3).map(|i| moved[i] * pull[i]).sum::<f64>(), moved[2])
 }
 
-/// Cylinders and wedges that rock, with next to no mass, between blades that move along the circumference: `m ω² = k + 2 kc (1 - cos θ)`.
+/// Nearly massless cylinders and rocking wedges between blades that move along the
+/// circumference satisfy `m ω² = k + 2 kc (1 - cos θ)`.
 #[test]
 fn stuck_dampers_that_turn_are_springs_between_blades() {
     let (mass, k, kt, kn, rc): (f64, f64, f64, f64, f64) = (0.4, 250e3, 40e3, 50e3, 3.5e-3);
@@ -180,7 +186,8 @@ fn stuck_dampers_that_turn_are_springs_between_blades() {
         for angles in [[30.0f64, 30.0f64], [20.0, 50.0], [65.0, 10.0]] {
             let (kc, turn) = condensed(&ties(angles, &points, [kt, kn]));
             if angles[0] == angles[1] {
-                // blades that part do not turn it, and it holds them as a wedge that cannot turn does
+                // blades that move apart do not rotate it, and it acts like a wedge that cannot
+                // rotate
                 let (s, c) = angles[0].to_radians().sin_cos();
                 near(template, kc, kt * kn / (2.0 * (kt * s * s + kn * c * c)), 1e-12);
             } else {
@@ -202,7 +209,8 @@ fn stuck_dampers_that_turn_are_springs_between_blades() {
     }
 }
 
-/// Its loads at rest are those of a wedge: both go through its centre, and no friction is needed.
+/// The loads of a cylinder at rest are those of a wedge: both pass through its centre, and no
+/// friction is needed.
 #[test]
 fn a_cylinder_is_pressed_by_its_balance() {
     let (a1, a2) = (15.0f64, 40.0f64);
@@ -224,7 +232,8 @@ fn a_cylinder_is_pressed_by_its_balance() {
     }
 }
 
-/// What nothing drives rests, however small the force that does is beside the wedges' load: a billionth of it is answered in proportion.
+/// Without excitation the wedge stays at rest. An excitation of a billionth of the wedge's load
+/// has a proportional response.
 #[test]
 fn a_wedge_that_nothing_drives_rests() {
     let amplitude = |force: &str| {
@@ -243,9 +252,10 @@ fn a_wedge_that_nothing_drives_rests() {
     }
 }
 
-/// While blades close, the wedge is pushed inwards against friction, while they open it slides outwards: between the blades it holds
-/// `C/2 tan(a ± ρ)` with `μ = tan ρ`, and a cycle loses `h (Δ - h/kc)`, with h the
-/// difference of both and Δ the range of the blades' distance.
+/// While blades close, they push the wedge inwards against friction; while they open, it slides
+/// outwards. Between the blades it exerts `C/2 tan(a ± ρ)` with `μ = tan ρ`. A cycle loses
+/// `h (Δ - h/kc)`, with the difference h of both forces and the range Δ of the blades'
+/// distance.
 #[test]
 fn a_slipping_wedge_loses_what_its_limits_say() {
     let (kt, kn, mu): (f64, f64, f64) = (40e3, 50e3, 0.3);
@@ -254,7 +264,7 @@ fn a_slipping_wedge_loses_what_its_limits_say() {
             ("a1", format!("{a} deg")),
             ("a2", format!("{a} deg")),
             ("speed", "2550 rpm".to_owned()),
-            // next to no inertia of the wedge, and its load
+            // a nearly massless wedge with its load
             ("m", "0.01 g".to_owned()),
             ("r", "40 m".to_owned()),
             ("kz", "1e5 N/mm".to_owned()),
@@ -275,12 +285,13 @@ fn a_slipping_wedge_loses_what_its_limits_say() {
         let range = 2.0 * 2.0 * at("blade_0_x_amplitude_m") * (PI / 4.0).sin();
         let lost = at("face1_0_dissipation_J") + at("face2_0_dissipation_J");
         assert!(range > 1.5 * height / kc, "slips for much of the period");
-        // blades move by little more than a sine
+        // the motion of the blades is nearly a sine
         near("loss", lost, height * (range - height / kc), 5e-3);
     }
 }
 
-/// A disk mass and a piece of the ring by nodal diameter: two masses, with the contact's spring between them where it sticks.
+/// A disk mass and a ring segment by nodal diameter: two masses, connected by the contact's
+/// spring if it sticks.
 #[test]
 fn a_rim_ring_has_the_frequencies_of_two_masses() {
     let (md, kd, kc, mr, kr, kt): (f64, f64, f64, f64, f64, f64) = (1.5, 8e5, 9e5, 0.005, 4e6, 3e5);
@@ -291,12 +302,13 @@ fn a_rim_ring_has_the_frequencies_of_two_masses() {
         let (a, b) = (rim + held, ring + held);
         let (sum, product) = (a / md + b / mr, (a * b - held * held) / (md * mr));
         let high = 0.5 * (sum + (sum * sum - 4.0 * product).sqrt());
-        // a ring that is free to turn has no frequency
+        // a ring that can rotate freely has no frequency there
         [product / high, high].into_iter().filter(|square| *square > 1e-6 * rim / md).map(f64::sqrt).collect()
     });
 }
 
-/// The contact carries `kt (x - y)` with `y (kt + 2 kr (1 - cos θ) - mr ω²) = kt x`, and slips from its limit on.
+/// The contact carries `kt (x - y)` with `y (kt + 2 kr (1 - cos θ) - mr ω²) = kt x`, and slips
+/// above its limit.
 #[test]
 fn a_rim_ring_begins_to_slip_at_its_limit() {
     let (mr, kr, kt): (f64, f64, f64) = (0.005, 4e6, 3e5);
@@ -310,7 +322,8 @@ fn a_rim_ring_begins_to_slip_at_its_limit() {
     slips_from("rim-ring", &[], ("rim_0", 150.0), force, limit / carried, "groove_0");
 }
 
-/// Half a percent below a force nothing slips, and the place moves as it must; half a percent above something does.
+/// Checks that nothing slips half a percent below a force, with the expected amplitude, and
+/// that something slips half a percent above it.
 fn slips_from(
     template: &str,
     parameters: &[(&str, String)],
@@ -334,13 +347,13 @@ fn slips_from(
     };
     let (below, above) = (at(0.995), at(1.005));
     near(template, below.0, 0.995 * amplitude, 1e-6);
-    // a cycle of as wide a slip would lose this
+    // energy loss of a cycle with slip over the whole motion
     let whole = force * amplitude;
     assert!(below.1.abs() < 1e-12 * whole, "{template} slips below {force} N: {} J", below.1);
     assert!(above.1 > 1e-5 * whole, "{template} holds above {force} N: {} J", above.1);
 }
 
-/// Along the faces and across them a blade has a spring of its own and those of two shrouds.
+/// Along the faces and across them, a blade acts on its own spring and on those of two shrouds.
 #[test]
 fn shrouds_have_the_frequencies_of_a_chain() {
     frequencies(("shroud", 16, 2), &[], 1e-9, |stuck, theta| {
@@ -351,8 +364,8 @@ fn shrouds_have_the_frequencies_of_a_chain() {
     });
 }
 
-/// With displacements `X` along and `Z` across the faces friction holds while `|kt ΔX ∓ μ kn ΔZ| < μ N₀`: tangential and normal load are sines of
-/// different phase.
+/// With displacements `X` along and `Z` across the faces, friction holds while
+/// `|kt ΔX ∓ μ kn ΔZ| < μ N₀`. The tangential and the normal load are sines of different phase.
 #[test]
 fn shrouds_begin_to_slip_where_their_load_falls() {
     let (kt, kn, mu, preload): (f64, f64, f64, f64) = (15e3, 20e3, 0.3, 10.0);

@@ -46,7 +46,7 @@ fn case(force: &str, disk: &str) -> Case {
     read(force, disk, STUDY).unwrap_or_else(|error| panic!("{error:?}")).case(0).unwrap()
 }
 
-/// Stiffness of each blade relative to the tuned one.
+/// Returns the stiffness of each blade relative to the tuned one.
 fn blades(case: &Case) -> Vec<f64> {
     (0..6).map(|s| case.model.springs[2 * s].stiffness / 1e5).collect()
 }
@@ -61,7 +61,7 @@ fn a_sector_becomes_a_ring() {
     let study = read("engine_order = -1", "", STUDY).unwrap();
     let data = run(&study, &Context::unwatched(1)).unwrap();
     let names: Vec<&str> = data.tables[0].columns.iter().map(|column| column.name.as_str()).collect();
-    // all sectors are alike, and bars would say nothing
+    // all sectors are alike, so bars would show nothing
     let amplitudes = (0..6).map(|s| data.tables[0].numbers(&format!("blade_{s}_amplitude_m")).unwrap()[0]);
     let amplitudes: Vec<f64> = amplitudes.collect();
     assert!(amplitudes.iter().all(|y| (y / amplitudes[0] - 1.0).abs() < 1e-6), "{amplitudes:?}");
@@ -72,8 +72,9 @@ fn a_sector_becomes_a_ring() {
     }
 }
 
-/// Bars and wheel of a mistuned disk stand at the peak, which lies between the points of the curve: as high as it, and blade by blade what a study of
-/// that one frequency finds. The points beside it have another blade as the largest.
+/// Bars and shape of a mistuned disk are drawn at the peak, which lies between the points of
+/// the curve. They equal the peak, and blade by blade a study of that one frequency. At the
+/// neighbouring points another blade has the largest amplitude.
 #[test]
 fn bars_stand_at_the_peak() {
     let mistuned = "mistuning = { of = \"k\", deviation = \"3 %\", seed = 7 }";
@@ -105,7 +106,7 @@ fn bars_stand_at_the_peak() {
     }
 }
 
-/// k (1 + deviation), whatever the name; what follows from a parameter follows.
+/// k (1 + deviation) for any name of the parameter; dependent parameters follow.
 #[test]
 fn mistuning_by_parameter_mass_and_spring() {
     let pattern = stickslip::model::normal_pattern(6, 0.02, 7);
@@ -121,7 +122,7 @@ fn mistuning_by_parameter_mass_and_spring() {
     let by_mass = case("", "mistuning = { of = \"blade\", deviation = 0.02, seed = 7 }");
     assert!((by_mass.model.masses[3].mass / (0.2 * (1.0 + pattern[3])) - 1.0).abs() < 1e-15);
     assert!(by_mass.model.ring.unwrap().order.is_none());
-    // no deviation, no mistuning
+    // a deviation of zero is not mistuning
     assert!(case("", "mistuning = { of = \"k\", deviation = 0 }").model.ring.unwrap().order.is_some());
 }
 
@@ -202,7 +203,8 @@ fn wrong_disks_are_refused_at_their_place() {
     assert!(read_study("d.toml", &varied, &[]).unwrap_err().message().contains("in another case"));
 }
 
-/// `only = \"blade\"` are the blades of all sectors, and one of them has its number.
+/// `only = \"blade\"` selects the blades of all sectors; a name with a number selects one of
+/// them.
 #[test]
 fn names_of_a_sector_stand_for_all() {
     let figure = |only: &str| read("", "", &format!("{STUDY}[figure]\nonly = {only}\n")).map(|_| ());
@@ -212,7 +214,7 @@ fn names_of_a_sector_stand_for_all() {
     assert!(figure("\"blade_6\"").is_err());
 }
 
-/// `ω² = (k + 2 kc (1 - cos 2πd/N)) / m` with the joints' springs in kc where they stick.
+/// `ω² = (k + 2 kc (1 - cos 2πd/N)) / m`, with the joints' springs in kc if they stick.
 #[test]
 fn frequencies_by_nodal_diameter() {
     let study = read("", "", "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n").unwrap();
@@ -231,8 +233,8 @@ fn frequencies_by_nodal_diameter() {
     assert!(mistuned.unwrap_err().message().contains("no nodal diameters"));
 }
 
-/// A blade that the speed stiffens, `k0 + k1 Ω²`: engine order e crosses at `Ω² = k0/(e² m - k1)`, and on a disk only the modes of its own
-/// nodal diameter.
+/// A blade with stress stiffening, `k0 + k1 Ω²`: engine order e crosses at
+/// `Ω² = k0/(e² m - k1)`. On a disk it crosses only the modes of its nodal diameter.
 #[test]
 fn campbell_crossings() {
     let sector = SECTOR
@@ -257,7 +259,8 @@ fn campbell_crossings() {
         assert_eq!(rows.len(), usize::from((20.0..200.0).contains(&speed)), "{order} {speed}");
         assert!(rows.iter().all(|row| (speeds[*row] / speed - 1.0).abs() < 1e-9), "{order}");
     }
-    // a diagram from rest has the same, though no line of an engine order leaves zero for a mode there
+    // a diagram from rest has the same crossings; no engine order line crosses a mode at zero
+    // speed
     let from_rest = kind.replace("20 Hz\", to = \"200 Hz\", points = 7", "0 rpm\", to = \"12000 rpm\", points = 11");
     let same = crossings(&format!("{plain}{from_rest}"));
     let others = (same.integers("engine_order").unwrap(), same.numbers("speed_Hz").unwrap());
@@ -277,17 +280,17 @@ fn campbell_crossings() {
     }
 }
 
-/// A disk mass, low and high side of it, and a blade of two masses; kg and N/m.
+/// A disk mass, its low and its high side, and a blade of two masses; kg and N/m.
 const STIFFNESS: &str = "%%MatrixMarket matrix coordinate real symmetric\n4 4 7\n1 1 5.5e5\n2 1 -2e5\n2 2 2e5\n3 1 -5e4\n3 3 8e4\n\
                          4 3 -3e4\n4 4 3e4\n";
 const MASS: &str = "%%MatrixMarket matrix coordinate real symmetric\n4 4 4\n1 1 1.5\n2 2 0.5\n3 3 0.3\n4 4 0.2\n";
 
-/// A study of a sector by its matrices, beside its files.
+/// A study of a sector given by matrices, next to its files.
 fn by_matrices(disk: &str, more: &str) -> Result<Study, StudyError> {
     stiffened("", disk, more)
 }
 
-/// The same with another key of `[structure]`.
+/// Like `by_matrices`, with another key of `[structure]`.
 fn stiffened(key: &str, disk: &str, more: &str) -> Result<Study, StudyError> {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
@@ -315,7 +318,8 @@ const SHROUD: &str = "[[joint]]\nname = \"shroud\"\nbetween = [\"tip\", \"next.t
                       law = { kind = \"jenkins\", stiffness = \"2e3 N/m\", limit = \"Ft\" }\n\
                       [[force]]\non = \"tip\"\namplitude = \"1 N\"\nengine_order = 2\n";
 
-/// Joints between neighbours, blades that deviate, and drawn parameters, all on one sector by its matrices.
+/// Joints between neighbours, mistuned blades and drawn parameters, all on one sector given by
+/// matrices.
 #[test]
 fn samples_of_a_disk_by_its_matrices() {
     let disk = "boundary = \"pairs.csv\"\nblade = \"blade.csv\"\n\
@@ -343,8 +347,9 @@ fn samples_of_a_disk_by_its_matrices() {
     );
 }
 
-/// Theory 12: a sector by its matrices with joints between neighbours, in the travelling wave, is the whole ring whose symmetry nobody knows: friction
-/// behind springs, rigid, and smooth.
+/// Theory 12: a sector given by matrices, with joints between neighbours, equals the whole ring
+/// in a travelling wave. The ring is solved without its symmetry, with elastic, rigid and
+/// smooth friction.
 #[test]
 fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
     let laws = [
@@ -353,7 +358,7 @@ fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
         "kind = \"jenkins-arctan\", stiffness = \"2e3 N/m\", limit = \"0.2 N\", alpha = \"300 s/m\"",
     ];
     for (law, hertz) in laws.iter().flat_map(|law| [(law, 43.7), (law, 44.6)]) {
-        // samples that are a multiple of the sectors are alike in all of these
+        // with a multiple of the number of sectors, the samples of all sectors are alike
         let more = format!(
             "[[joint]]\nname = \"shroud\"\nbetween = [\"tip\", \"next.tip\"]\nlaw = {{ {law} }}\n\
              [[force]]\non = \"tip\"\namplitude = \"1 N\"\nengine_order = 2\n\
@@ -382,8 +387,9 @@ fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
     }
 }
 
-/// With `x₂ = x₁ e^{jθ}` the waves of the sector have real matrices of three rows, to which rotation adds `(Ω/100 Hz)²` of what the second file
-/// has more. The lines and, on them, the crossings are their eigenvalues.
+/// With `x₂ = x₁ e^{jθ}` the waves of the sector have real matrices of three rows. Rotation
+/// adds `(Ω/100 Hz)²` times the difference of the second file. The lines and the crossings on
+/// them are the eigenvalues.
 #[test]
 fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
     let kind = "[parameters]\nspeed = \"0 Hz\"\nFt = \"1 N\"\n[study]\nkind = \"campbell\"\nspeed = { from = \"5 Hz\", to = \"80 Hz\", points = 6 }\n\
@@ -437,7 +443,7 @@ fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
         let text = format!("{} {}", error.message(), error.help_text().unwrap_or_default());
         assert!(text.contains(words), "{key}: {text}");
     }
-    // the export at rest is not at fault where the sum of both buckles
+    // if only the sum of both exports buckles, the export at rest is not blamed
     let key = "stiffened = { file = \"soft.mtx\", at = \"100 Hz\", speed = \"speed\" }";
     assert!(stiffened(key, "boundary = \"pairs.csv\"", kind).is_ok());
     let fast = kind.replace("speed = \"0 Hz\"", "speed = \"100 Hz\"");
@@ -475,7 +481,8 @@ fn wrong_sectors_by_matrices_are_refused_at_their_place() {
     );
 }
 
-/// A sector of six whose nodes move along x, y and z: a rim of two nodes at either side, and a blade node between them.
+/// A sector of six whose nodes move along x, y and z: a rim of two nodes on either side, and a
+/// blade node between them.
 fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
@@ -492,7 +499,7 @@ fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
             m.push(format!("{row} {row} 0.2"));
         }
     }
-    // rods, which carry a tenth across
+    // rods with a tenth of their stiffness across
     for (a, b, rod) in [(0, 1, 3e5), (2, 3, 3e5), (0, 2, 2e5), (1, 3, 2e5), (1, 4, 5e4), (3, 4, 4e4)] {
         let line: Vec<f64> = (0..3).map(|i| nodes[b][i] - nodes[a][i]).collect();
         let square: f64 = line.iter().map(|x| x * x).sum();
@@ -522,13 +529,13 @@ fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
     stickslip_study::read_file(&folder.path().join("disk.toml"), &[])
 }
 
-/// Coordinates tell which nodes of both sides are one, and whether what was said of them is right.
+/// Coordinates determine the matching nodes of both sides, and verify the stated pairs.
 #[test]
 fn coordinates_tell_a_wrong_sector() {
     let study = "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n";
     let frequencies = |disk: &str| {
         let data = run(&in_space(disk, study).unwrap(), &Context::unwatched(1)).unwrap();
-        // how far six modes are from the whole, in every row
+        // the error of six modes relative to the full structure, in every row
         let errors = data.tables[0].numbers("reduction_error").unwrap();
         assert!(errors.iter().all(|error| *error == errors[0] && *error >= 0.0));
         data.tables[0].numbers("frequency_Hz").unwrap().to_vec()
@@ -536,7 +543,7 @@ fn coordinates_tell_a_wrong_sector() {
     let named = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"");
     assert_eq!(frequencies("sectors = 6\naxis = \"z\"\nnodes = \"nodes.csv\"\nboundary = \"right.csv\""), named);
     assert_eq!(frequencies("sectors = 6\naxis = \"z\"\nnodes = \"nodes.csv\""), named);
-    // matrices alone do not tell
+    // the matrices alone do not reveal exchanged sides: the frequencies are wrong
     let exchanged = frequencies("sectors = 6\naxis = \"z\"\nboundary = \"swapped.csv\"");
     assert!(exchanged.iter().zip(&named).any(|(a, b)| (a / b - 1.0).abs() > 1e-3), "{exchanged:?} {named:?}");
     let refused = |disk: &str| {
@@ -556,8 +563,9 @@ fn coordinates_tell_a_wrong_sector() {
     }
 }
 
-/// The natural frequencies of a ring without its joints, Hz, and its shapes at all places, with `φᵀMφ = 1`: an eigenvalue solution of its full
-/// matrices, which know no sectors.
+/// Returns the natural frequencies of a ring without its joints, Hz, and its shapes at all
+/// places, with `φᵀMφ = 1`. They come from an eigenvalue solution of the full matrices, without
+/// the cyclic symmetry.
 fn dense_modes(model: &Model) -> (Vec<String>, Vec<(f64, Vec<f64>)>) {
     let system = model.assemble().unwrap();
     let full = system.structure().full();
@@ -572,7 +580,8 @@ fn dense_modes(model: &Model) -> (Vec<String>, Vec<(f64, Vec<f64>)>) {
     (system.places().to_vec(), modes)
 }
 
-/// A sector whose nodes move along x, y, z of their own: of every frequency `Σ φφᵀ` at the places is that of the whole ring.
+/// A sector whose nodes move along x, y, z: at every frequency, `Σ φφᵀ` at the places equals
+/// that of the whole ring.
 #[test]
 fn shapes_of_a_sector_are_those_of_the_ring() {
     let more = "[[place]]\nname = \"rim\"\ndof = \"2.x\"\n[study]\nkind = \"nodal-diameter\"\nmodes = 3\n";
@@ -583,7 +592,7 @@ fn shapes_of_a_sector_are_those_of_the_ring() {
     let (diameters, found) = (table.integers("nodal_diameter").unwrap(), table.numbers("frequency_Hz").unwrap());
     let joints = table.texts("joints").unwrap();
     let free: Vec<usize> = (0..table.rows()).filter(|row| joints[*row] == "free").collect();
-    // a shape at all places, and a quarter of a wave further
+    // a shape at all places, and the shape shifted by a quarter of a wave
     let waves = |row: usize| -> Vec<Vec<f64>> {
         let at = |name: &String, quarter: f64| {
             let (node, along) =
@@ -618,7 +627,7 @@ fn shapes_of_a_sector_are_those_of_the_ring() {
     assert!(titles[1].starts_with("mode 1, 1 nodal diameter, "), "{titles:?}");
 }
 
-/// What the figure of kind `nodal-diameter` shows of the shapes, and what it has not.
+/// The shapes that the figure of kind `nodal-diameter` shows, and those that it omits.
 #[test]
 fn the_shapes_that_are_drawn() {
     let titles = |keys: &str| -> Vec<String> {
@@ -638,7 +647,8 @@ fn the_shapes_that_are_drawn() {
     }
 }
 
-/// At an amplitude at which friction hardly matters a mode of a mistuned ring is that of its full matrices, blade by blade.
+/// At an amplitude with negligible friction, a mode of a mistuned ring is that of its full
+/// matrices, blade by blade.
 #[test]
 fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
     let kind = "[study]\nkind = \"modes\"\nmode = 3\nharmonics = 1\nsamples = 64\namplitude = { from = \"10 mm\", to = \"10 m\", points = 2 }\n";
@@ -648,7 +658,7 @@ fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
     let (hertz, shape) = &modes[2];
     let largest = shape.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap();
     let table = &data.tables[0];
-    // friction is 1e-5 of the elastic forces, and of what tells the modes apart 1e-3
+    // friction is 1e-5 of the elastic forces, and 1e-3 of the differences between the modes
     assert!((table.numbers("frequency_Hz").unwrap()[1] / hertz - 1.0).abs() < 1e-5);
     for (name, x) in names.iter().zip(shape) {
         let column = |what: &str| table.numbers(&format!("{name}_{what}")).unwrap()[1];
@@ -660,7 +670,7 @@ fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
     assert!(titles.len() == 2 && titles[1].starts_with("mode 3 at 10 m, "), "{titles:?}");
 }
 
-/// The peaks of a node of a sector: of all its directions, or of one, in all sectors.
+/// The peaks of a node of a sector, over all its directions or one of them, in all sectors.
 #[test]
 fn peaks_are_those_of_a_node_in_all_sectors() {
     let peaks = |of: &str| {
@@ -682,8 +692,8 @@ fn peaks_are_those_of_a_node_in_all_sectors() {
     );
 }
 
-/// The amplification of a case is the ratio of the highest peaks of two studies, one of them without mistuning; without deviation it is one.
-/// Of many disks the figure has the distribution.
+/// The amplification of a case is the ratio of the highest peaks with and without mistuning; it
+/// is one without deviation. The figure of many disks shows the distribution.
 #[test]
 fn amplification_is_the_ratio_of_two_studies() {
     let text = |deviation: &str, more: &str| {
@@ -717,13 +727,13 @@ fn amplification_is_the_ratio_of_two_studies() {
         stickslip_study::run::check(&study).unwrap().summary().warnings.join("; ").contains("all blades are alike")
     };
     assert!(warned(&text("0 %", "amplification = true")) && !warned(&text("3 %", seeds)));
-    // Whitehead's bound of six blades in the linear limit
+    // Whitehead's bound for six blades in the linear limit
     assert!(ratios.iter().all(|ratio| *ratio < 0.5 * (1.0 + 6f64.sqrt())), "{ratios:?}");
     let found = result(&text("3 %", seeds));
     let panel = found.figure.panels.last().unwrap();
     assert_eq!(panel.series[0].label, "24 disks");
     assert!(panel.title.contains("99.9 % below"), "{}", panel.title);
-    // a disk of one case shows its shape
+    // the figure of one case shows the disk's shape
     let one = result(&text("3 %", ""));
     assert!(one.figure.panels.iter().any(|panel| panel.picture), "{:?}", one.figure.panels.len());
 }

@@ -1,4 +1,4 @@
-//! Study files that must read, and to what.
+//! Study files that must be read, and their contents.
 
 use serde_json::Value as Json;
 use std::f64::consts::TAU;
@@ -17,7 +17,7 @@ fn set(name: &str, value: &str) -> Vec<(String, String)> {
     vec![(name.to_owned(), value.to_owned())]
 }
 
-/// The couples of the library are stated by calls, those of the templates by text.
+/// The couples of the library are built by calls, those of the templates by text.
 #[test]
 fn the_blade_couples_are_those_of_the_library() {
     let model = |name: &str| templates::find(name).unwrap().model().assemble().unwrap();
@@ -44,7 +44,7 @@ fn a_template_named_in_the_file_is_its_model_with_its_defaults() {
         }
         let first = &parameters[0];
         assert_eq!(quantity(&first.default, first.dimension), Ok(first.value));
-        // the file itself, once `vary` does not replace a parameter in every case
+        // the file itself, without `vary`, which replaces a parameter in every case
         let text: String =
             template.study.lines().filter(|line| !line.starts_with("vary")).map(|line| format!("{line}\n")).collect();
         assert_eq!(read(&text).case(0).unwrap().model, case.model, "{}", template.name);
@@ -73,7 +73,7 @@ vary = { Ft = { from = \"2 N\", to = \"4 N\", points = 3 } }
     assert_eq!(case.model.masses[1].mass, 0.2 / 50.0);
     assert_eq!(case.label(), "Ft = 3 N");
     assert_eq!(study.cases(), 3);
-    // a law that is replaced needs no values
+    // a replaced law does not need valid values
     let study = read_study("a.toml", &text.replace("limit = \"Ft\"", "limit = \"1 N\""), &set("Ft", "-1 N")).unwrap();
     assert_eq!(study.case(0).unwrap().model.joints[0].law.scale(), 1.0);
 }
@@ -146,7 +146,7 @@ fn transient_keys_arrive() {
 
 #[test]
 fn the_method_can_be_changed() {
-    // the table grows: options are tried on whichever methods have some
+    // options are tried on all methods that have some, because the table grows
     for row in method::TABLE {
         let mut table = format!("kind = \"{}\"\n", row.name);
         for option in row.options {
@@ -169,7 +169,7 @@ fn the_method_can_be_changed() {
     assert_eq!(error.line(), Some(38), "{error}");
 }
 
-/// A tiny check of JSON against the parts of JSON Schema that ours uses.
+/// Checks JSON against the parts of JSON Schema that this project uses.
 fn accepts(root: &Json, schema: &Json, value: &Json) -> Result<(), String> {
     if let Some(name) = schema["$ref"].as_str() {
         return accepts(root, &root["$defs"][name.rsplit('/').next().unwrap()], value);
@@ -243,7 +243,7 @@ fn the_json_schema_accepts_good_files_and_refuses_unknown_keys() {
     }
 }
 
-/// A value alone stands for a list of one, for the program and for the schema.
+/// A single value stands for a list of one, in the program and in the schema.
 #[test]
 fn vary_takes_a_single_value() {
     let text = EXAMPLE.replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "\"5 N\"");
@@ -277,7 +277,8 @@ fn the_example_of_every_key_is_toml() {
     }
 }
 
-/// `--set` of a parameter that `vary` has too: one case with that value, and every reader of the results is told.
+/// `--set` of a parameter that `vary` also lists: one case with that value, and a note for the
+/// reader of the results.
 #[test]
 fn set_replaces_the_values_of_vary_and_says_so() {
     let study = read_study("fig06.toml", EXAMPLE, &set("Ft", "3N")).unwrap();
@@ -286,7 +287,7 @@ fn set_replaces_the_values_of_vary_and_says_so() {
     assert_eq!((case.varied[0].si, case.model.joints[0].law.values()), (3.0, vec![3.0]));
     assert_eq!(study.notes(), ["Ft = 3N from `--set` replaces the 4 values of `vary`."]);
     assert_eq!(study.resolved()["replaced"][0]["values_in_file"], 4);
-    // the last of several; another parameter of `vary` keeps its values
+    // the last of several counts; another parameter of `vary` keeps its values
     let text = EXAMPLE.replace("vary = { Ft = [", "vary = { kt = { from = 1, to = 9, points = 5 }, Ft = [");
     let study = read_study("fig06.toml", &text, &[set("Ft", "3 N"), set("Ft", "m * 10 m/s^2")].concat()).unwrap();
     assert_eq!((study.cases(), study.case(4).unwrap().label().as_str()), (5, "kt = 9 N/m, Ft = 1.82 N"));
@@ -294,7 +295,8 @@ fn set_replaces_the_values_of_vary_and_says_so() {
     assert!(read_study("fig06.toml", EXAMPLE, &set("kt", "1 N/m")).unwrap().notes().is_empty());
 }
 
-/// A varied parameter stands in tables with its unit, in the number that was typed; without a unit under its bare name.
+/// A column of a varied parameter has its unit and the number that was typed; without a unit it
+/// has the bare name.
 #[test]
 fn columns_of_parameters_have_their_unit() {
     let text = EXAMPLE
@@ -320,7 +322,8 @@ fn columns_of_parameters_have_their_unit() {
     assert_eq!(columns, expected.map(|(name, value)| (name.to_owned(), value)));
 }
 
-/// A sample of every law of the table, stated by bare numbers in SI, on a node with its directions, is that sample.
+/// A sample of every law, stated by bare numbers in SI on a node with its directions, reads
+/// back as that sample.
 #[test]
 fn every_law_reads_back_from_its_keys() {
     for row in law::TABLE {
@@ -333,7 +336,7 @@ fn every_law_reads_back_from_its_keys() {
     }
 }
 
-/// The law of a joint between a node with so many directions and the ground.
+/// Returns the law of a joint between a node with this number of directions and the ground.
 fn joint_law(directions: usize, law: &str) -> Result<law::SharedLaw, String> {
     let names = ["\"x\"", "\"y\"", "\"z\""][..directions].join(", ");
     let directions = if directions > 1 { format!("directions = [{names}]\n") } else { String::new() };
@@ -366,7 +369,8 @@ fn dimensions_are_raised_to_the_exponent_of_the_law() {
     assert!(with("\"3 mm^-1\"", "0.5").unwrap_err().contains("`exponent`"));
 }
 
-/// Wherever a dimension is raised to a parameter, its unit can be written for every whole value that this parameter may have.
+/// If a dimension contains a parameter as an exponent, its unit can be written for every whole
+/// value of that parameter.
 #[test]
 fn a_unit_can_be_written_for_every_exponent() {
     for row in law::TABLE {
@@ -385,7 +389,7 @@ fn a_unit_can_be_written_for_every_exponent() {
                 let keys: Vec<String> = row.parameters.iter().zip(row.sample).map(|(p, s)| value(p, *s)).collect();
                 let text = format!("kind = \"{}\", {}", row.name, keys.join(", "));
                 let law = joint_law(row.sample().directions(), &text.replace(" s^0 kg^0", ""));
-                // what the law finds wrong in the others is its own matter
+                // other errors of the law are accepted here
                 if let Err(error) = law {
                     assert!(
                         !error.contains(&format!("`{}`", raised.key)) || error.contains("more than zero"),

@@ -1,5 +1,5 @@
-//! The example of every key of the reference goes through the reader and the checks: in a study that has the names, the files and the tables which the
-//! example speaks of, in the place of whatever that study has under the key.
+//! The example of every key of the reference passes the reader and the checks. It replaces the
+//! value of the key in a study that has the names, files and tables of the example.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -7,7 +7,7 @@ use stickslip_study::schema::{FILE, Key, METHOD, Presence, SAMPLE, STUDY, Takes}
 use stickslip_study::{kinds, read_file, run};
 use toml::{Table, Value};
 
-/// The couple of blades, with the names that examples use.
+/// A couple of blades, with the names that examples use.
 const COUPLE: &str = r#"
 schema = 1
 parameters = { Ft = "2 N", k = "105103 N/m", speed = "100 Hz" }
@@ -24,7 +24,7 @@ force = [{ on = "blade1", amplitude = "10 N" }]
 study = { kind = "response", frequency = "121 Hz" }
 "#;
 
-/// A mass that moves in a plane, with a face that is turned.
+/// A mass that moves in a plane, with a rotated face.
 const FACE: &str = r#"
 schema = 1
 mass = [{ name = "damper", mass = "10 g", directions = ["x", "z"] }]
@@ -37,7 +37,7 @@ force = [{ on = "face.n", amplitude = "1 N" }]
 study = { kind = "response", frequency = "121 Hz" }
 "#;
 
-/// A rigid body in a plane, with a point that a spring holds, beside a block.
+/// A rigid body in a plane with a point on a spring, and a block.
 const BODY: &str = r#"
 schema = 1
 mass = [{ name = "block", mass = "1 kg" }]
@@ -69,7 +69,7 @@ force = [{ on = "blade1", amplitude = "1 N", engine_order = 2 }]
 study = { kind = "response", frequency = "121 Hz" }
 "#;
 
-/// Three nodes by their matrices.
+/// Three nodes given by matrices.
 const MATRICES: &str = r#"
 schema = 1
 parameters = { a = "30 deg", speed = "100 Hz" }
@@ -79,7 +79,7 @@ study = { kind = "response", frequency = "121 Hz" }
 method = { kind = "harmonic-balance" }
 "#;
 
-/// The same as a sector of a disk.
+/// These matrices as a sector of a disk.
 const SECTOR: &str = r#"
 schema = 1
 structure = { stiffness = "blade.sti", mass = "blade.mas", dofs = "blade.dof", units = "mm-t-s" }
@@ -90,7 +90,8 @@ study = { kind = "response", frequency = "121 Hz" }
 method = { kind = "harmonic-balance" }
 "#;
 
-/// The study that has what the example of a key speaks of, what is to be changed beside it, and what is to be left out there.
+/// Returns a study with the names of a key's example, with the lines to change and the keys to
+/// leave out.
 fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'static str]) {
     match (table, key) {
         ("", "model") => (COUPLE, "", &["mass", "spring", "joint", "force", "motion"]),
@@ -122,14 +123,15 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
     }
 }
 
-/// The files that examples name: three nodes that springs tie along x, y and z to each other and to the ground.
+/// Writes the files that examples name: three nodes with springs along x, y and z between each
+/// other and to the ground.
 fn write_files(folder: &Path) {
     let write = |name: &str, text: &[u8]| std::fs::write(folder.join(name), text).unwrap();
     let nodes = [188, 189, 1353];
     let entries = |spring: f64| {
         let own = [3.0, 2.0, 2.5];
         let all = (0..9).flat_map(move |i| (i..9).map(move |k| (i, k)));
-        // the blade, which is the last, stands on the first alone
+        // the blade is the last node and is connected to the first one only
         all.filter(|(i, k)| i % 3 == k % 3 && (i / 3, k / 3) != (1, 2))
             .map(move |(i, k)| (i, k, if i == k { own[i / 3] * spring } else { -spring / 3.0 }))
     };
@@ -160,7 +162,8 @@ fn write_files(folder: &Path) {
     write("pattern.csv", format!("sector,deviation\n{pattern}").as_bytes());
 }
 
-/// A square matrix of doubles as MATLAB's level 5 has it: "MAT-File Format", MathWorks, 2024.
+/// Encodes a square matrix of doubles as a MATLAB level 5 file: "MAT-File Format", MathWorks,
+/// 2024.
 fn matlab(name: &str, n: u32, values: &[f64]) -> Vec<u8> {
     let element = |kind: u32, data: &[u8]| {
         let size = u32::try_from(data.len()).unwrap();
@@ -187,7 +190,7 @@ fn parsed(text: &str) -> Table {
     toml::from_str(text).unwrap_or_else(|error| panic!("{text}: {error}"))
 }
 
-/// The table of that name in a study, its last entry if it is a list.
+/// Returns the table of that name in a study; its last entry if it is a list.
 fn inside<'a>(study: &'a mut Table, table: &str) -> &'a mut Table {
     table.split('.').filter(|part| !part.is_empty()).fold(study, |at, part| {
         let next = at.get_mut(part).unwrap_or_else(|| panic!("no {part}"));
@@ -198,7 +201,7 @@ fn inside<'a>(study: &'a mut Table, table: &str) -> &'a mut Table {
     })
 }
 
-/// A study with the example of a key, and with those of the tables that it stands in.
+/// Builds a study with the example of a key and those of the tables that contain it.
 fn study_with(table: &str, key: &Key, outer: &[(String, &Key)], kind: Option<&'static kinds::Kind>) -> Table {
     let (text, beside, without) = host(table, key.name);
     let mut study = parsed(text);
@@ -230,11 +233,11 @@ fn study_with(table: &str, key: &Key, outer: &[(String, &Key)], kind: Option<&'s
     study
 }
 
-/// Keys of kinds of which one stands instead of the other.
+/// Pairs of keys of which one replaces the other.
 const INSTEAD: [(&str, &str); 3] =
     [("frequency", "run_up"), ("duration", "cycles"), ("samples_per_cycle", "time_step")];
 
-/// A study of a kind with what it must have, beside a key.
+/// Builds a study of a kind with its required keys, in addition to a key.
 fn of_kind(kind: &kinds::Kind, beside: &Key) -> Table {
     let mut study = parsed(&format!("kind = \"{}\"", kind.info.name));
     for key in kind.info.keys.iter().filter(|key| key.presence == Presence::Required) {
@@ -261,7 +264,7 @@ fn of_kind(kind: &kinds::Kind, beside: &Key) -> Table {
     study
 }
 
-/// Every key of a table and of the tables in it.
+/// Visits every key of a table and of its subtables.
 fn walk(
     (table, keys): (&str, &'static [Key]),
     outer: &[(String, &'static Key)],

@@ -1,4 +1,5 @@
-//! What is known before anything is computed is said before: a study that was checked is not refused when it runs.
+//! A study that passed the check is not refused when it runs: all refusals come before the
+//! computation.
 
 use std::collections::BTreeSet;
 use stickslip::law::{LawInfo, TABLE};
@@ -7,7 +8,8 @@ use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::{StudyError, kinds, read_study};
 
-/// Of every kind a small study: its keys in `[study]`, which may vary the mass `m`, and `[figure]`.
+/// A small study of every kind: its keys in `[study]`, which may vary the mass `m`, and
+/// `[figure]`.
 const STUDIES: &[(&str, &str)] = &[
     ("orbit", "frequency = \"15 Hz\"\nsamples = 16"),
     ("response", "frequency = [\"12 Hz\", \"15 Hz\"]\n[figure]\nreferences = true"),
@@ -20,7 +22,8 @@ const STUDIES: &[(&str, &str)] = &[
     ("nodal-diameter", "modes = 2\n[disk]\nsectors = 3"),
 ];
 
-/// A node with the directions of the law, each held by a spring, and the law between it and the ground.
+/// A node with the directions of the law, each on a spring, and the law between it and the
+/// ground.
 fn model(row: &LawInfo, mass: &str) -> String {
     let count = row.sample().directions();
     let directions = &["x", "y", "z"][..count];
@@ -36,7 +39,7 @@ fn model(row: &LawInfo, mass: &str) -> String {
     }
     let values: Vec<String> =
         row.parameters.iter().zip(row.sample).map(|(p, value)| format!("{} = {value:?}", p.key)).collect();
-    // whole numbers are written as such
+    // whole numbers are written without a decimal point
     let values = values.join(", ").replace(".0,", ",");
     let values = values.strip_suffix(".0").unwrap_or(&values);
     text + &format!(
@@ -45,12 +48,12 @@ fn model(row: &LawInfo, mass: &str) -> String {
     )
 }
 
-/// Whether a sentence is a refusal of a model.
+/// Returns whether a sentence refuses a model.
 fn refuses(text: &str) -> bool {
     ["cannot take", "needs a mass", "positive definite", "no method takes"].iter().any(|words| text.contains(words))
 }
 
-/// What a run says of a model that it cannot take.
+/// Returns the sentences of a run that refuse a model.
 fn refusals(outcome: &Result<Dataset, StudyError>) -> Vec<String> {
     match outcome {
         Err(error) => vec![error.to_string()],
@@ -61,13 +64,13 @@ fn refusals(outcome: &Result<Dataset, StudyError>) -> Vec<String> {
     }
 }
 
-/// Checks and runs a study; whether it was taken.
+/// Checks and runs a study; returns whether it was accepted.
 fn hold(what: &str, text: &str) -> bool {
     let study = read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{what}: {error}\n{text}"));
     let (checked, run) = (check(&study), run(&study, &Context::unwatched(1)));
     match checked {
         Ok(_) => assert_eq!(refusals(&run), Vec::<String>::new(), "{what}: checked, and refused when it runs"),
-        // in the same words
+        // the run refuses in the same words
         Err(error) => {
             assert!(error.help_text().is_some(), "{what}: {error}: and what to do?");
             let late = run.err().unwrap_or_else(|| panic!("{what}: runs, and {error}"));
@@ -101,13 +104,13 @@ fn what_was_checked_is_not_refused_when_it_runs() {
     assert!(taken > TABLE.len() * STUDIES.len() / 2 && refused > 0, "{taken} {refused}");
 }
 
-/// The same with every method by its name, on one orbit.
+/// Repeats the test for every method by its name, on one orbit.
 #[test]
 fn a_method_is_refused_or_taken_when_it_is_checked() {
     for row in TABLE {
         for method in method::TABLE {
             let (_, keys) = STUDIES[0];
-            // whether a motion that is waited for settles is no matter here
+            // two periods are enough here: the transient need not settle
             let waits = method.options.iter().any(|option| option.key == "periods");
             let few = if waits { "\nperiods = 2" } else { "" };
             let named = format!("{keys}\n[method]\nkind = \"{}\"{few}", method.name);
@@ -117,7 +120,8 @@ fn a_method_is_refused_or_taken_when_it_is_checked() {
     }
 }
 
-/// A transient of a law that no flow follows is told to smooth it, and follows it then.
+/// A transient refuses a law that no integrator follows, and advises a width. With the advised
+/// width it runs.
 #[test]
 fn a_transient_that_needs_a_width_says_so() {
     let mut smoothed = 0;
@@ -127,7 +131,7 @@ fn a_transient_that_needs_a_width_says_so() {
         let Err(error) = check(&read_study("study.toml", &text, &[]).unwrap()) else { continue };
         let help = error.help_text().unwrap();
         assert!(help.contains("width"), "{}: {help}", row.name);
-        // as the help says: [method] with kind = "…" and width = "…"
+        // as the help advises: [method] with kind = "…" and width = "…"
         let words: Vec<&str> = help.split('"').collect();
         let advised = format!("{text}[method]\nkind = \"{}\"\nwidth = \"{}\"\n", words[1], words[3]);
         assert!(hold(row.name, &advised), "{}: {help}", row.name);

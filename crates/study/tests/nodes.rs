@@ -1,10 +1,12 @@
-//! Nodes in a study: where a key takes the name of a place, that of a node is taken for all its directions, or refused with these named.
+//! Nodes in a study: a key that takes places accepts a node for all its directions, or refuses
+//! it and names them.
 
 use stickslip_study::dataset::{Dataset, Table};
 use stickslip_study::run::{Context, run};
 use stickslip_study::{Study, StudyError, read_study};
 
-/// A node with a tangent and a normal on springs, two contacts between it and the ground, and a place of one direction.
+/// A node with a tangent and a normal on springs, two contacts to the ground, and a place of
+/// one direction.
 fn text(study: &str) -> String {
     format!(
         r#"
@@ -70,7 +72,7 @@ const DECAY: &str = "[study]\nkind = \"transient\"\nduration = \"1 s\"\ntime_ste
 
 #[test]
 fn a_node_is_taken_for_all_its_directions_or_they_are_named() {
-    // before, key, whether the node (or joint of nodes) is taken
+    // before, key, whether the node (or joint of nodes) is accepted
     let table = [
         (format!("{RESPONSE}[figure]\n"), "only = [", "]", "tip", true),
         (format!("{RESPONSE}[figure]\n"), "only = [", "]", "pad", true),
@@ -98,7 +100,7 @@ fn a_node_is_taken_for_all_its_directions_or_they_are_named() {
         assert_eq!(error.help_text(), Some(directions.as_str()), "{error}");
         assert!(error.message().contains(&format!("`{node}` has no direction y")), "{error}");
     }
-    // where springs, joints and forces name a place
+    // places in springs, joints and forces
     for (from, to) in [("on = \"tip.x\"", "on = \"tip.y\""), ("between = [\"tip.z\"", "between = [\"tip.y\"")] {
         let error = read_study("study.toml", &text(RESPONSE).replace(from, to), &[]).unwrap_err();
         assert_eq!(error.help_text(), Some("say `tip.x` or `tip.z`"), "{error}");
@@ -118,7 +120,8 @@ fn the_peak_of_a_node_is_the_worse_of_its_directions() {
     assert_eq!(peak("[\"tip\", \"tip.z\"]"), peak("\"tip\""));
 }
 
-/// Forces are added along each direction by itself: those of the sum are those of the single loops, added up here.
+/// Forces are added along each direction separately: the sum equals that of the single loops,
+/// added here.
 #[test]
 fn loops_are_summed_along_each_direction() {
     let (single, sum) = (dataset(LOOPS), dataset(&format!("{LOOPS}sum = true\n")));
@@ -140,20 +143,22 @@ fn loops_are_summed_along_each_direction() {
     }
     let summary = table(&sum, "loops_summary");
     assert_eq!(summary.rows(), 2);
-    // a joint by its name is a loop along each of its directions
+    // the name of a joint gives a loop along each of its directions
     let pad = dataset(&format!("{LOOPS}loop = \"pad\"\n"));
     assert_eq!(force(&pad, "pad.z"), force(&single, "pad.z"));
     assert_eq!(table(&pad, "loops_summary").rows(), 2);
 }
 
-/// With its faces closed for good a contact is its springs, and without them nothing.
+/// The reference of a closed contact is its springs; the reference of an open one has no
+/// stiffness.
 #[test]
 fn contacts_have_linear_references() {
     let found = dataset(&format!("{RESPONSE}[figure]\nreferences = true\n"));
     let references = table(&found, "references");
     let column = |what: &str| references.numbers(&format!("tip_z_{what}_amplitude_m")).unwrap().to_vec();
     for (i, hertz) in references.numbers("frequency_Hz").unwrap().iter().enumerate() {
-        // along z the node is an oscillator of 1 kg, 150 N/m and 2 N s/m by itself, under 1 N at twice the frequency
+        // along z the node is an independent oscillator of 1 kg, 150 N/m and 2 N s/m, under 1 N
+        // at twice the frequency
         let omega = 2.0 * std::f64::consts::TAU * hertz;
         let linear = |stiffness: f64| 1.0 / (stiffness - omega * omega).hypot(2.0 * omega);
         for (what, stiffness) in [("free", 150.0), ("stuck", 150.0 + 80.0 + 10.0)] {
@@ -164,7 +169,7 @@ fn contacts_have_linear_references() {
     assert!(!found.notes.iter().any(|note| note.contains("reference")), "{:?}", found.notes);
 }
 
-/// A law without a slip limit has no linear reference, and the notes say so.
+/// A law without a slip limit has no linear reference, and a note says it.
 #[test]
 fn a_missing_reference_has_its_reason() {
     let cubic =
@@ -178,8 +183,8 @@ fn a_missing_reference_has_its_reason() {
     assert!(!found.figure.panels.iter().flat_map(|panel| &panel.series).any(references), "an empty line is drawn");
 }
 
-/// What a model is turned by turns its motion: a mass on equal springs rests on a face along its axes, or on one that stands at an angle and is
-/// pushed along its own tangent and normal.
+/// Rotating a model rotates its motion: a mass on equal springs rests on a face along its axes,
+/// or on a rotated face with a force along its own tangent and normal.
 #[test]
 fn a_turned_face_is_the_same_contact() {
     let text = |between: &str, place: &str| {
@@ -207,7 +212,7 @@ fn a_turned_face_is_the_same_contact() {
         }
     }
     assert!(column(&straight, "pad_slip_fraction")[0] > 0.0);
-    // x and z of the mass are what the face moves by, turned back
+    // x and z of the mass are the motion of the face, rotated back
     let mean = |name: &str| column(&turned, &format!("{name}_mean_m"))[0];
     let back = 0.3f64.cos() * mean("face_t") - 0.3f64.sin() * mean("face_n");
     assert!((mean("m_x") - back).abs() < 1e-9 * back.abs());
@@ -237,7 +242,8 @@ fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
     }
 }
 
-/// Which direction is the normal goes by no order in which nodes are named: those of different orders are refused. Amplitudes without a square are, too.
+/// The normal direction does not depend on the order in which nodes are named: nodes of
+/// different orders are refused. An excitation amplitude whose square underflows is refused, too.
 #[test]
 fn normals_and_sizes_that_mislead_are_refused() {
     let study = "[study]\nkind = \"orbit\"\nfrequency = \"1 Hz\"\n";

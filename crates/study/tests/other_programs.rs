@@ -1,4 +1,5 @@
-//! Small matrices as other programs write them, each with a right value that was computed without this software: in closed form, or by NumPy and SciPy.
+//! Small matrices in the formats of other programs. Each has a reference value computed without
+//! this software: in closed form, or by NumPy and SciPy.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -6,7 +7,7 @@ use stickslip_study::dataset::Dataset;
 use stickslip_study::read_file;
 use stickslip_study::run::{Checked, Context, check};
 
-/// The study, checked, beside these files of matrices.
+/// Returns the checked study, next to these files of matrices.
 fn checked(files: &[(&str, &str)], text: &str) -> Checked {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
@@ -23,7 +24,7 @@ fn run(checked: &Checked) -> Dataset {
     data
 }
 
-/// Natural frequencies with all joints free, Hz.
+/// Returns the natural frequencies with all joints free, Hz.
 fn frequencies(checked: &Checked) -> Vec<f64> {
     checked.summary().free.elastic.iter().map(|mode| mode.omega / TAU).collect()
 }
@@ -38,7 +39,8 @@ fn column(data: &Dataset, table: &str, name: &str) -> Vec<f64> {
     table.numbers(name).unwrap_or_else(|| panic!("no {name}: {:?}", table.columns)).to_vec()
 }
 
-/// `K = 1000 [2 -1 0; -1 2 -1; 0 -1 1]`, `M = 1`, 1 % damping in every mode: eigenvalues of NumPy, and the sum over the modes.
+/// `K = 1000 [2 -1 0; -1 2 -1; 0 -1 1]`, `M = 1`, 1 % modal damping: eigenvalues by NumPy, and
+/// modal superposition.
 #[test]
 fn a_chain_of_three_from_every_file() {
     let one = "%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1\n2 2 1\n3 3 1\n";
@@ -70,13 +72,14 @@ fn a_chain_of_three_from_every_file() {
         let checked = checked(&[("K", &content), ("mass.mtx", mass_file)], &text);
         close(&frequencies(&checked), &[2.239861, 6.275950, 9.069011], 3e-7);
         let data = run(&checked);
-        // a maximum is flat: where it is has half the digits of its height
+        // a maximum is flat: its location has half the digits of its height
         close(&column(&data, "peaks", "frequency_Hz"), &[2.2395889], 1e-6);
         close(&column(&data, "peaks", "amplitude_m"), &[0.1371246], 5e-7);
     }
 }
 
-/// Two coordinates that carry one mass, `M = v vᵀ` with `v = (0.1, 0.3)`: `ω² = 1 / (vᵀ K⁻¹ v)`; amplitudes by direct solution.
+/// Two coordinates that share one mass, `M = v vᵀ` with `v = (0.1, 0.3)`:
+/// `ω² = 1 / (vᵀ K⁻¹ v)`; amplitudes by direct solution.
 #[test]
 fn a_mass_that_two_coordinates_share() {
     let mass = "%%MatrixMarket matrix array real symmetric\n2 2\n1.0000000000000002e-02\n2.9999999999999999e-02\n\
@@ -91,8 +94,9 @@ fn a_mass_that_two_coordinates_share() {
     close(&column(&run(&checked), "curve", "u_amplitude_m"), &expected, 5e-7);
 }
 
-/// Two masses on a rigid link, `Tᵀ M T` in three coordinates, with a friction joint. Frequencies by condensing the massless part, and by QZ of the pencil;
-/// amplitudes by harmonic balance of 15 and 31 harmonics, which agree to 6e-5.
+/// Two masses on a rigid link, `Tᵀ M T` in three coordinates, with a friction joint.
+/// Frequencies come from condensing the massless part and from QZ of the pencil. Amplitudes
+/// come from harmonic balance with 15 and 31 harmonics, which agree to 6e-5.
 #[test]
 fn masses_on_a_rigid_link_with_friction() {
     let mass = "%%MatrixMarket matrix array real general\n3 3\n4.5\n-1.7500000000000004e-01\n4.5000000000000001e-01\n\
@@ -111,7 +115,8 @@ fn masses_on_a_rigid_link_with_friction() {
     close(&column(&run(&checked), "curve", "u_amplitude_m"), &expected, 1e-3);
 }
 
-/// A shaft in two directions with a gyroscopic coupling in its damping: eigenvalues of the first-order system, and the direct solution.
+/// A shaft in two directions with gyroscopic coupling in its damping matrix: eigenvalues of the
+/// first-order system, and the direct solution.
 #[test]
 fn gyroscopic_coupling_in_the_damping() {
     let damping = "%%MatrixMarket matrix coordinate real general\n2 2 4\n1 1 50\n2 2 50\n1 2 300\n2 1 -300\n";

@@ -1,10 +1,12 @@
-//! Random studies of every kind: each ends within its time estimate times ten, within a little memory, without a panic, and says of no number
-//! that does not exist that it converged.
+//! Random studies of every kind: each ends within ten times its time estimate and little
+//! memory, without a panic.
 //!
-//! The studies are texts, so that the reader takes part. Time is that of the thread that computes, where the system tells it: other work on the
-//! same machine does not count. `STICKSLIP_RANDOM_STUDIES=20000` runs more of them, `STICKSLIP_RANDOM_SEED=…` others.
+//! No row that counts as converged contains NaN. The studies are texts, so the test includes
+//! the reader. The time is that of the computing thread if the system provides it, so other
+//! work on the machine does not count. `STICKSLIP_RANDOM_STUDIES=20000` runs more studies,
+//! `STICKSLIP_RANDOM_SEED=…` others.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print their measurements
 
 mod random;
 
@@ -24,28 +26,29 @@ use stickslip_study::run::{CONVERGED, Context, check, run};
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, read_study};
 
-/// Studies of a usual run, and the first seed.
+/// Number of studies of a normal run, and the first seed.
 const STUDIES: usize = 1000;
 const SEED: u64 = 1;
-/// How much longer than estimated a study may take.
+/// Largest ratio of the time of a study to its estimate.
 const FACTOR: f64 = 10.0;
-/// What it may take beside, s: estimates below that are of no interest to anybody, and a search that ends without an orbit takes up to half a second
-/// where one that finds it takes a millisecond.
+/// Additional time, s. Estimates below it do not matter. A search without an orbit takes up to
+/// half a second where a successful one takes a millisecond.
 const SLACK: f64 = 4.0;
-/// Factors of matrices of 24 rows, and what all of them take in a test where the times of the estimates were measured, s: so long that a clock which
-/// ticks every four milliseconds tells it.
+/// Number of factorizations of matrices with 24 rows, and their total time, s, in a test build
+/// on the machine of the estimates. The time is long enough for a clock with ticks of 4 ms.
 const FACTORS: u32 = 20_000;
 const ALL_FACTORS: f64 = 0.05;
-/// Studies that are estimated to take longer than this are read and checked only, s.
+/// Studies with a longer estimate are only read and checked, s.
 const LONG: f64 = 10.0;
-/// How many of the studies that come nearest to their limits are told.
+/// Number of studies closest to their limits that are printed.
 const NEAREST: usize = 8;
-/// Most memory of the whole process, bytes.
+/// Largest memory of the whole process, bytes.
 const MEMORY: u64 = 500_000_000;
-/// Fewest studies in a hundred that are accepted; the others test that refusals are errors.
+/// Smallest percentage of accepted studies. The others test that refusals are errors.
 const ACCEPTED: usize = 60;
 
-/// A clock of the thread that made it: the time that it computed, where Linux tells it, or the time of day.
+/// A clock of the thread that created it: its processor time, or the time of day if the system
+/// does not provide it.
 struct Clock {
     schedstat: Option<PathBuf>,
     start: Instant,
@@ -72,8 +75,8 @@ impl Clock {
     }
 }
 
-/// How many times slower this machine is than the one whose times the estimates tell; one where it is faster. By what no change of the program makes
-/// faster: factors of small dense matrices.
+/// Returns the time of this machine relative to that of the estimates, at least one. It is
+/// measured by factorizations of small dense matrices, which no change of the program affects.
 fn slowness() -> f64 {
     let matrix = DMatrix::from_fn(24, 24, |i, k| ((i * 7919 + k * 104_729 + 1) as f64).sin());
     let factors = || {
@@ -85,7 +88,7 @@ fn slowness() -> f64 {
     (0..5).map(|_| factors()).fold(f64::INFINITY, f64::min).max(ALL_FACTORS) / ALL_FACTORS
 }
 
-/// What a thread is at.
+/// The study that a thread is running.
 struct Running {
     seed: u64,
     text: String,
@@ -93,14 +96,14 @@ struct Running {
     clock: Clock,
 }
 
-/// Most memory that the process has had, bytes, where Linux tells it.
+/// Returns the peak memory of the process, bytes; `None` if the system does not provide it.
 fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
 }
 
-/// What is wrong with a dataset, if anything is.
+/// Returns the error of a dataset, if there is one.
 fn fault(study: &Study, dataset: &Dataset) -> Option<String> {
     if dataset.record.interrupted {
         return Some("the run was interrupted".to_owned());
@@ -108,11 +111,12 @@ fn fault(study: &Study, dataset: &Dataset) -> Option<String> {
     if dataset.kind != study.kind().name || dataset.record.points.values().sum::<u64>() == 0 {
         return Some(format!("points are missing: {:?}", dataset.record.points));
     }
-    // a linear structure without damping, or that nothing holds, has no response that could be a reference
+    // An undamped or unconstrained linear structure has no response that could be a reference.
     dataset.tables.iter().filter(|table| table.name != "references").find_map(not_finite)
 }
 
-/// Columns that a converged orbit has: of a free structure the phase, and of methods that need no series the truncation, do not exist.
+/// Returns whether a column of a converged orbit must be finite. The phase of a free structure
+/// and the truncation of methods without a series do not exist.
 fn must_be_finite(name: &str) -> bool {
     ["_amplitude_m", "_mean_m", "_dissipation_J", "_slip_fraction", "residual", "energy_gap"]
         .iter()
@@ -124,7 +128,7 @@ fn not_finite(table: &Table) -> Option<String> {
     let all: Vec<String>;
     let status = match status.map(|column| &column.values) {
         Some(Values::Text(status)) => status,
-        // motions and loops are of orbits that converged
+        // tables without a status contain converged orbits only
         _ => {
             all = vec![CONVERGED.to_owned(); table.rows()];
             &all
@@ -149,15 +153,16 @@ fn not_finite(table: &Table) -> Option<String> {
 struct Done {
     seed: u64,
     kind: &'static str,
-    /// Time that it took and that was estimated, s; zero if it was not run for being too long.
+    /// Measured and estimated time, s; zero if the study was not run because it would take too
+    /// long.
     seconds: f64,
     estimate: f64,
     usual: f64,
-    /// Points by status.
+    /// Number of points by status.
     points: BTreeMap<String, u64>,
 }
 
-/// Reads and runs one study; `None` if it was refused.
+/// Reads and runs one study; returns `None` if it was refused.
 fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>, slowness: f64) -> Result<Option<Done>, String> {
     let running =
         |limit: f64| Some(Running { seed, text: text.to_owned(), limit: limit * slowness, clock: Clock::start() });
@@ -215,7 +220,7 @@ fn random_studies_end_in_time() {
                     }
                     let seed = first + index as u64;
                     let text = study_text(&mut Chance::new(seed));
-                    // a panic of the program is a fault of its study
+                    // a panic of the program is an error of its study
                     let run = || std::panic::catch_unwind(|| one(seed, &text, &slot, slowness));
                     let result = pool.install(run).unwrap_or_else(|_| Err("it panics".to_owned()));
                     *slot.lock().unwrap() = None;
@@ -260,7 +265,7 @@ fn random_studies_end_in_time() {
         );
         assert!(of_kind.len() * 30 >= count / 2, "{} of {count} are of the kind {}", of_kind.len(), kind.info.name);
     }
-    // those that come nearest to their limits
+    // the studies closest to their limits
     let share = |one: &Done| one.seconds / slowness / (SLACK + FACTOR * one.estimate);
     let mut nearest: Vec<&Done> = done.iter().collect();
     nearest.sort_by(|a, b| share(b).total_cmp(&share(a)));
@@ -276,15 +281,17 @@ fn random_studies_end_in_time() {
     }
 }
 
-/// Models whose methods are compared.
+/// Number of models whose methods are compared.
 const COMPARED: usize = 400;
-/// Errors are estimated, from the harmonics that were left out or from the decay of what is left of the transient: how much larger they may be.
-/// Measured on 3000 models: 4.6 times with harmonic balance, 8 times with `transient`, each on one of them.
+/// Largest ratio of an error to its estimate. Estimates come from the omitted harmonics or from
+/// the decay of the transient. Measured on 3000 models: 4.6 with harmonic balance, 8 with
+/// `transient`, each on one model.
 const ESTIMATE: f64 = 10.0;
-/// Relative distance of amplitudes below which no method claims to know them: residuals are closed to 1e-9 and better.
+/// Relative difference of amplitudes below which methods are not compared: residuals are at
+/// most 1e-9.
 const CLOSED: f64 = 1e-7;
 
-/// The largest amplitude, and the largest difference of amplitudes.
+/// Returns the largest amplitude, and the largest difference of amplitudes.
 fn distance(one: &Orbit, other: &Orbit) -> (f64, f64) {
     let pairs = one.places.iter().zip(&other.places).map(|(a, b)| (a.amplitude(), b.amplitude()));
     pairs.fold((0.0, 0.0), |(size, gap), (a, b)| (size.max(a), gap.max((a - b).abs())))
@@ -302,7 +309,7 @@ fn methods_agree_within_their_errors() {
         let (Some(omega), Ok(system)) = (case.frequencies.and_then(|f| f.get(0)), case.model.assemble()) else {
             continue;
         };
-        // one orbit at most: where motions never separate, two orbits differ by what sticks only
+        // the system has at most one orbit, except for offsets of stuck joints
         if !system.contracts() {
             continue;
         }
@@ -336,7 +343,7 @@ fn methods_agree_within_their_errors() {
     assert!(compared.iter().all(|compared| *compared * 10 >= count), "{compared:?} of {count}");
 }
 
-/// Options of method `transient`: an end after so many periods.
+/// Options of method `transient`: an end after this number of periods.
 fn settled() -> Options {
     Options::from([("periods".to_owned(), 2000.0)])
 }

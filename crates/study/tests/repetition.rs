@@ -1,4 +1,4 @@
-//! Repetition: one entry states many. What it states must be what the same entries written out one by one state.
+//! Repetition: a repeated entry states the same model as the entries written out one by one.
 
 use std::f64::consts::TAU;
 use stickslip::model::Model;
@@ -6,7 +6,8 @@ use stickslip_study::{StudyError, read_study};
 
 const STUDY: &str = "[study]\nkind = \"response\"\nfrequency = { from = \"110 Hz\", to = \"130 Hz\", points = 11 }\n";
 
-/// A ring of 12 blades with a wheel behind them, a joint between neighbours, a travelling force.
+/// A ring of 12 blades with a disk behind them, a joint between neighbours, and a travelling
+/// force.
 const RING: &str = r#"schema = 1
 [parameters]
 k = "100 N/mm"
@@ -106,7 +107,7 @@ stiffness = 1
     assert_eq!(between, expected);
 }
 
-/// Everything that is wrong names the entry, the index, and the place in the file.
+/// Every error names the entry, the index, and the place in the file.
 #[test]
 fn errors_name_the_entry_and_the_index() {
     let check = |from: &str, to: &str, line: usize, words: &[&str]| {
@@ -118,12 +119,12 @@ fn errors_name_the_entry_and_the_index() {
             assert!(all.contains(word), "{word}: {all}");
         }
     };
-    // found by the model: no wrap
+    // errors of the model: no wrap
     check(", wrap = true", "", 19, &["no place `blade13`", "(joint 1, i = 12)"]);
-    // found in the values
+    // errors of the values
     check("i * 0.1 N", "(4 - i) * 1 N", 20, &["zero or more, found -1 N", "(joint 1, i = 5)"]);
     check("*(1 + 0.01*sin(i))", "/abs(i - 3)", 13, &["divides by zero", "(spring 1, i = 3)"]);
-    // found in the text
+    // errors of the text
     check("sin(i)", "sin(j)", 13, &["no parameter `j`", "(i = 1)"]);
     check("0.2 kg\"", "0.2 kg\"\nmas = 1", 9, &["mass 1 has no key `mas`", "(i = 1)"]);
     check("\"blade{i}\"", "\"blade{i/2}\"", 7, &["whole number, found 0.5", "(i = 1)"]);
@@ -131,7 +132,7 @@ fn errors_name_the_entry_and_the_index() {
     check("\"blade{i}\"", "\"{i}\"", 7, &["`1` is no name"]);
     check("\"blade{i}\"", "\"blade\"", 7, &["stands twice", "(mass 1, i = 2)"]);
     check("repeat = { i = 12 }\nname", "name", 6, &["repeat = { i = 12 }"]);
-    // the repetition itself
+    // errors of the repetition itself
     check("{ i = 12 }", "{ i = 0 }", 6, &["number of times"]);
     check("{ i = 12 }", "{ i = 1.5 }", 6, &["number of times"]);
     check("{ i = 12 }", "{ i = [3, 2] }", 6, &["number of times"]);
@@ -145,7 +146,7 @@ fn errors_name_the_entry_and_the_index() {
     check("{ i = 12 }", "{ i = 9999999999 }", 6, &["number of times"]);
 }
 
-/// What is wrong in every turn of an entry is said once.
+/// An error in every element of a repeated entry is reported once.
 #[test]
 fn one_mistake_is_one_error() {
     let error = error(&(RING.replacen("k*(1", "3 kg*(1", 1).replacen("5 N", "5 m", 1) + STUDY));
@@ -154,7 +155,7 @@ fn one_mistake_is_one_error() {
     assert!(error.message().ends_with("found mass (kg) (spring 1, i = 1)"), "{error}");
 }
 
-/// `--set` and `vary` go through repeated entries as through others.
+/// `--set` and `vary` apply to repeated entries, too.
 #[test]
 fn parameters_reach_every_repeated_entry() {
     let text = RING.to_owned() + STUDY + "vary = { k = [\"1 N/mm\", \"2 N/mm\"] }\n";
@@ -163,7 +164,8 @@ fn parameters_reach_every_repeated_entry() {
     assert!((last(1) / last(0) - 2.0).abs() < 1e-15);
 }
 
-/// A ring of twenty thousand blades that move together: no joint is loaded, and each is an oscillator of its own.
+/// A ring of twenty thousand blades that move together: no joint is loaded, and each blade is
+/// an independent oscillator.
 #[test]
 fn twenty_thousand_blades() {
     let text = r#"
@@ -206,7 +208,7 @@ harmonics = 1
             assert!((amplitude / expected - 1.0).abs() < 1e-9, "{name}: {amplitude} {expected}");
         }
     }
-    // methods that carry full matrices say so at once, whatever the memory
+    // methods with full matrices refuse it at once, for any memory limit
     let exact = text.replace("kind = \"harmonic-balance\"\nharmonics = 1", "kind = \"event-driven\"");
     let study = read_study("ring.toml", &exact, &[]).unwrap().with_memory_limit(u64::MAX);
     let error = stickslip_study::run::check(&study).unwrap_err().to_string();

@@ -1,4 +1,5 @@
-//! What a response can be asked for beside its curve, against closed forms of linear oscillators and against sums over single loops.
+//! Additional results of a response, against closed forms of linear oscillators and sums over
+//! single loops.
 
 use std::f64::consts::TAU;
 use stickslip_study::dataset::{Dataset, Emphasis, Panel, Style, Table, Values};
@@ -73,7 +74,8 @@ references = true
     );
 }
 
-/// Three forces have three pairs of linear structures, each in the colour of its case; three limits have one.
+/// Three forces have three pairs of linear references, each in the colour of its case; three
+/// limits have one pair.
 #[test]
 fn references_belong_to_their_cases() {
     let study = |vary: &str| {
@@ -124,7 +126,7 @@ references = true
     let of = |what: &str, colour: usize| (format!("all joints {what}, of each case"), colour);
     let own: Vec<(String, usize)> = (0..3).flat_map(|case| [of("free", case), of("stuck", case)]).collect();
     assert_eq!((lines(&found, Emphasis::OwnReference), lines(&found, Emphasis::Reference)), (own, Vec::new()));
-    // a limit changes no linear structure
+    // a limit does not change the linear structure
     let alike = study("Ft = [\"1 N\", \"2 N\", \"4 N\"]");
     let grey = ["all joints free", "all joints stuck"].map(|label| (label.to_owned(), 0));
     assert_eq!(
@@ -132,7 +134,7 @@ references = true
         (Vec::new(), grey.to_vec())
     );
     assert_eq!(numbers(&alike, "references", "Ft_N").iter().filter(|limit| **limit != 1.0).count(), 0);
-    // of many cases the first and the last are named
+    // of many cases, the first and the last are named
     let many = study("F = { from = \"1 N\", to = \"9 N\", points = 9 }");
     let named: Vec<String> = lines(&many, Emphasis::OwnReference).into_iter().map(|(label, _)| label).collect();
     let expected = ["free, F = 1 N", "stuck, F = 1 N", "free, F = 9 N", "stuck, F = 9 N"];
@@ -167,7 +169,8 @@ output = ["velocity", "acceleration", "harmonics", "receptance", "joint_force", 
     }
 }
 
-/// So slowly that nothing but springs and friction counts: the joint slips at 2 N of the 5 N, and presses the other blade by as much.
+/// At this low frequency only springs and friction count: the joint slips at 2 N of the 5 N,
+/// and loads the other blade by 2 N.
 #[test]
 fn a_method_that_finds_nothing_is_followed_by_another_and_both_are_named() {
     let found = dataset(
@@ -201,7 +204,7 @@ peaks = false
     let (first, second) = (3.0 / 105e3, 2.0 / 111e3);
     for (column, expected) in [("blade1_amplitude_m", first), ("blade2_amplitude_m", second)] {
         let amplitudes = numbers(&found, "curve", column);
-        // the tolerance of harmonic balance, of the largest vibration
+        // the tolerance of harmonic balance, relative to the largest vibration
         assert!(amplitudes.iter().all(|x| (x - expected).abs() < 1e-3 * first), "{column} {amplitudes:?}");
     }
 }
@@ -213,16 +216,17 @@ fn a_slipping_joint_carries_its_limit() {
     assert!((numbers(&found, "curve", "foot_force_amplitude_N")[0] - 0.5).abs() < 1e-12);
 }
 
-/// Faces that an imposed motion `a cos φ` drags along. A slider behind a spring rests from every turning point until the motion has gone back
-/// `2 Ft/kt`: `cos φ = 1 - 2 Ft/(kt a)`. A stop at `g` touches while `a cos φ > g`.
+/// Contacts under an imposed motion `a cos φ`. A slider behind a spring sticks after every
+/// turning point until the motion has gone back by `2 Ft/kt`: `cos φ = 1 - 2 Ft/(kt a)`. A stop
+/// at `g` is closed while `a cos φ > g`.
 #[test]
 fn shares_of_the_period_are_closed_forms() {
     let half_turn = std::f64::consts::PI;
     let stick = (1.0f64 - 2.0 * 0.15 / (0.2 * 2.0)).acos() / half_turn;
     let open = 1.0 - (1.2f64 / 2.0).acos() / half_turn;
-    // no faces
+    // a joint without contact faces
     let spring = "[[joint]]\nname = \"spring\"\nbetween = [\"m\", \"ground\"]\nlaw = { kind = \"cubic\", stiffness = \"1e3 N/m^3\" }";
-    // as finely as each method samples contact
+    // tolerance by the sampling of contact in each method
     for (method, near) in
         [("event-driven", 1e-9), ("shooting", 2e-3), ("transient", 2e-3), ("harmonic-balance", 1.0 / 256.0)]
     {
@@ -280,7 +284,8 @@ kind = "{method}"
     }
 }
 
-/// A ring of joints is a map with a stripe for every one, whose shades are the columns; a few are areas that fill the period.
+/// Many joints are drawn as a map with a stripe for each one, shaded by the columns. A few are
+/// drawn as areas that fill the period.
 #[test]
 fn contacts_are_drawn_as_a_map_or_as_areas() {
     let text = |sectors: usize, extra: &str| {
@@ -299,12 +304,13 @@ fn contacts_are_drawn_as_a_map_or_as_areas() {
         assert_eq!(stripe.y, [joint as f64; 7]);
     }
     assert_eq!(found.figure.varied.as_ref().unwrap().range, Some([0.0, 100.0]));
-    // two sectors: a panel each, and the areas together are the whole period
+    // two sectors: one panel each, and the areas together are the whole period
     let found = dataset(&text(2, ""));
     let areas = found.figure.panels.iter().filter(|panel| panel.y.quantity == "share of the period");
     let tops: Vec<&[f64]> = areas.map(|panel| &panel.series.last().unwrap().y[..]).collect();
     assert!(tops.len() == 2 && tops.iter().all(|top| top.iter().all(|y| (y - 100.0).abs() < 1e-9)), "{tops:?}");
-    // of many cases the share with slip is a curve for each, of many joints their mean
+    // with many cases the slip fraction is a curve for each, and with many joints it is their
+    // mean
     let limits = "vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 8 } }";
     let found = dataset(&text(8, "").replace("vary = { Ft = [\"4 N\"] }", limits));
     let panel = found.figure.panels.last().unwrap();
@@ -314,7 +320,7 @@ fn contacts_are_drawn_as_a_map_or_as_areas() {
     assert!((panel.series[1].y[3] - 100.0 * mean).abs() < 1e-9, "{} {mean}", panel.series[1].y[3]);
 }
 
-/// Two masses: of the named ones the worst counts, at every frequency anew.
+/// Two masses: of the named ones, the largest amplitude counts at every frequency.
 #[test]
 fn the_worst_of_several_masses_counts() {
     let text = r#"
@@ -341,7 +347,7 @@ peak_of = "all"
     assert!(masses.iter().any(|mass| mass == "blade1"), "{masses:?}");
 }
 
-/// Ten sliders side by side: force and loss of the sum are the sums.
+/// Ten parallel sliders: force and loss of the sum are the sums.
 #[test]
 fn loops_of_several_joints_add_up() {
     let text = r#"
@@ -424,12 +430,13 @@ frequency = { from = "1 Hz", to = "2 Hz", points = 41 }
     let largest = pale.iter().map(|series| highest(&series.y)).fold(0.0, f64::max);
     assert_eq!(highest(&normal[0].y), largest);
     assert!(series.iter().all(|series| series.label.ends_with("of 9 places")), "{:?}", series[0].label);
-    // the softest of equally damped ones moves most at its resonance: F/(c ω)
+    // with equal damping, the softest place has the largest amplitude at its resonance: F/(c ω)
     assert!(found.figure.panels[0].title.contains("worst is b1"), "{}", found.figure.panels[0].title);
 }
 
-/// The band of many places is that of the exact curves at every one of its abscissae: linear oscillators, whose draws resonate between the
-/// points of the curve, each somewhere else.
+/// The band of many places equals that of the exact curves at each of its abscissae. The places
+/// are linear oscillators with resonances between the points of the curve, different in each
+/// draw.
 #[test]
 fn bands_of_the_largest_of_many_places_are_exact() {
     let (count, damping) = (48, 0.05);
@@ -496,7 +503,8 @@ fn axes_take_every_unit_of_their_quantity() {
     }
 }
 
-/// Without damping, below the force that friction can bound, no orbit is the highest.
+/// Without damping, friction with a small limit does not bound the resonance, so the curve has
+/// no peak. With damping it has one.
 #[test]
 fn a_peak_without_neighbours_is_none() {
     let text = r#"
@@ -549,8 +557,9 @@ amplitude = "{force}"
     )
 }
 
-/// A stop at a gap bends the resonance over: however many points, and where they lie, the high branch is followed to its end. The peak and where it is are
-/// those of the branch by arc length; SciPy's DOP853, swept up, is on it at 18.29 Hz.
+/// A stop with a gap bends the resonance. The upper branch is followed to its end for any
+/// number and place of the points. The peak equals that of the branch by arc length. SciPy's
+/// DOP853, swept up, is on it at 18.29 Hz.
 #[test]
 fn the_high_branch_goes_on_whatever_the_points_are() {
     for frequency in ["points = 151", "points = 601", "tolerance = \"0.1 %\""] {
@@ -572,7 +581,8 @@ fn the_high_branch_goes_on_whatever_the_points_are() {
     }
 }
 
-/// `auto` goes from event to event where Iwan's distribution is a few sliders, and by harmonic balance where it is itself: one table has what either tells.
+/// `auto` uses the event-driven method if Iwan's distribution is a few sliders, and harmonic
+/// balance otherwise. One table has the columns of both.
 #[test]
 fn cases_of_two_methods_stand_in_one_table() {
     let law = r#"kind = "iwan", stiffness = "2 N/mm", limit = "1 N", chi = -0.5, beta = 0.3, elements = "n""#;
@@ -596,8 +606,9 @@ vary = { n = [4, 0, 4] }"#;
     assert_eq!(amplitude[..3], amplitude[6..]);
 }
 
-/// A hardening spring bends the resonance over the frequencies behind it, and two motions are stable there: that of the table is told to have another. With
-/// twenty times the damping the bend is a hundredth of the width, and there is one.
+/// A hardening spring bends the resonance over higher frequencies, and two motions are stable
+/// there: a note says that the table has another orbit. With twenty times the damping the bend
+/// is a hundredth of the width, and there is one orbit.
 #[test]
 fn a_curve_that_folds_is_followed_both_ways() {
     let study = |stiffness: &str, damping: f64, points: usize| {
@@ -608,7 +619,7 @@ fn a_curve_that_folds_is_followed_both_ways() {
         let notes = dataset(&text).notes;
         notes.into_iter().filter(|note| note.contains("followed the other way")).collect::<Vec<String>>()
     };
-    // fewer points than a stretch of a curve with one orbit has, and more
+    // fewer and more points than a block of the sweep
     for points in [41, 141] {
         for stiffness in ["2e7", "-1e6"] {
             let notes = study(stiffness, 1.0, points);
@@ -618,8 +629,10 @@ fn a_curve_that_folds_is_followed_both_ways() {
     }
 }
 
-/// A softening spring bends the resonance towards lower frequencies: on the way there the curve jumps up beside it, and only the way back meets the peak. It
-/// is that of the branch by arc length, where no point and no direction decides; the rows of the way back are on it, and the figure has them.
+/// A softening spring bends the resonance to lower frequencies: the upward sweep jumps over the
+/// peak, and only the reverse sweep meets it. The peak equals that of the branch by arc length,
+/// which is independent of points and direction. The rows of the reverse sweep are on that
+/// branch, and the figure shows them.
 #[test]
 fn a_peak_that_only_the_way_back_meets_is_found() {
     let study = |kind: &str, points: &str| {
@@ -640,7 +653,8 @@ fn a_peak_that_only_the_way_back_meets_is_found() {
         let row = of_back[0];
         assert!((frequency[row] - at).abs() < 1e-5 && (amplitude[row] / height - 1.0).abs() < 1e-7, "{peaks:?}");
         assert!((0..back.len()).all(|other| other == row || amplitude[other] < 0.7 * height), "{peaks:?}");
-        // on the high branch a frequency above the peak has less, and more than the curve of the way there
+        // above the peak's frequency the upper branch is lower than the peak, and higher than
+        // the curve of the upward sweep
         let (curve, way_back) = (table(&found, "curve"), table(&found, "way_back"));
         let (there, low) = (curve.numbers("frequency_Hz").unwrap(), curve.numbers("m_amplitude_m").unwrap());
         let (over, high) = (way_back.numbers("frequency_Hz").unwrap(), way_back.numbers("m_amplitude_m").unwrap());
@@ -653,7 +667,7 @@ fn a_peak_that_only_the_way_back_meets_is_found() {
         let dotted = |panel: &Panel| panel.series.iter().filter(|series| series.label == "way back").count();
         assert_eq!(found.figure.panels.iter().map(dotted).collect::<Vec<_>>(), [1]);
     }
-    // the same peak counts where a parameter is sought that makes it lowest
+    // the same peak counts in the search for the parameter that minimizes it
     let rest = r#"
 [parameters]
 k3 = "-1e9 N/m^3"
@@ -670,9 +684,12 @@ vary = { k3 = ["-1e9 N/m^3", "-1 N/m^3"] }"#;
     assert_eq!(performance.flags("way_back").unwrap(), [Some(true), Some(false)]);
 }
 
-/// Two and three masses with a stop whose high branch ends closely beyond its top: coarse curves fell off the one at 59 Hz without a word (the branch has its
-/// top at 63.4068 Hz; SciPy's DOP853, swept up, 4.32 mm at 63.0 Hz), and the search for the top of the other crept towards it until it gave up, 3 % below.
-/// What has the same tops by arc length has them on every grid.
+/// Two and three masses with a stop, whose upper branch ends just beyond its peak.
+///
+/// Coarse curves left the branch at 59 Hz without a warning. It has its peak at 63.4068 Hz;
+/// SciPy's DOP853, swept up, gives 4.32 mm at 63.0 Hz. The search for the peak of the other
+/// model approached it slowly and gave up 3 % below. Both peaks by arc length must be found on
+/// every grid.
 #[test]
 fn tops_in_front_of_a_fold_are_found_on_coarse_curves() {
     let two = r#"
@@ -747,15 +764,16 @@ amplitude = "1.0 N"
         for grid in grids {
             let found =
                 top(&format!("kind = \"response\"\nfrequency = {{ from = \"{from}\", to = \"{to}\", {grid} }}\n{of}"));
-            // to a fold the height rises with the root of the distance
+            // near a fold the height grows with the square root of the distance
             assert!((found.0 / omega - 1.0).abs() < 1e-6, "{grid}: {found:?} {omega}");
             assert!((found.1 / height - 1.0).abs() < 3e-5, "{grid}: {found:?} {height}");
         }
     }
 }
 
-/// Theory 11.13: over a stop without a gap, driven at 2.6 times the natural frequency, the motion that repeats with the drive is unstable; with
-/// `period = 2` every method gives the one that repeats after two periods, in the same columns.
+/// Theory 11.13: over a stop without a gap, at 2.6 times the natural frequency, the orbit with
+/// the period of the excitation is unstable. With `period = 2` every method finds the orbit of
+/// two periods, with the same columns.
 #[test]
 fn theory_11_13_motions_of_two_periods_from_a_study_file() {
     let orbit = |method: &str| {
@@ -796,7 +814,7 @@ samples = 64
         assert!(off < allowed, "{method}: {off:.1e}");
         let names = |dataset: &Dataset| -> Vec<String> {
             let columns = table(dataset, "orbits").columns.iter().map(|column| column.name.clone());
-            // evidence that harmonic balance alone has
+            // only harmonic balance has this evidence
             columns.filter(|name| name != "return_defect").collect()
         };
         assert_eq!(names(&found), names(&exact), "{method}");
@@ -809,7 +827,7 @@ samples = 64
     }
 }
 
-/// 1 kg on 1 N/mm and 1 N s/m with a joint, under 2 N where it is driven.
+/// 1 kg on 1 N/mm and 1 N s/m with a joint, under 2 N on the mass.
 fn single(law: &str, study: &str) -> Dataset {
     dataset(&format!(
         r#"
@@ -834,7 +852,8 @@ amplitude = "2 N"
     ))
 }
 
-/// What faces can stick, slip or part says so; a stop touches or is open, by its force; a spring has no faces. The same in every method.
+/// The contact state of joints with faces is stick, slip or apart; a stop is closed or open, by
+/// its force; a spring has none. All methods agree.
 #[test]
 fn contact_is_said_of_what_has_faces() {
     let contacts = |law: &str, method: &str| {
@@ -845,7 +864,7 @@ fn contact_is_said_of_what_has_faces() {
     for method in ["event-driven", "shooting", "harmonic-balance"] {
         let (words, force) = contacts("kind = \"gap\", gap = \"1 mm\", stiffness = \"500 N/m\"", method);
         assert!(words.iter().any(|w| w == "touch") && words.iter().any(|w| w == "open"), "{method}");
-        // a series of the force passes zero beside the samples that tell the contact
+        // the series of the force passes zero near the samples at which the contact changes
         let clear = 0.1 * force.iter().copied().fold(0.0, f64::max);
         for (word, force) in words.iter().zip(force).filter(|(_, force)| force.abs() > clear) {
             assert_eq!(word, if force > 0.0 { "touch" } else { "open" }, "{method}");
@@ -859,10 +878,10 @@ fn contact_is_said_of_what_has_faces() {
     assert!(words.iter().any(|w| w == "stick") && words.iter().any(|w| w == "slip+"));
 }
 
-/// Coulomb friction shifts the centre of each swing and not the time between two turning points:
-/// every cycle of a free decay has the frequency
-/// `ω √(1 - ζ²)/2π` of the oscillator without it, whatever the samples. About the centre `F/k` a
-/// swing shrinks by `e^(-π ζ/√(1 - ζ²))`.
+/// Coulomb friction shifts the centre of each swing, not the time between two turning points.
+/// Every cycle of a free decay has the frequency `ω √(1 - ζ²)/2π` of the oscillator without
+/// friction, for any samples. About the centre `F/k` a swing decreases by the factor
+/// `e^(-π ζ/√(1 - ζ²))`.
 #[test]
 fn every_cycle_of_a_decay_has_its_frequency() {
     let (m, k, c, friction, start) = (2.0, 800.0, 4.0, 3.0, 0.1);
@@ -898,8 +917,8 @@ time_step = "{step}"
         let mut turn = start;
         for (frequency, amplitude) in frequencies.iter().zip(amplitudes) {
             assert!((frequency / expected - 1.0).abs() < 1e-9, "{step}: {frequency} instead of {expected}");
-            // turning points on either side: each centre is F/k towards the side that the swing
-            // comes from
+            // turning points on either side: each centre is F/k towards the side where the
+            // swing begins
             let next = |turn: f64| shrinks * (turn - friction / k) - friction / k;
             let (second, third) = (next(turn), next(next(turn)));
             let mean = 0.5 * (0.5 * (turn + second) + 0.5 * (second + third));
@@ -909,20 +928,22 @@ time_step = "{step}"
     }
 }
 
-/// A stiff element of Dahl creeps while it is worked back and forth; the motion loses energy in every cycle all the same.
+/// A stiff Dahl element creeps under alternating load; the motion still loses energy in every
+/// cycle.
 #[test]
 fn a_decay_with_creep_has_no_negative_damping() {
     let release = "kind = \"transient\"\nstart = { m = \"50 mm\" }\nduration = \"4 s\"\ntime_step = \"1 ms\"";
     let found = single("kind = \"dahl\", stiffness = \"20 N/mm\", limit = \"5 N\"", release);
     let ratios = numbers(&found, "decay", "damping_ratio");
     assert!(ratios.len() > 50, "{}", ratios.len());
-    // the damper alone has c/(2 √(k m)) with the stiffness of the stuck element beside the spring, 1 kg: more the element only adds
+    // The damper alone has c/(2 √(k m)) at 1 kg, with the stiffness of the stuck element in
+    // parallel with the spring. The element only adds damping.
     let least = 1.0 / (2.0 * 21_000f64.sqrt());
     assert!(ratios.iter().all(|ratio| *ratio > 0.9 * least), "{ratios:?}");
 }
 
-/// A run that is stopped when all points of a unit are there, and its peaks are not yet looked for, has not finished that unit: who goes on computes it
-/// again, with its peaks.
+/// A run that stops after all points of a unit, but before the search for its peaks, has not
+/// finished that unit. A continued run computes the unit again, with its peaks.
 #[test]
 fn a_unit_without_its_peaks_is_not_whole() {
     use std::sync::Arc;
@@ -949,7 +970,7 @@ fn a_unit_without_its_peaks_is_not_whole() {
     }
 }
 
-/// Three places on two faces in as many cases, with the shares of stick and slip.
+/// Three places on two faces with several cases, with the fractions of stick and slip.
 fn on_faces(limits: &str) -> Dataset {
     dataset(&format!(
         r#"
@@ -983,7 +1004,8 @@ vary = {{ Ft = [{limits}] }}
     ))
 }
 
-/// No case is left out of a figure without a word: where each cannot have its own panels, each has a curve in all.
+/// No case is left out of a figure without a note. If cases cannot have separate panels, each
+/// has a curve in all panels.
 #[test]
 fn contacts_of_all_cases_are_drawn() {
     let found = on_faces("\"0.2 N\", \"0.5 N\", \"1 N\", \"1.5 N\", \"2 N\"");
@@ -993,7 +1015,7 @@ fn contacts_of_all_cases_are_drawn() {
     assert_eq!(found.figure.panels.len(), 3 + 2 + 2);
 }
 
-/// Places, forces and states have colours of their own in the one legend of a figure.
+/// Places, forces and states have different colours in the legend of a figure.
 #[test]
 fn no_two_names_have_one_colour() {
     let found = on_faces("\"0.5 N\", \"1 N\"");
@@ -1006,7 +1028,8 @@ fn no_two_names_have_one_colour() {
     assert_eq!(colours.values().copied().collect::<Vec<_>>(), ["m1", "m2", "m3", "face1", "face2", "sticks", "slips"]);
 }
 
-/// Of places that move equally the first has the peak, whatever rounding says; one that is higher between the points is the worst of the title.
+/// If places move equally, the first one has the peak for any rounding. A place that is
+/// higher between the points is the worst one in the title.
 #[test]
 fn equal_places_have_one_name() {
     let study = |stiffness: &str| {
@@ -1038,7 +1061,7 @@ frequency = {{ from = "1 Hz", to = "2 Hz", points = 21 }}
         let inner = table.flags("at_range_end").unwrap().iter().position(|end| *end == Some(false)).unwrap();
         table.texts("mass").unwrap()[inner].clone()
     };
-    // equal but for 1e-9 of the stiffness: which is higher nobody can tell
+    // equal except for 1e-9 of the stiffness, so the order of the peaks is undetermined
     let equal = study("100 N/m * (1 + 1e-9*i*(9 - i))");
     assert_eq!(worst(&equal), "b1");
     assert!(equal.figure.panels[0].title.contains("all are alike"), "{}", equal.figure.panels[0].title);
@@ -1047,7 +1070,8 @@ frequency = {{ from = "1 Hz", to = "2 Hz", points = 21 }}
     assert!(softer.figure.panels[0].title.contains("worst is b8"), "{}", softer.figure.panels[0].title);
 }
 
-/// At its undamped resonance a force grows a motion without bound that friction does not hold: crosses stand there, and the legend counts them.
+/// At an undamped resonance the motion grows without bound if friction does not limit it: the
+/// figure has crosses there, and the legend counts them.
 #[test]
 fn points_without_an_orbit_are_drawn_and_counted() {
     let text = r#"
@@ -1075,7 +1099,8 @@ peaks = false
 [method]
 kind = "event-driven"
 "#;
-    // 4 N grow without bound where the limit is below pi/4 of them, 3.14 N (Den Hartog 1931): 1 N and 2 N, not 6 N
+    // 4 N grow without bound if the limit is below pi/4 of them, 3.14 N (Den Hartog 1931): 1 N
+    // and 2 N, not 6 N
     let found = dataset(text);
     let status = table(&found, "curve").texts("status").unwrap();
     let failed: Vec<usize> = (0..9).filter(|row| !status[*row].starts_with("converged")).collect();
@@ -1090,7 +1115,8 @@ kind = "event-driven"
     assert_eq!(crosses, [("2 points without an orbit", x.clone(), 0), ("2 points without an orbit", x, 1)]);
 }
 
-/// Backbone of a mass on a cubic spring: the half of peak to peak has the third harmonic in it, the first harmonic has a column of its own.
+/// Backbone of a mass on a cubic spring: the half of peak-to-peak includes the third harmonic;
+/// the first harmonic has another column.
 #[test]
 fn modes_tell_amplitude_and_first_harmonic() {
     let text = r#"
@@ -1113,7 +1139,8 @@ harmonics = 15
     let found = dataset(text);
     let (whole, first) = (numbers(&found, "modes", "m_amplitude_m"), numbers(&found, "modes", "m_first_harmonic_m"));
     let omega = numbers(&found, "modes", "frequency_Hz");
-    // free vibration of x'' + x + x^3 = 0 from x = a: the period is 4 K(m)/sqrt(1 + a^2) with the parameter m = a^2/(2 (1 + a^2))
+    // free vibration of x'' + x + x^3 = 0 from x = a: the period is 4 K(m)/sqrt(1 + a^2) with
+    // the parameter m = a^2/(2 (1 + a^2))
     let period = |a: f64| {
         let (mut mean, mut other) = (1.0, (1.0 - a * a / (2.0 * (1.0 + a * a))).sqrt());
         for _ in 0..40 {

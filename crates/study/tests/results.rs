@@ -1,4 +1,5 @@
-//! Results as typed values: what is read back from a dataset is what closed forms and other kinds say.
+//! Results as typed values: values that are read back from a dataset equal closed forms and the
+//! results of other kinds.
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, atomic::AtomicBool};
@@ -14,7 +15,7 @@ fn of(text: &str) -> (Study, Dataset) {
     (study, dataset)
 }
 
-/// Two oscillators of 1 kg that know nothing of each other, of 1 N/m and `k` N/m, each moved by 1 N.
+/// Two independent oscillators of 1 kg, with 1 N/m and `k` N/m, each under 1 N.
 fn oscillators(study: &str) -> (Study, Dataset) {
     of(&format!(
         r#"
@@ -55,13 +56,14 @@ frequency = { from = "0.4 rad/s", to = "3 rad/s", points = 27 }
 vary = { k = ["4 N/m", "6 N/m"], c = ["0.2 kg/s", "0.4 kg/s"] }
 "#;
 
-/// Relative rounding of a linear orbit and of hertz to rad/s and back.
+/// Relative rounding error of a linear orbit, and of the conversion from hertz to rad/s and
+/// back.
 const ROUNDING: f64 = 1e-9;
-/// Relative error of the frequency of a refined peak, around which the amplitude is flat.
+/// Relative error of the frequency of a refined peak, near which the amplitude is flat.
 const PLACE: f64 = 1e-3;
 
-/// Every amplitude is `F/√((k - m ω²)² + (c ω)²)` of its own mass, case and frequency; every peak stands at `√(k/m - c²/(2 m²))`, and is
-/// `F/(c √(k/m - c²/(4 m²)))`.
+/// Every amplitude is `F/√((k - m ω²)² + (c ω)²)` with the values of its mass, case and
+/// frequency. Every peak is at `√(k/m - c²/(2 m²))`, with the height `F/(c √(k/m - c²/(4 m²)))`.
 #[test]
 fn response_curves_are_those_of_their_case_and_mass() {
     let (study, dataset) = oscillators(SWEEP);
@@ -97,7 +99,8 @@ fn curves_without_peaks_have_none() {
     assert_eq!(curves.len(), 4);
 }
 
-/// Each loop loses `4 Ft (a - Ft/kt)` with the numbers of its own joint and case, whatever the frequency.
+/// Each loop loses `4 Ft (a - Ft/kt)` with the values of its joint and case, at any
+/// frequency.
 #[test]
 fn loops_are_those_of_their_case_frequency_and_joint() {
     let (study, dataset) = of(r#"
@@ -148,7 +151,7 @@ samples = 40
     }
 }
 
-/// A study of one frequency has no column of it.
+/// The tables of a study with one frequency have no column for it.
 #[test]
 fn a_loop_knows_the_only_frequency() {
     let (study, dataset) = of(stickslip_study::templates::find("element").unwrap().study);
@@ -176,10 +179,11 @@ vary = {{ {vary} }}
     read_study("couple.toml", &text, &[]).unwrap()
 }
 
-/// Two refinements of one peak end within this of each other.
+/// Largest relative difference of two refinements of one peak.
 const REFINED: f64 = 1e-9;
 
-/// A point of a performance curve is the peak of the response with the same parameters, and so is the optimum.
+/// A point of a performance curve is the peak of the response with the same parameters, and so
+/// is the optimum.
 #[test]
 fn performance_curves_are_made_of_the_peaks_of_responses() {
     let study = couple("performance", r#"kt = ["8000 N/m", "10000 N/m"], Ft = ["4 N", "6.5 N", "9 N"]"#);
@@ -202,7 +206,8 @@ fn performance_curves_are_made_of_the_peaks_of_responses() {
             assert!(!peak.at_range_end);
             assert_eq!(point.failed_orbits, 0);
         }
-        // with the soft contact the peak still falls at the highest limit, so that the curves are told apart
+        // with the soft contact the peak still falls at the highest limit, which distinguishes
+        // the curves
         let Some(optimum) = curve.optimum else {
             assert_eq!(kt, 8000.0);
             continue;
@@ -215,7 +220,7 @@ fn performance_curves_are_made_of_the_peaks_of_responses() {
     }
 }
 
-/// The peak of a damped oscillator falls with its damping alone: no optimum.
+/// The peak of a damped oscillator only falls with its damping, so there is no optimum.
 #[test]
 fn a_curve_that_only_falls_has_no_optimum() {
     let (study, dataset) = oscillators(
@@ -230,7 +235,7 @@ vary = { c = ["0.1 kg/s", "0.2 kg/s", "0.3 kg/s"] }
     assert_eq!(curves[0].optimum, None);
 }
 
-/// A run that was stopped before it began has no results, and that is no error.
+/// A run that was stopped before it began has no results, which is not an error.
 #[test]
 fn an_interrupted_run_has_what_was_finished() {
     let stopped = |kind: &str| {
@@ -253,7 +258,7 @@ fn what_is_not_the_result_of_the_study_is_refused() {
     let (study, dataset) = oscillators(SWEEP);
     let wrong_kind = hysteresis::loops(&study, &dataset).unwrap_err();
     assert!(wrong_kind.to_string().contains("`study` is of the kind `response`"), "{wrong_kind}");
-    // without a column, or with one cut short
+    // without a column, or with a shorter one
     let mut broken = dataset.clone();
     broken.tables[0].columns.retain(|column| column.name != "fast_amplitude_m");
     let column = response::curves(&study, &broken).unwrap_err();
@@ -270,7 +275,7 @@ fn what_is_not_the_result_of_the_study_is_refused() {
     assert!(matches!(rows, ResultsError::Rows { .. }), "{rows}");
 }
 
-/// The largest number of a column over all tables, NaN apart.
+/// The worst evidence is the largest number of a column over all tables, without NaN.
 #[test]
 fn the_worst_evidence_is_the_largest() {
     let (_, mut dataset) = oscillators(SWEEP);
@@ -289,7 +294,8 @@ fn the_worst_evidence_is_the_largest() {
     assert_eq!(worst_evidence(&dataset).residual, None);
 }
 
-/// Rigid joints in a triangle, which stop to be told apart before the first period is over: the rows until then are there, and their summary is of them.
+/// Rigid joints in a triangle become indistinguishable within the first period, and the transient
+/// breaks down. The rows until then exist, and their summary covers them.
 #[test]
 fn a_transient_that_breaks_down_keeps_what_it_has() {
     let text = r#"
@@ -344,13 +350,13 @@ cycles = 20
         assert_eq!(summary.numbers("largest_displacement_m").unwrap()[row], largest);
         assert!(largest > 0.0);
     }
-    // smoothed, as its message says, it goes to the end
+    // with the width that its message advises, it runs to the end
     let (_, smoothed) = of(&format!("{text}\n[method]\nkind = \"shooting\"\nwidth = \"0.1 mm/s\"\n"));
     assert_eq!(smoothed.record.points.get("converged"), Some(&1), "{:?}", smoothed.record.points);
 }
 
-/// A joint that sticks for the whole period beside a stop: where it sticks decides when the stop is closed, and a run says so. Without the stop, or where
-/// it slips, it does not.
+/// A note reports a stuck joint in a model with a stop: the position at which it sticks
+/// determines when the stop closes. Without the stop, or if the joint slips, there is no note.
 #[test]
 fn a_stuck_joint_beside_a_stop_is_told() {
     let stop = "[[joint]]\nname = \"stop\"\nbetween = [\"b\", \"ground\"]\nlaw = { kind = \"gap\", gap = \"0.05 mm\", stiffness = \"30 N/mm\" }\n";
@@ -408,8 +414,9 @@ kind = "event-driven"
     }
 }
 
-/// Where the place of a contact that sticks is one at which it comes up to its limit, for an instant of the period, the derivative of the return is that of
-/// slip: 1.41 for an orbit that is stable, the contact that is open throughout left out. Such an orbit sticks, is one of a continuum, and has no verdict.
+/// A contact that sticks may reach its limit for an instant of the period. The derivative of
+/// the return map is then that of slip: 1.41 for a stable orbit, without the contact that stays
+/// open. Such an orbit is one of a continuum, and its stability is unknown.
 #[test]
 fn what_sticks_up_to_its_limit_is_not_called_unstable() {
     let text = r#"

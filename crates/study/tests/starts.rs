@@ -1,4 +1,5 @@
-//! Transients that begin pulled: joints carry what they carry on the way to the place of release.
+//! Transients that begin with held places: joints carry the forces of the displacement to the
+//! place of release.
 
 use stickslip_study::dataset::Dataset;
 use stickslip_study::read_study;
@@ -15,7 +16,7 @@ fn displacement(dataset: &Dataset, place: &str) -> Vec<f64> {
     table.numbers(&column).unwrap_or_else(|| panic!("{column} in {names:?}")).to_vec()
 }
 
-/// A mass of 10 kg on 20 N/µm that is pulled by 0.2 mm with a joint, without damping.
+/// A mass of 10 kg on 20 N/µm that is displaced by 0.2 mm with a joint, without damping.
 fn pulled(law: &str, begin: &str) -> Vec<f64> {
     let text = format!(
         "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"10 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"20 N/um\"\n\
@@ -29,8 +30,8 @@ fn lowest(motion: &[f64]) -> f64 {
     motion.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// A joint that sticks is a spring relaxed at zero: the motion is symmetric. Relaxed where it is let go it is relaxed at 0.2 mm:
-/// the motion goes about `kt u/(k + kt)`.
+/// A stuck joint is a spring relaxed at zero, so the motion is symmetric. A joint relaxed at
+/// the place of release, 0.2 mm, gives a motion about `kt u/(k + kt)`.
 #[test]
 fn a_joint_that_sticks_swings_about_zero() {
     let law = "{ kind = \"jenkins\", stiffness = \"10 N/um\", limit = \"10 kN\" }";
@@ -40,15 +41,18 @@ fn a_joint_that_sticks_swings_about_zero() {
     assert!((low / (2.0 / 3.0 * 0.1e-3 - (0.2e-3 - 2.0 / 3.0 * 0.1e-3)) - 1.0).abs() < 1e-3, "{low}");
 }
 
-/// A joint that has slipped on the way carries its limit: `k (a₀ - a₁)/2 (a₀ + a₁) = W`, with the loss of half a loop.
+/// A joint that slipped during the displacement carries its limit:
+/// `k (a₀ - a₁)/2 (a₀ + a₁) = W`, with the loss of half a loop.
 #[test]
 fn a_joint_that_slips_on_the_way_carries_its_limit() {
     let (k, kt, limit, a) = (20e6, 10e6, 200.0, 0.2e-3);
     let low = lowest(&pulled("{ kind = \"jenkins\", stiffness = \"10 N/um\", limit = \"200 N\" }", ""));
-    // from +limit through the elastic range to -limit, then sliding until the kinetic energy is gone
+    // from +limit through the elastic range to -limit, then slip until the kinetic energy is
+    // zero
     let energy = |x: f64| 0.5 * k * x * x;
     let elastic = 2.0 * limit / kt;
-    // ½ k a² + work of the joint: + limit to - limit over `elastic` does none on the mean, beyond it - limit times the way
+    // ½ k a² + work of the joint: from +limit to -limit over `elastic` its mean work is zero,
+    // beyond that it is -limit times the distance
     let balance = |b: f64| energy(a) - energy(b) - limit * (a + b - elastic);
     let (mut inside, mut beyond) = (0.0, a);
     for _ in 0..60 {
@@ -58,7 +62,8 @@ fn a_joint_that_slips_on_the_way_carries_its_limit() {
     assert!((low / -inside - 1.0).abs() < 1e-4, "{low} {inside}");
 }
 
-/// What `start` does not name follows: the second of two masses in a row stands where the first one leads it.
+/// Places that `start` does not name are in equilibrium: the second of two masses in series
+/// follows the first one.
 #[test]
 fn what_is_not_pulled_is_in_equilibrium() {
     let study = |begin: &str| {

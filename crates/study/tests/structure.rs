@@ -1,8 +1,11 @@
-//! Studies of structures by their matrices: files in several formats and units, against a dense solution that knows nothing of places,
-//! reductions or studies; with masses and joints added; and each file that is wrong.
+//! Studies of structures given by matrices, against dense solutions without places, reductions
+//! or studies.
+//!
+//! The tests cover files in several formats and units, added masses and joints, and every kind
+//! of wrong file.
 
 #[path = "../../stickslip/tests/reduction/brick.rs"]
-#[allow(dead_code)] // what other tests ask of it
+#[allow(dead_code)] // other tests use the rest of it
 mod brick;
 
 use brick::Brick;
@@ -17,21 +20,21 @@ use stickslip_study::dataset::Dataset;
 use stickslip_study::read_file;
 use stickslip_study::run::{Context, check, run};
 
-/// Damping in proportion to mass (1/s) and stiffness (s).
+/// Rayleigh damping: factors of mass (1/s) and stiffness (s).
 const RAYLEIGH: (f64, f64) = (20.0, 2e-6);
 const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 
-/// A steel blade 80 mm long, held at x = 0, with 8 x 2 x 1 elements: 144 rows.
+/// A steel blade 80 mm long, fixed at x = 0, with 8 x 2 x 1 elements: 144 rows.
 fn blade() -> Brick {
     Brick::new([8, 2, 1], [0.08, 0.02, 0.004], true)
 }
 
-/// `node.direction` of every row; nodes count from 101.
+/// Returns `node.direction` for every row; nodes count from 101.
 fn named(brick: &Brick) -> Vec<String> {
     (0..brick.dofs()).map(|row| format!("{}.{}", 101 + row / 3, DIRECTIONS[row % 3])).collect()
 }
 
-/// The name of a node at the far end.
+/// Returns the name of a node at the free end.
 fn tip(brick: &Brick, y: usize, z: usize) -> String {
     (101 + brick.row([8, y, z], 0).unwrap() / 3).to_string()
 }
@@ -42,13 +45,14 @@ fn full(matrix: &stickslip_numerics::sparse::Matrix) -> DMatrix<f64> {
     full
 }
 
-/// Writes both matrices in units of which one of stiffness is `units.0` N/m and one of mass `units.1` kg.
+/// Writes both matrices in units with a stiffness unit of `units.0` N/m and a mass unit of
+/// `units.1` kg.
 fn write_pair(folder: &Path, brick: &Brick, ending: &str, units: (f64, f64)) {
     for (name, matrix, unit) in [("k", &brick.stiffness, units.0), ("m", &brick.mass, units.1)] {
         let entries = matrix.entries().map(|(row, column, value)| (row, column, value / unit));
         let made = Matrix::new(matrix.n(), matrix.n(), Symmetry::General, entries).unwrap();
         match ending {
-            // CalculiX: upper triangle, from 1
+            // CalculiX: upper triangle, indices from 1
             "sti" => {
                 let mut text = String::new();
                 for entry in made.both_triangles().filter(|entry| entry.column >= entry.row) {
@@ -74,7 +78,7 @@ fn structure(ending: &str, dofs: &str, units: &str, more: &str) -> String {
 
 const DAMPED: &str = "rayleigh = { mass = \"20 /s\", stiffness = \"2e-6 s\" }";
 
-/// Runs a study whose files stand in `folder`.
+/// Runs a study whose files are in `folder`.
 fn results(folder: &Path, text: &str) -> Dataset {
     let path = folder.join("study.toml");
     std::fs::write(&path, text).unwrap();
@@ -88,7 +92,8 @@ fn numbers<'a>(data: &'a Dataset, column: &str) -> &'a [f64] {
     data.tables[0].numbers(column).unwrap_or_else(|| panic!("no {column}: {:?}", data.tables[0].columns))
 }
 
-/// Amplitudes of all rows under a force along `load`, with what is added to mass and stiffness.
+/// Returns the amplitudes of all rows under a force along `load`, with added mass and
+/// stiffness.
 fn dense(brick: &Brick, hertz: f64, load: &DVector<f64>, added: &[(usize, f64, f64)]) -> DVector<Complex64> {
     let omega = hertz * TAU;
     let (mut mass, mut stiffness) = (full(&brick.mass), full(&brick.stiffness));
@@ -102,7 +107,8 @@ fn dense(brick: &Brick, hertz: f64, load: &DVector<f64>, added: &[(usize, f64, f
     z.lu().solve(&load.map(|v| Complex64::new(v, 0.0))).unwrap()
 }
 
-/// The force of 1 N along z on a node at the tip, and the frequencies of the test, Hz; the first bending mode is near 520 Hz.
+/// A force of 1 N along z on a node at the tip, and the frequencies of the test, Hz. The first
+/// bending mode is near 520 Hz.
 const FORCED: &str = "[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n\
     [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"515 Hz\", \"900 Hz\"]\n";
 const HERTZ: [f64; 3] = [300.0, 515.0, 900.0];
@@ -111,7 +117,7 @@ fn place(name: &str, node: &str) -> String {
     format!("[[place]]\nname = \"{name}\"\ndofs = [\"{node}.x\", \"{node}.y\", \"{node}.z\"]\n")
 }
 
-/// Whatever the format and the units, the response is that of a dense solution.
+/// The response is that of a dense solution in every format and unit.
 #[test]
 fn files_of_several_formats_and_units_have_one_response() {
     let brick = blade();
@@ -142,7 +148,8 @@ fn files_of_several_formats_and_units_have_one_response() {
     }
 }
 
-/// In few coordinates the response is as far from the whole as the record says, for each kind and by every method.
+/// The error of a reduced model is at most the recorded one, for each kind of reduction and by
+/// every method.
 #[test]
 fn reductions_are_as_good_as_they_say() {
     let brick = blade();
@@ -161,19 +168,23 @@ fn reductions_are_as_good_as_they_say() {
             structure("npz", "rows.csv", "m-kg-s", &format!("{DAMPED}\n{reduce}")) + &place("tip", &node) + FORCED;
         let data = results(folder.path(), &format!("{text}[method]\nkind = \"{method}\"\n"));
         let error = numbers(&data, "reduction_error")[0];
-        // up to the last of the modes that are named, beside whose resonances a small shift of frequency is a large error
+        // With a given number of modes the error covers frequencies up to the last mode. Near a
+        // resonance a small frequency shift is a large error.
         assert!(error > 0.0 && (reduce.contains("modes") || error < 1e-4), "{reduce}: {error:e}");
         for (i, hertz) in HERTZ.iter().enumerate() {
             let expected = dense(&brick, *hertz, &load, &[])[z].norm();
             let off = numbers(&data, "tip_z_amplitude_m")[i] / expected - 1.0;
-            // near the resonance, 515 Hz, an error of its frequency counts by 1 / (2 zeta) = 60
+            // near the resonance at 515 Hz, an error of its frequency is amplified by 1 / (2
+            // zeta) = 60
             assert!(off.abs() < 60.0 * error.max(1e-6), "{reduce} {method} {hertz}: {off:e}, {error:e}");
         }
     }
 }
 
-/// The error of so many modes is that over the frequencies of the study: with the drive lower it is smaller, and it says up to where. Craig-Bampton
-/// takes as many modes as an error asks for, on solids more than three times the highest frequency.
+/// With a given number of modes the error is that over the frequencies of the study. It is
+/// smaller for lower excitation frequencies, and the record states the range. Craig-Bampton
+/// takes the modes that an error requires, on solids more than three times the highest
+/// frequency.
 #[test]
 fn errors_are_those_of_the_studys_frequencies() {
     let brick = blade();
@@ -199,8 +210,9 @@ fn errors_are_those_of_the_studys_frequencies() {
     assert!(close.0 <= 1e-5, "{close:?}");
 }
 
-/// What the blade weighs without its held face, which tells wrong units where frequencies cannot. Along x the mass of 8 elements whose first face
-/// does not move is `ρ V (1 - (2/3)/8)`: the square of a line from 0 to 1 leaves a third.
+/// The mass of the blade without its fixed face shows wrong units where frequencies cannot.
+/// Along x the mass of 8 elements with a fixed first face is `ρ V (1 - (2/3)/8)`: the square of
+/// a line from 0 to 1 has the mean 1/3.
 #[test]
 fn a_structure_says_what_it_weighs() {
     let brick = blade();
@@ -222,7 +234,7 @@ fn a_structure_says_what_it_weighs() {
     }
 }
 
-/// Of two sizes that differ the file with the fewer rows is the one that was cut short.
+/// If two matrices differ in size, the message names the file with fewer rows as truncated.
 #[test]
 fn a_stiffness_cut_short_is_named() {
     let brick = blade();
@@ -231,7 +243,7 @@ fn a_stiffness_cut_short_is_named() {
     for (short, other) in [("k.sti", "stiffness"), ("m.sti", "mass")] {
         let path = folder.path().join(short);
         let whole = std::fs::read_to_string(&path).unwrap();
-        // entries among the first rows alone, as of a file that ends too early
+        // entries of the first rows only, as in a file that ends too early
         let cut: String = whole.lines().filter(|line| early(line)).map(|line| format!("{line}\n")).collect();
         std::fs::write(&path, cut).unwrap();
         let text = structure("sti", "rows.csv", "m-kg-s", DAMPED) + &place("tip", &node) + FORCED;
@@ -243,12 +255,13 @@ fn a_stiffness_cut_short_is_named() {
     }
 }
 
-/// Whether a line `row column value` is of the first 60 rows.
+/// Returns whether both indices of a line `row column value` are at most 60.
 fn early(line: &str) -> bool {
     line.split_whitespace().take(2).all(|index| index.parse::<usize>().unwrap() <= 60)
 }
 
-/// Where no drive tells how far a reduction must reach, the message asks for it.
+/// Without an excitation frequency the range of a reduction is undetermined, and the message
+/// asks for it.
 #[test]
 fn modes_of_a_structure_need_an_end() {
     let brick = blade();
@@ -263,7 +276,8 @@ fn modes_of_a_structure_need_an_end() {
     assert!(said.contains("no drive frequency that tells up to which"), "{said}");
 }
 
-/// Drawn parameters in a study of matrices alone: every draw is the response with its values, all on one reduction.
+/// Drawn parameters in a study with matrices alone: every draw is the response with its values,
+/// all on one reduction.
 #[test]
 fn parameters_of_a_structure_are_drawn() {
     let brick = blade();
@@ -289,7 +303,8 @@ fn parameters_of_a_structure_are_drawn() {
     }
 }
 
-/// A lumped mass on a spring to the ground, tied to the blade, and a mass that has no other place than a row of it.
+/// A lumped mass with a spring to the blade and another one to the ground equals a dense
+/// solution.
 #[test]
 fn masses_and_springs_are_added_at_places() {
     let brick = blade();
@@ -307,7 +322,7 @@ fn masses_and_springs_are_added_at_places() {
            [study]\nkind = \"response\"\nfrequency = [\"300 Hz\", \"515 Hz\", \"900 Hz\"]\n";
     let data = results(folder.path(), &text);
     for (i, hertz) in HERTZ.iter().enumerate() {
-        // the damper is eliminated: it pulls the tip by its dynamic stiffness
+        // the added mass is eliminated: it loads the tip by its dynamic stiffness
         let own = spring + hold - mass * (hertz * TAU).powi(2);
         let mut load = DVector::zeros(brick.dofs());
         load[z] = spring / own;
@@ -320,7 +335,8 @@ fn masses_and_springs_are_added_at_places() {
     }
 }
 
-/// A row of the structure that is moved: of the others, a dense solution with its column on the other side.
+/// A row of the structure has an imposed motion. The others equal a dense solution with its
+/// column on the right-hand side.
 #[test]
 fn rows_can_be_moved() {
     let brick = blade();
@@ -350,7 +366,8 @@ fn rows_can_be_moved() {
     }
 }
 
-/// Friction in the plane is the same in every direction: tangents turned by 30 degrees about the normal give the same orbit.
+/// Friction in the plane is isotropic: tangents rotated by 30 degrees about the normal give the
+/// same orbit.
 #[test]
 fn a_turned_frame_has_the_same_orbit() {
     let brick = blade();
@@ -378,12 +395,12 @@ fn a_turned_frame_has_the_same_orbit() {
             assert!((a - b).abs() < 1e-6 * largest, "{column}: {a} {b}");
         }
     }
-    // and a frame is needed to see them: the tangents themselves differ
+    // the tangential motions themselves differ, so the frame has an effect
     let first = numbers(&straight, "pad_t1_amplitude_m")[0];
     assert!((first - numbers(&turned, "pad_t1_amplitude_m")[0]).abs() > 1e-2 * first);
 }
 
-/// A frame takes the rows of a node along x, y and z by their names, in whatever order they are stated.
+/// A frame takes the rows of a node along x, y and z by their names, in any order.
 #[test]
 fn rows_of_a_frame_are_taken_by_their_names() {
     let brick = blade();
@@ -405,7 +422,7 @@ fn rows_of_a_frame_are_taken_by_their_names() {
     assert_eq!(of(["z", "x", "y"]), straight);
 }
 
-/// Each mistake says which file or key, and what to do.
+/// Each error names the file or key, and what to do.
 #[test]
 fn what_is_wrong_is_said() {
     let brick = blade();
@@ -460,7 +477,7 @@ fn what_is_wrong_is_said() {
     told("\"m-kg-s\"", "\"mm-t\"", &["mm-t-s"]);
     told(&format!("\"{node}.z\""), "\"7.z\"", &["no row `7.z`"]);
     told(&format!("\"{node}.z\"]"), &format!("\"{node}.w\"]"), &["no row", "its rows of this node are"]);
-    // a number is near no other: the first and the last say which there are
+    // no name is similar to a number: the first and the last row show the range
     told(&format!("\"{node}.z\""), "\"9999.z\"", &["no row", "its 144 rows are", ", … `"]);
     told(DAMPED, &format!("{DAMPED}\nreduce = {{ kind = \"none\", modes = 3 }}"), &["leave out one"]);
     told(DAMPED, &format!("{DAMPED}\nreduce = {{ orders = 2 }}"), &["`orders`", "add `modes`"]);
@@ -472,7 +489,7 @@ fn what_is_wrong_is_said() {
     told(&format!("\"{node}.z\"]"), &format!("\"{node}.x\"]"), &["stands twice", "sum = {"]);
     told("tip.z", "tip", &["several directions"]);
     told("tip.z", "top.z", &["no place `top.z`"]);
-    // what is moved takes along what is the same
+    // a place on the row of an imposed motion follows that motion
     let twin = format!("dofs = [\"{node}.x\", \"{node}.y\", \"{node}.z\"]\n");
     let moved = format!(
         "{twin}[[place]]\nname = \"twin\"\ndof = \"{node}.x\"\n[[motion]]\non = \"twin\"\namplitude = \"1 mm\"\n"
@@ -486,7 +503,7 @@ fn what_is_wrong_is_said() {
         &format!("{DAMPED}\nreduce = {{ up_to = \"1e12 Hz\" }}"),
         &["has none far above", "lowest frequencies", "reduce = false"],
     );
-    // stiffness in other units than was said: frequencies of 5e-4 Hz, and of 5e8 Hz
+    // stiffness in wrong units: frequencies of 5e-4 Hz and 5e8 Hz
     let other = good.replacen("k.mtx\"\nmass = \"m.mtx", "k.npz\"\nmass = \"m.npz", 1);
     for unit in [1e12, 1e-12] {
         write_pair(path, &brick, "npz", (unit, 1.0));
@@ -500,8 +517,9 @@ fn what_is_wrong_is_said() {
     }
 }
 
-/// A free vibration of the blade in few coordinates, its joint next to nothing: amplitudes are those of places, the largest the one that was
-/// asked for, and they are those of a dense eigenvalue solution.
+/// A free vibration of the reduced blade with a nearly ineffective joint. Amplitudes are those
+/// of places, and the largest one is the requested amplitude. They equal a dense eigenvalue
+/// solution.
 #[test]
 fn a_mode_is_given_at_places() {
     let brick = blade();
@@ -535,8 +553,8 @@ fn a_mode_is_given_at_places() {
     }
 }
 
-/// Rows that a program has constrained, by 1e36 on the diagonal or by leaving them empty, are left out; damping from a file; a place that is a weighted
-/// sum of rows, and one that is the mean of two nodes.
+/// Constrained rows, marked by 1e36 on the diagonal or by empty rows, are left out. Damping
+/// comes from a file. One place is a weighted sum of rows, another the mean of two nodes.
 #[test]
 fn constrained_rows_sums_means_and_damping_by_a_file() {
     let brick = blade();
@@ -579,11 +597,12 @@ fn constrained_rows_sums_means_and_damping_by_a_file() {
     }
 }
 
-/// Matrices as Nastran punches them: a row without mass, and a free body whose rigid motion comes back at 1 Hz by the digits that are lost.
+/// Matrices in Nastran's punch format: a massless row, and a free body whose rigid motion
+/// appears at 1 Hz because of lost digits.
 #[test]
 fn a_row_without_mass_and_a_rigid_motion_at_one_hertz() {
     let folder = tempfile::tempdir().unwrap();
-    // mass - spring - nothing - spring - mass, held to the ground by next to nothing
+    // mass - spring - massless - spring - mass, with a very soft spring to the ground
     let (spring, mass) = (4e5, 0.5);
     let rigid = mass * TAU.powi(2);
     let k = [[spring + rigid, -spring, 0.0], [-spring, 2.0 * spring, -spring], [0.0, -spring, spring + rigid]];
@@ -620,7 +639,8 @@ fn a_row_without_mass_and_a_rigid_motion_at_one_hertz() {
         let data = results(folder.path(), &text);
         for (i, hertz) in [0.5, 1.0, 90.0, 200.0].into_iter().enumerate() {
             let s = Complex64::new(0.0, hertz * TAU);
-            // the massless row is in the middle: two masses on one spring of half the stiffness, by their common and their opposed motion
+            // the massless row is in the middle: two masses on one spring of half the
+            // stiffness, by their common and opposed motion
             let own = s * s * mass + s * 20.0 * mass + rigid;
             let (common, opposed) = (0.5 / own, 0.5 / (own + spring));
             for (column, expected) in [("one_amplitude_m", common + opposed), ("middle_amplitude_m", common)] {
@@ -632,8 +652,9 @@ fn a_row_without_mass_and_a_rigid_motion_at_one_hertz() {
     }
 }
 
-/// A free body with modal damping, whose free motion has none, and a mass on a spring of its own beside it; from event to event, where roots that fall
-/// together nearly are no modes. The free chain of three masses has the shapes (1, 0, -1) and (1, -2, 1) at k/m and 3 k/m.
+/// A free body with modal damping but an undamped rigid motion, and a mass on another spring,
+/// by the event-driven method. Nearly equal roots are not modes. The free chain of three masses
+/// has the shapes (1, 0, -1) and (1, -2, 1) at k/m and 3 k/m.
 #[test]
 fn a_free_body_with_modal_damping_and_a_sprung_mass() {
     let folder = tempfile::tempdir().unwrap();
@@ -676,7 +697,7 @@ fn a_free_body_with_modal_damping_and_a_sprung_mass() {
     }
 }
 
-/// λ and shapes of unit mass, by Cholesky's factor of M.
+/// Returns λ and the shapes of unit mass, by the Cholesky factor of M.
 fn modes(brick: &Brick) -> (Vec<f64>, DMatrix<f64>) {
     let factor = full(&brick.mass).cholesky().unwrap().l();
     let inverse = factor.solve_lower_triangular(&DMatrix::identity(brick.dofs(), brick.dofs())).unwrap();
@@ -684,8 +705,10 @@ fn modes(brick: &Brick) -> (Vec<f64>, DMatrix<f64>) {
     (eigen.eigenvalues.as_slice().to_vec(), inverse.transpose() * eigen.eigenvectors)
 }
 
-/// Modal damping of all rows: the ratio of every mode up to five times the highest drive frequency, or up to the frequency that is said, and
-/// growing with the frequency beyond; beside a mass, a spring and an imposed motion, and by methods that need full matrices.
+/// Modal damping without a reduction: the ratio holds for every mode up to five times the
+/// highest excitation frequency, or up to the given frequency. It grows with the frequency
+/// above. The model also has a mass, a spring and an imposed motion, and some methods need full
+/// matrices.
 #[test]
 fn modal_damping_without_a_reduction() {
     let brick = blade();
@@ -738,15 +761,15 @@ fn modal_damping_without_a_reduction() {
             let x = stiffness.lu().solve(&load).unwrap();
             for (column, expected) in [("tip_z_amplitude_m", x[z]), ("weight_amplitude_m", x[n])] {
                 let off = numbers(&data, column)[i] / expected.norm() - 1.0;
-                // a dense solution of 1e9 N/m beside 1e3
+                // accuracy of a dense solution with 1e9 N/m and 1e3 N/m
                 assert!(off.abs() < 1e-8, "{reduce} {method} {column} {hertz}: {off:e}");
             }
         }
     }
 }
 
-/// With friction the damping of modes is that of a reduction with the same last frequency, and the energies balance: the work of the forces is what
-/// the joint and the modes take.
+/// With friction the modal damping is that of a reduction with the same last frequency. The
+/// energies balance: the work of the forces equals the dissipation of the joint and the modes.
 #[test]
 fn modal_damping_with_friction_without_a_reduction() {
     let brick = blade();
@@ -769,7 +792,8 @@ fn modal_damping_with_friction_without_a_reduction() {
     }
 }
 
-/// So many modes with more orders of residual vectors come nearer: each order makes two more terms of the residual series exact.
+/// With a fixed number of modes, more orders of residual vectors reduce the error. Each order
+/// makes two more terms of the residual series exact.
 #[test]
 fn orders_of_residual_vectors() {
     let brick = blade();
@@ -782,11 +806,12 @@ fn orders_of_residual_vectors() {
     };
     let [one, two, three] = ["", ", orders = 2", ", orders = 3"].map(error);
     assert_eq!(one.to_bits(), error(", orders = 1, kind = \"rubin\"").to_bits());
-    // (900 Hz / 3 kHz of the first mode left out)⁴ for each; what rounding leaves of the third
+    // (900 Hz / 3 kHz of the first omitted mode)⁴ for each order; rounding limits the third
     assert!(two < 0.1 * one && three <= two.max(1e-9), "{one:e} {two:e} {three:e}");
 }
 
-/// The error of the reduction stands in every row of every kind that has an orbit or a frequency: in all tables but those of samples over time.
+/// The error of the reduction is in every row with an orbit or a frequency, of every kind: in
+/// all tables except time samples.
 #[test]
 fn the_error_of_the_reduction_stands_beside_every_result() {
     let brick = blade();
@@ -827,7 +852,7 @@ fn the_error_of_the_reduction_stands_beside_every_result() {
             met.push(table.name.clone());
         }
     }
-    // of some studies there may be no rows; of these there are
+    // some studies may have no rows; these must have some
     for name in [
         "loops_summary",
         "orbits",
@@ -848,7 +873,8 @@ fn the_error_of_the_reduction_stands_beside_every_result() {
     }
 }
 
-/// Masses in a row on springs of 20 N/um, held at one end and free at the other, as files `k.mtx` and `m.mtx`.
+/// Writes a chain of masses on springs of 20 N/um, fixed at one end and free at the other, as
+/// `k.mtx` and `m.mtx`.
 fn write_chain(folder: &Path, masses: usize) {
     let spring = 2e7;
     let mass = (0..masses).map(|i| (i, i, 0.05 + 0.01 * (i as f64).sin()));
@@ -860,8 +886,8 @@ fn write_chain(folder: &Path, masses: usize) {
     }
 }
 
-/// Harmonics that a joint makes meet modes far above the drive, the seventh one here: so many coordinates as the program takes by itself know them. Of so few
-/// rows it keeps all.
+/// Harmonics of a joint meet modes far above the excitation, here the seventh harmonic. The
+/// default frequency range contains these modes. This small structure is not reduced by default.
 #[test]
 fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
     let folder = tempfile::tempdir().unwrap();
@@ -891,7 +917,8 @@ fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
     assert_eq!(format!("{:?}", of("").tables), format!("{:?}", all.tables), "few rows are all kept");
 }
 
-/// Masses that no spring holds, one of them on a joint that sticks: its spring is all that there is, and the modes of the others are all the same one.
+/// Masses without springs, one of them on a stuck joint: its spring is the only stiffness, and
+/// the other modes are all the same.
 #[test]
 fn a_structure_without_stiffness() {
     let folder = tempfile::tempdir().unwrap();
@@ -912,8 +939,9 @@ fn a_structure_without_stiffness() {
     }
 }
 
-/// A stiff slider at the driven end of a chain with hardly any damping makes harmonics far above what the coordinates know. What a run says of that is the
-/// difference from all rows, here by another method.
+/// A stiff slider at the driven end of a nearly undamped chain produces harmonics far above the
+/// range of the reduced model. The note of the run states the difference from all rows, here
+/// computed by another method.
 #[test]
 fn what_few_coordinates_leave_out_of_the_harmonics_of_joints_is_measured() {
     const MASSES: usize = 300;
@@ -942,7 +970,8 @@ fn what_few_coordinates_leave_out_of_the_harmonics_of_joints_is_measured() {
     }
     let told = few.notes.iter().find(|note| note.contains("solved again")).unwrap();
     assert!(told.starts_with("warning: ") && told.contains("reduce = { up_to = "), "{told}");
-    // each of several cases is held against more coordinates, so that its rows say what they say alone
+    // each of several cases is compared with a larger model, so its rows equal those of a study
+    // of that case alone
     let several = varied("", "Ft", "vary = { Ft = [\"4 kN\", \"4 N\"] }", exact);
     let (alone, among) = (numbers(&few, "reduction_error"), numbers(&several, "reduction_error"));
     assert_eq!(alone, &among[alone.len()..]);

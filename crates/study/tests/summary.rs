@@ -1,4 +1,4 @@
-//! What a study says of itself before it is run.
+//! The summary of a study before it is run.
 
 use std::sync::Arc;
 use stickslip_study::run::{Context, check, run};
@@ -9,7 +9,7 @@ fn study(text: &str) -> Study {
     read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-/// The starting study of a template, edited.
+/// Returns the study of a template, edited.
 fn template(name: &str, edits: &[(&str, &str)]) -> String {
     edits.iter().fold(templates::find(name).unwrap().study.to_owned(), |text, (from, to)| {
         assert!(text.contains(from), "{from} is not in the template");
@@ -21,7 +21,7 @@ fn summary(text: &str) -> ModelSummary {
     ModelSummary::new(&study(text)).unwrap()
 }
 
-/// The only warning holds all these words.
+/// The only warning contains all these words.
 fn warns(text: &str, words: &[&str]) {
     let warnings = summary(text).warnings;
     assert_eq!(warnings.len(), 1, "{warnings:?}\n{text}");
@@ -39,7 +39,7 @@ fn silent(text: &str) {
 fn starting_studies_have_nothing_to_warn_of() {
     for row in templates::TABLE {
         let mut warnings = summary(row.study).warnings;
-        // a friction ring is that by its nature
+        // friction alone keeps a friction ring in place
         warnings.retain(|warning| !warning.contains("friction alone keeps them in place"));
         assert_eq!(warnings, Vec::<String>::new(), "{}", row.study);
     }
@@ -48,17 +48,17 @@ fn starting_studies_have_nothing_to_warn_of() {
 #[test]
 fn the_couple_says_its_modes_and_where_it_slips() {
     let text = summary(templates::find("blade-couple").unwrap().study).to_string();
-    // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589 Hz (6.8): 2 N are 10.1
-    // % of it
+    // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589
+    // Hz (6.8): 2 N are 10.1 % of it
     for word in
         ["3 degrees of freedom, 1 joint", "shown for Ft = 2 N", "121.25", "0.072", "rigid until then", "120.9589 Hz"]
     {
         assert!(text.contains(word), "{word}: {text}");
     }
     assert!(text.contains("119.5 to 120.2704 Hz, 120.6697 to 122.5 Hz; 0.101 of the excitation is enough"), "{text}");
-    // of the three masses one may have two peaks
+    // one of the three masses may have two peaks
     assert!(text.contains("4 cases, 979 rows"), "4 (241 + 1.3 · 3 masses): {text}");
-    // a spring before the slider: 2 N / 10 kN/m
+    // a spring in series with the slider: 2 N / 10 kN/m
     let text = summary(templates::find("blade-couple-massless").unwrap().study).to_string();
     assert!(text.contains("slips at 2 N, 200 µm of relative displacement"), "{text}");
     // without degrees of freedom there are no modes
@@ -79,12 +79,12 @@ fn a_model_that_nothing_drives() {
     };
     warns(&decay(""), &["nothing vibrates"]);
     silent(&decay("start = { blade1 = \"1 mm\" }"));
-    // one value of several that is zero is a reference
+    // a zero among several values is a reference
     silent(&template(
         "blade-couple",
         &[("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", "vary = { F0 = [\"0 N\", \"5 N\"] }")],
     ));
-    // a mode is free vibration
+    // a mode is a free vibration
     let modes = "kind = \"modes\"\namplitude = { from = \"10 um\", to = \"10 cm\" }";
     silent(&template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\""), (drive, modes)]));
     let constant = ("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 0");
@@ -105,7 +105,8 @@ fn masses_that_nothing_holds() {
     warns(&template("blade-couple", &ground), &["no spring holds `contact`", "friction alone"]);
 }
 
-/// A block on a contact that presses it away: with the force that presses it back nothing is said.
+/// A block on a contact whose preload pushes it away: there is no warning if a force pushes it
+/// back.
 #[test]
 fn a_preload_that_nothing_balances() {
     let block = |press: &str| {
@@ -126,7 +127,7 @@ fn parameters_that_nothing_uses() {
     warns(&template("blade-couple", &edits), &["uses the parameter `spare`, `other`"]);
     let varied = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\""), ("vary = { Ft =", "vary = { spare =")];
     warns(&template("blade-couple", &varied), &["`vary` changes `spare`", "the same"]);
-    // used by way of another parameter, in an expression of `vary`, in the study
+    // used in another parameter, in an expression of `vary`, in the study
     let used = [
         ("F0 = \"10 N\"", "F0 = \"10 N\"\nhalf = \"1 N\"\nlow = \"119.5 Hz\""),
         ("\"2 N\", \"4 N\"", "\"2 * half\", \"4 N\""),
@@ -153,20 +154,21 @@ fn a_range_without_a_resonance() {
         )
     };
     warns(&range("100 Hz", "110 Hz"), &["between 100 and 110 Hz", "the nearest is at 120.575 Hz with all joints free"]);
-    // between the free frequency of a mode and its stuck one there may be one
+    // a resonance may lie between the free frequency of a mode and its stuck one
     silent(&range("120.7 Hz", "120.9 Hz"));
     silent(&range("100 Hz", "121 Hz"));
-    // the third harmonic of the drive meets it
+    // the third harmonic of the excitation meets the resonance
     let third = [
         ("from = \"119.5 Hz\", to = \"122.5 Hz\"", "from = \"40 Hz\", to = \"41 Hz\""),
         ("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 3"),
     ];
     silent(&template("blade-couple", &third));
-    // one frequency is a point, not a range
+    // a single frequency is a point, not a range
     silent(&template("blade-couple", &[("{ from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }", "\"100 Hz\"")]));
 }
 
-/// On `k + 3/4 k3 a²` a cubic spring has its resonance wherever its amplitude puts it.
+/// A cubic spring of `k + 3/4 k3 a²` has its resonance at any frequency, depending on its
+/// amplitude.
 #[test]
 fn a_stiffening_spring_has_its_resonance_at_any_frequency() {
     let oscillator = |joint: &str| {
@@ -182,15 +184,15 @@ fn a_stiffening_spring_has_its_resonance_at_any_frequency() {
     ));
 }
 
-/// The narrower resonance of the couple is that of a blade with half of the contact's mass, of the width b/(2π (m + m1/2)) = 0.174 Hz: 3 Hz
-/// hold 17.2 of them.
+/// The narrower resonance of the couple is that of a blade with half of the contact's mass. Its
+/// width is b/(2π (m + m1/2)) = 0.174 Hz, which fits 17.2 times into 3 Hz.
 #[test]
 fn frequencies_further_apart_than_a_resonance_is_wide() {
     let points = |points: &str| template("blade-couple", &[("points = 241", points)]);
     warns(&points("points = 9"), &["are 0.38 Hz apart", "0.17 Hz wide", "19 points would do"]);
     silent(&points("points = 19"));
     silent(&points("tolerance = \"1 %\""));
-    // no orbit is taken between the ends of a branch but those that it needs
+    // a branch computes its points between the ends as needed
     let branch = [("kind = \"response\"", "kind = \"branch\""), ("points = 241", "points = 2")];
     silent(&template("blade-couple-massless", &branch));
 }
@@ -216,7 +218,7 @@ fn bare_numbers_as_angles() {
     }
 }
 
-/// Parameters in trigonometric functions have no unit by their place.
+/// Parameters in trigonometric functions have no unit by their position.
 #[test]
 fn bare_parameters_as_angles() {
     let wedge = |angle: &str| template("under-platform-wedge", &[("a1 = \"30 deg\"", &format!("a1 = {angle}"))]);
@@ -234,7 +236,7 @@ fn a_mode_that_never_slips() {
         let study = format!("kind = \"modes\"\nmode = 2\namplitude = {{ from = \"1 um\", to = \"{to}\" }}");
         template("blade-couple-massless", &[(drive, &study)])
     };
-    // both blades move against each other, each by the amplitude: they slip at 2 N / 10 kN/m = 2 x
+    // both blades move in opposition, each by the amplitude: they slip at 2 N / 10 kN/m = 2 x
     warns(&modes("0.09 mm"), &["no joint slips", "end at 90 µm", "100 µm"]);
     silent(&modes("0.11 mm"));
 }
@@ -272,7 +274,8 @@ fn an_optimum_at_the_edge_is_warned_of() {
     );
 }
 
-/// A study that is too large, refused with its size; the same study may have more memory.
+/// Checks that a study that is too large is refused with its size, and accepted with a larger
+/// memory limit.
 fn refused(text: &str, key: &str) {
     let study = study(text).with_memory_limit(2_000_000_000);
     let context = Context { finished: Arc::new(|| panic!("nothing is computed")), ..Context::unwatched(1) };
@@ -281,7 +284,7 @@ fn refused(text: &str, key: &str) {
     assert!(error.help_text().unwrap().contains(key) && error.line().is_some(), "{error:?}");
     let size = ModelSummary::new(&study).unwrap().size;
     assert!(size.memory < size.whole && size.whole > 2_000_000_000, "{size:?}");
-    // a run that writes its tables while it goes on is refused at its own size
+    // a run that writes its tables continuously is refused at its own size
     let error = check(&study.clone().with_memory_limit(size.memory - 1)).unwrap_err();
     assert!(error.message().contains("B of memory"), "{error}");
     check(&study.with_memory_limit(size.memory)).unwrap();
@@ -300,7 +303,8 @@ fn studies_that_need_too_much_memory_are_refused_in_advance() {
     refused(&loops, "samples");
     let summary = ModelSummary::new(&study(&loops)).unwrap();
     assert!((10_000_000..10_010_000).contains(&summary.size.rows), "{:?}", summary.size);
-    // displacement, velocity of three masses, of the joint also force and contact: a thousand orbits of 20,000 samples
+    // displacement and velocity of three masses, also force and contact of the joint: a
+    // thousand orbits of 20,000 samples
     let orbits = template(
         "blade-couple",
         &[
@@ -318,7 +322,7 @@ fn studies_that_need_too_much_memory_are_refused_in_advance() {
     refused(&cases, "vary");
 }
 
-/// A point of a branch keeps the coefficients of its motion, not what the equations take while they are solved.
+/// A point of a branch keeps the coefficients of its motion, not the memory of the equations.
 #[test]
 fn a_branch_is_counted_by_what_it_keeps() {
     let (name, masses) = (|i: usize| if i == 0 { "ground".to_owned() } else { format!("m{i}") }, 300);
@@ -337,7 +341,8 @@ fn a_branch_is_counted_by_what_it_keeps() {
          [study]\nkind = \"branch\"\nsteps = 10\nfrequency = {{ from = \"1 Hz\", to = \"2 Hz\" }}\n"
     );
     let size = ModelSummary::new(&study(&text)).unwrap().size;
-    // 16 harmonics of 16 bytes and the start, what is measured of each mass, 40 kB of the joint
+    // 16 harmonics of 16 bytes and the start, the measured numbers of each mass, 40 kB of the
+    // joint
     let kept = 50.0 * (16.0 * 17.0 * 300.0 + 100.0 * 300.0 + 40.0 * 1024.0);
     assert!((kept..3.0 * kept).contains(&(size.memory as f64)), "{} {kept}", size.memory);
 }
@@ -373,7 +378,7 @@ fn sizes_are_those_of_the_tables() {
         let dataset = run(&study, &context).unwrap();
         let rows: usize = dataset.tables.iter().map(|table| table.rows()).sum();
         let cells: usize = dataset.tables.iter().map(|table| table.rows() * table.columns.len()).sum();
-        // switches and multipliers that do not occur are counted
+        // columns of switches and multipliers that do not occur are counted
         let kind = study.kind().name;
         assert!(
             rows as u64 <= estimate.rows + 4 && (rows as f64) > 0.9 * estimate.rows as f64,
@@ -386,7 +391,8 @@ fn sizes_are_those_of_the_tables() {
 
 #[test]
 fn the_time_is_estimated_within_bounds() {
-    // a run of a second must not be called an hour, nor the other way round; a property test holds it to ten times
+    // A run of a second must not be estimated at an hour, nor the reverse. A property test
+    // checks a factor of ten.
     let small = summary(templates::find("element").unwrap().study).seconds;
     assert!((0.05..2.0).contains(&small), "{small}");
     let points = |count: &str| summary(&template("blade-couple", &[("points = 241", count)])).seconds;
@@ -394,7 +400,8 @@ fn the_time_is_estimated_within_bounds() {
     assert!(many > 50.0 * few && many < 100.0 * few, "{few} {many}");
 }
 
-/// What ten million orbits of the couple take was measured: 282 s of processor. What they may take is told beside it.
+/// Measured: ten million orbits of the couple take 282 s of processor time. The summary also
+/// states the longest time.
 #[test]
 fn the_usual_time_is_told_beside_the_longest() {
     let text = template(
@@ -411,7 +418,8 @@ fn the_usual_time_is_told_beside_the_longest() {
     assert!(said.contains("minutes on one thread, up to "), "{said}");
 }
 
-/// Rigid joints take the eliminations of their steps. Measured on one core: 1.3 s for a point of a ring of 96 blades of which no neighbour is known.
+/// Steps with rigid joints need eliminations. Measured on one core: 1.3 s for a point of a ring
+/// of 96 blades without a warm start.
 #[test]
 fn rigid_joints_take_eliminations() {
     let ring = |blades: usize| {
@@ -454,13 +462,15 @@ harmonics = 15
     let large = ring(96);
     assert!((0.4..4.0).contains(&large.seconds), "{} s", large.seconds);
     assert!(large.usual_seconds < large.seconds);
-    // in bands the time goes with the blades, beside what every run takes
+    // with banded matrices the time is proportional to the number of blades, plus a constant
     let growth = (ring(192).seconds - large.seconds) / (large.seconds - ring(48).seconds);
     assert!((1.5..3.0).contains(&growth), "{growth}");
 }
 
-/// Two contacts of two directions on three bodies, followed for sixty periods, twice; 36 mistuned sectors of two masses from event to event at nine frequencies, far
-/// from each other; a ring of 300 rigid joints with five harmonics, of which no neighbour is known: wall time of the command, with its files.
+/// Wall times of the command, with its files:
+/// - two contacts of two directions on three bodies, followed for sixty periods, twice;
+/// - 36 mistuned sectors of two masses, event-driven, at nine distant frequencies;
+/// - a ring of 300 rigid joints with five harmonics, without a warm start.
 #[test]
 fn the_usual_time_is_that_which_was_measured() {
     let contacts = r#"
@@ -575,7 +585,8 @@ harmonics = 5
     }
 }
 
-/// A place has a peak to refine where a resonance lifts one of the inner frequencies above its neighbours: none if all are nearest to the ends.
+/// A place has a peak to refine if a resonance raises one of the inner frequencies above its
+/// neighbours. There is none if all resonances are nearest to the ends.
 #[test]
 fn peaks_are_refined_where_resonances_are() {
     let seconds = |range: &str, peaks: &str| {
@@ -585,15 +596,17 @@ fn peaks_are_refined_where_resonances_are() {
         let vary = r#"vary = { Ft = ["2 N", "4 N", "6 N", "8 N"] }"#;
         summary(&template("blade-couple", &[(given, &range), (vary, cases)])).seconds
     };
-    // at 121 Hz and below the contact's own resonance: nearest to the middle of the one range, to an end of the other
+    // at 121 Hz and below the contact's own resonance: nearest to the middle of the first
+    // range, to an end of the second
     for (range, peak) in [(r#"from = "61 Hz", to = "181 Hz""#, true), (r#"from = "110 Hz", to = "300 Hz""#, false)] {
         let (with, without) = (seconds(range, "true"), seconds(range, "false"));
         assert_eq!(with > 1.2 * without, peak, "{range}: {with} s, {without} s without");
     }
 }
 
-/// Wedges under the platforms of 12 and 36 blades, one preload, on one thread, and of 12 mistuned ones: processor time of the command, with its files.
-/// The three points of the last are far from each other, and every orbit of its peak is sought anew; it was ended after 36 s.
+/// Processor times of the command, with its files: wedges under the platforms of 12 and 36
+/// blades, one preload, on one thread, and of 12 mistuned blades. The three points of the last
+/// study are distant, and every orbit of its peak has no warm start. It was stopped after 36 s.
 #[test]
 fn the_usual_time_of_wedges_is_that_which_was_measured() {
     let vary = r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#;
@@ -620,7 +633,8 @@ fn the_usual_time_of_wedges_is_that_which_was_measured() {
     }
 }
 
-/// Branches of tuned rings follow one sector. Measured: 2.2 s for 12 blades with wedges, which took as long for 36.
+/// Branches of tuned disks follow one sector. Measured: 2.2 s for 12 blades with wedges, and
+/// the same for 36.
 #[test]
 fn a_branch_of_a_tuned_disk_takes_the_time_of_a_sector() {
     let kind = (r#"kind = "response""#, r#"kind = "branch""#);
@@ -634,7 +648,8 @@ fn a_branch_of_a_tuned_disk_takes_the_time_of_a_sector() {
     assert!((0.7..7.0).contains(&few) && (few - many).abs() < 0.2 * few, "{few} s, {many} s");
 }
 
-/// The search for an optimum takes most of a performance study, if there is one: both times are told.
+/// The search for an optimum takes most of the time of a performance study, if there is an
+/// optimum: both times are stated.
 #[test]
 fn an_optimum_takes_its_time_if_there_is_one() {
     let small = ("points = 241", "points = 2001");
@@ -646,13 +661,14 @@ fn an_optimum_takes_its_time_if_there_is_one() {
     let (least, place) = curve.spared.unwrap();
     assert!(least < 0.2 * curve.usual_seconds, "{least} s of {} s", curve.usual_seconds);
     assert!(curve.to_string().contains(place), "{curve}");
-    // of two values none is between the others
+    // two values have none between them
     let two = (r#"["2 N", "4 N", "6 N", "8 N"]"#, r#"["2 N", "4 N"]"#);
     assert!(summary(&template("blade-couple", &[kind, two])).spared.is_none());
 }
 
-/// Transients of 13 points were measured: 0.4 s with the exact law, 26 s with the smooth one. The free contact has nearly no damping of its own, but the drive
-/// does not move it, and friction does not leave it alone: only the longest time counts with it.
+/// Measured: transients of 13 points take 0.4 s with the exact law, 26 s with the smooth one.
+/// The free contact has almost no damping, but the excitation does not drive it and friction
+/// damps it, so it only counts in the longest time.
 #[test]
 fn transients_usually_die_with_the_modes_that_are_driven() {
     let arctan = r#"law = { kind = "coulomb-arctan", limit = "Ft", alpha = "25 s/mm" }"#;
@@ -672,7 +688,8 @@ fn transients_usually_die_with_the_modes_that_are_driven() {
     }
 }
 
-/// Friction at a constant limit has one orbit; a stop, and friction that falls with velocity, may have more, and are named.
+/// Friction with a constant limit has one orbit. A stop, and friction that falls with velocity,
+/// may have several and are named.
 #[test]
 fn several_orbits_are_announced() {
     let coulomb = r#"law = { kind = "coulomb", limit = "Ft" }"#;
@@ -685,7 +702,7 @@ fn several_orbits_are_announced() {
     assert_eq!(stop.orbits, Some(Orbits::Several("`gap` of j".to_owned())));
 }
 
-/// A stop 1 kg may hit, with a bare gap, and a figure with references.
+/// A stop for a mass of 1 kg, with a gap as a bare number, and a figure with references.
 fn stop(law: &str, figure: &str) -> String {
     format!(
         r#"
@@ -731,13 +748,13 @@ fn references_that_no_law_has_are_missed_before_the_run() {
             format!("no reference curve with all joints {what}: the law `cubic` of joint `j` has no slip limit");
         assert!(warning.contains(&words), "{warning}");
     }
-    // a run says it once
+    // a run reports it once
     let notes = run(&study(&text), &Context::unwatched(1)).unwrap().notes;
     assert_eq!(notes.iter().filter(|note| note.contains("no reference curve")).count(), 2, "{notes:?}");
     silent(&stop("kind = \"gap\", gap = \"1 mm\", stiffness = \"1 N/mm\"", references));
 }
 
-/// Percentiles of draws have no linear curve behind them, which is said, and none is computed.
+/// Percentiles of draws have no linear reference; a warning says it, and none is computed.
 #[test]
 fn references_of_draws_are_missed_before_the_run() {
     let sample =
@@ -758,14 +775,15 @@ fn a_long_run_says_so_at_its_start() {
     assert_eq!(points(smooth, "points = 11"), None);
     let said = points(smooth, "points = 1000000").unwrap();
     assert!(said.contains("on one thread, up to") && said.contains("days") && said.contains("Ctrl-C"), "{said}");
-    // what is hard to find everywhere takes days as a rule
+    // orbits that are hard to find at all points take days
     let falling = "kind = \"stribeck\", limit = \"1 N\", static_limit = \"1.5 N\", velocity = \"10 mm/s\"";
     let series = stop(falling, "[method]\nkind = \"harmonic-balance\"").replace("points = 11", "points = 1000000");
     let said = summary(&series).long_run().unwrap();
     assert!(said.contains("days on one thread, up to") && said.contains("Ctrl-C"), "{said}");
 }
 
-/// A mass of 2 kg on 100 N/mm, pressed by `preload` on a face of 300 N/mm, under a constant force.
+/// A mass of 2 kg on 100 N/mm, pressed by `preload` on a face of 300 N/mm, under a constant
+/// force.
 fn pressed(preload: &str, constant: &str) -> String {
     format!(
         r#"
@@ -799,8 +817,8 @@ output = "joint_mean"
     )
 }
 
-/// The spring of the structure takes `k/(k + kn)` of the preload off the face, and the constant force is shared in the same way; the mean of a
-/// small vibration is the same.
+/// The spring of the structure takes the fraction `k/(k + kn)` of the preload, and the constant
+/// force is shared likewise. The mean of a small vibration is the same.
 #[test]
 fn what_the_structure_takes_of_a_preload() {
     for (preload, constant, left) in [(40.0, 0.0, 10.0), (40.0, 40.0, 40.0), (40.0, 80.0, 70.0), (40.0, -40.0, -20.0)] {
@@ -827,7 +845,8 @@ fn what_the_structure_takes_of_a_preload() {
     }
 }
 
-/// Faces that are apart at rest count as closed in the modes with all joints stuck, as they do in the reference curve of a figure.
+/// Contacts that are open at rest count as closed in the modes with all joints stuck, as in the
+/// reference curve of a figure.
 #[test]
 fn stuck_is_closed() {
     let hertz = |k: f64| (k / 2.0).sqrt() / std::f64::consts::TAU;
@@ -843,7 +862,8 @@ fn stuck_is_closed() {
     assert!(found.stuck.elastic[0].omega > found.free.elastic[0].omega, "{found}");
 }
 
-/// A wedge that nothing presses lies between its faces: one warning for all, which says what is missing.
+/// A wedge without a load lies loose between its faces: one warning for all wedges says what is
+/// missing.
 #[test]
 fn wedges_that_nothing_presses() {
     let edit = ("speed = \"2600 rpm\"", "speed = \"0 rpm\"");
@@ -854,7 +874,8 @@ fn wedges_that_nothing_presses() {
 
 #[test]
 fn a_tuned_disk_is_warned_of_the_nodal_diameters_that_its_excitation_meets() {
-    // with three nodal diameters the disk has a mode at 99 Hz free and 101 Hz stuck, with two and four none from 96 to 104 Hz
+    // with nodal diameter 3 the disk has a mode at 99 Hz free and 101 Hz stuck; with 2 and 4 it
+    // has none from 96 to 104 Hz
     let disk = |order: i32, more: &str| {
         format!(
             "schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[parameters]\nEO = {order}\n[study]\nkind = \"response\"\npeak_of = \"blade\"\n\
@@ -867,7 +888,7 @@ fn a_tuned_disk_is_warned_of_the_nodal_diameters_that_its_excitation_meets() {
     for order in [2, 4] {
         silent(&disk(order, ""));
     }
-    // blades that differ answer with all of them
+    // mistuned blades respond with all nodal diameters
     let mistuned = "[disk]\nsectors = 24\nmistuning = { of = \"kb\", deviation = \"1 %\", seed = 7 }\n";
     warns(&disk(2, mistuned), &["may step over it"]);
 }
@@ -928,7 +949,7 @@ fn resonances_without_damping() {
     // 15.9155 Hz = sqrt(10,000 N/m / 1 kg)/2 pi
     warns(&rubbing(JENKINS, &undamped), &["nothing but the joints damps the resonance at 15.9155 Hz", "damping_ratio"]);
     silent(&rubbing(JENKINS, &[]));
-    // beyond the range, and where no force drives it, it does no harm
+    // an undamped resonance is harmless outside the range, and if no force drives it
     let range = ("from = \"14 Hz\"", "from = \"17 Hz\"");
     silent(&rubbing(JENKINS, &[undamped[0], range]));
     // bristles have viscous friction while they slip freely: 2 N s/m
@@ -955,7 +976,8 @@ fn stiffnesses_that_no_structure_has() {
     assert!(warnings.iter().any(|warning| warning.contains("between `body` and `ground`")), "{warnings:?}");
 }
 
-/// Bristles that bend are springs with dampers: (s1 + s2)/(2 sqrt((s0 + k) m)) = 316.6278/(2 sqrt(100,002)) at sqrt(100,002)/2 pi = 50.33 Hz.
+/// Stuck bristles are springs with dampers: (s1 + s2)/(2 sqrt((s0 + k) m)) = 316.6278/(2
+/// sqrt(100,002)) at sqrt(100,002)/2 pi = 50.33 Hz.
 #[test]
 fn stuck_bristles_damp() {
     let law = "kind = \"lugre\", stiffness = \"1e5 N/m\", damping = \"316.2278 N s/m\", viscous = \"0.4 N s/m\", limit = \"1 N\", static_limit = \"1.5 N\", velocity = \"0.001 m/s\"";
@@ -973,7 +995,8 @@ fn stuck_bristles_damp() {
     assert!(found.to_string().contains("50.33 Hz, damping 50 %"), "{found}");
 }
 
-/// An Iwan joint of 4 N slips as a whole at FS (1 + beta)/(KT (beta + (chi+1)/(chi+2))) = 4.105 mm, and by parts before.
+/// An Iwan joint of 4 N slips completely at FS (1 + beta)/(KT (beta + (chi+1)/(chi+2))) = 4.105
+/// mm, and partly before.
 #[test]
 fn an_iwan_joint_says_its_macro_slip() {
     let law = "kind = \"iwan\", stiffness = \"2 N/mm\", limit = \"4 N\", chi = -0.5, beta = 0.3";
@@ -989,7 +1012,8 @@ fn an_iwan_joint_says_its_macro_slip() {
     assert!(undamped.contains("any excitation is enough at its undamped resonance at 17.43455 Hz"), "{undamped}");
 }
 
-/// Bouc-Wen tends to stiffness/(beta + gamma), and has both references: free of force, and the spring of small motion.
+/// Bouc-Wen has the limit stiffness/(beta + gamma), and both references: free, and the spring
+/// of small motion.
 #[test]
 fn bouc_wen_has_one_limit_and_both_references() {
     let law = "kind = \"bouc-wen\", stiffness = \"15 N/mm\", beta = \"0.6 /mm\", gamma = \"0.2 /mm\", exponent = 1";

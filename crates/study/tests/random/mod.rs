@@ -1,10 +1,12 @@
-//! A generator of study files: small structures with parameters over many decades, every law, method and kind.
+//! Generator of random study files: small structures with parameters over many decades, every
+//! law, method and kind.
 
 use std::fmt::Write;
 use stickslip::law;
 use stickslip_study::{kinds, templates};
 
-/// Random numbers by splitmix64 (Steele, Lea, Flood 2014): the same for a seed on every machine.
+/// Random numbers by splitmix64 (Steele, Lea, Flood 2014): a seed gives the same numbers on
+/// every machine.
 pub struct Chance(u64);
 
 impl Chance {
@@ -20,7 +22,7 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -29,12 +31,12 @@ impl Chance {
         low + (high - low) * self.unit()
     }
 
-    /// A whole number from `low` to `high`, both included.
+    /// Returns a whole number from `low` to `high`, both included.
     pub fn count(&mut self, low: usize, high: usize) -> usize {
         low + (self.next() % (high - low + 1) as u64) as usize
     }
 
-    /// True in one of `n` cases.
+    /// Returns true with the probability `1/n`.
     pub fn one_in(&mut self, n: usize) -> bool {
         self.count(1, n) == 1
     }
@@ -43,12 +45,12 @@ impl Chance {
         all[self.count(0, all.len() - 1)]
     }
 
-    /// A power of ten between these exponents.
+    /// Returns a power of ten between these exponents.
     fn decade(&mut self, low: f64, high: f64) -> f64 {
         10f64.powf(self.between(low, high))
     }
 
-    /// Now and then anything at all instead of what makes sense.
+    /// Sometimes replaces a sensible value by an arbitrary one.
     fn or_extreme(&mut self, value: f64) -> f64 {
         if self.one_in(80) { self.decade(-9.0, 12.0) } else { value }
     }
@@ -71,15 +73,15 @@ impl Scales {
     }
 }
 
-/// What of the model the rest of the study names.
+/// Names of the model that the rest of the study uses.
 struct Names {
     masses: Vec<String>,
     joints: Vec<String>,
-    /// Quantities that `vary` may have: name and value with its unit.
+    /// Parameters that `vary` may contain: name and value with its unit.
     parameters: Vec<(&'static str, f64, &'static str)>,
 }
 
-/// The text of a study.
+/// Generates the text of a study.
 pub fn study_text(chance: &mut Chance) -> String {
     let scales =
         Scales { mass: chance.decade(-3.0, 1.5), hertz: chance.decade(0.0, 3.0), force: chance.decade(-1.0, 3.0) };
@@ -117,14 +119,16 @@ fn template(chance: &mut Chance, text: &mut String) -> (Names, Scales) {
         joints: model.joints.iter().map(|joint| joint.name.clone()).collect(),
         parameters: vec![("Ft", chance.decade(-1.0, 1.5), "N")],
     };
-    // the blade couples, and the element, which has no frequency of its own
+    // the blade couples, and the element, which has no natural frequency
     let hertz = if names.masses.len() > 1 { 120.6 } else { 0.2 };
     (names, Scales { mass: 0.182, hertz, force: 10.0 })
 }
 
-/// A law with parameters of these scales; half of the limits are the parameter `limit`.
+/// Generates a law with parameters of these scales. Half of the limits are the parameter
+/// `limit`.
 fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
-    // places here move along one direction; smooth laws have a rate and exact ones are of pieces
+    // places here move along one direction; smooth laws have a rate, exact laws consist of
+    // pieces
     let fits = |row: &&law::LawInfo| {
         let law = row.sample();
         law.directions() == 1 && if smooth { law.rate().is_some() } else { law.pieces().is_some() }
@@ -152,7 +156,7 @@ fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
             _ if parameter.dimension == stickslip::dimension::Dimension::NONE => *sample,
             "lambda" | "beta" | "gamma" => chance.decade(-1.0, 1.0) / scales.length(),
             "damping" | "viscous" => 1e-3 * chance.decade(-1.0, 1.0) * (scales.mass * scales.stiffness()).sqrt(),
-            // steepness at rest: a share of the velocity scale
+            // steepness at rest: a fraction of the velocity scale
             "alpha" => chance.decade(0.0, 3.0) / (scales.length() * std::f64::consts::TAU * scales.hertz),
             _ => sample * chance.decade(-1.0, 1.0),
         };
@@ -170,7 +174,7 @@ fn lists(chance: &mut Chance, scales: &Scales, kind: &str, text: &mut String) ->
         let value = scales.stiffness() * chance.decade(-1.0, 1.0);
         chance.or_extreme(value)
     };
-    // damping ratios from a ten-thousandth to a third, now and then none or a negative one
+    // damping ratios from a ten-thousandth to a third, sometimes zero or negative
     let damping = |chance: &mut Chance| match chance.count(1, 12) {
         1 => 0.0,
         2 if chance.one_in(5) => -1e-3 * (scales.mass * scales.stiffness()).sqrt(),
@@ -197,7 +201,7 @@ fn lists(chance: &mut Chance, scales: &Scales, kind: &str, text: &mut String) ->
     } else {
         let free = chance.one_in(10);
         match chance.count(1, 3) {
-            // a chain, or a ring
+            // a chain or a ring
             1 => {
                 (1..n).for_each(|i| spring(chance, &name(i - 1), &name(i), ""));
                 if n > 2 && chance.one_in(2) {
@@ -206,7 +210,7 @@ fn lists(chance: &mut Chance, scales: &Scales, kind: &str, text: &mut String) ->
             }
             // a star
             2 => (1..n).for_each(|i| spring(chance, &name(0), &name(i), "")),
-            // each on its own foot
+            // each mass on a spring to the ground
             _ => (1..n).for_each(|i| spring(chance, &name(i), "ground", "")),
         }
         if !free {
