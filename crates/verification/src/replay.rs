@@ -101,8 +101,8 @@ const STRIDE: f64 = 2.0;
 pub const NODES: [f64; 2] = [1.0 / 3.0, 1.0];
 const STAGES: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 
-/// Returns the states of a rate law at the end of a step of length `h` (s), from the states
-/// before it and the motion at the [`NODES`].
+/// Returns the states of a rate law at the end of a step of length `h` (s), from the
+/// states before it. `motion` holds the motion at the [`NODES`].
 ///
 /// # Panics
 /// If the equations of the step are singular.

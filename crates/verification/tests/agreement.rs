@@ -92,8 +92,8 @@ fn a_stuck_spring_at_its_limit() {
     // no load acts before the vibration
     let furthest = high.max(-low);
     assert!(furthest > 1.02 * 0.5 * (high - low), "{low} {high}");
-    // with a limit between half of the travel and the larger extreme, the slider is stuck in
-    // the orbit but would slip on the path to it
+    // a limit between half of the travel and the larger extreme: the slider is stuck in the
+    // orbit, but would slip on the path to it
     let limit = stiffness * 0.5 * (furthest + 0.5 * (high - low));
     let system = mass(&[Arc::new(Jenkins { stiffness, limit }), gap], 20.0, 0.0);
     let (a, b) = (orbit(&EventDriven, &system, 150.0), orbit(&HarmonicBalance::default(), &system, 150.0));

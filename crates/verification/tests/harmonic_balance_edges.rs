@@ -48,8 +48,8 @@ fn agrees(model: &Model, omega: f64) {
 }
 
 /// Permanently stuck contacts with limits up to 1e100. A body stuck to the ground supports a
-/// driven body through a spring, so its amplitude is `F/|k + c - m ω² + i b ω|`. The test
-/// covers smooth and falling friction too.
+/// driven body through a spring. The amplitude is `F/|k + c - m ω² + i b ω|`. The test covers
+/// smooth and falling friction too.
 #[test]
 fn limits_that_nothing_reaches() {
     let (stiffness, coupling, omega) = (100.0, 40.0, 7.0);
