@@ -127,8 +127,8 @@ fn excitation_without_a_fundamental() {
     }
 }
 
-/// A light part resonates at the seventeenth harmonic, above the first comparison of 7 with 15
-/// harmonics.
+/// A light part resonates at the seventeenth harmonic, above the first comparison of 7 with
+/// 15 harmonics.
 #[test]
 fn a_resonance_above_the_series() {
     let model = Model {

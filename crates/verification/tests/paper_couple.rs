@@ -185,10 +185,10 @@ fn theory_6_5_sensitivity_to_alpha() {
 /// The performance curve: the largest a1 over frequency as a function of the limit.
 ///
 /// Section 6.6 uses harmonic balance with the harmonics 1, 3, 5 on a grid of 0.02 Hz. With the
-/// exact law and maxima over frequency, its values are within 1 %, except near the optimum,
-/// where the small mass is near its 1:3 resonance. There 6 N is 5.4 % too low, 6.5 N 2.2 % too
-/// low, and 7 N 1.2 % too high. The optimum is not 1.956 cm at 6.5 N but 1.975 cm at 6.68 N,
-/// where the curve has two equally high peaks.
+/// exact law and maxima over frequency, its values are within 1 % away from the optimum. Near
+/// the optimum the small mass is near its 1:3 resonance. There 6 N is 5.4 % too low, 6.5 N
+/// 2.2 % too low, and 7 N 1.2 % too high. The optimum is not 1.956 cm at 6.5 N but 1.975 cm at
+/// 6.68 N, where the curve has two equally high peaks.
 #[test]
 fn theory_6_6_performance_curve() {
     let asymmetric = [
