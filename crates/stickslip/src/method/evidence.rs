@@ -94,7 +94,8 @@ impl Judge {
         Judge { proven, ..Judge::of_any_size(system) }
     }
 
-    /// Makes a judge for any system, even where stability is proven or the integration is slow.
+    /// Makes a [`Judge`] for any system, even where stability is proven or the integration is
+    /// slow.
     pub fn of_any_size(system: &System) -> Self {
         let name = "the judge of stability"; // this name appears in no message
         let flow: Option<Box<dyn Flow>> = match Kind::of(system, None) {

@@ -23,7 +23,8 @@ pub(crate) trait ReturnMap {
     /// Reports the relative change of the state in the last return; infinite before the first.
     ///
     /// A flow that chooses new steps in every return has a different error in each, so the
-    /// iteration may never settle. Once the change is that small, the flow must keep its steps.
+    /// iteration may never settle. Once the change is as small as this error, the flow must
+    /// keep its steps.
     fn moves(&mut self, _change: f64) {}
 }
 
@@ -128,8 +129,8 @@ impl Search {
     }
 }
 
-/// Returns before Newton's method for an orbit of several periods. Newton's method alone would
-/// first find an orbit of one period.
+/// Number of returns before Newton's method for an orbit of several periods. Newton's method
+/// alone would first find an orbit of one period.
 pub(crate) const APPROACH: usize = 60;
 
 /// Iterates the map [`APPROACH`] times and returns the state.
@@ -251,7 +252,7 @@ fn window(count: usize) -> Option<usize> {
     count.is_multiple_of(2 * FIRST_WINDOW).then_some(count / 2)
 }
 
-/// Returns before the first check for progress; later checks follow whenever the number
+/// Number of returns before the first check for progress; later checks follow whenever it
 /// doubles. The search fails after [`HOPELESS`] negative checks in a row. Beats of neighbouring
 /// modes rise and fall, but not over growing windows.
 const PATIENCE: usize = 1024;
@@ -287,7 +288,7 @@ const ITERATIONS: usize = 60;
 const RESCUES: usize = 6;
 /// Most halvings of a Newton step before a phase of iterating the map.
 const HALVINGS: i32 = 4;
-/// Returns in the first phase; each later phase is longer by half.
+/// Number of returns in the first phase; each later phase is longer by half.
 const RETURNS: usize = 40;
 /// A state larger than rest by this factor (10^7 times the static response) cannot be checked.
 const LARGEST: f64 = 1e10;
@@ -300,7 +301,7 @@ const FAR: f64 = 1e6;
 fn too_large(size: f64, aim: Aim) -> bool {
     aim.rest > 0.0 && size > LARGEST * aim.rest
 }
-/// A Newton step must reduce the residual at least by this factor.
+/// A Newton step must leave at most this fraction of the residual.
 const DECREASE: f64 = 0.95;
 /// Singular values below this fraction of the largest belong to the continuum of stick offsets.
 const CONTINUUM: f64 = 1e-10;

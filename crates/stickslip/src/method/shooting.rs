@@ -175,7 +175,7 @@ impl Stepping {
     }
 }
 
-/// Finds orbits by time integration, with either search.
+/// Finds orbits by time integration, by Newton's method or by waiting until the motion settles.
 pub(super) struct Shooter<'a> {
     system: &'a System,
     shared: Arc<System>,
