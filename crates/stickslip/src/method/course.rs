@@ -160,8 +160,8 @@ mod tests {
         }
     }
 
-    /// Returns that repeat every third time are told from returns that settle slowly and from
-    /// irregular returns.
+    /// The classification distinguishes a motion that repeats every third period from a slowly
+    /// settling and from an irregular one.
     #[test]
     fn what_repeats_is_told_from_what_does_not() {
         let system = block([0.0, 10.0]);
