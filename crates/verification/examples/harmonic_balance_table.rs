@@ -1,8 +1,9 @@
-//! Amplitude error of harmonic balance against the exact method over the paper's curves, by number of harmonics.
+//! Amplitude error of harmonic balance against the exact method over the paper's curves, by
+//! number of harmonics.
 //!
 //! `cargo run --release -p stickslip-verification --example harmonic_balance_table`
 
-#![allow(clippy::print_stdout)] // a table is what this prints
+#![allow(clippy::print_stdout)] // the example prints a table
 
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -53,7 +54,7 @@ fn main() {
                 let mut start: Option<Vec<f64>> = None;
                 let (mut worst, mut estimate, mut failed, mut reason) = (0.0f64, 0.0f64, 0, "");
                 let begin = Instant::now();
-                // many harmonics take long: every eighth point is enough to see what they reach
+                // many harmonics take long: every eighth point shows the reached error
                 let stride = if method.tolerance.is_some_and(|tolerance| tolerance < 1e-3) { 8 } else { 1 };
                 for (omega, judge) in omegas.iter().zip(&reference).step_by(stride) {
                     match solver.orbit(*omega, start.as_deref()) {

@@ -1,4 +1,5 @@
-//! One mass on springs along each of a law's directions, held by the law too: what every law of the table is tried on.
+//! A test system for every law of the table: one mass on a spring and the law, along each
+//! direction of the law.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -13,15 +14,16 @@ pub const MASS: f64 = 0.182;
 pub const STIFFNESS: f64 = 105_103.0;
 /// Amplitude of the force along the first direction, N.
 pub const FORCE: f64 = 10.0;
-/// Drive frequency, rad/s.
+/// Excitation frequency, rad/s.
 pub const OMEGA: f64 = TAU * 118.0;
 
-/// Amplitude of the force along a direction, N.
+/// Returns the complex amplitude of the force along a direction, N.
 pub fn load(a: usize) -> Complex64 {
     Complex64::from_polar(FORCE / (1 + a) as f64, 0.9 * a as f64)
 }
 
-/// The mass with viscous `damping` (N s/m) along each direction, under [`load`] and the same constant force (N) along all.
+/// Returns the mass with viscous `damping` (N s/m) along each direction, under [`load`] and the
+/// constant force `constant` (N) along all directions.
 pub fn held(law: &SharedLaw, damping: f64, constant: f64) -> System {
     let d = law.directions();
     let one = DMatrix::identity(d, d);

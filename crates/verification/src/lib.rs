@@ -1,7 +1,8 @@
-//! Tests of Stickslip against closed forms, published results and outside integrators; see `tests/`.
+//! Tests of Stickslip against closed forms, published results and independent integrators; see
+//! `tests/`.
 //!
-//! The library part holds what several tests share: random models, templates with changes, and small numerics (search, quadrature)
-//! written apart from the library's own.
+//! The library part holds code that several tests share: random models, changed templates, and
+//! small numerics (search, quadrature). It does not use the numerics of the other crates.
 
 pub mod held;
 pub mod loose_dampers;
@@ -19,7 +20,7 @@ use stickslip::orbit::{Orbit, Sample};
 use stickslip::structure::{Structure, StructureError};
 use stickslip_study::templates;
 
-/// The Rust of the book, which compiles and runs.
+/// Compiles and runs the Rust examples of the book.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../../../docs/src/getting_started.md")]
@@ -28,17 +29,19 @@ mod book {
     struct Matrices;
 }
 
-/// A small generator of uniform numbers, so that every test can name its models by a seed.
-/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014), SplitMix64.
+/// A small generator of uniform random numbers, so that a seed identifies each model of a test.
+///
+/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014),
+/// SplitMix64.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
 impl Random {
-    /// Starts at a seed.
+    /// Makes a generator from a seed.
     pub fn new(seed: u64) -> Self {
         Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
-    /// Uniform in [0, 1).
+    /// Returns a number uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -46,28 +49,30 @@ impl Random {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
-    /// Uniform in `[low, high)`.
+    /// Returns a number uniform in `[low, high)`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
-    /// A whole number in `0..n`.
+    /// Returns a whole number in `0..n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
 }
 
-/// A symmetric matrix with eigenvalues from `least` up.
+/// Returns a symmetric matrix with eigenvalues of at least `least`.
 fn definite(random: &mut Random, n: usize, least: f64, size: f64) -> DMatrix<f64> {
     let b = DMatrix::from_fn(n, n, |_, _| random.between(-1.0, 1.0));
     DMatrix::identity(n, n) * least + &b * b.transpose() * size
 }
 
-/// One of these laws with parameters up to twice or half of its sample's, and those that may be left out as they are there.
+/// Returns one of these laws with parameters between half and twice those of its sample.
+/// Parameters with a default keep the sample's value.
 pub fn random_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
     drawn_law(random, among, |random, value, p| if p.default.is_some() { value } else { around(random, value) })
 }
 
-/// One of these laws with parameters from all that each may be: zero, of either sign, any count.
+/// Returns one of these laws with parameters from their whole ranges: zero, either sign, any
+/// count.
 pub fn any_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
     drawn_law(random, among, |random, value, p| match p.range {
         Range::Positive => around(random, value),
@@ -79,7 +84,7 @@ pub fn any_law(random: &mut Random, among: &[&'static LawInfo]) -> SharedLaw {
     })
 }
 
-/// Up to twice or half as much.
+/// Returns a value between half and twice `value`.
 fn around(random: &mut Random, value: f64) -> f64 {
     value * 2f64.powf(random.between(-1.0, 1.0))
 }
@@ -101,17 +106,18 @@ fn drawn_law(
     row.sample()
 }
 
-/// A system of up to four degrees of freedom with full matrices and up to two joints of any laws of the table, and a drive frequency, rad/s.
+/// Returns a system with one to four degrees of freedom, full matrices and one or two joints,
+/// with an excitation frequency in rad/s. The joints have any laws of the table.
 pub fn random_system(seed: u64) -> (System, f64) {
     random_system_of(seed, TABLE)
 }
 
-/// The same with parameters of the laws from all that they may be.
+/// Returns such a system with law parameters from their whole ranges.
 pub fn random_system_of_any(seed: u64) -> (System, f64) {
     system_with(seed, &|random| any_law(random, TABLE))
 }
 
-/// The same with joints of these laws.
+/// Returns such a system with joints of these laws.
 pub fn random_system_of(seed: u64, among: &[&'static LawInfo]) -> (System, f64) {
     system_with(seed, &|random| random_law(random, among))
 }
@@ -122,7 +128,7 @@ fn system_with(seed: u64, law: &dyn Fn(&mut Random) -> SharedLaw) -> (System, f6
     let mass = definite(&mut random, n, 0.5, 1.0);
     let stiffness = definite(&mut random, n, 1e4, 1e4);
     let natural = (stiffness[(0, 0)] / mass[(0, 0)]).sqrt();
-    // damping ratios of some percent, so that transients die
+    // damping ratios of some percent, so that transients decay
     let damping = definite(&mut random, n, 0.1 * natural, 0.05 * natural);
     let places = (0..n).map(|i| format!("p{i}")).collect();
     let structure = Structure::new(places, mass, damping, stiffness).unwrap();
@@ -147,10 +153,14 @@ fn system_with(seed: u64, law: &dyn Fn(&mut Random) -> SharedLaw) -> (System, f6
     (builder.build().unwrap(), natural * random.between(0.4, 1.6))
 }
 
-/// A row of 6 to 20 bodies, or a ring of them, mistuned and held by the ground and by each other, with joints of any laws of the table between about
-/// every other pair of neighbours, each body driven with a phase of its own, and a drive frequency near its band, rad/s.
+/// Returns a mistuned row or ring of 6 to 20 bodies and an excitation frequency near its band,
+/// rad/s.
+///
+/// The bodies are connected to the ground and to their neighbours. About every other pair of
+/// neighbours has a joint with any law of the table. A force with a random phase acts on each
+/// body.
 pub fn random_row(seed: u64) -> (System, f64) {
-    // numbers of neighbouring seeds are those of one sequence, one apart
+    // spread the seeds: the sequences of neighbouring seeds are shifted by one number
     let mut random = Random::new(seed << 20);
     let (count, closed) = (6 + random.below(15), random.unit() < 0.5);
     let pairs = if closed { count } else { count - 1 };
@@ -167,7 +177,7 @@ pub fn random_row(seed: u64) -> (System, f64) {
         stiffness[(i, j)] -= between;
         stiffness[(j, i)] -= between;
     }
-    // damping ratios of some percent, so that transients die
+    // damping ratios of some percent, so that transients decay
     let damping = &mass * (0.08 * natural);
     let places = (0..count).map(|i| format!("p{i}")).collect();
     let mut builder = System::builder(Structure::new(places, mass, damping, stiffness).unwrap());
@@ -176,7 +186,7 @@ pub fn random_row(seed: u64) -> (System, f64) {
             continue;
         }
         let law = random_law(&mut random, TABLE);
-        // a law of several directions has its first between the pair, and the others to the ground
+        // the first direction of a law acts between the pair, the others against the ground
         let axis = |d: usize| match d {
             0 => Axis::new(vec![(i, 1.0), ((i + 1) % count, -1.0)]),
             d => Axis::new(vec![((i + d) % count, 1.0)]),
@@ -194,9 +204,12 @@ pub fn random_row(seed: u64) -> (System, f64) {
     (builder.build().unwrap(), natural * random.between(0.8, 1.3))
 }
 
-/// A random structure and a drive frequency (rad/s): 1 to 4 masses, 1 to 3 joints of exact laws between any two places, light
-/// damping, one or two harmonics of force on some masses, driven anywhere between a third and three times a natural frequency,
-/// every third one at a natural frequency of the structure without joints.
+/// Returns a random model and an excitation frequency, rad/s.
+///
+/// The model has 1 to 4 masses, 1 to 3 joints of exact laws between any two places, and light
+/// damping. Forces of one or two harmonics act on some masses. The frequency lies between a
+/// third and three times a natural frequency. For every third seed it equals a natural
+/// frequency of the structure without joints.
 pub fn random_model(seed: u64) -> (Model, f64) {
     let mut random = Random::new(seed);
     let count = 1 + random.below(4);
@@ -204,7 +217,7 @@ pub fn random_model(seed: u64) -> (Model, f64) {
     let name = |i: usize| if i == 0 { GROUND.to_owned() } else { format!("m{i}") };
     for i in 1..=count {
         model.masses.push(Mass::new(name(i), random.between(0.1, 2.0)));
-        // every mass is held by something: by the ground, or by a mass before it
+        // a spring connects every mass to the ground or to an earlier mass
         let other = if random.unit() < 0.6 { 0 } else { random.below(i) };
         let stiffness = 10f64.powf(random.between(2.0, 4.0));
         let damping = random.between(0.001, 0.1) * stiffness.sqrt();
@@ -238,16 +251,16 @@ pub fn random_model(seed: u64) -> (Model, f64) {
     (model, natural * factor)
 }
 
-/// A template with some parameters changed, assembled.
+/// Assembles a template with some parameters changed.
 pub fn template(name: &str, changes: &[(&str, f64)]) -> System {
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
     template.model_with(changes).unwrap_or_else(|error| panic!("{error}")).assemble().expect("well formed")
 }
 
-/// The same system with another mass matrix, as it is; a mass matrix that is none is refused.
+/// Returns the same system with another mass matrix.
 ///
 /// # Errors
-/// As [`Structure::new`].
+/// Same as [`Structure::new`], which refuses an invalid mass matrix.
 pub fn with_mass(system: &System, change: impl FnOnce(&mut DMatrix<f64>)) -> Result<System, StructureError> {
     let old = system.structure();
     let mut mass = old.mass().clone();
@@ -256,7 +269,8 @@ pub fn with_mass(system: &System, change: impl FnOnce(&mut DMatrix<f64>)) -> Res
     Ok(system.on(structure).expect("as many degrees of freedom"))
 }
 
-/// A template with the laws of all joints replaced by `law(limit)`, given the slip limit of each.
+/// Assembles a template with the laws of all joints replaced by `law(limit)`, given the slip
+/// limit of each.
 pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> SharedLaw) -> System {
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
     let mut model = template.model_with(changes).unwrap_or_else(|error| panic!("{error}"));
@@ -266,7 +280,8 @@ pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> S
     model.assemble().expect("well formed")
 }
 
-/// The exact orbit at `omega` (rad/s), found from nothing, with its evidence in bounds.
+/// Returns the exact orbit at `omega` (rad/s), found without a warm start, and asserts its
+/// evidence.
 pub fn exact(system: &System, omega: f64) -> Orbit {
     let orbit = EventDriven.solver(system).expect("exact laws").orbit(omega, None).expect("an orbit");
     assert!(orbit.evidence.residual < 1e-10 && orbit.evidence.energy_gap < 1e-9, "{orbit:?}");
@@ -287,8 +302,10 @@ pub fn near(what: &str, actual: f64, expected: f64, absolute: f64) {
     assert!(error <= absolute, "{what}: {actual:.12e} instead of {expected:.12e}, error {error:.1e}");
 }
 
-/// Where `function` is largest in `[low, high]`, and its largest value there: a scan over `points` intervals, then golden-section
-/// search between the neighbours of each of the three highest maxima of the scan until the bracket is below `width`.
+/// Returns the maximizer of `function` in `[low, high]` and the maximum.
+///
+/// A scan over `points` intervals gives the three highest local maxima. Golden-section search
+/// refines each between its neighbours until the bracket is below `width`.
 pub fn maximum(mut function: impl FnMut(f64) -> f64, [low, high]: [f64; 2], points: usize, width: f64) -> (f64, f64) {
     let at = |i: usize| low + (high - low) * i as f64 / points as f64;
     let values: Vec<f64> = (0..=points).map(|i| function(at(i))).collect();
@@ -323,7 +340,8 @@ fn golden(mut function: impl FnMut(f64) -> f64, [mut a, mut b]: [f64; 2], width:
     if fc > fd { (c, fc) } else { (d, fd) }
 }
 
-/// The zero of `function` in `[low, high]`, at whose ends it has different signs, by bisection to the last bit.
+/// Returns the zero of `function` in `[low, high]` by bisection to the last bit. The function
+/// must change its sign.
 pub fn zero(mut function: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
     let sign = function(low).signum();
     assert!(function(high).signum() != sign, "no change of sign between {low} and {high}");
@@ -337,9 +355,10 @@ pub fn zero(mut function: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2])
     0.5 * (low + high)
 }
 
-/// Integral of `function(t)` over `[0, end]`, smooth between the `breaks`: Gauss's rule with eight points on 16 parts of each piece.
+/// Returns the integral of `function(t)` over `[0, end]`, with a function that is smooth
+/// between the `breaks`. Uses the Gauss rule with eight points on 16 parts of each piece.
 pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) -> f64 {
-    // abscissas and weights of Abramowitz and Stegun (1964), Table 25.4
+    // abscissas and weights: Abramowitz and Stegun (1964), Table 25.4
     const POINTS: [(f64, f64); 4] = [
         (0.183_434_642_495_649_8, 0.362_683_783_378_362),
         (0.525_532_409_916_329, 0.313_706_645_877_887_27),
@@ -364,7 +383,8 @@ pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) 
     sum
 }
 
-/// Harmonic `n` of a quantity of an orbit: `X` in `Re(X e^{jnΩt})`, by Gauss's rule between the switches.
+/// Returns harmonic `n` of a quantity of an orbit, `X` in `Re(X e^{jnΩt})`, by the Gauss rule
+/// between the switches.
 pub fn harmonic(orbit: &Orbit, n: u32, quantity: impl Fn(&Sample) -> f64) -> Complex64 {
     let (period, mut breaks) = (orbit.period(), orbit.switch_times());
     breaks.push(0.5 * period);
@@ -375,7 +395,7 @@ pub fn harmonic(orbit: &Orbit, n: u32, quantity: impl Fn(&Sample) -> f64) -> Com
     Complex64::new(part(f64::cos), -part(f64::sin))
 }
 
-/// Rows of a table of `data/`, each a map from column to text.
+/// Reads a table of `data/`: one map from column to text per row.
 pub fn table(path: &str) -> Vec<BTreeMap<String, String>> {
     let path = format!("{}/../../data/{path}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
@@ -395,7 +415,7 @@ pub fn table(path: &str) -> Vec<BTreeMap<String, String>> {
     lines.map(|line| names.iter().cloned().zip(cells(line)).collect()).collect()
 }
 
-/// A number in a row of a [`table`].
+/// Returns a number in a row of a [`table`].
 pub fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
     row[column].parse().unwrap_or_else(|_| panic!("column {column}: `{}` is no number", row[column]))
 }

@@ -1,8 +1,9 @@
-//! Random under-platform dampers that nothing but contacts holds, and their motion in time by an integration that shares
-//! no code with the library.
+//! Random under-platform dampers that only contacts hold, and their motion in time by an
+//! integration that shares no code with the library.
 //!
-//! Wedges between a blade and a stiff wall, roofs between two blades, and cylinders, which roll. A constant force presses
-//! the damper against its two faces, on which it sticks, slips and separates.
+//! The dampers are wedges between a blade and a stiff wall, roofs between two blades, and
+//! cylinders, which roll. A constant force presses the damper against two faces. It sticks,
+//! slips and separates there.
 
 use crate::Random;
 use nalgebra::{DMatrix, DVector};
@@ -13,25 +14,27 @@ use stickslip::law::FrictionContact;
 use stickslip::model::{Axis, System};
 use stickslip::structure::Structure;
 
-/// Steps in which the constant load grows, and in which the damper then comes to rest.
+/// Steps in which the constant load grows, and steps in which the damper then comes to rest.
 const LOAD_STEPS: usize = 20_000;
-/// Their length, in periods of a blade.
+/// Length of these steps, in periods of a blade.
 const LOAD_STEP: f64 = 1e-3;
-/// The damper may go on to ring by so many times what is left of the blades' transient: nothing damps it on its contacts.
+/// Tolerance for the damper in tolerances of the blades. The contacts do not damp the ringing
+/// of the damper.
 const LOOSER: f64 = 300.0;
-/// Periods over which two amplitudes are compared.
+/// Periods between two compared amplitudes.
 const WINDOW: usize = 40;
 
-/// How a motion is followed.
+/// Settings of the integration.
 #[derive(Debug, Clone, Copy)]
 pub struct Course {
-    /// Steps of a period.
+    /// Steps per period.
     pub steps: usize,
     /// Periods over which the excitation grows from zero.
     pub growth: usize,
-    /// Periods after which it is given up.
+    /// Periods after which the integration fails.
     pub periods: usize,
-    /// Change of the blades' amplitudes, relative to the largest, below which it has settled.
+    /// Change of the blades' amplitudes, relative to the largest, below which the motion has
+    /// settled.
     pub settled: f64,
 }
 
@@ -42,7 +45,7 @@ pub struct LooseDamper {
     pub kind: &'static str,
     /// Mass, damping, stiffness.
     pub matrices: [DMatrix<f64>; 3],
-    /// Of each face the tangent and the normal, over all degrees of freedom.
+    /// Tangent and normal of each face, over all degrees of freedom.
     pub faces: [[DVector<f64>; 2]; 2],
     /// Tangential and normal stiffness, N/m.
     pub stiffness: [f64; 2],
@@ -52,18 +55,18 @@ pub struct LooseDamper {
     pub load: DVector<f64>,
     /// Complex amplitudes of the harmonic forces, N.
     pub excitation: DVector<Complex64>,
-    /// Drive frequencies at which it is looked at, rad/s.
+    /// Excitation frequencies of the tests, rad/s.
     pub frequencies: Vec<f64>,
     /// Degrees of freedom of the blades, which come first.
     pub blades: usize,
 }
 
-/// Uniform in its logarithm.
+/// Returns a number uniform in its logarithm.
 fn decade(random: &mut Random, low: f64, high: f64) -> f64 {
     low * (high / low).powf(random.unit())
 }
 
-/// Damper number `seed`.
+/// Returns the damper with this seed.
 pub fn loose_damper(seed: u64) -> LooseDamper {
     let mut random = Random::new(seed);
     let kind = ["wedge", "roof", "cylinder"][(seed % 3) as usize];
@@ -102,7 +105,7 @@ pub fn loose_damper(seed: u64) -> LooseDamper {
     let other = (angle + random.between(-0.1, 0.1)).clamp(20f64.to_radians(), 70f64.to_radians());
     let mut faces = [face(n, 0, angle), face(n, 1, other)];
     if rolls {
-        // turning moves the rim along both faces
+        // rotation moves the rim along both faces
         (faces[0][0][6], faces[1][0][6]) = (-radius, radius);
     }
     let press = decade(&mut random, 3.0, 3000.0);
@@ -128,8 +131,8 @@ pub fn loose_damper(seed: u64) -> LooseDamper {
     }
 }
 
-/// Two blades of 250 g with a roof damper of 12 g at 40 degrees under their platforms, pressed by its centrifugal load at a
-/// radius of 320 mm and a speed of rotation (rpm).
+/// Returns two blades of 250 g with a roof damper of 12 g at 40 degrees under their platforms.
+/// The centrifugal load at a radius of 320 mm and a rotation speed in rpm presses the damper.
 pub fn roof_damper(speed: f64) -> LooseDamper {
     let diagonal = |values: [f64; 6]| DMatrix::from_diagonal(&DVector::from_row_slice(&values));
     let mut load = DVector::zeros(6);
@@ -155,12 +158,13 @@ pub fn roof_damper(speed: f64) -> LooseDamper {
     }
 }
 
-/// Tangent and normal of the face towards a blade, at an angle to the direction of rotation, over all degrees of freedom.
+/// Returns tangent and normal of the face towards a blade, over all degrees of freedom. The
+/// angle is measured from the direction of rotation.
 fn face(n: usize, blade: usize, angle: f64) -> [DVector<f64>; 2] {
     let side = if blade == 0 { -1.0 } else { 1.0 };
     let (sine, cosine) = angle.sin_cos();
     let (mut tangent, mut normal) = (DVector::zeros(n), DVector::zeros(n));
-    // of the damper against the blade
+    // direction of the damper relative to the blade
     for (row, along, across) in [(0, side * sine, side * cosine), (1, -cosine, sine)] {
         (tangent[4 + row], normal[4 + row]) = (along, across);
         (tangent[2 * blade + row], normal[2 * blade + row]) = (-along, -across);
@@ -169,10 +173,10 @@ fn face(n: usize, blade: usize, angle: f64) -> [DVector<f64>; 2] {
 }
 
 impl LooseDamper {
-    /// As a system of the library.
+    /// Builds the system for the library.
     ///
     /// # Panics
-    /// On matrices that are none.
+    /// If the matrices are invalid.
     pub fn system(&self) -> System {
         let n = self.load.len();
         let [m, c, k] = self.matrices.clone();
@@ -198,7 +202,8 @@ impl LooseDamper {
         builder.build().expect("a system")
     }
 
-    /// Friction force and normal force after a straight step of the displacements `from` one point `to` the next.
+    /// Returns friction force and normal force of a face after a straight step of its
+    /// displacements `from` one point `to` the next.
     fn contact(&self, friction: f64, from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
         let [kt, kn] = self.stiffness;
         let normal = kn * to[1];
@@ -210,12 +215,13 @@ impl LooseDamper {
         [(begin + kt * (to[0] - from[0]) * share).clamp(-limit, limit), normal]
     }
 
-    /// Displacements along the faces.
+    /// Returns the displacements along the faces.
     fn along(&self, x: &DVector<f64>) -> [[f64; 2]; 2] {
         [0, 1].map(|face| [0, 1].map(|axis| self.faces[face][axis].dot(x)))
     }
 
-    /// Displacements along the faces that solve `u = free - G f(u)`, with the forces.
+    /// Solves `u = free - G f(u)` for the displacements along the faces; returns them with the
+    /// forces.
     fn solve(
         &self,
         gain: &[[f64; 4]; 4],
@@ -241,7 +247,8 @@ impl LooseDamper {
             if size(&r) <= 1e-14 * scale {
                 return Some((u, f));
             }
-            // derivatives of the forces: of each normal force by its own displacement, of friction by both of its face
+            // derivatives of the forces: the normal force depends on its own displacement,
+            // friction on both displacements of its face
             let mut slopes = [[0.0; 4]; 4];
             for face in 0..2 {
                 let (t, n) = (2 * face, 2 * face + 1);
@@ -283,7 +290,8 @@ impl LooseDamper {
         (size(&r) <= 1e-10 * scale).then_some((u, f))
     }
 
-    /// What forces along the faces move there, for an inverse of the structure's matrix, and what they move everywhere.
+    /// Returns the displacements due to unit forces along the faces, first along the faces and
+    /// then everywhere, for an inverse of the system matrix.
     fn gains(&self, inverse: &DMatrix<f64>) -> ([[f64; 4]; 4], Vec<DVector<f64>>) {
         let axes: Vec<&DVector<f64>> = self.faces.iter().flatten().collect();
         let moved: Vec<DVector<f64>> = axes.iter().map(|axis| inverse * *axis).collect();
@@ -291,8 +299,8 @@ impl LooseDamper {
         (gain, moved)
     }
 
-    /// Displacements and friction forces in static equilibrium: the constant load grows slowly on a structure whose every
-    /// motion is damped critically.
+    /// Returns displacements and friction forces in static equilibrium. The constant load grows
+    /// slowly, and every motion is critically damped.
     fn pressed(&self) -> Option<(DVector<f64>, [f64; 2])> {
         let n = self.load.len();
         let [m, _, k] = &self.matrices;
@@ -312,8 +320,10 @@ impl LooseDamper {
         Some((motion.x, motion.friction))
     }
 
-    /// Half of peak to peak of all displacements in the motion to which the one from static equilibrium comes, with an
-    /// excitation that grows slowly; `None` where it does not settle.
+    /// Returns half the peak-to-peak value of all displacements in the settled motion from
+    /// static equilibrium.
+    ///
+    /// The excitation grows slowly. Returns `None` if the motion does not settle.
     pub fn settled(&self, omega: f64, course: Course) -> Option<Vec<f64>> {
         let Course { steps, growth, periods, settled } = course;
         let n = self.load.len();
@@ -336,7 +346,8 @@ impl LooseDamper {
                 let now: Vec<f64> = ranges.iter().map(|(low, high)| 0.5 * (high - low)).collect();
                 let size = now.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
                 if let Some(before) = &before {
-                    // both ends: a cylinder that rolls on comes to no orbit
+                    // compare both ends of the range: a cylinder that keeps rolling reaches no
+                    // orbit
                     let change = |until: usize| {
                         let pairs = ranges.iter().zip(before).take(until);
                         let ends = pairs.flat_map(|(a, b): (_, &(f64, f64))| [a.0 - b.0, a.1 - b.1]);
@@ -350,7 +361,7 @@ impl LooseDamper {
                 before = Some(ranges.clone());
             }
             if (count + 1) % WINDOW == WINDOW - 1 {
-                // the last period before amplitudes are compared
+                // the last period before the amplitudes are compared
                 ranges.fill((f64::INFINITY, f64::NEG_INFINITY));
             }
         }
@@ -383,7 +394,7 @@ impl<'a> Motion<'a> {
         Some(Motion { damper, damping, length, inverse, gain, moved, x, v, a, friction: [0.0; 2] })
     }
 
-    /// One step, at whose end this load acts.
+    /// Makes one step; `load` acts at its end.
     fn advance(&mut self, load: DVector<f64>) -> Option<()> {
         let h = self.length;
         let ahead = &self.x + &self.v * h + &self.a * (0.25 * h * h);
@@ -407,7 +418,7 @@ fn flat([one, two]: [[f64; 2]; 2]) -> [f64; 4] {
     [one[0], one[1], two[0], two[1]]
 }
 
-/// The solution of four equations, their right side in the last column.
+/// Solves four equations with the right-hand side in the last column.
 fn eliminated(mut matrix: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for i in 0..4 {
         let pivot = (i..4).max_by(|a, b| matrix[*a][i].abs().total_cmp(&matrix[*b][i].abs()))?;

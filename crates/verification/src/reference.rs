@@ -1,8 +1,13 @@
-//! A motion in time to hold every method against: small implicit steps, none of the library's methods, derivatives by differences.
+//! A reference motion in time for the tests of all methods: small implicit steps, no method of
+//! the library, derivatives by differences.
 //!
-//! Newmark's average acceleration (trapezoidal rule) for the structure, of second order; laws by the first of their views, step by step:
-//! return maps as they are, rate laws by steps that damp what is too fast for them, sliders by trial and clamp, rigid ones behind a spring that is
-//! stiff beyond what the steps resolve.
+//! The structure is integrated by Newmark's average acceleration (trapezoidal rule), of second
+//! order. Each law is integrated by the first of its views:
+//!
+//! - laws with a step by that step;
+//! - laws with a rate by steps that damp fast processes;
+//! - sliders by trial force and clamp; a rigid slider gets a spring that is stiffer than the
+//!   steps resolve.
 
 use crate::replay::{self, NODES};
 use nalgebra::DVector;
@@ -11,13 +16,14 @@ use stickslip::model::{Axis, System};
 
 type Along = [f64; MOST_DIRECTIONS];
 
-/// A law with the states that it has in this motion.
+/// A law with its states in this motion.
 #[derive(Debug, Clone)]
 struct Contact {
     law: SharedLaw,
     pieces: Option<Vec<Piece>>,
     axes: Vec<Axis>,
-    /// Internal states, or forces of sliders with whether they moved last.
+    /// Internal states, or forces of sliders; `moving` tells which sliders moved in the last
+    /// step.
     z: Vec<f64>,
     moving: Vec<bool>,
     u: Along,
@@ -35,37 +41,39 @@ pub struct Reference<'a> {
     a: DVector<f64>,
     contacts: Vec<Contact>,
     time: f64,
-    /// Steps whose equations were not solved.
+    /// Number of steps with equations that were not solved.
     pub lost: usize,
 }
 
-/// Velocity over which a law that has only a resolvent is made smooth, relative to that of the motion, times the steps of a period: what they can
-/// resolve.
+/// Velocity over which a law with only a resolvent is smoothed: a fraction of the velocity of
+/// the motion, times the steps per period. The steps can resolve it.
 const NARROW: f64 = 0.5;
 
-/// A displacement of the size that the loads cause, m.
+/// Returns a displacement of the size that the loads cause, m.
 fn travel(system: &System, omega: f64) -> f64 {
     let structure = system.structure();
     let hold = structure.stiffness().diagonal().max().max(omega * omega * structure.mass().diagonal().max());
     system.excitation(omega).iter().map(|(_, f)| f.norm()).sum::<f64>() / hold
 }
 
-/// Stiffness of the spring in front of a rigid slider, in masses over the square of a step.
+/// Stiffness of the spring in series with a rigid slider, in masses over the square of a step.
 const RIGID: f64 = 100.0;
 /// Newton iterations of a step.
 const ITERATIONS: usize = 40;
-/// Residual relative to the forces at which a step is solved.
+/// Residual, relative to the forces, at which a step is solved.
 const SOLVED: f64 = 1e-9;
 /// Relative increment of the differences.
 const INCREMENT: f64 = 1e-6;
 
 impl<'a> Reference<'a> {
-    /// From displacements and velocities, with so many steps a period of the drive; joints begin without memory.
+    /// Starts from displacements and velocities, with `steps` steps per excitation period and
+    /// joints without memory.
     pub fn new(system: &'a System, omega: f64, steps: usize, displacement: &[f64], velocity: &[f64]) -> Self {
         let contacts = system.joints().iter().map(|joint| {
             let mut law = joint.law().clone();
             if law.step().is_none() && law.rate().is_none() && law.pieces().is_none() {
-                // set-valued, and no sum of sliders: its smooth neighbour, steeper than anything that the motion shows
+                // a set-valued law that is not a sum of sliders: smooth it over a velocity far
+                // below that of the motion
                 law = law.regularised(NARROW / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
             let pieces = if law.step().is_none() && law.rate().is_none() { law.pieces() } else { None };
@@ -93,7 +101,8 @@ impl<'a> Reference<'a> {
         reference
     }
 
-    /// Begins with the states of joints that an orbit begins with, if these are all: forces of sliders behind springs, and those of steps and rates.
+    /// Sets the joint states of an orbit's start, if they are all of the states here: forces of
+    /// sliders behind springs, and states of steps and rates.
     #[must_use]
     pub fn with_states(mut self, states: &[f64]) -> Self {
         let mut left = states;
@@ -149,7 +158,7 @@ impl<'a> Reference<'a> {
         out
     }
 
-    /// One step. Unknown is the acceleration at its end.
+    /// Makes one step. The unknown is the acceleration at its end.
     pub fn advance(&mut self) {
         let (n, h) = (self.system.dofs(), self.step);
         let structure = self.system.structure();
@@ -173,7 +182,7 @@ impl<'a> Reference<'a> {
                     axis.rows().iter().for_each(|&(i, w)| residual[i] += w * force[p]);
                 }
                 for (q, other) in axes.iter().enumerate() {
-                    // the acceleration moves velocity and displacement at the end of the step together
+                    // the final acceleration changes final velocity and displacement together
                     let by = INCREMENT * (rate[q].abs() + (self.omega * u[q]).abs()).max(1e-9);
                     let side = |sign: f64| {
                         let (mut moved, mut faster) = (u, rate);
@@ -209,8 +218,11 @@ impl<'a> Reference<'a> {
         (self.x, self.v, self.a, self.time) = (x, v, a, time);
     }
 
-    /// Half of peak to peak of every degree of freedom over the last of at most so many periods, and how much the last two differ, relative: it
-    /// ends when that is below `settled`.
+    /// Integrates at most `periods` periods, until the amplitudes change by less than
+    /// `settled`, relative, in one period.
+    ///
+    /// Returns half the peak-to-peak value of every degree of freedom over the last period, and
+    /// the last change.
     pub fn settle(&mut self, periods: usize, settled: f64) -> (Vec<f64>, f64) {
         let steps = (std::f64::consts::TAU / (self.omega * self.step)).round() as usize;
         let mut before = vec![0.0; self.x.len()];
@@ -236,7 +248,7 @@ impl<'a> Reference<'a> {
 }
 
 impl Contact {
-    /// Force, states and moving sliders after a step of length `h` to `u`, `v`.
+    /// Returns force, states and moving sliders after a step of length `h` to `u`, `v`.
     fn after(&self, u: Along, v: Along, h: f64, stiff: f64) -> (Along, Vec<f64>, Vec<bool>) {
         let (mut z, mut moving) = (self.z.clone(), self.moving.clone());
         if let Some(step) = self.law.step() {
@@ -244,7 +256,7 @@ impl Contact {
             return (force, z, moving);
         }
         if let Some(rate) = self.law.rate() {
-            // as the structure moves, with the mean acceleration of the step
+            // the joint moves with the structure, with the mean acceleration of the step
             let motion = NODES.map(|c| {
                 let velocity = std::array::from_fn(|a| self.v[a] + c * (v[a] - self.v[a]));
                 let way = |a: usize| c * h * (self.v[a] + 0.5 * c * (v[a] - self.v[a]));
@@ -276,7 +288,8 @@ mod tests {
     use super::*;
     use crate::template;
 
-    /// Against the exact orbit of the paper's couple: amplitudes to the order of the steps.
+    /// Compares with the exact orbit of the paper's couple: the amplitudes agree to the order
+    /// of the steps.
     #[test]
     fn it_finds_the_exact_orbit() {
         let system = template("blade-couple-massless", &[("b", 4.0)]);

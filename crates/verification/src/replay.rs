@@ -1,4 +1,5 @@
-//! A law alone under a given motion, through each of its views: what no method has touched.
+//! A law alone under a given motion, evaluated through each of its views and without any
+//! method.
 
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -9,7 +10,7 @@ use crate::Random;
 /// Displacement (m) and velocity (m/s) along all directions.
 pub type Instant = ([f64; MOST_DIRECTIONS], [f64; MOST_DIRECTIONS]);
 
-/// A given motion, for times from zero on.
+/// A given motion as a function of time, from zero on.
 pub type Given<'a> = &'a dyn Fn(f64) -> Instant;
 
 /// A view of a law.
@@ -22,7 +23,7 @@ pub enum View {
     Prox,
 }
 
-/// The views that a law offers.
+/// Returns the views that a law offers.
 pub fn views(law: &dyn Law) -> Vec<View> {
     let offered = [
         (View::Pieces, law.pieces().is_some()),
@@ -33,10 +34,12 @@ pub fn views(law: &dyn Law) -> Vec<View> {
     offered.into_iter().filter(|(_, has)| *has).map(|(view, _)| view).collect()
 }
 
-/// Forces of a law (N) at the `times`, from a contact that nothing has moved; the times rise from zero.
+/// Returns the forces of a law (N) at the `times`, from a contact that has not moved. The times
+/// rise from zero.
 ///
-/// Pieces and steps go straight from sample to sample. Rates are integrated from one to the next by the two-stage Radau IIA method, of order 3.
-/// Resolvents behind a spring are implicit Euler steps, of order 1.
+/// Pieces and steps move straight from sample to sample. Rates are integrated between samples
+/// by the two-stage Radau IIA method, of order 3. Resolvents behind a spring use implicit Euler
+/// steps, of order 1.
 ///
 /// # Panics
 /// If the law does not offer the view.
@@ -90,13 +93,16 @@ fn step(step: &dyn Step, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIR
 
 /// Newton iterations for the stages of a step.
 const ITERATIONS: usize = 30;
-/// The longest change of a stage in an iteration: some states are logarithms of what they stand for.
+/// Largest change of a stage per iteration, because some states are logarithms of physical
+/// quantities.
 const STRIDE: f64 = 2.0;
-/// Nodes and matrix of the two-stage Radau IIA method, of order 3: what is too fast for a step is damped in it, and does not ring.
+/// Nodes and matrix of the two-stage Radau IIA method, of order 3. It damps processes that are
+/// too fast for a step, without oscillation.
 pub const NODES: [f64; 2] = [1.0 / 3.0, 1.0];
 const STAGES: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 
-/// The states of a rate law at the end of a step of length `h` (s), from those before it and the motion at the [`NODES`].
+/// Returns the states of a rate law at the end of a step of length `h` (s), from the
+/// states before it. `motion` holds the motion at the [`NODES`].
 ///
 /// # Panics
 /// If the equations of the step are singular.
@@ -168,12 +174,12 @@ fn prox(directions: usize, law: &dyn Prox, motion: Given<'_>, times: &[f64]) -> 
         .map(|&time| {
             let (u, v) = motion(time);
             if law.compliance() > 0.0 && time > last {
-                // f = f₀ + k (way - h s'), f = φ(s'): with the penalty k h that is one resolvent
+                // `f = f₀ + k (Δu - h s')`, `f = φ(s')`: one resolvent with the penalty `k h`
                 let stiffness = 1.0 / law.compliance();
                 let y: Vec<f64> = (0..directions).map(|a| force[a] + stiffness * (u[a] - before[a])).collect();
                 force = resolve(&y, stiffness * (time - last));
             } else if law.compliance() == 0.0 {
-                // λ = J(λ + ε v): the larger the penalty, the faster this settles
+                // `λ = J(λ + ε v)`: a larger penalty converges faster
                 let penalty = 1e6 + 1e3 * law.least_penalty();
                 for _ in 0..100 {
                     let y: Vec<f64> = (0..directions).map(|a| force[a] + penalty * v[a]).collect();
@@ -186,7 +192,7 @@ fn prox(directions: usize, law: &dyn Prox, motion: Given<'_>, times: &[f64]) -> 
         .collect()
 }
 
-/// Energy lost between the samples, `∫ f · du` by the trapezoidal rule, J.
+/// Returns the energy lost between the samples, `∫ f · du` by the trapezoidal rule, J.
 pub fn lost(motion: Given<'_>, times: &[f64], forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
     let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
     let each = |k: usize| -> f64 {
@@ -196,7 +202,8 @@ pub fn lost(motion: Given<'_>, times: &[f64], forces: &[[f64; MOST_DIRECTIONS]])
     (0..times.len() - 1).map(each).sum()
 }
 
-/// A closed motion along all directions, of three or four harmonics, half of them with even ones; period 1 s over `speed`. It begins at zero.
+/// Returns a periodic motion along all directions that begins at zero, with the period 1 s over
+/// `speed`. Even seeds give three odd harmonics, odd seeds four harmonics.
 pub fn random_motion(seed: u64, directions: usize, speed: f64) -> impl Fn(f64) -> Instant {
     let mut random = Random::new(seed);
     let harmonics: &[f64] = if seed.is_multiple_of(2) { &[1.0, 3.0, 5.0] } else { &[1.0, 2.0, 3.0, 4.0] };
@@ -217,7 +224,8 @@ pub fn random_motion(seed: u64, directions: usize, speed: f64) -> impl Fn(f64) -
     }
 }
 
-/// So many equal steps over so many periods of length `period`, with both ends.
+/// Returns `count` equal steps per period over `periods` periods of length `period`, with both
+/// ends.
 pub fn steps(period: f64, periods: usize, count: usize) -> Vec<f64> {
     (0..=periods * count).map(|k| period * k as f64 / count as f64).collect()
 }

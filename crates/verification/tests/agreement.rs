@@ -1,5 +1,5 @@
-//! All methods give the same orbit where there is a continuum of them: that in which friction that never slips stands as in
-//! static equilibrium under the constant loads. Every method says that there are more.
+//! All methods choose the same orbit of a continuum: permanently stuck friction keeps its
+//! static equilibrium under the constant loads. Every method reports that more orbits exist.
 
 use nalgebra::dmatrix;
 use num_complex::Complex64;
@@ -14,7 +14,7 @@ use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Symmetry};
 use stickslip::structure::Structure;
 
-/// A mass with joints to the ground, a drive and a constant force.
+/// Returns a mass with joints to the ground, a harmonic force and a constant force.
 fn mass(laws: &[SharedLaw], drive: f64, constant: f64) -> System {
     let one = |value: f64| dmatrix![value];
     let structure = Structure::new(vec!["m".into()], one(1.0), one(8.0), one(1e4)).unwrap();
@@ -30,7 +30,8 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// Iwan's inner sliders that never slip, or a stuck Jenkins element, beside a gap that knows positions.
+/// Permanently stuck inner sliders of Iwan's law, or a stuck Jenkins element, together with a
+/// gap, which depends on position.
 #[test]
 fn methods_agree_where_parts_of_a_joint_never_slip() {
     let iwan: SharedLaw = Arc::new(Iwan { stiffness: 4e3, limit: 3.0, chi: -0.5, beta: 0.3, elements: 16 });
@@ -44,52 +45,55 @@ fn methods_agree_where_parts_of_a_joint_never_slip() {
         let exact = orbit(&EventDriven, &system, omega);
         for (name, other, allowed) in [
             ("harmonic balance", orbit(&precise, &system, omega), 2e-5),
-            // 1e-5 of a motion whose mean is some times its amplitude
+            // 1e-5 of a motion with a mean of some times its amplitude
             ("shooting", orbit(&Shooting::default(), &system, omega), 1e-4),
         ] {
             let (a, b) = (&exact.places[0], &other.places[0]);
             let off = (a.maximum - b.maximum).abs().max((a.minimum - b.minimum).abs()) / a.amplitude();
             assert!(off < allowed, "{name} {friction:?} {omega}: {off:.1e}, {a:?} {b:?}");
             assert_eq!(other.evidence.history, ["j0"], "{name}");
-            // the place where it is held is free: a multiplier of one, for the exact method whose map knows the slider
+            // the position of the stuck slider is free: a multiplier of one for the exact
+            // method, which has the slider in its map
             assert_eq!(exact.is_stable(), Some(true));
             let one = exact.multipliers().unwrap()[0];
             assert!((one.norm() - 1.0).abs() < 1e-6, "{one}");
         }
         assert_eq!(exact.evidence.history, ["j0"]);
-        // waiting leads to any of them, and says so; the mean force of what never slips is another
+        // `transient` may find any of the orbits and reports this; the mean force of the stuck
+        // parts then differs
         let waited = orbit(&Transient { tolerance: 1e-6, ..Transient::default() }, &system, omega);
         assert_eq!(waited.evidence.history, ["j0"]);
     }
 }
 
-/// A spring that never slips carries its share of a constant force, which has been applied with the spring in place: the mean
-/// position is `F/(k + kt)`.
+/// A permanently stuck spring carries its share of a constant force that was applied with the
+/// spring in place. The mean position is `F/(k + kt)`.
 #[test]
 fn a_stuck_spring_carries_its_share_of_a_constant_force() {
     let system = mass(&[Arc::new(Jenkins { stiffness: 2e4, limit: 40.0 })], 5.0, 4.0);
     for method in [&EventDriven as &dyn Method, &HarmonicBalance::default()] {
-        // an odd system but for its constant force
+        // apart from the constant force, the system is odd
         let found = orbit(method, &system, 100.0);
         assert_eq!(found.symmetry, Symmetry::FullPeriod);
         assert!((found.places[0].mean / (4.0 / 3e4) - 1.0).abs() < 1e-7, "{:?}", found.places[0]);
     }
 }
 
-/// Where the limit would be passed from static equilibrium, the slider goes only as far as it must: the motion just reaches its
-/// limit.
+/// If the motion from static equilibrium exceeds the limit, the slider moves only as far as
+/// necessary. The orbit then just reaches its limit.
 #[test]
 fn a_stuck_spring_at_its_limit() {
-    // a mean that is no mean of the extremes: with a second harmonic, which the gap makes
+    // the second harmonic due to the gap makes the mean differ from the middle of the extremes
     let stiffness = 2e4;
     let gap: SharedLaw = Arc::new(Gap { gap: 0.0, stiffness: 8e4 });
     let wide = mass(&[Arc::new(Jenkins { stiffness, limit: 1e3 }), gap.clone()], 20.0, 0.0);
     let found = orbit(&EventDriven, &wide, 150.0);
     let (low, high) = found.joints[0].displacement[0];
-    // nothing is loaded before it vibrates
+    // no load acts before the vibration
     let furthest = high.max(-low);
     assert!(furthest > 1.02 * 0.5 * (high - low), "{low} {high}");
-    // between half of the travel and the way to the further extreme it never slips in the orbit, and would on the way there
+    // a limit between half of the travel and the larger extreme: the slider is stuck in the
+    // orbit, but would slip on the path to it
     let limit = stiffness * 0.5 * (furthest + 0.5 * (high - low));
     let system = mass(&[Arc::new(Jenkins { stiffness, limit }), gap], 20.0, 0.0);
     let (a, b) = (orbit(&EventDriven, &system, 150.0), orbit(&HarmonicBalance::default(), &system, 150.0));
@@ -101,7 +105,7 @@ fn a_stuck_spring_at_its_limit() {
     }
 }
 
-/// A symmetric motion is one, whatever sticks.
+/// A symmetric motion is unique, even with stuck joints.
 #[test]
 fn a_mirrored_orbit_has_no_history() {
     let system = mass(&[Arc::new(Jenkins { stiffness: 2e4, limit: 40.0 })], 5.0, 0.0);
@@ -110,8 +114,9 @@ fn a_mirrored_orbit_has_no_history() {
     assert!(orbit.evidence.history.is_empty());
 }
 
-/// Two masses on a spinning shaft: a gyroscopic damping matrix, and one that acts one way alone, with a direct solution where there is no joint and
-/// with all methods against each other where there is one.
+/// Two masses on a rotating shaft, with a gyroscopic and with a one-sided damping matrix.
+/// Without a joint, the methods agree with a direct solution; with a joint, they agree with
+/// each other.
 #[test]
 fn methods_agree_with_gyroscopic_damping() {
     let (mass, stiffness) = (dmatrix![1.0, 0.0; 0.0, 0.3], dmatrix![12e3, -2e3; -2e3, 4.5e3]);
@@ -152,7 +157,8 @@ fn methods_agree_with_gyroscopic_damping() {
     }
 }
 
-/// The force that an orbit reports of a law with stiffness beyond its slip limit is the one that moves the other mass: `m x'' + c x' + k x`.
+/// A law may have a stiffness on top of its slip limit. The reported force is the one that
+/// moves the other mass: `m x'' + c x' + k x`.
 #[test]
 fn forces_beyond_a_slip_limit_are_reported_whole() {
     let law = Valanis { stiffness: 2e3, slip_stiffness: 200.0, lambda: 3e3, kappa: 0.7 };
@@ -183,11 +189,12 @@ fn forces_beyond_a_slip_limit_are_reported_whole() {
     }
 }
 
-/// The error of a series is at most this many times what is stated, as the book says; largest values err by more than the root mean square that is stated.
+/// Largest error of a series in reported errors, as the book states. Extreme values have a
+/// larger error than the reported root mean square.
 const FACTOR: f64 = 3.0;
 
-/// A contact that slips, sticks and parts within every period: integration in time, by Newton's method and by waiting, against the series, within what
-/// they say of their errors.
+/// A contact slips, sticks and separates in every period. Shooting, `transient` and harmonic
+/// balance agree within their reported errors.
 #[test]
 fn methods_agree_on_a_contact_that_opens_and_closes() {
     let contact = FrictionContact { tangential: 5e3, normal: 8e3, friction: 0.3, preload: 4.0, tangents: 1 };
@@ -206,7 +213,7 @@ fn methods_agree_on_a_contact_that_opens_and_closes() {
         let error = |orbit: &Orbit| orbit.evidence.truncation.expect("an estimate");
         let shooting = Shooting { tolerance: 1e-9, ..Shooting::default() };
         for found in [orbit(&shooting, &system, omega), orbit(&Transient::default(), &system, omega)] {
-            // without friction, without slip or without an opening this were another test
+            // the test requires separation, friction and partial slip
             let force = |i: i32| found.sample(found.period() * f64::from(i) / 1000.0).joints[0].force;
             let pressed: Vec<f64> = (0..1000).map(|i| force(i)[1]).collect();
             assert!(pressed.contains(&0.0) && pressed.iter().any(|force| *force > contact.preload), "{omega}");
@@ -220,8 +227,9 @@ fn methods_agree_on_a_contact_that_opens_and_closes() {
     }
 }
 
-/// Bodies that friction alone holds against a constant force, which it carries: the force along a body's face slips at first and shakes down. Where
-/// nothing slips any more the amplitude is `F/|k - m Ω²|` beside a body that stands still; springs that carry no mean would let all drift.
+/// Bodies that friction alone holds against a constant force. The force along the face slips at
+/// first and shakes down. In the settled motion one body stands still, and the other has the
+/// amplitude `F/|k - m Ω²|`. If stuck springs carried no mean force, all bodies would drift.
 #[test]
 fn friction_that_never_slips_carries_what_nothing_else_does() {
     let between = |a: &str, b: &str| [a.to_owned(), b.to_owned()];

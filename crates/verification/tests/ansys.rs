@@ -1,5 +1,5 @@
-//! A `.full` file that MAPDL wrote, through a study file: its frequencies as SciPy finds them in the matrices that another reader takes out of it. See
-//! `data/ansys/README.md`.
+//! A `.full` file of MAPDL through a study file: its frequencies agree with SciPy on matrices
+//! extracted by another reader. See `data/ansys/README.md`.
 
 use flate2::read::GzDecoder;
 use std::fs::File;
@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::Path;
 use stickslip_study::read_file;
 
-/// Of the lowest eight modes, Hz.
+/// Frequencies of the lowest eight modes, Hz.
 const FREQUENCIES: [f64; 8] = [
     1283.20036921,
     1283.20036921,
@@ -19,7 +19,7 @@ const FREQUENCIES: [f64; 8] = [
     16497.85701889,
 ];
 
-/// Ours and SciPy's end where the shift-and-invert of both does.
+/// Both results are limited by the accuracy of shift-and-invert.
 const DIGITS: f64 = 1e-9;
 
 #[test]
@@ -29,7 +29,7 @@ fn a_file_of_mapdl_is_read() {
     let mut bytes = Vec::new();
     GzDecoder::new(File::open(packed).unwrap()).read_to_end(&mut bytes).unwrap();
     std::fs::write(folder.path().join("beam.full"), bytes).unwrap();
-    // nodes of the file are called 63, 91, ... and its units are not told
+    // the file names its nodes 63, 91, ...; it does not state its units
     let study = "schema = 1\n[structure]\nstiffness = { file = \"beam.full\", name = \"stiffness\" }\n\
         mass = { file = \"beam.full\", name = \"mass\" }\nunits = \"m-kg-s\"\nreduce = false\n\
         [[place]]\nname = \"node\"\nnodes = [\"91\"]\n[[force]]\non = \"node.x\"\namplitude = \"1 N\"\n\

@@ -1,10 +1,18 @@
-//! Random systems with random laws, small ones with full matrices and long rows and rings, in every method that takes them, each orbit held
-//! against small steps in time ([`stickslip_verification::reference`]), which share no code with any method.
+//! Random systems with random laws in every method that takes them: small systems with full
+//! matrices, and long rows and rings.
 //!
-//! `STICKSLIP_AUDIT_MODELS=1000` and `STICKSLIP_AUDIT_FIRST=SEED` make it longer, `STICKSLIP_AUDIT_ROWS=100` that of the rows, `STICKSLIP_AUDIT_ANY=300` that of laws with any parameters; it prints what
-//! agrees, what was refused or failed and why, and what the reference cannot judge: none of that counts as right.
+//! Each orbit is compared with small steps in time ([`stickslip_verification::reference`]),
+//! which share no code with any method. Environment variables extend the audit:
+//!
+//! - `STICKSLIP_AUDIT_MODELS=1000`: number of small systems;
+//! - `STICKSLIP_AUDIT_ANY=300`: number of systems with any law parameters;
+//! - `STICKSLIP_AUDIT_ROWS=100`: number of rows and rings;
+//! - `STICKSLIP_AUDIT_FIRST=SEED`: first seed.
+//!
+//! The audit prints the orbits that agree, the refusals and failures with their reasons, and
+//! the orbits that the reference cannot judge. An unjudged orbit does not count as correct.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -14,42 +22,46 @@ use stickslip::orbit::Orbit;
 use stickslip_verification::reference::Reference;
 use stickslip_verification::{random_row, random_system, random_system_of_any};
 
-/// Models without a wish.
+/// Default numbers of models.
 const MODELS: u64 = 12;
 const ANY: u64 = 12;
 const ROWS: u64 = 2;
-/// The first of those whose laws have any parameters: the reference settles for this one and those behind it.
+/// Default first seed of the systems with any law parameters; the reference settles for the
+/// default ones.
 const FIRST_OF_ANY: u64 = 20;
-/// The first of the rows without a wish: with those before it goes a quarter of a minute.
+/// Default first seed of the rows; the default rows and the small systems take 15 s.
 const FIRST_ROW: u64 = 4;
-/// Steps a period of the reference, and where that disagrees; its own error is some 1e-4: (2π 3/500)²/12 for the third harmonic.
+/// Steps per period of the reference, and the finer steps if it disagrees. Its error is some
+/// 1e-4: `(2π 3/500)²/12` for the third harmonic.
 const STEPS: [usize; 2] = [500, 4000];
-/// Periods that the reference is given to settle.
+/// Most periods until the reference settles.
 const PERIODS: usize = 40;
-/// Difference to the reference, relative to the largest amplitude, that is its own error or that of a method's tolerance of 1e-3.
+/// Allowed difference to the reference, relative to the largest amplitude: the error of the
+/// reference, or of a method's tolerance of 1e-3.
 const NEAR: f64 = 5e-3;
-/// Share of its distance that a reference keeps when its steps are shortened, below which it comes to the orbit, and it is the reference that is too
-/// coarse: of rigid and steep laws it makes smooth ones whose creep, where an orbit sticks, is of the order of its step.
+/// If finer steps reduce the difference by this factor, the reference converges to the orbit
+/// and is merely too coarse. It smooths rigid and steep laws, and their creep in stick is
+/// proportional to its step.
 const COMES: f64 = 0.5;
-/// Change over the last period below which the reference has settled.
+/// Relative change over the last period below which the reference has settled.
 const SETTLED: f64 = 1e-4;
 /// Tolerance of method `transient`.
 const WAITED: f64 = 1e-6;
-/// Seconds for one orbit that are worth a line.
+/// Seconds above which an orbit is printed.
 const SLOW: f64 = 5.0;
-/// One in so many models with laws of steps is waited for.
+/// In a long audit, method `transient` runs for one in this number of models with step laws.
 const RARELY: u64 = 8;
-/// Share of orbits that the reference may leave unjudged, besides one.
+/// Largest fraction of orbits without a judgement; one more orbit is allowed.
 const UNJUDGED: f64 = 0.05;
-/// Share of orbits that may fail without a reason that explains it.
+/// Largest fraction of orbits that may fail; one more orbit is allowed.
 const UNEXPLAINED: f64 = 0.02;
 
 fn variable(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// How far an orbit is from the motion that small steps reach from its own state, m, and relative to its largest amplitude; `None` if that does
-/// not settle.
+/// Returns the distance between an orbit and the motion that small steps reach from its state,
+/// in m and relative to its largest amplitude. Returns `None` if that motion does not settle.
 fn distance(system: &System, omega: f64, orbit: &Orbit, steps: usize) -> Option<(f64, f64)> {
     let start = orbit.sample(0.0);
     let reference = Reference::new(system, omega, steps, &start.displacement, &start.velocity);
@@ -70,19 +82,20 @@ fn every_orbit_is_a_motion() {
     audit(&random_system, 0, models, models > MODELS);
 }
 
-/// The same with laws whose parameters are anything that they may be: zero, of either sign, any count.
+/// Laws with any valid parameters: zero, either sign, any count.
 #[test]
 fn every_orbit_of_any_parameters_is_a_motion() {
     audit(&random_system_of_any, FIRST_OF_ANY, variable("STICKSLIP_AUDIT_ANY", ANY), false);
 }
 
-/// Where harmonic balance has the structure in modes or in banded form, and coupled joints by the dozen.
+/// Harmonic balance uses modes or the banded form here, and has a dozen coupled joints.
 #[test]
 fn every_orbit_of_a_row_is_a_motion() {
     audit(&random_row, FIRST_ROW, variable("STICKSLIP_AUDIT_ROWS", ROWS), false);
 }
 
-/// Models of `made` by their seeds, in all methods; in a `long` audit some are waited for in equal steps, which takes up to half a minute an orbit.
+/// Runs all methods on the models of `made`. A `long` audit also runs `transient` in equal
+/// steps on some models, which takes up to half a minute per orbit.
 fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: bool) {
     let first = variable("STICKSLIP_AUDIT_FIRST", first);
     let mut counts: BTreeMap<(&str, String), usize> = BTreeMap::new();
@@ -92,7 +105,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
         let (system, omega) = made(seed);
         let laws: Vec<&str> = system.joints().iter().map(|joint| joint.law().name()).collect();
         for row in METHODS.iter().filter(|row| row.name != "auto") {
-            // waiting for transients is brute force: so much of it is enough here
+            // method `transient` is slow; this tolerance is enough here
             let options = row.options.iter().filter(|o| row.name == "transient" && o.key == "tolerance");
             let method = (row.build)(&options.map(|o| (o.key.to_owned(), WAITED)).collect()).unwrap();
             let quick =
@@ -103,7 +116,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
             let mut count = |what: String| *counts.entry((row.name, what)).or_default() += 1;
             let mut solver = match method.solver(&system) {
                 Ok(solver) => solver,
-                // a method that cannot take a law says which
+                // a method that cannot take a law names it
                 Err(error) => {
                     assert!(laws.iter().any(|law| error.to_string().contains(law)), "{seed}: {error}");
                     count("refused".to_owned());
@@ -126,7 +139,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
                 }
             };
             let allowed = NEAR + 3.0 * orbit.evidence.truncation.unwrap_or(0.0);
-            // a reference that is too coarse for a law is no judge
+            // a reference that is too coarse for a law cannot judge
             let (mut coarser, mut judged) = (None, None);
             for steps in STEPS {
                 (coarser, judged) = (judged, distance(&system, omega, &orbit, steps));
@@ -146,7 +159,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
                     count("agrees".to_owned());
                 }
                 Some(_) if comes => silent("the reference is too coarse"),
-                // small steps leave it sooner or later
+                // small steps leave an unstable orbit sooner or later
                 _ if orbit.is_stable() == Some(false) => silent("unstable, and says so"),
                 None => silent("the reference does not settle"),
                 Some((_, distance)) => {

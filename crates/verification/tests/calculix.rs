@@ -1,5 +1,8 @@
-//! A blade by CalculiX, through a study file: its frequencies to six digits, and its response without joints to 1e-5, whole and in few
-//! coordinates, and to 1e-8 as SciPy solves the same matrices. The data is made by `data/calculix/make.py` and `direct.py`.
+//! A blade by CalculiX, through a study file.
+//!
+//! Its frequencies agree to six digits. Its response without joints agrees to 1e-5, with all
+//! rows and reduced, and to 1e-8 with SciPy on the same matrices. `data/calculix/make.py` and
+//! `direct.py` make the data.
 
 use flate2::read::GzDecoder;
 use num_complex::Complex64;
@@ -18,7 +21,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(data(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// The matrices as CalculiX wrote them.
+/// Unpacks the matrices of CalculiX.
 fn unpack(name: &str, folder: &Path) {
     for name in [format!("{name}.sti"), format!("{name}.mas")] {
         let mut bytes = Vec::new();
@@ -28,7 +31,7 @@ fn unpack(name: &str, folder: &Path) {
     std::fs::copy(data(&format!("{name}.dof")), folder.join(format!("{name}.dof"))).unwrap();
 }
 
-/// These, and a study beside them.
+/// Makes a folder with these matrices and a study.
 fn folder(more: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     unpack("blade", folder.path());
@@ -43,14 +46,15 @@ fn folder(more: &str) -> tempfile::TempDir {
     folder
 }
 
-/// The nodes of `blade_response.csv`: the middle, the other corner of the tip, both edges, the foot, and where it is driven.
+/// The nodes of `blade_response.csv`: the middle, the other corner of the tip, both edges, the
+/// foot, and the driven node.
 const PLACES: [(&str, u32); 6] =
     [("middle", 449), ("corner", 865), ("front", 655), ("back", 681), ("foot", 236), ("tip", 900)];
 
-/// On both sides of the three lowest resonances.
+/// Frequencies on both sides of the three lowest resonances.
 const HERTZ: [&str; 6] = ["451.3 Hz", "462.81 Hz", "2054.9 Hz", "2096.4 Hz", "3158.8 Hz", "3238.2 Hz"];
 
-/// Both print seven digits; ours are right to more.
+/// CalculiX prints seven digits; the library's values are accurate to more.
 const SIX_DIGITS: f64 = 1e-6;
 
 #[test]
@@ -67,7 +71,7 @@ fn frequencies_to_six_digits() {
     }
 }
 
-/// Rows of a response: Hz, node, and real and imaginary parts along x, y, z, mm.
+/// Reads the rows of a response: Hz, node, and real and imaginary parts along x, y, z in mm.
 fn rows(name: &str) -> Vec<Vec<f64>> {
     let row = |line: &str| line.split(',').map(|value| value.parse().unwrap()).collect();
     let rows: Vec<Vec<f64>> = text(name).lines().skip(1).map(row).collect();
@@ -75,7 +79,8 @@ fn rows(name: &str) -> Vec<Vec<f64>> {
     rows
 }
 
-/// A row, its place, and how far the response of the study is from it, relative to its largest component, where `reduce` says in which coordinates.
+/// Returns, for each row, the frequency, the place, and the distance of the study's response
+/// from it, relative to the largest component. `reduce` is the reduction of the study.
 fn apart(rows: &[Vec<f64>], reduce: &str) -> Vec<(f64, &'static str, f64)> {
     let folder = folder(&format!("reduce = {reduce}"));
     let study = read_file(&folder.path().join("blade.toml"), &[]).unwrap();
@@ -99,17 +104,19 @@ fn apart(rows: &[Vec<f64>], reduce: &str) -> Vec<(f64, &'static str, f64)> {
     rows.iter().map(one).collect()
 }
 
-/// To five digits those of CalculiX, where it is right to so many; all nodes at all frequencies, the driven one too, as SciPy solves the same matrices.
+/// Five digits agree with CalculiX where it is accurate to that. All nodes at all frequencies,
+/// with the driven node, agree with SciPy on the same matrices.
 #[test]
 fn response_without_joints() {
     let (calculix, direct) = (rows("blade_response.csv"), rows("blade_direct.csv"));
     let all = [calculix.as_slice(), direct.as_slice()].concat();
-    // in few coordinates what these promise
+    // the reduced model must reach the tolerance that it promises
     for (reduce, exact) in [("false", 1e-8), ("{ up_to = \"5 kHz\", tolerance = 1e-6 }", 1e-6)] {
         let found = apart(&all, reduce);
         let (of_calculix, of_direct) = found.split_at(calculix.len());
         for (hertz, place, apart) in of_calculix {
-            // at the end that is driven the modes that CalculiX leaves out count beside all resonances but the first
+            // at the driven end, the modes that CalculiX omits matter at all but the first
+            // resonance
             let bound = match (*place, *hertz < 500.0) {
                 ("tip", true) => 5e-5,
                 ("tip" | "corner", false) => continue,
@@ -123,9 +130,11 @@ fn response_without_joints() {
     }
 }
 
-/// Elements with incompatible modes bring rows of their own, called by nodes behind those of the mesh, here 42, with stiffness and mass. The frequencies
-/// are those of CalculiX all the same, and the first is that of a slender beam but for what a plate is stiffer; in few coordinates the
-/// response is that of all rows.
+/// Elements with incompatible modes have inner rows with stiffness and mass. Their nodes follow
+/// those of the mesh, here after 42.
+///
+/// The frequencies agree with CalculiX. The first is that of a slender beam, up to the larger
+/// stiffness of a plate. The response of the reduced model agrees with that of all rows.
 #[test]
 fn inner_rows_of_incompatible_modes() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,8 @@
-//! The sector of a bladed disk by CalculiX, through study files: frequencies of every nodal diameter to six digits, whole and in few coordinates,
-//! and the response to an engine order against a direct solution by SciPy. The data is made by `make.py` and `direct.py` in `data/calculix`.
+//! The sector of a bladed disk by CalculiX, through study files.
+//!
+//! Frequencies of every nodal diameter agree to six digits, with all rows and reduced. The
+//! response to an engine order agrees with a direct solution by SciPy. `make.py` and
+//! `direct.py` in `data/calculix` make the data.
 
 use flate2::read::GzDecoder;
 use num_complex::Complex64;
@@ -20,7 +23,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(data(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// The matrices as CalculiX wrote them, and beside them a study.
+/// Writes the matrices of CalculiX and a study into a folder, and reads the study.
 fn study(structure: &str, disk: &str, more: &str) -> Study {
     let folder = tempfile::tempdir().unwrap();
     for name in ["sector.sti", "sector.mas"] {
@@ -32,7 +35,7 @@ fn study(structure: &str, disk: &str, more: &str) -> Study {
     for name in ["sector.dof", "sector_boundary.csv"] {
         std::fs::copy(data(name), folder.path().join(name)).unwrap();
     }
-    // the blade stands on the rim, at 90 mm and beyond
+    // the blade stands on the rim, at x = 90 mm and beyond
     let blade: String = text("sector_nodes.csv")
         .lines()
         .skip(1)
@@ -52,7 +55,7 @@ fn study(structure: &str, disk: &str, more: &str) -> Study {
     read_file(&folder.path().join("disk.toml"), &[]).unwrap_or_else(|error| panic!("{error:?}"))
 }
 
-/// The node farthest out, at the top.
+/// Returns the outermost node, at the top.
 fn tip() -> String {
     let nodes = text("sector_nodes.csv");
     let far = |line: &&str| line.split(',').skip(1).map(|v| v.parse::<f64>().unwrap()).sum::<f64>();
@@ -65,7 +68,7 @@ fn computed(study: &Study) -> Dataset {
     found
 }
 
-/// CalculiX prints seven digits; ours are right to more.
+/// CalculiX prints seven digits; the library's values are accurate to more.
 const SIX_DIGITS: f64 = 1e-6;
 
 #[test]
@@ -79,7 +82,7 @@ fn frequencies_of_every_nodal_diameter_to_six_digits() {
         let (mut worst, mut met) = (0.0f64, 0);
         for line in text("sector_frequencies.csv").lines().skip(1) {
             let fields: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
-            // it lists each twice
+            // the file lists each mode twice
             let (diameter, mode) = (fields[0] as u64, (fields[1] as u64).div_ceil(2));
             if mode > count {
                 continue;
@@ -98,7 +101,7 @@ const PATTERN: &str = "sector,deviation\n0,1 %\n1,-0.4 %\n2,0.7 %\n3,0\n4,-1.2 %
 /// Rayleigh damping, 1/s and s.
 const DAMPING: (f64, f64) = (8.0, 2e-7);
 
-/// Beside a resonance and at one.
+/// One frequency near a resonance and one at a resonance.
 const HERTZ: [f64; 2] = [1332.6, 1346.0];
 
 fn response(reduce: &str, disk: &str, force: &str) -> Study {
@@ -113,7 +116,7 @@ fn response(reduce: &str, disk: &str, force: &str) -> Study {
     study(&structure, disk, &more)
 }
 
-/// Complex displacement of a place of a sector along x, y, z at a point, m.
+/// Returns the complex displacement of a place of a sector along x, y, z at a point, m.
 fn displacement(found: &Dataset, place: &str, sector: usize, point: usize) -> [Complex64; 3] {
     ["x", "y", "z"].map(|along| {
         let column = |what: &str| found.tables[0].numbers(&format!("{place}_{sector}_{along}_{what}")).unwrap()[point];
@@ -126,7 +129,8 @@ fn apart(a: [Complex64; 3], b: [Complex64; 3]) -> f64 {
     size(std::array::from_fn(|k| a[k] - b[k])) / size(b)
 }
 
-/// Point, node, and displacement in m of every row of a response, whose frequencies are [`HERTZ`].
+/// Returns point, node, and displacement in m for every row of a response with the frequencies
+/// [`HERTZ`].
 fn rows(name: &str) -> Vec<(usize, String, [Complex64; 3])> {
     let row = |line: &str| {
         let fields: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
@@ -137,7 +141,8 @@ fn rows(name: &str) -> Vec<(usize, String, [Complex64; 3])> {
     text(name).lines().skip(1).map(row).collect()
 }
 
-/// Sector 5 leads the first one by five times the engine order's share of a turn.
+/// Returns the largest distance in sectors 0 and 5. Sector 5 leads the first by five times the
+/// engine order's fraction of a turn.
 fn worst(found: &Dataset, expected: &[(usize, String, [Complex64; 3])]) -> f64 {
     let lead = Complex64::cis(TAU * 2.0 * 5.0 / 12.0);
     let both = |(point, node, expected): &(usize, String, [Complex64; 3])| {
@@ -148,7 +153,7 @@ fn worst(found: &Dataset, expected: &[(usize, String, [Complex64; 3])]) -> f64 {
     expected.iter().map(both).fold(0.0, f64::max)
 }
 
-/// Whole and in few coordinates.
+/// The response with all rows, and of the reduced model.
 #[test]
 fn an_engine_order_against_a_direct_solution() {
     let direct = rows("sector_direct.csv");
@@ -167,8 +172,9 @@ fn an_engine_order_against_a_direct_solution() {
     }
 }
 
-/// Blades that differ: few coordinates against all rows of all sectors with the stiffness of the blades scaled there, beside a resonance and at one with
-/// a damping ratio of 1.4e-3. The tuned modes alone leave 4e-3 of the amplitude there, a shift by 6e-6.
+/// Mistuned blades: the reduced model against all rows of all sectors with scaled blade
+/// stiffness. The frequencies are near and at a resonance with a damping ratio of 1.4e-3. The
+/// tuned modes alone have an error of 4e-3 of the amplitude there, a shift by 6e-6.
 #[test]
 #[ignore = "a whole ring of 23,220 rows"]
 fn blades_that_differ_in_few_coordinates_and_in_all() {

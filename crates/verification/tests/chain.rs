@@ -1,6 +1,7 @@
-//! Several joints: a chain of eight blades, joints that switch at the same instant, and joints listed in another order.
+//! Several joints: a chain of eight blades, joints that switch at the same instant, and joints
+//! listed in another order.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -22,7 +23,8 @@ fn joint(name: &str, a: &str, b: &str, law: SharedLaw) -> Joint {
     Joint { name: name.into(), between: [a.into(), b.into()], law }
 }
 
-/// The chain of `data/smooth_orbits/chain8.py`: eight mistuned blades, a joint of another limit between any two neighbours.
+/// Returns the chain of `data/smooth_orbits/chain8.py`: eight mistuned blades, with a joint of
+/// a different limit between any two neighbours.
 fn chain(forces: &[Force], law: impl Fn(f64) -> SharedLaw) -> Model {
     let blade = |i: usize| format!("blade{i}");
     Model {
@@ -54,7 +56,8 @@ fn shoot(model: &Model, tolerance: f64) -> Orbit {
     Shooting { tolerance, width: None, ..Shooting::default() }.solver(&system).unwrap().orbit(OMEGA, None).unwrap()
 }
 
-/// Excitation under which several joints slip: all blades, each with its own phase (an engine order).
+/// Returns an excitation under which several joints slip: all blades, with the phases of an
+/// engine order.
 fn travelling(amplitude: f64) -> Vec<Force> {
     (1..=8).map(|i| force(&format!("blade{i}"), amplitude, 1.9 * i as f64)).collect()
 }
@@ -77,8 +80,9 @@ fn chain_of_eight_agrees_with_scipy() {
                 _ => continue,
             };
             if row["quantity"] == "joint_loss" && index > 0 {
-                // joints that do not slip creep, with losses down to 1e-9 of the work; the residual at which the orbit is closed,
-                // 1e-11, is amplified two thousand times by the slow creep (multiplier 0.9995): they keep the digits of the work
+                // joints that do not slip creep, with losses down to 1e-9 of the work. The
+                // creep (multiplier 0.9995) amplifies the residual of the closed orbit, 1e-11,
+                // two thousand times; these losses have the digits of the work
                 near(&format!("{row:?}"), found, expected, 1e-12 * orbit.energy.work_in + digits * expected);
             } else {
                 worst = worst.max((found / expected - 1.0).abs());
@@ -92,7 +96,8 @@ fn chain_of_eight_agrees_with_scipy() {
     }
 }
 
-/// The smooth law's state at the exact orbit: in slip the slider moves with the joint, in stick it creeps.
+/// Returns the smooth law's state near the exact orbit: in slip the slider moves with the
+/// joint, in stick it creeps.
 fn start_near(orbit: &Orbit, alpha: f64) -> Vec<f64> {
     let mut start = orbit.start[..16].to_vec();
     for (j, joint) in orbit.sample(0.0).joints.iter().enumerate() {
@@ -103,7 +108,8 @@ fn start_near(orbit: &Orbit, alpha: f64) -> Vec<f64> {
     start
 }
 
-/// One joint slips, four, all seven. The smooth orbits tend to the exact one as alpha^(-2/3): see the couple.
+/// One joint slips, then four, then all seven. The smooth orbits tend to the exact one with the
+/// order alpha^(-2/3), as for the couple.
 #[test]
 fn chain_of_eight_exact_against_smooth() {
     for (forces, slipping) in [(vec![force("blade1", 10.0, 0.0)], 1), (travelling(4.0), 4), (travelling(20.0), 7)] {
@@ -134,7 +140,8 @@ fn chain_of_eight_exact_against_smooth() {
     }
 }
 
-/// A central mass driven, with two or more equal ones around it, each behind its own equal joint.
+/// Returns a driven central mass with equal masses around it; an equal joint connects each of
+/// them to the centre.
 fn star(count: usize, law: &dyn Fn() -> SharedLaw, order: &[usize], turned: &[usize]) -> Model {
     let arm = |i: usize| format!("arm{i}");
     let mut model = Model {
@@ -154,7 +161,8 @@ fn star(count: usize, law: &dyn Fn() -> SharedLaw, order: &[usize], turned: &[us
     model
 }
 
-/// Joints that are alike switch at the same instants: symmetry makes every switch a switch of all.
+/// Equal joints switch at the same instants: by symmetry, every switch is a switch of all
+/// joints.
 #[test]
 fn joints_switch_together_by_symmetry() {
     type Make = Box<dyn Fn() -> SharedLaw>;
@@ -178,7 +186,8 @@ fn joints_switch_together_by_symmetry() {
                     near("loss", joint.dissipation, first.dissipation, 1e-11 * orbit.energy.work_in);
                 }
                 assert_eq!(orbit.evidence.switches, count * first.switches);
-                // between the switches all contacts are in the same state (the turned joint slips the other way)
+                // between the switches all contacts have the same state (the reversed joint
+                // slips in the other direction)
                 let times = orbit.switch_times();
                 for pair in times.windows(2).filter(|pair| pair[1] - pair[0] > 1e-9 * orbit.period()) {
                     let joints = orbit.sample(0.5 * (pair[0] + pair[1])).joints;
@@ -204,7 +213,7 @@ fn joints_switch_together_by_symmetry() {
     }
 }
 
-/// The order in which joints are listed plays no part, with ties at every switch.
+/// The order of the joints in the list has no effect, even with simultaneous switches.
 #[test]
 fn order_of_listing_does_not_matter() {
     let law = || -> SharedLaw { Arc::new(Coulomb { limit: 1.2 }) };
@@ -220,7 +229,8 @@ fn order_of_listing_does_not_matter() {
             near("loss", orbit.energy.friction, orbits[0].energy.friction, 1e-11 * orbit.energy.work_in);
         }
     }
-    // random models, joints reversed: no ties, but every decision is about a set
+    // random models with reversed joints: no simultaneous switches, but every decision involves
+    // a set of joints
     let (mut compared, mut worst) = (0, 0.0f64);
     for seed in 0..150 {
         let (mut model, omega) = random_model(seed);
@@ -241,7 +251,8 @@ fn order_of_listing_does_not_matter() {
     assert!(compared > 20 && worst < 1e-9, "{worst}");
 }
 
-/// Two blades pulled apart symmetrically from a central one by opposite forces: the centre stays, both joints switch together.
+/// Opposite forces pull two blades apart from a central one. The centre stays at rest, and both
+/// joints switch together.
 #[test]
 fn opposite_drives_leave_the_centre_at_rest() {
     let mut model = star(2, &|| Arc::new(Coulomb { limit: 1.2 }), &[0, 1], &[]);
@@ -252,7 +263,7 @@ fn opposite_drives_leave_the_centre_at_rest() {
         assert_eq!(orbit.joints[0].switches, orbit.joints[1].switches);
         near("centre", orbit.places[0].amplitude(), 0.0, 1e-12 * orbit.places[1].amplitude());
         close("equal losses", orbit.joints[0].dissipation, orbit.joints[1].dissipation, 1e-12);
-        // one arm alone, rubbing on the ground, is the same motion
+        // a single arm that rubs on the ground has the same motion
         let alone = Model {
             masses: vec![Mass::new("arm", 0.5)],
             springs: vec![spring("arm", GROUND, 300.0, 0.2)],

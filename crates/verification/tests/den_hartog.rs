@@ -1,8 +1,10 @@
-//! Den Hartog's oscillator, `m x'' + k x + F Sgn x' = P cos(Ωt)`, exact law: theory section 7.
+//! Den Hartog's oscillator, `m x'' + k x + F Sgn x' = P cos(Ωt)`, with the exact law: theory
+//! section 7.
 //!
-//! Source: Den Hartog, "Forced vibrations with combined Coulomb and viscous friction" (1931). `r = Ω √(m/k)`, `beta = F/P`.
+//! `r = Ω √(m/k)`, `beta = F/P`. Source: Den Hartog, "Forced vibrations with combined Coulomb
+//! and viscous friction" (1931).
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::Arc;
@@ -12,7 +14,8 @@ use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Orbit, Symmetry};
 use stickslip_verification::{close, exact, integral, maximum, near, zero};
 
-/// Slip limits and frequencies inside the region without stops, away from r = 1/2, 1/3, 1/4 … (theory 7.6).
+/// Slip limits and frequencies inside the region without stops, away from r = 1/2, 1/3, 1/4, …
+/// (theory 7.6).
 const CASES: [(f64, f64); 9] =
     [(0.2, 0.8), (0.5, 0.8), (0.5, 1.2), (0.7, 1.2), (0.1, 0.4), (0.6, 0.7), (0.5, 3.0), (0.5, 2.0), (0.78, 0.99)];
 
@@ -29,7 +32,7 @@ fn oscillator(m: f64, k: f64, limit: f64) -> Model {
     }
 }
 
-/// The orbit with m = k = P = 1.
+/// Returns the orbit with m = k = P = 1.
 fn orbit(beta: f64, r: f64) -> Orbit {
     forced(1.0, 1.0, 1.0, beta, r)
 }
@@ -40,18 +43,18 @@ fn forced(m: f64, k: f64, p: f64, beta: f64, r: f64) -> Orbit {
     exact(&model.assemble().unwrap(), r * (k / m).sqrt())
 }
 
-/// `U` and `V` of 7.2.
+/// Returns `U` and `V` of 7.2.
 fn functions(r: f64) -> (f64, f64) {
     ((PI / (2.0 * r)).tan() / r, 1.0 / (1.0 - r * r))
 }
 
-/// Amplitude of 7.2 with m = k = P = 1.
+/// Returns the amplitude of 7.2 with m = k = P = 1.
 fn amplitude(beta: f64, r: f64) -> f64 {
     let (u, v) = functions(r);
     (v * v - beta * beta * u * u).sqrt()
 }
 
-/// `S` of 7.3: the largest value of its function on 0 < tau < pi, with the limit at 0.
+/// Returns `S` of 7.3: the maximum of its function on 0 < tau < pi, with the limit at 0.
 fn s(r: f64) -> f64 {
     let tan = (PI / (2.0 * r)).tan();
     let f = |tau: f64| ((tau / r).sin() + tan * (tau.cos() - (tau / r).cos())) / (r * tau.sin());
@@ -68,7 +71,7 @@ fn theory_7_1_motion_between_reversals() {
     for (beta, r) in CASES {
         let (orbit, x0) = (orbit(beta, r), amplitude(beta, r));
         let (u, v) = functions(r);
-        // tau = 0 at the positive maximum, where the force stands at the phase phi
+        // tau = 0 at the positive maximum; the phase of the force there is phi
         let phase = (-beta * u / x0 * (x0 / v)).atan2(x0 * (x0 / v) / x0);
         for i in 0..=100 {
             let tau = f64::from(i) / 100.0 * PI;
@@ -95,7 +98,7 @@ fn theory_7_2_amplitude_and_phase() {
         let nearest = orbit.switch_times().iter().map(|t| (t - time).abs()).fold(f64::INFINITY, f64::min);
         near("instant of the maximum", nearest, 0.0, 1e-8);
     }
-    // the reference values of section 7
+    // reference values of section 7
     for (beta, r, x0) in [(0.2, 0.8, 2.7114152554), (0.5, 0.8, 2.3322349875), (0.5, 1.2, 1.6574674711)] {
         near("printed amplitude", orbit(beta, r).places[0].maximum, x0, 0.5e-10);
     }
@@ -114,7 +117,8 @@ fn theory_7_3_no_stop_limits() {
     for (r, printed) in printed {
         let limit = beta_max(r);
         near("printed limit", limit, printed, 0.6e-6);
-        // stops appear where the closed form says: orbits just below have none, orbits just above have two a period or more
+        // stops begin at the closed-form limit: orbits just below have no stop, orbits just
+        // above have two or more per period
         let (below, above) = (orbit(limit * (1.0 - 1e-6), r), orbit(limit * (1.0 + 1e-6), r));
         assert_eq!(below.evidence.switches, 2, "r {r}");
         assert!(above.evidence.switches > 2 && above.joints[0].slip_fraction < 1.0, "r {r}: {above:?}");
@@ -141,7 +145,8 @@ fn theory_7_4_friction_loss() {
         close("work in", orbit.energy.work_in, expected, 1e-8);
         close("work in from the first harmonic", -PI * orbit.places[0].first_harmonic.im, expected, 1e-8);
     }
-    // towards resonance: without stops the amplitude grows without bound below beta = pi/4, and above no such motion exists
+    // towards resonance without stops: below beta = pi/4 the amplitude grows without bound;
+    // above it, no such motion exists
     for r in [0.99, 0.999, 0.9999, 1.0001, 1.001] {
         let (u, v) = functions(r);
         near("limit of boundedness", (v / u).abs(), FRAC_PI_4, 0.6 * (1.0 - r).abs());
@@ -159,7 +164,8 @@ fn theory_7_5_determinant_of_the_return_map() {
         let map = &orbit.return_map;
         let determinant = map[(0, 0)] * map[(1, 1)] - map[(0, 1)] * map[(1, 0)];
         close("determinant", determinant, (x0 * r * r - beta) / (x0 * r * r + beta), 1e-8);
-        // both multipliers of the full period have the modulus |det| (a pair of equal modulus over half a period, squared)
+        // both multipliers of the full period have the modulus |det|: they are the squares of a
+        // pair of equal modulus over half a period
         let multipliers = orbit.multipliers().unwrap();
         close("product", (multipliers[0] * multipliers[1]).re, determinant * determinant, 1e-8);
         if multipliers[0].im != 0.0 {
@@ -172,8 +178,8 @@ fn theory_7_5_determinant_of_the_return_map() {
     near("printed", map[(0, 0)] * map[(1, 1)] - map[(0, 1)] * map[(1, 0)], 0.49815078, 0.5e-8);
 }
 
-/// Excitation of the base by `Y cos(Ωt)` with friction against the base: the relative motion obeys the same equation with
-/// `P = m Ω² Y`. Source: Hundal (1979).
+/// The base moves by `Y cos(Ωt)`, with friction against the base. The relative motion obeys the
+/// same equation with `P = m Ω² Y`. Source: Hundal (1979).
 #[test]
 fn theory_7_base_excitation() {
     for (beta, r, y) in [(0.5, 0.8, 0.01), (0.4, 1.3, 0.02), (0.5, 2.5, 0.01)] {
@@ -199,7 +205,8 @@ fn theory_7_base_excitation() {
     }
 }
 
-/// Free decay: each half cycle of duration π √(m/k) takes `2 F/k` off the turning point, until it is within `F/k`: there it stops.
+/// Free decay: each half cycle of duration π √(m/k) lowers the turning point by `2 F/k`, until
+/// the mass stops within `F/k`.
 #[test]
 fn theory_7_free_decay() {
     let (m, k, limit, x0) = (0.7f64, 30.0f64, 0.9, 0.5);
@@ -237,13 +244,17 @@ fn theory_7_free_decay() {
     assert!(found.len() >= 20 && stops > 10, "{} {stops}", found.len());
 }
 
-/// What the closed forms of a ringing spring neglect, relative: the fall of the holding force over one of the hundred rings of a stick and more, twice.
+/// Relative error of the closed forms for the ringing spring: twice the fall of the holding
+/// force over one ring; a stick has a hundred rings or more.
 const RINGS: f64 = 0.02;
 
-/// (11.12): a stiff spring before the slider rings in stick at `w = √(kt/m)`, and tends to rigid friction slowly. Rigid friction holds with
-/// `R = P cos(Ωt) - k x₀` until `R = -F`. A ring about it is cut where its force reaches the limit, so that its amplitude is `a = F + R` while R falls:
-/// a velocity `a/√(kt m)`, of order `kt^-1/2`. From ring to ring R falls by `δ = |R'| 2π/w`, and of each the share `√(2δ/a)/2π` slips: of order
-/// `kt^-1/4`.
+/// (11.12): a stiff spring in series with the slider rings during stick, and tends slowly to
+/// rigid friction.
+///
+/// Rigid friction holds with `R = P cos(Ωt) - k x₀` until `R = -F`. The limit cuts a ring about
+/// this force, so its amplitude is `a = F + R` while R falls. The velocity is `a/√(kt m)`, of
+/// order `kt^-1/2`. From ring to ring R falls by `δ = |R'| 2π/w` with `w = √(kt/m)`. The
+/// fraction `√(2δ/a)/2π` of each ring slips, of order `kt^-1/4`.
 #[test]
 fn theory_11_12_a_stiff_spring_rings_in_stick() {
     let (limit, omega) = (0.6, 0.4);
@@ -252,7 +263,7 @@ fn theory_11_12_a_stiff_spring_rings_in_stick() {
     let hold = |phase: f64| phase.cos() - amplitude;
     let end = (amplitude - limit).acos();
     let begin = end - PI * (1.0 - slips);
-    // R rises next to nothing after the first contact, so that all rings are cut from the beginning
+    // R hardly rises after the first contact, so the limit cuts all rings
     assert!(begin < 0.0 && hold(0.0) - hold(begin) < 1e-3, "{begin}");
     let mut shares = Vec::new();
     for stiffness in [1e5f64, 1e6] {
@@ -262,7 +273,8 @@ fn theory_11_12_a_stiff_spring_rings_in_stick() {
         let elastic = exact(&model.assemble().unwrap(), omega);
         let ring = 2.0 * PI / stiffness.sqrt();
         let share = |phase: f64| (2.0 * omega * phase.sin() * ring / (limit + hold(phase))).sqrt() / (2.0 * PI);
-        // over the phase to the end of stick, by its root: the share grows without bound there
+        // integrate over the root of the phase to the end of stick, because the slip fraction
+        // is unbounded there
         let expected = integral(|root| 2.0 * root * share(end - root * root), end.sqrt(), &[]) / PI;
         let found = elastic.joints[0].slip_fraction - slips;
         close("share that slips in stick", found, expected, RINGS);

@@ -1,4 +1,5 @@
-//! Bladed disks: one sector with the phase of each harmonic against the whole ring, against closed forms, and against each other's excitation.
+//! Bladed disks: one sector with phase-shifted harmonics against the whole ring, against closed
+//! forms, and under aliased engine orders.
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -25,7 +26,8 @@ fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
     Force { on: on.to_owned(), amplitude, phase: 0.3, harmonic }
 }
 
-/// A blade on its part of the disk, which springs join to the next; a joint between neighbouring blades.
+/// Returns a blade on its disk sector. Springs connect the sector to the next one, a joint
+/// connects neighbouring blades.
 fn sector(law: SharedLaw) -> Model {
     Model {
         masses: vec![Mass::new("disk", 2.0), Mass::new("blade", 0.3)],
@@ -45,7 +47,7 @@ fn ring(sector: &Model, sectors: usize, forces: &[Around]) -> Model {
     disk.ring(|_| sector.clone()).unwrap()
 }
 
-/// The same ring, whose symmetry nobody knows.
+/// Returns the same ring without the information on its symmetry.
 fn whole(mut model: Model) -> Model {
     model.ring = None;
     model
@@ -55,8 +57,8 @@ fn orbit(model: &Model, method: &dyn Method, omega: f64) -> Orbit {
     method.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None).unwrap()
 }
 
-/// Largest difference of numbers of two orbits, relative to the largest amplitude, and to the largest loss or the work of a newton over that
-/// amplitude.
+/// Returns the largest difference of two orbits: amplitudes relative to the largest amplitude,
+/// losses relative to the largest loss or to 1 N times the largest amplitude.
 fn distance(a: &Orbit, b: &Orbit) -> f64 {
     let size = b.places.iter().fold(0.0f64, |m, place| m.max(place.amplitude()));
     let loss = b.joints.iter().fold(size * 1.0, |m, joint| m.max(joint.dissipation));
@@ -69,7 +71,8 @@ fn distance(a: &Orbit, b: &Orbit) -> f64 {
     places.chain(joints).fold(0.0, f64::max)
 }
 
-/// Theory 12: harmonic balance of one sector with the phase of each harmonic is that of the full ring.
+/// Theory 12: harmonic balance of one sector with phase-shifted harmonics equals that of the
+/// full ring.
 #[test]
 fn a_tuned_sector_is_the_full_ring() {
     let laws: [SharedLaw; 4] = [
@@ -79,7 +82,8 @@ fn a_tuned_sector_is_the_full_ring() {
         Arc::new(Gap { gap: 0.3, stiffness: 0.1 }),
     ];
     for (sectors, order, omega) in [(7, 2, 3.05), (8, -3, 3.3), (6, 3, 3.2), (24, 5, 3.1)] {
-        // some laws are sampled: sectors are alike to the last digit only if each lags by whole samples
+        // some laws are sampled: the sectors agree to the last digit only if the lag is a whole
+        // number of samples
         let samples = Some(sectors * 128);
         let balance = HarmonicBalance { harmonics: Some(9), samples, ..HarmonicBalance::default() };
         for law in &laws {
@@ -95,7 +99,7 @@ fn a_tuned_sector_is_the_full_ring() {
     }
 }
 
-/// The same with preload, several harmonics of the excitation, and three directions.
+/// A sector with preload, two directions and several harmonics of excitation equals its ring.
 #[test]
 fn a_sector_with_normal_contact_is_its_ring() {
     let law = FrictionContact { tangential: 2.0, normal: 3.0, friction: 0.3, preload: 0.6, tangents: 1 };
@@ -120,7 +124,8 @@ fn a_sector_with_normal_contact_is_its_ring() {
     }
 }
 
-/// Methods in time know no waves: they follow the ring, and what they find is the wave.
+/// Time integrations do not use the travelling wave. They integrate the ring, and find the
+/// wave.
 #[test]
 fn methods_in_time_find_the_wave() {
     let balance = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
@@ -134,7 +139,7 @@ fn methods_in_time_find_the_wave() {
     assert!(apart < 1e-5, "{apart:.1e}");
 }
 
-/// Engine orders e, e + N and the like are one excitation; -e is its mirror image.
+/// The engine orders e and e + N give the same excitation; -e gives its mirror image.
 #[test]
 fn engine_orders_alias() {
     let balance = HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() };
@@ -150,7 +155,7 @@ fn engine_orders_alias() {
         assert!((a.amplitude() - b.amplitude()).abs() < 1e-10 * a.amplitude());
         assert!((a.first_harmonic - b.first_harmonic).norm() < 1e-10 * a.amplitude());
     }
-    // linear: order e excites nodal diameter n and no other if and only if e = jN ± n
+    // linear: order e excites the nodal diameter n alone if and only if e = jN ± n
     let free = Model { joints: Vec::new(), ..sector(law.clone()) };
     for (order, diameter) in [(3, 3), (21, 3), (27, 3), (45, 3), (12, 12), (25, 1)] {
         let orbit = orbit(&ring(&free, 24, &[Around::EngineOrder(order)]), &EventDriven, 3.1);
@@ -169,7 +174,7 @@ fn engine_orders_alias() {
     }
 }
 
-/// Blades of 1 kg and 1 N/m without damping of their own, a damper between neighbours.
+/// Returns undamped blades of 1 kg and 1 N/m with a damper between neighbours.
 fn dampers(stiffness: f64, limit: f64, load: f64) -> Model {
     Model {
         masses: vec![Mass::new("blade", 1.0)],
@@ -184,7 +189,8 @@ fn dampers(stiffness: f64, limit: f64, load: f64) -> Model {
     }
 }
 
-/// The largest amplitude of the first place between two frequencies, rad/s, by harmonic balance.
+/// Returns the largest amplitude of the first place between two frequencies (rad/s) by harmonic
+/// balance.
 fn largest(model: &Model, harmonics: usize, [mut low, mut high]: [f64; 2]) -> f64 {
     let system = model.assemble().unwrap();
     let balance = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
@@ -197,8 +203,8 @@ fn largest(model: &Model, harmonics: usize, [mut low, mut high]: [f64; 2]) -> f6
     at(0.5 * (low + high))
 }
 
-/// Theory (10.5): dampers between the blades of a tuned disk, one-term harmonic balance, no viscous damping. The optimum of the limit
-/// is `π F0/(4 sin(θ/2))`, the amplitude there `π F0/(4 kd sin²(θ/2))`.
+/// Theory (10.5): dampers between the blades of a tuned disk, one harmonic, no viscous damping.
+/// The optimal limit is `π F0/(4 sin(θ/2))`; the amplitude there is `π F0/(4 kd sin²(θ/2))`.
 #[test]
 fn eq10_5_optimum_of_dampers_between_blades() {
     let (sectors, diameter, stiffness, load) = (24, 3, 0.2, 1.0);
@@ -206,7 +212,8 @@ fn eq10_5_optimum_of_dampers_between_blades() {
     let best = PI * load / (4.0 * half.sin());
     let amplitude = PI * load / (4.0 * stiffness * half.sin().powi(2));
     assert!((best - 2.052_344_3).abs() < 1e-7 && (amplitude - 26.815_170_6).abs() < 1e-7, "{best} {amplitude}");
-    // the peak: phase resonance at ω² = k + 4 sin²(θ/2) Re K_J(2 A sin(θ/2)), at a limit beside the optimum, and at it
+    // peak: phase resonance at `ω² = k + 4 sin²(θ/2) Re K_J(2 A sin(θ/2))`, evaluated at the
+    // optimal limit and near it
     let peak = |limit: f64| {
         let system = ring(&dampers(stiffness, limit, load), sectors, &[Around::EngineOrder(diameter)]);
         largest(&system, 1, [1.0, 1.06])
@@ -218,17 +225,21 @@ fn eq10_5_optimum_of_dampers_between_blades() {
     }
 }
 
-/// Theory (10.5) in time, from rest: at the optimum the motion that is left has the amplitude of the closed form within 0.2 %, by waiting for it and by
-/// small steps that share no code with any method. More harmonics find what one term leaves out, and no larger peak. The 24 sectors under engine order 3
-/// are three rings of 8 under engine order 1, of the same θ.
+/// Theory (10.5) in time, from rest: at the optimum the settled motion has the amplitude of the
+/// closed form within 0.2 %.
+///
+/// References are method `transient` and small steps without any method of the library. More
+/// harmonics give the part that one harmonic lacks, but no larger peak. The 24 sectors under
+/// engine order 3 are three rings of 8 sectors under engine order 1, with the same θ.
 #[test]
 fn eq10_5_optimum_in_time() {
     const ONE_TERM: f64 = 2e-3;
     const SETTLED: f64 = 1e-7;
-    // what is left after so many periods of the wave that goes the other way, which friction hardly damps; it adds to one blade what it takes from another
+    // remaining wave in the opposite direction after this number of periods; friction hardly
+    // damps it. It raises one blade and lowers another by the same amount
     const PERIODS: usize = 300;
     const OTHER_WAVE: f64 = 5e-3;
-    // beside its square, and 1000 steps a period
+    // the square of that wave, and the error of 1000 steps per period
     const SMALL_STEPS: f64 = 1e-4;
     let (sectors, stiffness, load) = (8, 0.2, 1.0);
     let half = PI / f64::from(sectors);
@@ -250,11 +261,12 @@ fn eq10_5_optimum_in_time() {
     }
     let mean = stepped.iter().sum::<f64>() / f64::from(sectors);
     close("small steps", mean, waited.places[0].amplitude(), SMALL_STEPS);
-    // the same over all frequencies
+    // the peak over all frequencies
     close("peak", largest(&model, 63, [1.0, 1.06]), amplitude, ONE_TERM);
 }
 
-/// Theory (10.5) at θ = 0: blades that move alike do not rub, whatever the limit, and have the amplitude `F0/|k - m ω²|` of one alone.
+/// Theory (10.5) at θ = 0: blades in phase do not rub, at any limit. Their amplitude is that of
+/// a single blade, `F0/|k - m ω²|`.
 #[test]
 fn eq10_5_engine_order_zero_is_not_damped() {
     for limit in [1e-3, 1.0, 1e3] {
@@ -272,8 +284,8 @@ fn eq10_5_engine_order_zero_is_not_damped() {
     }
 }
 
-/// Theory (10.5), the couple with one joint in anti-phase under `F0` on each blade: `k + 2 K_J`, so that the optimum of the limit is `π F0/2`, and the
-/// amplitude there `π F0/(2 kd)`.
+/// Theory (10.5) for a couple with one joint in anti-phase under `F0` on each blade: stiffness
+/// `k + 2 K_J`. The optimal limit is `π F0/2`, and the amplitude there is `π F0/(2 kd)`.
 #[test]
 fn eq10_5_couple_in_anti_phase() {
     let (stiffness, load) = (0.2, 1.0);
@@ -292,7 +304,7 @@ fn eq10_5_couple_in_anti_phase() {
             forces: vec![force("a", load, 1), opposed],
             ..Model::default()
         };
-        // between the free frequency and the stuck one, √(1 + 2 kd); both are undamped
+        // between the free frequency and the stuck one, `√(1 + 2 kd)`; both are undamped
         largest(&couple, 1, [1.04, 1.14])
     };
     let found = peak(best);
@@ -302,8 +314,11 @@ fn eq10_5_couple_in_anti_phase() {
     }
 }
 
-/// Blades of unit mass and stiffness on a ring, alike but for their stiffness, with springs between them, all damped alike to the ground: the largest
-/// amplitude of any blade at the resonances of the ring under engine order 0, relative to that of the tuned ring.
+/// Returns the largest amplitude of any blade at the resonances of a mistuned ring under engine
+/// order 0, relative to the tuned ring.
+///
+/// The blades have unit mass, a mistuned stiffness near one, springs between neighbours, and
+/// equal dampers to the ground.
 fn amplification(pattern: &[f64], coupling: f64) -> f64 {
     let one = |s: usize| Model {
         masses: vec![Mass::new("blade", 1.0)],
@@ -315,7 +330,8 @@ fn amplification(pattern: &[f64], coupling: f64) -> f64 {
     let ring = disk.ring(one).unwrap();
     let survey = ring.survey().unwrap();
     let system = survey.system();
-    // half widths of a resonance around each; between two that overlap lies a larger one
+    // sample around each resonance in fractions of its width; the maximum of two overlapping
+    // resonances lies between them
     let detunings = (-8..=8).map(|step| 0.25 * f64::from(step) * DAMPING);
     let around = |omega: f64| detunings.clone().map(move |detuning| omega + detuning);
     let largest = |omega: f64| {
@@ -324,16 +340,20 @@ fn amplification(pattern: &[f64], coupling: f64) -> f64 {
         x.iter().fold(0.0f64, |most, z| most.max(z.norm()))
     };
     let found = survey.free().elastic.iter().flat_map(|mode| around(mode.omega)).map(largest).fold(0.0, f64::max);
-    // force over damping at ω = 1, to the square of the damping ratio
+    // the tuned amplitude is force over damping at ω = 1, up to the square of the damping ratio
     found * DAMPING
 }
 
-/// N/m and kg/s: damping far below the coupling, both far below the stiffness.
+/// Coupling in N/m and damping in kg/s. The damping is far below the coupling, and both are far
+/// below the stiffness.
 const COUPLING: f64 = 1e-3;
 const DAMPING: f64 = 1e-6;
 
-/// Theory 12, Whitehead's bound `(1 + √N)/2` for small mistuning and the same damping of every mode. It is that of a mode in which one blade moves
-/// `1 + √N` times as much as each of the others, and each blade's stiffness follows from its equation of motion at ω = 1.
+/// Theory 12: Whitehead's bound `(1 + √N)/2` for small mistuning and equal damping of all
+/// modes.
+///
+/// The bound belongs to a mode in which one blade moves `1 + √N` times as much as each of the
+/// others. The stiffness of each blade follows from its equation of motion at ω = 1.
 #[test]
 fn whiteheads_bound_is_reached_and_not_passed() {
     for sectors in [4, 12] {
@@ -350,7 +370,7 @@ fn whiteheads_bound_is_reached_and_not_passed() {
         assert!((reached / bound - 1.0).abs() < 1e-4, "{sectors}: {reached} of {bound}");
         let mut worst = 0.0f64;
         for seed in 0..60 {
-            // weaker and stronger than the coupling by turns
+            // alternate between mistuning weaker and stronger than the coupling
             let deviation = COUPLING * [0.1, 1.0, 5.0][seed as usize % 3];
             worst = worst.max(amplification(&normal_pattern(sectors, deviation, seed), COUPLING));
         }
@@ -358,13 +378,16 @@ fn whiteheads_bound_is_reached_and_not_passed() {
     }
 }
 
-/// Theory 12: with blades that are not nearly alike the same bound is passed. A mode of the frequency `ω` has the resonance `1/ω` of that bound, since
-/// its damping is viscous, so that with mistuning up to `δ` it is `(1 + √N)/(2 √(1 - δ))`, in the limit of weak coupling and damping.
+/// Theory 12: strongly mistuned blades exceed Whitehead's bound.
+///
+/// Damping is viscous, so a mode of the frequency `ω` reaches `1/ω` times the bound. Mistuning
+/// up to `δ` thus gives `(1 + √N)/(2 √(1 - δ))` in the limit of weak coupling and damping.
 #[test]
 fn whiteheads_bound_is_passed_by_soft_blades() {
     const MOST: f64 = 0.6;
     let bound = 1.5;
-    // the mode 3, 1, 1, 1 at ω² = 0.4 + 4/3 coupling, where the leading blade has just the largest deviation
+    // mode 3, 1, 1, 1 at `ω² = 0.4 + 4/3 coupling`; the leading blade has just the largest
+    // deviation
     for (coupling, expected) in [(0.08, 2.107), (1e-3, 2.368)] {
         let shape = [3.0, 1.0, 1.0, 1.0];
         let square = 1.0 - MOST + 4.0 / 3.0 * coupling;
@@ -375,7 +398,8 @@ fn whiteheads_bound_is_passed_by_soft_blades() {
         close("by hand", bound / square.sqrt(), expected, 5e-4);
         close("found", amplification(&pattern, coupling), bound / square.sqrt(), 1e-4);
     }
-    // softer blades beside stiffer ones, as stiff on average as the tuned ring: the bound of a pair, `(1 + √2)/2`, at the frequency of that pair
+    // two soft and two stiff blades with the mean stiffness of the tuned ring: the bound of a
+    // pair, `(1 + √2)/2`, at the frequency of the soft pair
     let pair = 0.5 * (1.0 + 2f64.sqrt());
     let beside = 2.0 * COUPLING;
     let pattern = [-MOST, beside - MOST, MOST, MOST - beside];

@@ -1,6 +1,7 @@
-//! Loops of a single element moved by `a cos Ωt`: theory sections 2 and 3 (the paper's Figs. 2, 3, 4).
+//! Loops of a single element with the imposed motion `a cos Ωt`: theory sections 2 and 3 (the
+//! paper's Figs. 2, 3, 4).
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
@@ -21,7 +22,7 @@ fn element(kt: f64, a: f64, omega: f64) -> Orbit {
     exact(&template("element", &[("kt", kt), ("Ft", FT), ("a", a)]), omega)
 }
 
-/// A smooth orbit, with errors per step of 1e-11.
+/// Returns a smooth orbit, with a relative error per step of 1e-11.
 fn smooth(system: &stickslip::model::System, omega: f64) -> Orbit {
     let method = Shooting { tolerance: 1e-11, width: None, ..Shooting::default() };
     method.solver(system).unwrap().orbit(omega, None).unwrap()
@@ -42,7 +43,8 @@ fn theory_2_1_slip_begins_at_the_limit() {
             assert_eq!((orbit.joints[0].dissipation, orbit.joints[0].slip_fraction), (0.0, 0.0));
             for i in 0..64 {
                 let (x1, force) = orbit.sample(f64::from(i) / 64.0 * orbit.period()).moved[0];
-                near("straight line", force, kt * x1, 1e-14 * FT); // the symmetric one of the continuum
+                // the symmetric orbit of the continuum
+                near("straight line", force, kt * x1, 1e-14 * FT);
             }
         }
         let orbit = element(kt, (1.0 + 1e-9) * d, omega);
@@ -78,7 +80,7 @@ fn theory_2_2_loop_is_a_parallelogram() {
 
 #[test]
 fn theory_2_3_dissipation_of_the_parallelogram() {
-    // the table of section 2, W in microjoule
+    // table of section 2, W in microjoule
     let printed = [1.0, 4.0, 7.0, 4.2, 7.2, 10.2];
     for ((kt, a), printed) in CASES.into_iter().zip(printed) {
         for omega in [0.1, 1.0, 100.0] {
@@ -91,14 +93,14 @@ fn theory_2_3_dissipation_of_the_parallelogram() {
     let (kt, a) = (3.0, 2e-3);
     let loss = |ft: f64| exact(&template("element", &[("kt", kt), ("Ft", ft), ("a", a)]), 1.0).joints[0].dissipation;
     let (best, most) = maximum(loss, [1e-4, 5.9e-3], 40, 1e-9);
-    near("best limit", best, kt * a / 2.0, 1e-7 * kt * a); // flat top: half of the digits
+    near("best limit", best, kt * a / 2.0, 1e-7 * kt * a); // flat maximum: half of the digits
     close("largest loss", most, kt * a * a, 1e-12);
 }
 
 #[test]
 #[allow(clippy::approx_constant)] // 0.318310 is a printed number
 fn theory_2_4_describing_function() {
-    // the table of section 2: keq, w ceq, slip angle in degrees, x1 in mm at the onset of slip
+    // table of section 2: keq, w ceq, slip angle in degrees, x1 in mm at the onset of slip
     let printed = [
         (0.857622, 0.203718, 126.8699, -0.75),
         (0.500000, 0.318310, 90.0000, 0.00),
@@ -137,7 +139,7 @@ fn theory_2_4_describing_function() {
 
 #[test]
 fn theory_3_1_smooth_element() {
-    // rho and beta alone matter; the force stays below the arctangent at the highest velocity
+    // only rho and beta matter; the force stays below the arctangent at the highest velocity
     for (kt, a) in CASES {
         let (alpha, omega) = (25e3, 1.0);
         let orbit = smooth_element(kt, a, alpha, omega);
@@ -154,19 +156,21 @@ fn theory_3_1_smooth_element() {
         close("similarity", other.joints[0].dissipation, 3.0 * orbit.joints[0].dissipation, 1e-8);
     }
     near("bound of 3.1", FRAC_2_PI * (25e3f64 * 2e-3).atan(), 0.98727, 0.5e-5);
-    // tiny beta: a spring and a linear dashpot c = 2 alpha Ft0 / pi in series
+    // tiny beta: a spring in series with a linear dashpot `c = 2 alpha Ft0 / pi`
     let (kt, a, omega) = (1.0, 2e-3, 1.0);
     for alpha in [1.0, 0.1] {
         let orbit = smooth_element(kt, a, alpha, omega);
         let dashpot = Complex64::new(0.0, omega * 2.0 * alpha * FT / PI);
         let maxwell = dashpot / (1.0 + dashpot / kt);
         let first = harmonic(&orbit, 1, |sample| sample.moved[0].1) / a;
-        // the arctangent's next term is (alpha a w)^2 / 4 of the first; samples between steps carry 1e-7
+        // the next term of the arctangent is `(alpha a w)^2 / 4` of the first; samples between
+        // steps have errors of 1e-7
         let digits = 0.3 * (alpha * a * omega).powi(2) + 1e-7;
         assert!((first - maxwell).norm() < digits * maxwell.norm(), "{first} {maxwell}");
     }
-    // Large beta: the parallelogram. The slowest part is the reversal: there v grows as t, and the force is below the limit by
-    // about Ft0/(alpha v) until kt v t makes up for it, t^3 ~ 1/alpha: an error of the force, and of the loss, as alpha^(-2/3).
+    // Large beta: the parallelogram. The reversal is the slowest part. There v grows as t, and
+    // the force is below the limit by about `Ft0/(alpha v)` until `kt v t` compensates,
+    // `t^3 ~ 1/alpha`. The error of the force and of the loss is of order alpha^(-2/3).
     let losses: Vec<f64> = [25e3, 25e4, 25e5, 25e6, 25e7]
         .iter()
         .map(|alpha| smooth_element(kt, a, *alpha, omega).joints[0].dissipation)
@@ -191,11 +195,11 @@ fn theory_3_1_arctan_dashpot_under_harmonic_motion() {
         };
         let orbit = smooth(&model.assemble().unwrap(), omega);
         let first = limit * 4.0 / PI * ((1.0 + z * z).sqrt() - 1.0) / z;
-        let digits = 1e-9 + 1e-15 / (z * z); // (√(1 + z²) - 1)/z cancels for small z
+        let digits = 1e-9 + 1e-15 / (z * z); // `(√(1 + z²) - 1)/z` cancels for small z
         close("loss", orbit.joints[0].dissipation, PI * a * first, digits);
         let law = CoulombArctan { limit, alpha }.linearised(a, omega);
         close("linearised", law.im * a, first, digits);
-        // finer and finer towards the reversals, where the arctangent is steep
+        // smaller intervals towards the reversals, where the arctangent is steep
         let mut breaks = vec![FRAC_PI_2, PI, 3.0 * FRAC_PI_2];
         for k in 1..14 {
             breaks.extend([-1.0, 1.0].map(|sign| FRAC_PI_2 + sign * 0.5f64.powi(k)));
@@ -207,7 +211,8 @@ fn theory_3_1_arctan_dashpot_under_harmonic_motion() {
     }
 }
 
-/// The loops of `data/smooth_orbits/element_loops.csv`: massless at four speeds, with mass at two (theory 3.2, 3.4).
+/// The loops of `data/smooth_orbits/element_loops.csv`: without mass at four speeds, with mass
+/// at two (theory 3.2, 3.4).
 #[test]
 fn theory_3_2_and_3_4_loop_areas_of_the_arctan_elements() {
     let (mut worst, mut rows) = (0.0f64, 0);
@@ -232,7 +237,8 @@ fn theory_3_2_and_3_4_loop_areas_of_the_arctan_elements() {
     assert_eq!(rows, 36);
 }
 
-/// Section 3.2's printed areas (rtol 1e-4 there), and those of 3.4 for the arctan element with mass at 1 rad/s.
+/// The printed areas of section 3.2 (rtol 1e-4), and of section 3.4 for the arctan element with
+/// mass at 1 rad/s.
 #[test]
 fn theory_3_2_and_3_4_printed_areas() {
     let printed = [
@@ -256,14 +262,15 @@ fn theory_3_2_and_3_4_printed_areas() {
     for ((kt, a), printed) in CASES.into_iter().zip(printed) {
         let loss = 1e6 * with_mass(kt, a, 1.0).joints[0].dissipation;
         close("with mass", loss, printed, 1e-4);
-        // "very similar": within 0.3 % of the massless element
+        // "very similar" in the source: within 0.3 % of the massless element
         close("similar", loss, 1e6 * smooth_element(kt, a, 25e3, 1.0).joints[0].dissipation, 3e-3);
     }
-    // at one cycle per second the small mass rings and the loops are no rhombs any more
+    // at one cycle per second the small mass rings, and the loops are no longer parallelograms
     let printed = [2.78, 6.12, 8.90, 4.53, 7.43, 10.30];
     for ((kt, a), printed) in CASES.into_iter().zip(printed) {
         let orbit = with_mass(kt, a, TAU);
-        // the printed areas are off by up to 2e-3; the test before this one has SciPy's, which agree to 1e-7
+        // the printed areas have errors of up to 2e-3; the previous test compares with SciPy,
+        // which agrees to 1e-7
         close("ringing", 1e6 * orbit.joints[0].dissipation, printed, 2e-3);
         let most =
             (0..4000).map(|i| orbit.sample(f64::from(i) * orbit.period() / 4000.0).moved[0].1).fold(0.0, f64::max);
@@ -272,7 +279,8 @@ fn theory_3_2_and_3_4_printed_areas() {
     }
 }
 
-/// The element with mass is Den Hartog's oscillator moved at its base: `m = m1`, `k = kt`, `P = kt a`.
+/// The element with mass is Den Hartog's oscillator with a moved base: `m = m1`, `k = kt`,
+/// `P = kt a`.
 #[test]
 fn theory_3_3_element_with_mass_is_den_hartogs_oscillator() {
     for (kt, a, omega) in [(1.0, 2e-3, 15.0), (1.0, 2.75e-3, 30.0), (5.0, 2e-3, 40.0), (5.0, 1.25e-3, 60.0)] {
@@ -287,9 +295,12 @@ fn theory_3_3_element_with_mass_is_den_hartogs_oscillator() {
     close("natural frequency", (5.0f64 / 2e-3).sqrt(), 50.0, 1e-12);
 }
 
-/// True Coulomb friction with mass at 1 rad/s: a staircase of many stops. Section 3.4 prints 1.2975, 8.5307 and 5.9186 for three
-/// of the six areas; SciPy's own integration with stops (`data/smooth_orbits`), the smooth law with alpha up to 1e8 s/m there, and
-/// the event-driven orbit agree on 1.0416, 7.0025 and 4.2065 instead: the printed three do not stand.
+/// Coulomb friction with mass at 1 rad/s: a staircase of many stops.
+///
+/// Section 3.4 prints 1.2975, 8.5307 and 5.9186 for three of the six areas. Three computations
+/// agree on 1.0416, 7.0025 and 4.2065 instead: SciPy's integration with stops
+/// (`data/smooth_orbits`), the smooth law there with alpha up to 1e8 s/m, and the event-driven
+/// orbit. The three printed areas are wrong.
 #[test]
 fn theory_3_4_coulomb_element_with_mass_is_a_staircase() {
     let printed = [1.2975, 3.9992, 8.5307, 5.9186, 7.2166, 10.2033];

@@ -1,7 +1,9 @@
-//! Energy of orbits: theory section 9, for every template and several joints. Work, viscous loss and friction loss are computed
-//! here from harmonics and samples, apart from the library's own closed forms.
+//! Energy of orbits: theory section 9, for every template and for several joints.
+//!
+//! The tests compute work, viscous loss and friction loss from harmonics and samples, without
+//! the library's closed forms.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -11,7 +13,7 @@ use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_verification::{close, exact, integral, random_model, template, template_with};
 
-/// The couples of the paper, slipping without stops, with stops, and nearly stuck.
+/// The couples of the paper: slip without stops, slip with stops, and almost stuck.
 const POINTS: [(&str, f64, f64); 8] = [
     ("blade-couple", 2.0, 121.25),
     ("blade-couple", 4.0, 120.75),
@@ -23,7 +25,7 @@ const POINTS: [(&str, f64, f64); 8] = [
     ("symmetric-couple", 4.0, 121.6),
 ];
 
-/// Loop area of joint `j` by quadrature of force times velocity between the switches.
+/// Returns the loop area of joint `j`: force times velocity, integrated between the switches.
 fn area(orbit: &Orbit, j: usize) -> f64 {
     let mut breaks = orbit.switch_times();
     breaks.push(0.5 * orbit.period());
@@ -34,12 +36,13 @@ fn area(orbit: &Orbit, j: usize) -> f64 {
     integral(power, orbit.period(), &breaks)
 }
 
-/// `-π F0 Im X1` for the force `F0 cos Ωt` on blade 1.
+/// Returns `-π F0 Im X1` for the force `F0 cos Ωt` on blade 1.
 fn work_in(orbit: &Orbit) -> f64 {
     -PI * 10.0 * orbit.places[0].first_harmonic.im
 }
 
-/// `Σ π b w n² |X_n|²` over the dampers to the ground: harmonics by a sum over samples, as many as their fall allows.
+/// Returns `Σ π b w n² |X_n|²` over the dampers to the ground; the harmonics are sums over
+/// samples.
 fn viscous(orbit: &Orbit, blades: [usize; 2]) -> f64 {
     const SAMPLES: usize = 2048;
     const HARMONICS: usize = 255;
@@ -67,7 +70,7 @@ fn theory_9_energies_from_harmonics_and_loops() {
         let what = format!("{name}, {ft} N, {hertz} Hz");
         let last = orbit.places.len() - 1;
         close(&format!("{what}: work in"), orbit.energy.work_in, work_in(&orbit), 1e-10);
-        // n² |X_n|² falls as n^-4 at least: beyond 255 harmonics less than 1e-8 is left
+        // `n² |X_n|²` falls at least as n^-4: harmonics above 255 contribute less than 1e-8
         close(&format!("{what}: viscous"), orbit.energy.viscous, viscous(&orbit, [0, last]), 1e-8);
         close(&format!("{what}: loop area"), orbit.energy.friction, area(&orbit, 0), 1e-9);
         let balance = work_in(&orbit) - viscous(&orbit, [0, last]) - area(&orbit, 0);
@@ -93,7 +96,8 @@ fn theory_9_energies_of_the_smooth_law() {
     }
 }
 
-/// Harmonics, samples and the reported energies of models with up to three joints and several harmonics of force.
+/// Work and losses from samples agree with the reported energies, for models with up to three
+/// joints and several harmonics of force.
 #[test]
 fn theory_9_balance_of_random_models() {
     let (mut tried, mut worst) = (0, 0.0f64);
@@ -122,7 +126,7 @@ fn theory_9_balance_of_random_models() {
         let [work, viscous, friction] = [0, 1, 2].map(|which| integral(|t| powers(t)[which], orbit.period(), &breaks));
         let size = work.abs().max(viscous);
         if size < 1e-9 {
-            continue; // hardly anything moves
+            continue; // hardly any motion
         }
         tried += 1;
         for (reported, found) in

@@ -1,5 +1,8 @@
-//! A joint whose slip limit is zero carries no force: the free reference of every damper. Each method that takes a law must take it with
-//! this limit too, and give the motion that the structure has without the joint.
+//! A joint with a slip limit of zero carries no force; it is the free reference of every
+//! damper.
+//!
+//! Each method that takes a law must take it with this limit too, and give the motion of the
+//! structure without the joint.
 
 use std::f64::consts::TAU;
 use stickslip::law::{self, SharedLaw};
@@ -7,14 +10,17 @@ use stickslip::method::{self, Method, Options};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Contact, Orbit};
 
-/// Tolerance of the methods in time, relative; harmonic balance and event-driven are far below.
+/// Relative tolerance of the time integrations; harmonic balance and event-driven are far
+/// below.
 const NEAR: f64 = 1e-6;
 
-/// What an elastic joint may seem to lose, as a share of the work of a period: its force goes in and out with a thousand times of that work, and
-/// equal steps close their orbits to 1e-10.
+/// Largest apparent loss of an elastic joint, as a fraction of the work per period. The energy
+/// that its force exchanges is a thousand times that work, and orbits in equal steps are closed
+/// to 1e-10.
 const LOSSLESS: f64 = 1e-8;
 
-/// The laws that act along one direction and have a slip limit or faces that part, with their name: as sampled, and with the limit zero.
+/// Returns the laws of one direction that can be free, with their names: with the sample's
+/// values, and free.
 fn laws() -> Vec<(&'static str, SharedLaw, SharedLaw)> {
     let rows = law::TABLE.iter().map(|row| (row.name, row.sample()));
     rows.filter(|(_, law)| law.directions() == 1)
@@ -22,7 +28,8 @@ fn laws() -> Vec<(&'static str, SharedLaw, SharedLaw)> {
         .collect()
 }
 
-/// A mass of 1 kg on 1e4 N/m and 20 kg/s with these joints to the ground, driven by 3 N.
+/// Returns a mass of 1 kg on 1e4 N/m and 20 kg/s with these joints to the ground, under a force
+/// of 3 N.
 fn oscillator(laws: &[SharedLaw]) -> Model {
     let between = || ["m".to_owned(), GROUND.to_owned()];
     Model {
@@ -38,7 +45,7 @@ fn oscillator(laws: &[SharedLaw]) -> Model {
     }
 }
 
-/// The methods that take this law, with a width where one is needed.
+/// Returns the methods that take this law, with a width if they need one.
 fn methods(law: SharedLaw) -> Vec<(&'static str, Box<dyn Method>)> {
     let system = oscillator(std::slice::from_ref(&law)).assemble().unwrap();
     let mut all = Vec::new();
@@ -69,7 +76,7 @@ fn every_method_gives_the_linear_motion() {
                 assert!((found / expected - 1.0).abs() < NEAR, "{}, {name}, {omega}: {found} {expected}", law);
                 let joint = &orbit.joints[0];
                 assert_eq!(joint.dissipation, 0.0, "{}, {name}", law);
-                // methods in steps add up their lengths
+                // methods in steps sum their step lengths
                 assert!((joint.slip_fraction - 1.0).abs() < 1e-12, "{}, {name}: {}", law, joint.slip_fraction);
                 assert!(!orbit.is_one_of_many(), "{}, {name}", law);
                 let sample = orbit.sample(0.3 * orbit.period());
@@ -81,11 +88,11 @@ fn every_method_gives_the_linear_motion() {
             combinations += 1;
         }
     }
-    // every law is taken by `auto` and by another method at least
+    // at least `auto` and one other method take every law
     assert!(combinations >= 2 * laws().len(), "{combinations}");
 }
 
-/// Beside a joint that holds, one that does not changes nothing.
+/// A free joint next to a joint with a limit has no effect.
 #[test]
 fn beside_another_joint_it_is_not_there() {
     for (law, other, free) in laws() {
@@ -100,7 +107,7 @@ fn beside_another_joint_it_is_not_there() {
     }
 }
 
-/// A place that is moved against such a joint: a loop without area.
+/// A free joint under an imposed motion has a loop without area.
 #[test]
 fn its_loop_has_no_area() {
     for (law, _, free) in laws() {
@@ -117,17 +124,17 @@ fn its_loop_has_no_area() {
     }
 }
 
-/// A joint whose slip limit nothing reaches is a spring, however large the limit: at the resonance of the stuck structure, where a motion
-/// that is only nearly closed would show.
+/// A permanently stuck joint acts as a spring for any limit. The test runs at the resonance of
+/// the stuck structure, where an orbit that is not quite closed would show.
 #[test]
 fn a_limit_that_nothing_reaches_makes_a_spring() {
     for limit in [1e3, 1e6, 1e12] {
         let law: SharedLaw = std::sync::Arc::new(law::Jenkins { stiffness: 5e3, limit });
         let system = oscillator(std::slice::from_ref(&law)).assemble().unwrap();
         let omega = (1.5e4f64).sqrt();
-        // F/(c Ω) where k + kt = m Ω²
+        // `F/(c Ω)` where `k + kt = m Ω²`
         let expected = 3.0 / (20.0 * omega);
-        // a slider that was made smooth creeps
+        // a smoothed slider creeps
         for (name, method) in methods(law).into_iter().filter(|(name, _)| *name != "shooting") {
             let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
             let ratio = orbit.places[0].amplitude() / expected - 1.0;

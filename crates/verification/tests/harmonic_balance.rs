@@ -1,4 +1,5 @@
-//! Harmonic balance against closed forms and against the exact method: theory sections 2, 3, 6, 10, 11.
+//! Harmonic balance against closed forms and against the exact method: theory sections 2, 3, 6,
+//! 10, 11.
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -19,14 +20,14 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// A law under the imposed motion `a cos t`.
+/// Returns a law under the imposed motion `a cos t`.
 fn imposed(law: SharedLaw, a: f64) -> System {
     let joint = Joint { name: "contact".into(), between: ["mover".into(), GROUND.into()], law };
     let motion = Motion { on: "mover".into(), amplitude: a, phase: 0.0, harmonic: 1 };
     Model { joints: vec![joint], motions: vec![motion], ..Model::default() }.assemble().unwrap()
 }
 
-/// First harmonic of the joint's force, from `samples` instants.
+/// Returns the first harmonic of the joint's force from `samples` instants.
 fn first_force(orbit: &Orbit, samples: usize) -> Complex64 {
     let period = orbit.period();
     let term = |i: usize| {
@@ -36,7 +37,7 @@ fn first_force(orbit: &Orbit, samples: usize) -> Complex64 {
     (0..samples).map(term).sum::<Complex64>() * (2.0 / samples as f64)
 }
 
-/// Griffin's oscillator: m = k = F0 = 1, damper of stiffness 0.2.
+/// Returns Griffin's oscillator: m = k = F0 = 1, damper of stiffness 0.2.
 fn griffin(limit: f64, damping: f64) -> Model {
     Model {
         masses: vec![Mass::new("m", 1.0)],
@@ -60,7 +61,8 @@ fn theory_2_4_and_11_1_describing_function() {
         let stiffness = kt / PI * Complex64::new(slip - 0.5 * (2.0 * slip).sin(), slip.sin().powi(2));
         let system = imposed(Arc::new(Jenkins { stiffness: kt, limit: 1.0 }), a);
         let orbit = orbit(&balance(1, 4096), &system, 1.0);
-        // a sum over samples misses the kinks between them: second order, (2π/4096)²/12
+        // a sum over samples misses the kinks between them: an error of second order,
+        // `(2π/4096)²/12`
         let found = first_force(&orbit, 4096) / a;
         assert!((found - stiffness).norm() < 2e-7 * kt, "{kt} {a}: {found} instead of {stiffness}");
         let loss = 4.0 * (a - d);
@@ -76,7 +78,7 @@ fn theory_3_1_arctan_dashpot() {
         let orbit = orbit(&balance(1, 4096), &imposed(Arc::new(law), 1.0), 1.0);
         let first = 2.0 * 4.0 / PI * z / ((1.0 + z * z).sqrt() + 1.0);
         let found = orbit.joints[0].dissipation / PI;
-        // sharp laws: velocity taken as linear over a sample, error (2π/4096)²/6
+        // sharp laws: the velocity is linear within a sample, with an error of `(2π/4096)²/6`
         assert!((found / first - 1.0).abs() < 1e-6, "{z}: {}", found / first - 1.0);
     }
 }
@@ -140,7 +142,8 @@ fn theory_10_3_nonlinear_mode() {
 #[test]
 fn theory_10_4_flutter_limit_cycles() {
     for (cw, expected) in [(0.03, [5.7898528, 36.6514653]), (0.05, [6.8340957, 18.6306951])] {
-        // the closed form prescribes |c| ω: find the damping that has it at the orbit's frequency
+        // the closed form prescribes `|c| ω`: iterate the damping until it holds at the orbit's
+        // frequency
         for (which, amplitude) in expected.into_iter().enumerate() {
             let mut damping = -cw;
             let mut found = None;
@@ -158,7 +161,8 @@ fn theory_10_4_flutter_limit_cycles() {
     }
 }
 
-/// 6.3 with Jenkins in place of the small mass: error at H = 15, and the mean of both blades, which friction does not touch.
+/// (6.3) with Jenkins instead of the small mass: the error at H = 15, and the mean of both
+/// blades, which friction does not affect.
 #[test]
 fn massless_couple_against_event_driven() {
     let couple = templates::find("blade-couple-massless").unwrap();
@@ -183,7 +187,8 @@ fn massless_couple_against_event_driven() {
     }
 }
 
-/// Rigid friction with a contact mass, where codes with a penalty stop: whole curves, no failed point, and an error estimate that holds.
+/// Rigid friction with a contact mass, where penalty codes fail: whole curves without a failed
+/// point.
 #[test]
 fn whole_curves_of_figures_6_7_and_10() {
     let cases: [(&str, &[(&str, f64)]); 3] =
@@ -208,7 +213,7 @@ fn whole_curves_of_figures_6_7_and_10() {
     }
 }
 
-/// 6.6: the performance curve of the couple by the exact method, and its minimum near 6.4 N.
+/// (6.6): the performance curve of the couple by the exact method, with its minimum near 6.4 N.
 #[test]
 fn theory_6_6_performance_of_the_couple() {
     let couple = templates::find("blade-couple").unwrap();
@@ -219,18 +224,21 @@ fn theory_6_6_performance_of_the_couple() {
         points: 31,
         quantities: &|orbit: &Orbit| vec![orbit.places[0].amplitude()],
     };
-    // 6.6 was found with five harmonics at most, which 6.3 says is 5 % off at 6 N, and on a grid of 0.02 Hz: 2 % away from there
+    // (6.6) used at most five harmonics, 5 % off at 6 N by (6.3), and a grid of 0.02 Hz: it is
+    // 2 % accurate away from 6 N
     for (limit, cm) in [(0.5, 6.11), (2.0, 4.87), (4.0, 3.24), (5.0, 2.45), (8.0, 2.19), (12.0, 2.78)] {
         let row = performance.peak(limit).unwrap();
         assert_eq!(row.failed, 0);
         let found = 100.0 * row.peak.unwrap().value;
         assert!((found / cm - 1.0).abs() < 0.02, "{limit} N: {found} cm instead of {cm}");
     }
-    // the minimum, which 6.6 puts near 6.4 N: with the exact law it stands higher, as the grids below show
+    // (6.6) puts the minimum near 6.4 N; with the exact law it is higher, as the grids below
+    // show
     let best = performance.curve(&[5.5, 6.0, 6.5, 7.0]).unwrap().optimum.unwrap();
     let lowest = best.peak.unwrap().value;
     for limit in [6.2, 6.4, 6.6, 6.65, 6.7, 6.75, 6.8, 7.0] {
-        // a grid of 0.002 Hz without any search: its maximum is no higher than the peak, and no grid maximum is below the optimum
+        // a grid of 0.002 Hz without a search: its maximum is not above the peak, and not below
+        // the optimum
         let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
         let mut solver = EventDriven.solver(&system).unwrap();
         let mut start: Option<Vec<f64>> = None;
@@ -256,8 +264,9 @@ impl Dice {
         low + (high - low) * ((self.0 >> 33) as f64) / (1u64 << 31) as f64
     }
 
-    /// Two to four masses, three joints with the chosen share of rigid ones and `laws` laws side by side in each, several harmonics of
-    /// excitation, sometimes a constant.
+    /// Returns two to four masses with three joints of `laws` parallel laws each, and an
+    /// excitation frequency. The first law is rigid with the probability `rigid`. The
+    /// excitation has several harmonics and sometimes a constant force.
     fn model(&mut self, rigid: f64, laws: usize) -> (Model, f64) {
         let n = self.between(2.0, 4.999) as usize;
         let mut model = Model::default();
@@ -274,7 +283,7 @@ impl Dice {
             let other = if j + 1 < n { name(j + 1) } else { GROUND.into() };
             for k in 0..laws {
                 let limit = self.between(0.05, 0.6) / laws as f64;
-                // rigid friction beside rigid friction would leave the share of each open
+                // parallel rigid contacts would leave the share of each undetermined
                 let law: SharedLaw = if k == 0 && self.between(0.0, 1.0) < rigid {
                     Arc::new(Coulomb { limit })
                 } else {
@@ -294,7 +303,8 @@ impl Dice {
     }
 }
 
-/// Distance of two orbits: the largest of the places, root mean square without the mean, relative to the largest motion.
+/// Returns the distance of two orbits: the largest root mean square difference of a place
+/// without its mean, relative to the largest motion.
 fn distance(one: &Orbit, other: &Orbit) -> f64 {
     let (points, period) = (2000, one.period());
     let n = one.places.len();
@@ -312,7 +322,8 @@ fn distance(one: &Orbit, other: &Orbit) -> f64 {
     (most(&apart) / most(&size)).sqrt()
 }
 
-/// The reported error against the true one on 200 random models: within a factor 3 in 95 of 100, never below a tenth, and no model fails.
+/// Compares the reported with the true error on 200 random models. It is within a factor of 3
+/// in 95 of 100, and always above a tenth.
 fn judge_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
     let mut dice = Dice(seed);
     let (mut judged, mut within) = (0, 0);
@@ -322,7 +333,8 @@ fn judge_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
         let Ok(exact) = EventDriven.solver(&system).unwrap().orbit(omega, None) else { continue };
         let found = match method.solver(&system).unwrap().orbit(omega, None) {
             Ok(found) => found,
-            // a tolerance that needs more harmonics than there may be is refused, and nothing is claimed
+            // the solver refuses a tolerance that needs more harmonics than allowed, and claims
+            // nothing
             Err(OrbitError::Truncation { .. }) => continue,
             Err(error) => panic!("case {case}: {error}"),
         };
@@ -350,13 +362,14 @@ fn the_error_estimate_is_honest_with_two_laws_per_joint() {
     judge_estimates(HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() }, 2, 21);
 }
 
-/// The automatic choice: that the search ends where the estimate happens to be low must not make it dishonest.
+/// The automatic choice: the search ends where the estimate is low, and the estimate must still
+/// be reliable.
 #[test]
 fn the_error_estimate_of_the_automatic_choice_is_honest() {
     judge_estimates(HarmonicBalance { tolerance: Some(3e-3), ..HarmonicBalance::default() }, 1, 22);
 }
 
-/// Floquet multipliers by the judge of the exact method: those of the orbit that it finds itself.
+/// The Floquet multipliers agree with those of the exact method.
 #[test]
 fn stability_by_the_same_judge() {
     let couple = templates::find("blade-couple-massless").unwrap();
@@ -366,14 +379,14 @@ fn stability_by_the_same_judge() {
         let judge = orbit(&EventDriven, &system, TAU * hertz);
         assert_eq!(found.is_stable(), Some(true));
         for (a, b) in found.multipliers().unwrap().iter().zip(judge.multipliers().unwrap()) {
-            // a switch that is off by the error of the series, 1e-6 of the period
+            // a switch has the error of the series, 1e-6 of the period
             assert!((a.norm() - b.norm()).abs() < 1e-4, "{hertz} Hz: {a} {b}");
         }
     }
 }
 
-/// The banded form of large systems gives what the condensed form gives: a chain beyond its border against the same chain whose
-/// far end is cut off by blades that nothing drives.
+/// The banded form of large systems agrees with the condensed form. A long chain, with undriven
+/// blades beyond the twelfth, is compared with the short chain.
 #[test]
 fn long_chains_take_the_banded_form() {
     let chain = |blades: usize| {
@@ -404,7 +417,8 @@ fn long_chains_take_the_banded_form() {
     }
 }
 
-/// The arctan laws against shooting on the same smooth equations, within three times the reported error.
+/// The arctan laws agree with shooting on the same smooth equations, within three times the
+/// reported error.
 #[test]
 fn smooth_laws_against_shooting() {
     use std::sync::Arc;
@@ -433,7 +447,8 @@ fn smooth_laws_against_shooting() {
     }
 }
 
-/// What a user reads where harmonic balance cannot help: too few harmonics, too few samples, a tolerance out of reach, no motion at all.
+/// Messages where harmonic balance cannot give an orbit: too few harmonics, too few samples, a
+/// tolerance out of reach, no motion.
 #[test]
 fn clear_words_instead_of_wrong_amplitudes() {
     let mut model = griffin(1.0, 0.0);
@@ -450,7 +465,8 @@ fn clear_words_instead_of_wrong_amplitudes() {
     let method = HarmonicBalance { tolerance: Some(1e-7), ..HarmonicBalance::default() };
     let error = method.solver(&system).unwrap().orbit(TAU * 121.0, None).unwrap_err();
     assert_eq!(error.status(), "tolerance-not-reached");
-    // harmonics that are allowed but too few: the orbit says that it is not accurate, and its estimate how far
+    // too few harmonics by option: the orbit reports that it is truncated, and estimates its
+    // error
     let exact = orbit(&EventDriven, &system, TAU * 121.0);
     let method = HarmonicBalance { harmonics: Some(3), ..HarmonicBalance::default() };
     let found = orbit(&method, &system, TAU * 121.0);
@@ -459,12 +475,12 @@ fn clear_words_instead_of_wrong_amplitudes() {
     assert!(estimate > error / 3.0 && estimate < 3.0 * error, "{estimate:.1e} {error:.1e}");
     let enough = HarmonicBalance { tolerance: Some(0.5), ..method };
     assert_eq!(orbit(&enough, &system, TAU * 121.0).evidence.accuracy, Accuracy::Converged);
-    // a start that is far off: a state is no start for a series, which begins with its own guess
+    // a remote state has no effect: a series starts from its own initial guess
     let far = vec![1e3; exact.start.len()];
     let method = balance(9, 1024);
     let found = method.solver(&system).unwrap().orbit(TAU * 121.0, Some(&far)).unwrap();
     assert_eq!(found.places[0].amplitude(), orbit(&method, &system, TAU * 121.0).places[0].amplitude());
-    // (10.1): without damping and with a limit below pi F0/4 the resonance has no bound
+    // (10.1): without damping and with a limit below `pi F0/4` the resonance is unbounded
     let system = griffin(0.5, 0.0).assemble().unwrap();
     let error = HarmonicBalance::default().solver(&system).unwrap().orbit(1.0, None).unwrap_err();
     assert_eq!(error.status(), "not-converged");

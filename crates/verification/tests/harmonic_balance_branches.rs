@@ -16,7 +16,8 @@ fn balance(harmonics: usize) -> HarmonicBalance {
     HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() }
 }
 
-/// Along frequency, with onset of slip on the way: the whole range, and the peak that maximising over frequency finds.
+/// A branch along frequency with onset of slip covers the whole range. Its peak agrees with the
+/// maximum over frequency.
 #[test]
 fn along_frequency_to_the_peak() {
     for (template, harmonics) in [("blade-couple-massless", 9), ("blade-couple", 3)] {
@@ -49,8 +50,9 @@ fn along_frequency_to_the_peak() {
     }
 }
 
-/// Figs. 6, 7 and 10 by continuation: rigid friction with a contact mass, whole curves for all four slip limits. The branch goes from end to
-/// end without a turn, and its points are those that the method finds one by one.
+/// Figs. 6, 7 and 10 by continuation: rigid friction with a contact mass, whole curves for all
+/// four slip limits. The branch has no turning point, and its points agree with single
+/// solutions.
 #[test]
 fn figures_6_7_and_10_by_continuation() {
     let cases: [(&str, &[(&str, f64)]); 3] =
@@ -77,9 +79,10 @@ fn figures_6_7_and_10_by_continuation() {
                     "{template} {all:?} H = {harmonics}: {} points",
                     branch.points.len()
                 );
-                // a structure that only dissipates, with friction whose limit is constant, has one periodic motion at a frequency
+                // a dissipative structure with a constant friction limit has one periodic
+                // motion per frequency
                 assert!(branch.turns.is_empty());
-                // the corrector may go as far again as the step
+                // the corrector may move as far as the step
                 assert!(branch.points.windows(2).all(|pair| pair[1].value - pair[0].value < TAU * 0.1));
                 let mut solver = method.solver(&system).unwrap();
                 for point in branch.points.iter().step_by(20) {
@@ -92,8 +95,9 @@ fn figures_6_7_and_10_by_continuation() {
     }
 }
 
-/// Along the force on an oscillator with negative damping, where friction holds small motions and lets large ones go: the branch turns
-/// back at the force beyond which no bounded motion exists. All points satisfy the closed form of one harmonic, (2.4).
+/// A branch along the force on an oscillator with negative damping; friction stabilizes small
+/// motions, not large ones. The branch turns at the largest force with a bounded motion. All
+/// points satisfy the closed form of one harmonic, (2.4).
 #[test]
 fn along_a_force_around_a_turning_point() {
     let (kt, omega, damping) = (0.2, 1.0488, -0.03);
@@ -132,9 +136,11 @@ fn along_a_force_around_a_turning_point() {
     }
 }
 
-/// Rigid friction on an oscillator with negative damping, along the force: from slip without stops past the force below which no such motion
-/// exists, back through motions that no waiting finds, around the onset of large slip and down into stick. The judge is the exact method,
-/// started from the points of the branch.
+/// Rigid friction on an oscillator with negative damping, along the force.
+///
+/// The branch begins in slip without stops, up to the smallest force with such a motion. It
+/// turns back through unstable motions, and turns again at the onset of large slip, down into
+/// stick. The exact method checks it, with the points of the branch as warm starts.
 #[test]
 fn rigid_friction_around_two_turning_points() {
     let omega = 1.1f64.sqrt();
@@ -162,7 +168,8 @@ fn rigid_friction_around_two_turning_points() {
     .branch()
     .unwrap();
     assert_eq!((branch.end, branch.turns.len()), (End::Border, 2));
-    // one harmonic puts the first turn at F² = ((1 - ω²) a)² + (4/π - 0.03 ω a)², least over a
+    // for one harmonic the first turn is at `F² = ((1 - ω²) a)² + (4/π - 0.03 ω a)²`, minimized
+    // over a
     let first = |a: f64| (0.1 * a).hypot(4.0 / PI - 0.03 * omega * a);
     let lowest = (0..1000).map(|i| first(0.01 * f64::from(i))).fold(f64::INFINITY, f64::min);
     let turn = branch.points[branch.turns[0]].value;
@@ -177,7 +184,8 @@ fn rigid_friction_around_two_turning_points() {
             assert!(a < 1e-9, "{} {a}", point.value);
             continue;
         }
-        // near the turns the amplitude is no function of the force, and there the exact method may find the other branch
+        // near the turns one force has several amplitudes, and the exact method may find the
+        // other branch
         if a < 1e-3 || branch.turns.iter().any(|turn| (branch.points[*turn].value - point.value).abs() < 5e-3) {
             continue;
         }
@@ -186,7 +194,7 @@ fn rigid_friction_around_two_turning_points() {
             failed += 1;
             continue;
         };
-        // the branch is flat between the turns: the force there differs by less than a hundredth
+        // the branch is flat between the turns: the force there differs by less than 1 %
         let bound = if point.value > 1.3 { 0.01 } else { 0.15 };
         assert!(
             (a / exact.places[0].amplitude() - 1.0).abs() < bound,

@@ -1,4 +1,5 @@
-//! Harmonic balance at the edges of what it can do: what it must find, and what it must refuse.
+//! Difficult cases of harmonic balance: orbits that it must find, and systems that it must
+//! refuse.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -32,7 +33,8 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// The amplitudes of both methods agree within three times the reported error, which is within the tolerance.
+/// Asserts that the amplitudes of both methods agree within three times the reported error, and
+/// that this error is within the tolerance.
 fn agrees(model: &Model, omega: f64) {
     let system = model.assemble().unwrap();
     let (found, exact) = (orbit(&HarmonicBalance::default(), &system, omega), orbit(&EventDriven, &system, omega));
@@ -45,8 +47,9 @@ fn agrees(model: &Model, omega: f64) {
     }
 }
 
-/// Contacts hold, whatever the limit that they do not reach: a body that sticks to the ground beside one that is driven, a spring between them, is a
-/// support of it, so that its amplitude is `F/|k + c - m ω² + i b ω|`; with smooth, plane and falling friction too.
+/// Permanently stuck contacts with limits up to 1e100. A body stuck to the ground supports a
+/// driven body through a spring. The amplitude is `F/|k + c - m ω² + i b ω|`. The test covers
+/// smooth and falling friction too.
 #[test]
 fn limits_that_nothing_reaches() {
     let (stiffness, coupling, omega) = (100.0, 40.0, 7.0);
@@ -79,7 +82,8 @@ fn limits_that_nothing_reaches() {
     }
 }
 
-/// A contact that holds does so however steeply its friction would fall: as with friction that does not.
+/// A permanently stuck contact behaves the same for constant friction and for friction that
+/// falls steeply with velocity.
 #[test]
 fn friction_that_falls_holds_too() {
     let couple = |law: SharedLaw| {
@@ -100,7 +104,8 @@ fn friction_that_falls_holds_too() {
     }
 }
 
-/// Excitation of the sixth harmonic alone: the motion has its multiples, which are what has to be doubled.
+/// Excitation of the sixth harmonic alone: the motion has multiples of six, and refinement
+/// doubles these.
 #[test]
 fn excitation_without_a_fundamental() {
     let law = Arc::new(Jenkins { stiffness: 0.5, limit: 0.15 });
@@ -114,7 +119,7 @@ fn excitation_without_a_fundamental() {
     for omega in [0.175, 0.18, 0.19] {
         agrees(&model, omega);
     }
-    // what does not move with the drive's frequency has no phase against it
+    // a motion without the excitation frequency has no phase relative to it
     let system = model.assemble().unwrap();
     for method in [&EventDriven as &dyn Method, &HarmonicBalance::default()] {
         let found = orbit(method, &system, 0.18);
@@ -122,7 +127,8 @@ fn excitation_without_a_fundamental() {
     }
 }
 
-/// A light part that resonates at the seventeenth harmonic, above a first comparison of seven with fifteen.
+/// A light part resonates at the seventeenth harmonic, above the first comparison of 7 with
+/// 15 harmonics.
 #[test]
 fn a_resonance_above_the_series() {
     let model = Model {
@@ -135,7 +141,8 @@ fn a_resonance_above_the_series() {
     agrees(&model, 1.0);
 }
 
-/// The highest harmonic meets an undamped resonance: the force of the contact is resolved nevertheless.
+/// The highest harmonic meets an undamped resonance. The series still resolves the force of the
+/// contact.
 #[test]
 fn a_resonance_at_the_highest_harmonic() {
     let model = Model {
@@ -154,7 +161,7 @@ fn a_resonance_at_the_highest_harmonic() {
     }
 }
 
-/// A free body: a mean force that friction cannot hold pushes it away, and one that it holds does not.
+/// A free body drifts under a mean force above the friction, and stays under a smaller one.
 #[test]
 fn a_free_body_drifts_or_sticks() {
     let model = |limit: f64| Model {
@@ -170,8 +177,8 @@ fn a_free_body_drifts_or_sticks() {
     assert!(held.places[0].amplitude() < 1e-9 && held.evidence.stuck == ["joint"], "{held:?}");
 }
 
-/// A slider on a body that nothing else holds carries no more than its limit, also where nothing vibrates on it: pushed by more, the body is dragged away;
-/// pushed by less, its spring is bent by what it carries.
+/// A slider is the only support of a body, and nothing excites the body. A constant force above
+/// the limit drags the body away; a smaller force only bends the spring.
 #[test]
 fn a_constant_force_beyond_the_limit_is_not_held() {
     let model = |push: f64| Model {
@@ -192,8 +199,9 @@ fn a_constant_force_beyond_the_limit_is_not_held() {
     }
 }
 
-/// Multipliers beside one are those of the flow's own orbit where the series may be on the wrong side: one that is 4e-4 off put a
-/// pair outside the circle, 1.0047, inside it. Those of the series itself err by a few times its return defect.
+/// Near the stability limit the multipliers are those of the time integration's own orbit. An
+/// error of 4e-4 of the series moved a pair of modulus 1.0047 inside the unit circle.
+/// Multipliers of the series have an error of a few return defects.
 #[test]
 fn a_series_beside_the_limit_of_stability_knows_its_side() {
     let stop = |name: &str, a: &str, b: &str, gap, stiffness| Joint {
@@ -221,8 +229,9 @@ fn a_series_beside_the_limit_of_stability_knows_its_side() {
     assert!(largest > 1.004 && its > 1.004 && (its - largest).abs() < 10.0 * defect, "{its} {largest} {defect}");
 }
 
-/// Rigid friction in a plane beside an elastic contact there, pushed along one direction, is friction along that: the series is as long as rigid friction
-/// asks for, with as many samples for the law with memory beside it.
+/// Rigid and elastic friction in a plane under a force along one direction equal friction along
+/// that direction. The series is as long as rigid friction requires, and the law with memory
+/// gets enough samples for it.
 #[test]
 fn rigid_and_elastic_friction_in_a_plane_have_their_long_series() {
     let (mass, damping, stiffness) = (679.4, 97.44, [743_700.0, 1_931_000.0]);
@@ -251,7 +260,7 @@ fn rigid_and_elastic_friction_in_a_plane_have_their_long_series() {
     assert!(error < 2e-3 && error < 3.0 * found.evidence.truncation.unwrap(), "{error:.1e} {:?}", found.evidence);
 }
 
-/// Without excitation there is rest.
+/// Without excitation the orbit is at rest.
 #[test]
 fn no_excitation_is_rest() {
     for law in [Arc::new(Jenkins { stiffness: 2.0, limit: 0.5 }) as SharedLaw, Arc::new(Coulomb { limit: 0.5 })] {
@@ -266,7 +275,8 @@ fn no_excitation_is_rest() {
     }
 }
 
-/// An even harmonic that moves a place which touches no mass: the work there is that of its spring's damper, π c h Ω a².
+/// An even harmonic moves a place without mass. Its work is the loss of the spring's damper, π
+/// c h Ω a².
 #[test]
 fn a_moved_place_without_a_mass() {
     let motion = |on: &str, harmonic| Motion { on: on.into(), amplitude: 1.0, phase: 0.0, harmonic };
@@ -283,7 +293,8 @@ fn a_moved_place_without_a_mass() {
     assert!(found.energy.viscous > TAU / 2.0 * 0.1 * 2.0);
 }
 
-/// Multipliers of an element with an inner slider do not depend on the phase of the force, and are those of shooting.
+/// The multipliers of an element with an inner slider do not depend on the phase of the force,
+/// and agree with shooting.
 #[test]
 fn multipliers_of_an_inner_slider() {
     let law = Arc::new(JenkinsArctan { stiffness: 1.0, limit: 1.0, alpha: 3.0 });
@@ -305,8 +316,9 @@ fn multipliers_of_an_inner_slider() {
     }
 }
 
-/// The same rigid friction said otherwise: in parallel contacts that share its limit, and as friction in a plane of which the motion takes one line only.
-/// Nothing decides what each of them carries while they stick, and the motion is that of the one.
+/// Several forms of the same rigid friction: parallel contacts that share its limit, and plane
+/// friction with motion along one line. The distribution of the force in stick is undetermined;
+/// the motion is that of one contact.
 #[test]
 fn friction_that_is_shared_is_that_of_one_contact() {
     let (limit, omega) = (3.068, 50.137);
@@ -343,8 +355,8 @@ fn friction_that_is_shared_is_that_of_one_contact() {
     }
 }
 
-/// A spring that stiffens a thousandfold over the motion, at a frequency where Newton's method finds nothing from the linear motion: rest leads to the
-/// orbit in time, and it is that of shooting.
+/// A spring stiffens a thousandfold over the motion, and Newton's method fails from the linear
+/// motion. An integration in time from rest leads to the orbit, which agrees with shooting.
 #[test]
 fn time_leads_to_orbits_that_newton_misses() {
     let (system, omega) = random_system(987);

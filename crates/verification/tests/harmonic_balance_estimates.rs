@@ -1,10 +1,12 @@
-//! The error that harmonic balance states, for every law that it takes, on random systems with full matrices: never below the true one by more than a
-//! factor.
+//! Error estimates of harmonic balance for every law that it takes, on random systems with full
+//! matrices. An estimate may be too low only by a bounded factor.
 //!
-//! The true motion is that of shooting, whose own error is a thousandth; for laws that shooting cannot take, that of harmonic balance with a
-//! thirtieth of the tolerance and sixteen times the samples. `STICKSLIP_ESTIMATES=50` makes it longer, it prints the worst of every law.
+//! The reference is shooting, with a thousandth of the error. For laws that shooting cannot
+//! take, it is harmonic balance with a thirtieth of the tolerance and sixteen times the
+//! samples. `STICKSLIP_ESTIMATES=50` sets the number of models per law. The test prints the
+//! worst case of every law.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::sync::Arc;
 use stickslip::law::{BoucWen, Dahl, LuGre, SharedLaw, TABLE};
@@ -13,13 +15,14 @@ use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::Orbit;
 use stickslip_verification::random_system_of;
 
-/// Models of every law without a wish.
+/// Default number of models per law.
 const MODELS: u64 = 5;
-/// The true error is at most this many times what is stated, as the book says. Most is 1.2, and 2.7 for `stribeck`.
+/// Largest true error in estimates, as the book states. Measured: up to 1.2, and 2.7 for
+/// `stribeck`.
 const FACTOR: f64 = 3.0;
-/// Relative error of the motions that count as true.
+/// Relative error of the reference motions.
 const TRUE: f64 = 3e-5;
-/// Samples of harmonic balance as judge.
+/// Samples of harmonic balance as the reference.
 const SAMPLES: usize = 16_384;
 
 fn judge(system: &System, omega: f64) -> Option<Orbit> {
@@ -30,7 +33,8 @@ fn judge(system: &System, omega: f64) -> Option<Orbit> {
     method.solver(system).ok()?.orbit(omega, None).ok()
 }
 
-/// The largest difference of the places, root mean square without the mean, relative to the largest motion; and that of the amplitudes.
+/// Returns the largest root mean square difference of a place without its mean, relative to the
+/// largest motion.
 fn distance(one: &Orbit, other: &Orbit) -> f64 {
     let (points, period) = (2000, one.period());
     let (mut apart, mut size) = (vec![0.0; one.places.len()], vec![0.0; one.places.len()]);
@@ -78,8 +82,10 @@ fn the_estimate_holds_for_every_law() {
     assert!(low.is_empty(), "{}", low.join("\n"));
 }
 
-/// Laws whose states cross their range between two samples are to a series as steep as rigid friction, and samples place a change of sign to a sample only: two
-/// motions may be near each other by chance (9.8e-6 where the error was 1.9e-4). The way over which they cross it is a thousandth to a millionth of the motion.
+/// Laws with states that cross their range between two samples act like rigid friction on a
+/// series. Samples locate a change of sign only to one sample, so two series may be close by
+/// chance (9.8e-6 where the error was 1.9e-4). The states cross their range over a thousandth
+/// to a millionth of the motion.
 #[test]
 fn the_estimate_holds_for_stiff_laws_with_states() {
     let laws = |stiffness: f64| -> [SharedLaw; 3] {

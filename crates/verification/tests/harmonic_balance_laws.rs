@@ -1,5 +1,6 @@
-//! Every law in harmonic balance: the orbit's motion is given to the law alone, by a view of it and not by a port, and what it answers must
-//! balance the structure and lose what the orbit says.
+//! Every law in harmonic balance: a view of the law, not the port, evaluates the forces under
+//! the orbit's motion. These forces must balance the structure and dissipate the reported
+//! energy.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -13,19 +14,23 @@ use stickslip_verification::replay::{self, View};
 /// Viscous damping, N s/m.
 const DAMPING: f64 = 5.0;
 
-/// What errors of the series may come to in the force, in units of the estimated error of the motion: elastic forces are ten times the drive's,
-/// and a steep law answers the motion's ripple.
+/// Largest force error due to the series, in estimated errors of the motion. Elastic forces are
+/// ten times the excitation, and a steep law responds to the ripple of the series.
 const SERIES: f64 = 100.0;
-/// What they may come to in the return of the state, in the same unit: velocities count there as displacements do.
+/// Largest return defect due to the series, in the same unit; velocities count there like
+/// displacements.
 const RETURN: f64 = 30.0;
-/// The same of what a port samples: the way between two of 1024 samples is curved, and a rate law's step is of order 3.
+/// Error due to the samples of a port: the motion between two of 1024 samples is curved, and
+/// the steps of a rate law have order 3.
 const SAMPLED: f64 = 5e-6;
 
-/// Periods after which a law is asked what it answers to the orbit's motion, until that balances the structure: one forgets at once how it began,
-/// another creeps for hundreds of periods. What answers no orbit does so after none of them.
+/// Numbers of periods of the orbit's motion after which the forces may balance. Some laws
+/// forget their start at once, others creep for hundreds of periods. A wrong orbit does not
+/// balance after any of them.
 const PERIODS: [usize; 4] = [5, 20, 80, 320];
 
-/// The forces that the law gives in the last of so many periods of the orbit's motion: samples, and what it loses.
+/// Returns the forces of the law over the last of `periods` periods of the orbit's motion, and
+/// their loss.
 fn answer(law: &SharedLaw, view: View, orbit: &Orbit, periods: usize) -> (Vec<[f64; 3]>, f64) {
     const SAMPLES: usize = 4096;
     let period = orbit.period();
@@ -40,15 +45,15 @@ fn answer(law: &SharedLaw, view: View, orbit: &Orbit, periods: usize) -> (Vec<[f
     (forces[last..times.len() - 1].to_vec(), loss)
 }
 
-/// Amplitude of a harmonic of samples along a direction.
+/// Returns the amplitude of a harmonic of samples along a direction.
 fn harmonic(samples: &[[f64; 3]], a: usize, h: usize) -> Complex64 {
     let n = samples.len() as f64;
     let scale = if h == 0 { 1.0 } else { 2.0 } / n;
     samples.iter().enumerate().map(|(i, f)| Complex64::cis(-TAU * (h * i) as f64 / n) * (f[a] * scale)).sum()
 }
 
-/// How far the law's answer to the orbit's motion is from losing what the orbit says, and from balancing the structure in first harmonic and mean
-/// along each direction, in shares of the drive's work and force.
+/// Returns the errors of loss, and of the balance in first harmonic and mean along each
+/// direction. They are relative to the work and the force of the excitation.
 fn off_balance(law: &SharedLaw, view: View, orbit: &Orbit, constant: f64, periods: usize) -> Vec<f64> {
     let (forces, loss) = answer(law, view, orbit, periods);
     let mut off = vec![(orbit.joints[0].dissipation - loss).abs() / orbit.energy.work_in];
@@ -70,7 +75,7 @@ fn every_law_balances_the_structure() {
         let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
         let mut solver = match advised(&method, &system) {
             Ok(solver) => solver,
-            // a law may be refused by name, with what to use instead
+            // harmonic balance may refuse a law by name, with alternative methods
             Err(MethodError { refusal: Refusal::Law { .. }, ways }) => {
                 assert!(ways.methods.contains(&"event-driven"), "{}: {ways}", info.name);
                 continue;
@@ -80,9 +85,11 @@ fn every_law_balances_the_structure() {
         taken += 1;
         let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {constant}: {error}", info.name));
         let views = replay::views(&*law);
-        // a rigid law's resolvent leaves the force open at rest, which a series never reaches: any other view is better
+        // the resolvent of a rigid law leaves the force at rest free, and a series never quite
+        // rests: prefer any other view
         let view = *views.iter().find(|view| **view != View::Prox).unwrap_or(&views[0]);
-        // a flow through time comes back to where the series begins, with the states that the port gives
+        // the time integration from the start of the series, with the states of the port,
+        // returns
         if let Some(defect) = orbit.evidence.return_defect {
             let bound = SAMPLED + RETURN * orbit.evidence.truncation.expect("an estimate");
             assert!(defect < bound, "{} {constant}: returns {defect:.1e} of {bound:.1e}", info.name);
@@ -101,7 +108,7 @@ fn every_law_balances_the_structure() {
     assert!(taken > TABLE.len() && 2 * returned > taken, "most laws: {taken} {returned}");
 }
 
-/// Where the force is too small for any slip, and where it is large, there is an orbit too.
+/// Orbits exist for a force too small for slip, and for a large force.
 #[test]
 fn every_law_has_small_and_large_orbits() {
     for (info, share) in TABLE.iter().flat_map(|info| [(info, 0.01), (info, 10.0)]) {
@@ -121,7 +128,7 @@ fn every_law_has_small_and_large_orbits() {
             continue;
         };
         let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {share}: {error}", info.name));
-        // what is left where rigid friction holds all is rounding
+        // if rigid friction holds everything, the remainder is rounding
         let unit = FORCE * FORCE * share * share / STIFFNESS;
         let energy = orbit.energy;
         let gap = (energy.work_in - energy.viscous - energy.friction).abs();

@@ -1,5 +1,5 @@
-//! Nonlinear modes with laws of velocity: against describing functions, against the elastic law that they tend to, and against the
-//! linear modes at both ends.
+//! Nonlinear modes with laws of velocity. References: describing functions, the elastic law in
+//! the limit, and the linear modes at both ends.
 
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};
@@ -10,7 +10,7 @@ use stickslip::model::{Axis, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::structure::Structure;
 use stickslip_study::templates;
 
-/// One mass of 1 kg on a spring of 1 N/m with a joint to the ground.
+/// Returns a mass of 1 kg on a spring of 1 N/m with a joint to the ground.
 fn oscillator(law: SharedLaw) -> System {
     Model {
         masses: vec![Mass::new("m", 1.0)],
@@ -22,7 +22,7 @@ fn oscillator(law: SharedLaw) -> System {
     .unwrap()
 }
 
-/// The whole mode.
+/// Returns the mode, and asserts that it is complete.
 fn followed(system: &System, request: ModeRequest) -> Mode {
     let mode = mode(system, request).unwrap();
     assert_eq!(mode.lost, None, "{request:?}");
@@ -30,19 +30,20 @@ fn followed(system: &System, request: ModeRequest) -> Mode {
     mode
 }
 
-/// Relative error of a frequency or a damping ratio: solved to 1e-11, by equations that a damping ratio up to 20 makes stiffer.
+/// Relative error of a frequency or a damping ratio. They are solved to 1e-11; a damping ratio
+/// up to 20 makes the equations stiffer.
 const ROUNDING: f64 = 1e-8;
 
-/// Velocity taken as linear over one of 4096 samples: (2π/4096)²/6 at a sharp passage through zero, and five times that where all of the
-/// law is curved.
+/// Error of a linear velocity over one of 4096 samples: `(2π/4096)²/6` at a sharp zero
+/// crossing, and five times that for a law that is curved everywhere.
 const SAMPLES: f64 = 2e-6;
 
-/// The penalty that the oscillator's force has with one harmonic, N s/m, at 1 rad/s: the impedances of mass and spring together,
-/// 1 + 30 times.
+/// Penalty on the oscillator's force with one harmonic, N s/m, at 1 rad/s: the sum of the
+/// impedances of mass and spring, 1 + 30 times.
 const PENALTY: f64 = 62.0;
 
-/// Rigid friction with one harmonic: the force is `4 Ft/π` against the velocity `a ω`, so that `ω² = k/m` and
-/// `ζ = (4 Ft/π)/(2 ω² m a) = 2 Ft/(π k a)`.
+/// Rigid friction with one harmonic: the force is `4 Ft/π` against the velocity `a ω`. Thus
+/// `ω² = k/m` and `ζ = (4 Ft/π)/(2 ω² m a) = 2 Ft/(π k a)`.
 #[test]
 fn rigid_friction_is_its_describing_function() {
     let limit = 1.5;
@@ -51,7 +52,8 @@ fn rigid_friction_is_its_describing_function() {
     for point in followed(&system, request).points {
         assert!((point.omega - 1.0).abs() < ROUNDING, "{point:?}");
         let expected = 2.0 * limit / (PI * point.amplitude);
-        // a cosine of amplitude ε a ω, cut off at the limit, in place of a rectangle: (limit/(ε a ω))²/6 is missing
+        // the force is a cosine of amplitude ε a ω, clipped at the limit, instead of a
+        // rectangle: an error of `(limit/(ε a ω))²/6`
         let blurred = (limit / (PENALTY * point.amplitude)).powi(2) / 6.0;
         assert!((point.damping / expected - 1.0).abs() < blurred + SAMPLES, "{point:?} instead of {expected}");
     }
@@ -74,12 +76,14 @@ fn arctangent_is_its_describing_function() {
     }
 }
 
-/// Share of the slip limit by which the missing harmonics of a force may change the first one, relative to ε times the velocity: they are
-/// a third of the force and less, act in the resolvent as the velocity λ₃/ε, and only where the law is curved; measured 0.047.
+/// Largest effect of the missing harmonics of the force on the first one, as a fraction of the
+/// slip limit over ε times the velocity. They are at most a third of the force, and enter the
+/// resolvent as the velocity λ₃/ε. They matter only where the law is curved. Measured: 0.047.
 const MISSING: f64 = 0.06;
 
-/// A steep arctangent behind a spring tends to the slider behind a spring. Both are right up to the missing harmonics, but of different
-/// unknowns, the slider's force and the motion: their distance falls with the harmonics.
+/// A steep arctangent behind a spring tends to a slider behind a spring. The two series
+/// truncate different unknowns, the slider's force and the motion, so their distance decreases
+/// with the harmonics.
 #[test]
 fn steep_jenkins_arctan_is_jenkins() {
     let (stiffness, limit) = (0.2, 1.0);
@@ -95,24 +99,27 @@ fn steep_jenkins_arctan_is_jenkins() {
         (apart(|point| point.omega), apart(|point| point.damping))
     };
     let (few, many) = (distance(15), distance(63));
-    // the force has kinks: its harmonics fall as 1/h², and with them the distance by more than four from 15 to 63
+    // the force has kinks, so its harmonics fall as 1/h²; the distance falls by more than a
+    // factor of four from 15 to 63
     assert!(many.0 < 0.25 * few.0 && many.1 < 0.25 * few.1, "{few:?} {many:?}");
     // the frequency changes by a tenth along the mode, the damping ratio goes up to 0.029
     assert!(many.0 < 1e-4 && many.1 < 1e-4, "{many:?}");
 }
 
-/// The smaller and the larger solution λ of `a λ² - b λ + c = 0`.
+/// Returns the smaller and the larger solution λ of `a λ² - b λ + c = 0`.
 fn roots(a: f64, b: f64, c: f64) -> (f64, f64) {
     let root = (b * b - 4.0 * a * c).sqrt();
     ((b - root) / (2.0 * a), (b + root) / (2.0 * a))
 }
 
-/// What friction of 2 N leaves of itself at an amplitude of 1 m √kg: it changes ω and ζ by no more than its force relative to the
-/// elastic ones, 2/(105 103 · 2), twice over.
+/// Effect of a friction of 2 N at an amplitude of 1 m √kg. It changes ω and ζ by at most its
+/// force relative to the elastic ones, 2/(105 103 · 2), here doubled.
 const FAINT: f64 = 2e-5;
 
-/// The symmetric couple from end to end. Against each other, blade and contact mass are a chain of two when they slip freely; when they
-/// stick, the contact masses stand still. In step nothing ever slips, and the whole is linear.
+/// The symmetric couple from free to stuck.
+///
+/// In antiphase and free slip, blade and contact mass are a chain of two. In stick, the contact
+/// masses stand still. In phase nothing ever slips, and the mode is linear.
 #[test]
 fn symmetric_couple_from_free_to_stuck() {
     let (blade, small, k, kt, b) = (0.182 - 0.00091, 0.00091, 105_103.0, 1e4, 0.2);
@@ -127,7 +134,8 @@ fn symmetric_couple_from_free_to_stuck() {
         assert!((smallest.damping - b / (2.0 * blade * stuck)).abs() < ROUNDING, "{harmonics}: {smallest:?}");
         assert!(smallest.places[1].norm() < ROUNDING * smallest.places[0].norm(), "{harmonics}: {smallest:?}");
         assert!((largest.omega / chain - 1.0).abs() < FAINT, "{harmonics}: {largest:?} instead of {chain}");
-        // modal damping of the free chain, with the contact mass at kt/(kt - ω² small) of the blade
+        // modal damping of the free chain; the amplitude of the contact mass is
+        // `kt/(kt - ω² small)` of the blade's
         let ratio = kt / (kt - chain * chain * small);
         let free = b / (2.0 * chain * (blade + ratio * ratio * small));
         assert!((largest.damping - free).abs() < FAINT, "{harmonics}: {largest:?} instead of {free}");
@@ -137,9 +145,12 @@ fn symmetric_couple_from_free_to_stuck() {
     }
 }
 
-/// The non-symmetric couple from end to end. Large motions are those of one blade, and of the other with the contact mass. Friction pulls
-/// both frequencies together until, at one amplitude, both modes are one. Below it there are two again: the blades slip against each
-/// other, until they stick in that mode, or stick in the one in which they move together. Either is right.
+/// The non-symmetric couple from free to stuck.
+///
+/// Large motions are those of one blade, and of the other blade with the contact mass. Friction
+/// draws the two frequencies together until the modes meet at one amplitude. Below it two modes
+/// exist again: in one the blades slip against each other and finally stick; in the other they
+/// move together and stick. A followed mode may end in either.
 #[test]
 fn blade_couple_from_free_to_stuck() {
     let (blade, small, k, kt) = (0.182 - 0.00091, 0.00182, 105_103.0_f64, 1e4);
@@ -167,12 +178,14 @@ fn blade_couple_from_free_to_stuck() {
     }
 }
 
-/// Modal amplitude, m √kg, above which both modes are two. With one harmonic they meet where friction makes up for half of the
-/// difference of the free frequencies, δ: at `a = (4 Ft/π)/(2 ω √m δ)` = 1.9e-3.
+/// Modal amplitude, m √kg, above which the two modes are distinct. With one harmonic they meet
+/// where friction compensates half of the difference δ of the free frequencies: at
+/// `a = (4 Ft/π)/(2 ω √m δ)` = 1.9e-3.
 const TWO: f64 = 4e-3;
 
-/// Relative agreement of frequencies and damping ratios that are solved for at the same amplitude, and of largest damping ratios. The
-/// followed curve is the same for all, so that only the rounding of the amplitudes is left; required is far less.
+/// Relative agreement of frequencies and damping ratios at equal amplitudes, and of the largest
+/// damping ratios. The followed curve is the same, so the differences are rounding; the
+/// tolerance is far larger.
 const SAME: (f64, f64) = (1e-6, 1e-4);
 
 fn same(what: &str, one: &ModePoint, other: &ModePoint) {
@@ -180,7 +193,7 @@ fn same(what: &str, one: &ModePoint, other: &ModePoint) {
     assert!((one.damping - other.damping).abs() <= SAME.1 * other.damping.abs() + 1e-12, "{what}: {one:?} {other:?}");
 }
 
-/// The points of `some` that `all` has too agree with them; returns how many these are.
+/// Asserts that the common points of `some` and `all` agree; returns their number.
 fn compare(what: &str, some: &Mode, all: &Mode) -> usize {
     let mut common = 0;
     for one in &some.points {
@@ -192,8 +205,8 @@ fn compare(what: &str, some: &Mode, all: &Mode) -> usize {
     common
 }
 
-/// A mode does not depend on how many points are asked for, nor on where the range begins and ends: 30 random models with up to three
-/// joints. Each is followed to its end.
+/// A mode does not depend on the number of points or on the ends of the range. The test follows
+/// modes of 30 random models with up to three joints to their ends.
 #[test]
 fn a_mode_does_not_depend_on_its_points() {
     let mut lost = Vec::new();
@@ -213,7 +226,7 @@ fn a_mode_does_not_depend_on_its_points() {
             assert_eq!(compare(&format!("seed {seed}, {points} points"), &coarse, &fine), coarse.points.len());
             same(&format!("seed {seed}, largest"), &coarse.largest.unwrap(), fine.largest.as_ref().unwrap());
         }
-        // a part of the range, whose points are some of the whole
+        // a part of the range; its points are points of the whole
         let part = mode(&system, ModeRequest { range: (1e-4, 1e-2), points: 41, ..request }).unwrap();
         assert_eq!(compare(&format!("seed {seed}, part"), &part, &fine), part.points.len());
         lost.extend(fine.lost.map(|lost| (seed, number, lost)));
@@ -221,8 +234,8 @@ fn a_mode_does_not_depend_on_its_points() {
     assert!(lost.is_empty(), "{lost:?}");
 }
 
-/// The couple at 8 N: its largest damping ratio is the same for any number of points, and that of the motion that the mode goes on to.
-/// Both modes nearly become one, and both say so, at amplitudes where the other is near.
+/// The couple at 8 N: the largest damping ratio does not depend on the number of points. The
+/// two modes almost meet, and both report the amplitude at which they do.
 #[test]
 fn blade_couple_has_one_largest_damping() {
     let system = stickslip_verification::template("blade-couple", &[("Ft", 8.0)]);
@@ -238,15 +251,19 @@ fn blade_couple_has_one_largest_damping() {
         assert_eq!(one.lost, None);
         assert!(one.merges.len() == 1 && (6e-3..8e-3).contains(&one.merges[0]), "{:?}", one.merges);
     }
-    // one goes on to blades that move against each other, which friction damps, the other to blades that move together and stick
+    // one mode ends with blades in antiphase, which friction damps, the other with blades that
+    // move together and stick
     let largest = |mode: &Mode| mode.largest.as_ref().map_or(0.0, |point| point.damping);
     let (against, together) = (largest(&followed[1]).max(largest(&other)), largest(&followed[1]).min(largest(&other)));
     assert!((0.055..0.06).contains(&against) && (0.003..0.004).contains(&together), "{against} {together}");
 }
 
-/// Points of both modes of the couple at 8 N with five harmonics, from SciPy's root finder on the same equations written anew (rigid
-/// friction by its projection with ε = 62 N s/m, 512 samples, 600 random starts at each amplitude): modal amplitude, ω, ζ.
-/// With ε = 20 N s/m ω changes by 2e-3 rad/s and ζ by 2e-6, with which the program's own ε has to agree.
+/// Both modes of the couple at 8 N with five harmonics, as modal amplitude, ω, ζ.
+///
+/// The reference is SciPy's root finder on an independent implementation of the equations:
+/// rigid friction by its projection with ε = 62 N s/m, 512 samples, 600 random starts per
+/// amplitude. With ε = 20 N s/m, ω changes by 2e-3 rad/s and ζ by 2e-6. The solver's own ε must
+/// agree within that.
 #[test]
 fn blade_couple_agrees_with_a_search_from_random_starts() {
     let system = stickslip_verification::template("blade-couple", &[("Ft", 8.0)]);
@@ -267,8 +284,8 @@ fn blade_couple_agrees_with_a_search_from_random_starts() {
     }
 }
 
-/// What a mode is does not depend on the coordinates: with displacements as sums of others, all matrices full, the mass matrix too,
-/// frequencies and damping ratios are the same.
+/// A mode does not depend on the coordinates. With displacements as sums of others, all
+/// matrices are full; frequencies and damping ratios stay the same.
 #[test]
 fn full_mass_matrices_are_respected() {
     for seed in [4, 8, 12, 20] {

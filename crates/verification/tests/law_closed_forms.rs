@@ -1,4 +1,5 @@
-//! Laws alone under given motions, through their views, against closed forms.
+//! Laws alone under given motions, through their views, against closed forms. Numbers such as
+//! (11.1) refer to the theory notes.
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -9,10 +10,11 @@ use stickslip::law::{
 use stickslip_verification::replay::{Instant, View, forces, lost, steps};
 use stickslip_verification::{close, integral, near, zero};
 
-/// A motion through points, straight and at constant speed between them, a second from one to the next.
+/// Returns a motion through points, straight and at constant speed, one second from point to
+/// point.
 fn through(points: Vec<[f64; 3]>) -> impl Fn(f64) -> Instant {
     move |time| {
-        // a corner belongs to what comes before it
+        // a corner belongs to the segment before it
         let k = ((time.ceil() as usize).max(1) - 1).min(points.len() - 2);
         let share = time - k as f64;
         let way = [0, 1, 2].map(|a| points[k + 1][a] - points[k][a]);
@@ -20,21 +22,21 @@ fn through(points: Vec<[f64; 3]>) -> impl Fn(f64) -> Instant {
     }
 }
 
-/// Along one direction.
+/// Returns such a motion along one direction.
 fn along(places: &[f64]) -> impl Fn(f64) -> Instant + use<> {
     through(places.iter().map(|&u| [u, 0.0, 0.0]).collect())
 }
 
-/// Samples between two points, a power of two: times are then exact.
+/// Samples between two points; a power of two makes the times exact.
 const FINE: usize = 1 << 14;
 
-/// Force along the first direction at the samples of a motion through places.
+/// Returns the force along the first direction at the samples of a motion through places.
 fn first(law: &dyn Law, view: View, places: &[f64], samples: usize) -> Vec<f64> {
     let times = steps(1.0, places.len() - 1, samples);
     forces(law, view, &along(places), &times).iter().map(|force| force[0]).collect()
 }
 
-/// Energy lost over the last two of the ways.
+/// Returns the energy lost over the last two segments.
 fn loop_loss(law: &dyn Law, view: View, places: &[f64], samples: usize) -> f64 {
     let times = steps(1.0, places.len() - 1, samples);
     let found = forces(law, view, &along(places), &times);
@@ -42,15 +44,15 @@ fn loop_loss(law: &dyn Law, view: View, places: &[f64], samples: usize) -> f64 {
     lost(&along(places), &times[from..], &found[from..])
 }
 
-/// From zero, three times to and fro.
+/// Returns the places from zero and then back and forth three times.
 fn cycles(a: f64) -> [f64; 8] {
     [0.0, a, -a, a, -a, a, -a, a]
 }
 
-/// (11.1)
+/// (11.1): the loss of a Jenkins loop and its equivalent stiffness and damping.
 #[test]
 fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form() {
-    // kt a, kt, loss, stiffness, damping for a slip limit of 1
+    // `kt`, `a`, loss, stiffness and damping for a slip limit of 1
     for (stiffness, a, loss, keq, ceq) in [
         (1.0, 1.25, 1.0, 0.857_622, 0.203_718),
         (1.0, 2.00, 4.0, 0.5, 1.0 / PI),
@@ -60,7 +62,7 @@ fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form
         (5.0, 2.75, 10.2, 0.162_800, 0.429_324),
     ] {
         let law = Jenkins { stiffness, limit: 1.0 };
-        // with the places where slip begins as corners
+        // the places where slip begins are corners
         let slip = a - 2.0 / stiffness;
         let places = [0.0, a, slip, -a, -slip, a];
         let times = steps(1.0, 5, 1);
@@ -72,7 +74,7 @@ fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form
     }
 }
 
-/// (11.2)
+/// (11.2): loss, stiffness and damping under a circular motion in the plane.
 #[test]
 fn theory_11_2_circular_motion_slips_all_the_time() {
     let (stiffness, limit, a) = (3.0, 1.0, 0.8);
@@ -96,7 +98,7 @@ fn theory_11_2_circular_motion_slips_all_the_time() {
     near("damping", stiffness.im, 1.136_324_2, 1e-6);
 }
 
-/// (11.3)
+/// (11.3): a normal load in phase with the tangential motion.
 #[test]
 fn theory_11_3_a_normal_load_in_phase_makes_a_polygon() {
     let (mu, preload, kt, nu, a) = (0.4, 10.0, 20.0, 6.0, 1.0);
@@ -123,7 +125,7 @@ fn theory_11_3_a_normal_load_in_phase_makes_a_polygon() {
     }
 }
 
-/// (11.4)
+/// (11.4): the four-parameter Iwan model by parallel sliders.
 #[test]
 fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
@@ -132,9 +134,10 @@ fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
     let u = 0.4 * far;
     for elements in [32, 62, 250, 1000] {
         let loss = loop_loss(&law(elements), View::Pieces, &cycles(u), FINE);
-        close("loss", loss, 0.017_491_512_6, 0.024 * 32.0 / f64::from(elements)); // as the law promises
+        // the promised error of the law
+        close("loss", loss, 0.017_491_512_6, 0.024 * 32.0 / f64::from(elements));
     }
-    // first loading: R u^(χ+2) / (χ+2) + u (R (φ^(χ+1) - u^(χ+1)) / (χ+1) + S)
+    // first loading: `R u^(χ+2) / (χ+2) + u (R (φ^(χ+1) - u^(χ+1)) / (χ+1) + S)`
     let d = 0.3 + 0.5 / 1.5;
     let (r, s) = (0.5 / (far.powf(1.5) * d), 1.0 / far * 0.3 / d);
     for share in [0.05, 0.4, 0.9, 1.0] {
@@ -147,7 +150,8 @@ fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
     close("at rest", law(32).linearised(1e-12, 1.0).re, 10.0, 1e-12);
 }
 
-/// (11.4) without sliders: the law itself, from a thousandth of full slip to beyond it, with exponents near -1 and without the spring that slips last.
+/// (11.4) without sliders: the law itself. Amplitudes go from a thousandth of full slip to
+/// beyond it; cases include exponents near -1 and `beta = 0`.
 #[test]
 fn theory_11_4_iwan_is_exact() {
     for (chi, beta) in [(-0.5, 0.3), (-0.5, 0.0), (-0.95, 0.0), (-0.99, 0.2), (-0.1, 3.0), (0.0, 0.0)] {
@@ -162,7 +166,8 @@ fn theory_11_4_iwan_is_exact() {
                 + u * (r * (far.powf(chi + 1.0) - u.powf(chi + 1.0)) / (chi + 1.0) + s);
             close("backbone", first(&law, View::Step, &[0.0, u], 1)[1], expected, 1e-12);
             let loss = 4.0 * r * u.powf(chi + 3.0) / ((chi + 2.0) * (chi + 3.0));
-            // the trapezoidal rule leaves the square of its step, and of a vertical tangent where the motion turns somewhat more
+            // the trapezoidal rule has an error of the square of its step, somewhat more at the
+            // vertical tangent after a turning point
             let [coarse, fine] =
                 [FINE, 4 * FINE].map(|samples| loop_loss(&law, View::Step, &cycles(u), samples) - loss);
             assert!(
@@ -179,7 +184,8 @@ fn theory_11_4_iwan_is_exact() {
     close("loss", loss, 0.017_491_512_553_529_69, 1e-7);
 }
 
-/// The loss of a cycle of sliders to the last digits: all the places where one of them begins to slip are corners.
+/// Returns the loss of a cycle of sliders to the last digits; all places where a slider begins
+/// to slip are corners.
 fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
     let mut slips: Vec<f64> = law
         .pieces()
@@ -198,16 +204,19 @@ fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
     lost(&along(&places), &times[1..], &found[1..])
 }
 
-/// (11.4) to the digits that are given. Where the amplitude is an edge between two sliders' shares of the distribution, the force of first loading is
-/// exact, and the loss errs by powers of `1 / elements`, which fewer elements tell. Shares are graded by `exp(1.5 / √elements)`: edges of some sliders are
-/// those of four and nine times as many.
+/// (11.4) to all given digits, by extrapolation over the number of elements.
+///
+/// At an amplitude on the edge between the shares of two sliders, the force of first loading is
+/// exact. The error of the loss is then a series in powers of `1 / elements`, which few
+/// elements determine. Shares are graded by `exp(1.5 / √elements)`, so four and nine times as
+/// many sliders have the same edges.
 #[test]
 fn theory_11_4_iwan_tends_to_segalmans_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
     let far = law(1).slips_at();
     let d = 0.3 + 0.5 / 1.5;
     let (r, s) = (0.5 / (far.powf(1.5) * d), 1.0 / far * 0.3 / d);
-    // the value at zero of the polynomial in 1 / elements through the losses
+    // value at zero of the polynomial in `1 / elements` through the losses
     let tends_to = |counts: &[u32], u: f64| {
         let weighted = |&count: &u32| {
             let others = counts.iter().filter(|other| **other != count);
@@ -223,16 +232,17 @@ fn theory_11_4_iwan_tends_to_segalmans_loss() {
         let expected = r * u.powf(1.5) / 1.5 + u * (r * (far.sqrt() - u.sqrt()) / 0.5 + s);
         for count in counts {
             close("backbone", first(&law(count), View::Pieces, &[0.0, u], 1)[1], expected, 1e-14);
-            // a third of what the law promises between edges
+            // a third of the error that the law promises between edges
             let off = 1.0 - exact_loop_loss(&law(count), u) / (4.0 * r * u.powf(2.5) / (1.5 * 2.5));
             assert!((0.27..0.29).contains(&(off.abs() * f64::from(count))), "{off:e}");
         }
     }
-    // an edge of 67 sliders but for 2e-5, of which the loss notices the square; without a fourth of its like up to 1000
+    // 0.4 is an edge of 67 sliders up to 2e-5, and the loss depends on the square of that; no
+    // fourth such number exists up to 1000
     close("loss", tends_to(&[67, 268, 603], 0.4 * far), 0.017_491_512_553_529_69, 1e-8);
 }
 
-/// (11.5)
+/// (11.5): the loop of Dahl's model.
 #[test]
 fn theory_11_5_dahls_loop_is_a_hyperbolic_tangent() {
     let law = Dahl { stiffness: 5.0, limit: 1.0 };
@@ -241,7 +251,7 @@ fn theory_11_5_dahls_loop_is_a_hyperbolic_tangent() {
     close("loss", loop_loss(&law, View::Rate, &places, FINE), 2.001_457_681_9, 1e-8);
 }
 
-/// (11.6)
+/// (11.6): Bouc-Wen and LuGre contain Dahl's model.
 #[test]
 fn theory_11_6_bouc_wen_and_lugre_contain_dahl() {
     let dahl = Dahl { stiffness: 5.0, limit: 2.0 };
@@ -257,7 +267,8 @@ fn theory_11_6_bouc_wen_and_lugre_contain_dahl() {
     near("bound", bouc_wen.scale(), 2.0, 1e-14);
 }
 
-/// (11.15): a long way to one side ends at the bound whatever gamma and the exponent are; without `beta + gamma > 0` there is none, and the law is refused.
+/// (11.15): a long motion to one side ends at the bound for any gamma and exponent. Without
+/// `beta + gamma > 0` no bound exists, and the law is refused.
 #[test]
 fn theory_11_15_bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
     for (beta, gamma, exponent) in [(1.0, 0.5, 1.0), (1.0, -0.6, 2.0), (0.5, 3.0, 1.5), (2.0, 0.0, 6.0)] {
@@ -279,17 +290,17 @@ fn theory_11_15_bouc_wen_is_bounded_if_beta_and_gamma_are_positive_together() {
 fn theory_11_6_lugre_slides_steadily_with_its_curve_and_holds_like_a_spring() {
     let law = LuGre { stiffness: 1e4, damping: 30.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
     for v in [-0.5, 0.005, 0.02, 1.0] {
-        // a second at this velocity
+        // one second at this velocity
         let force = *first(&law, View::Rate, &[0.0, v], FINE).last().unwrap();
         let share: f64 = v / 0.01;
         near("sliding", force, (2.0 + 0.5 * (-share * share).exp()).copysign(v) + 0.4 * v, 1e-6);
     }
-    // so slow that dampers carry nothing, so short that bristles do not slip
+    // slow enough that dampers carry nothing, short enough that bristles do not slip
     let force = *first(&law, View::Rate, &[0.0, 1e-9], 64).last().unwrap();
     close("stiction", force, 1e4 * 1e-9, 0.01);
 }
 
-/// Parallel sliders with a given force of first loading: straight between its corners.
+/// Parallel sliders with a given force of first loading, linear between its corners.
 #[derive(Debug)]
 struct Graded(Vec<Piece>);
 
@@ -317,20 +328,21 @@ impl Law for Graded {
 }
 
 impl Graded {
-    /// Corners at these displacements; beyond the last one all slips.
+    /// Makes the law with corners at these displacements; it slips fully beyond the last one.
     fn new(corners: &[f64], backbone: impl Fn(f64) -> f64) -> Self {
         let mut edges = vec![0.0];
         edges.extend(corners);
         let mut slopes: Vec<f64> =
             edges.windows(2).map(|pair| (backbone(pair[1]) - backbone(pair[0])) / (pair[1] - pair[0])).collect();
         slopes.push(0.0);
-        // a slider that gives way at a corner takes the change of slope there
+        // the slider that slips at a corner has the change of slope as its stiffness
         let piece = |k: usize| Piece::slider(Some(slopes[k] - slopes[k + 1]), (slopes[k] - slopes[k + 1]) * corners[k]);
         Graded((0..corners.len()).map(piece).collect())
     }
 }
 
-/// (11.7): an elastic bar on rigid-plastic shear: Goodman and Klumpp's micro-slip in its limit of many sliders.
+/// (11.7): an elastic bar on rigid-plastic shear, the limit of many sliders of the micro-slip
+/// model of Goodman and Klumpp.
 #[test]
 fn theory_11_7_micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
     let (ea, tau, length) = (7.0, 0.4, 2.0);
@@ -347,7 +359,7 @@ fn theory_11_7_micro_slip_of_a_bar_loses_with_the_cube_of_the_force() {
     near("all slips", first(&law, View::Pieces, &[0.0, 2.0 * far], 1)[1], tau * length, 1e-12);
 }
 
-/// (11.8)
+/// (11.8): the tangential contact of spheres.
 #[test]
 fn theory_11_8_spheres_of_cattaneo_and_mindlin() {
     let (limit, far) = (1.3, 0.02);
@@ -363,7 +375,8 @@ fn theory_11_8_spheres_of_cattaneo_and_mindlin() {
     }
 }
 
-/// (11.9), Masing's rule: after a turning point the force is the first loading at twice the scale, and the loss follows from the first loading alone.
+/// (11.9), Masing's rule: after a turning point the force is that of first loading at twice the
+/// scale. The loss follows from the first loading alone.
 #[test]
 fn theory_11_9_sliders_obey_masings_rule() {
     let iwan = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.3, beta: 0.2, elements: 12 };
@@ -374,7 +387,7 @@ fn theory_11_9_sliders_obey_masings_rule() {
         let backbone = first(law, view, &[0.0, u], FINE);
         let loop_force = first(law, view, &[0.0, u, -u], FINE);
         for k in (0..=FINE).step_by(512) {
-            // u - u_r over two goes from nothing to u
+            // half of `u - u_r` goes from zero to `u`
             near(law.name(), loop_force[FINE + k], backbone[FINE] - 2.0 * backbone[k], 1e-12);
         }
         let under: f64 = backbone.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]) * u / FINE as f64).sum();
@@ -383,7 +396,8 @@ fn theory_11_9_sliders_obey_masings_rule() {
     }
 }
 
-/// (11.10): along straight ways a step of any length is exact: the same forces at the corners, whatever lies between them.
+/// (11.10): along straight segments a step of any length is exact, so the forces at the corners
+/// do not depend on the samples between them.
 #[test]
 fn theory_11_10_steps_do_not_depend_on_their_length() {
     let plane = Jenkins2d { stiffness: 3.0, limit: 1.0 };
@@ -405,7 +419,8 @@ fn theory_11_10_steps_do_not_depend_on_their_length() {
     }
 }
 
-/// (11.11): a contact that opens and closes under harmonic motion, in the plane: the error of its steps is of second order.
+/// (11.11): a contact in the plane opens and closes under harmonic motion. The error of its
+/// steps is of second order.
 #[test]
 fn theory_11_11_separation_costs_no_order_of_accuracy() {
     let law = FrictionContact { tangential: 20.0, normal: 15.0, friction: 0.4, preload: 2.0, tangents: 2 };
@@ -426,8 +441,11 @@ fn theory_11_11_separation_costs_no_order_of_accuracy() {
     assert!(errors[1] < errors[0] / 10.0 && errors[2] < errors[1] / 10.0, "of second order: {errors:?}");
 }
 
-/// Loss of a cycle of a contact along one tangent by its events alone: `T` is zero where the faces meet, follows its spring until it reaches `mu N`, and
-/// slips until `|T|` would grow faster than its limit. Motion `u = a cos θ`, `N = preload + load cos(θ - lag)`; θ from contact to separation.
+/// Returns the loss of a cycle of a contact along one tangent, computed from its events.
+///
+/// `T` is zero when the faces meet and then follows its spring until it reaches `mu N`. It
+/// slips until `|T|` would grow faster than its limit. The motion is `u = a cos θ`,
+/// `N = preload + load cos(θ - lag)`, with θ from contact to separation.
 fn loss_by_events(kt: f64, mu: f64, a: f64, [preload, load, lag]: [f64; 3]) -> f64 {
     const SCAN: usize = 4000;
     let (u, normal) = (|t: f64| a * t.cos(), |t: f64| preload + load * (t - lag).cos());
@@ -439,7 +457,7 @@ fn loss_by_events(kt: f64, mu: f64, a: f64, [preload, load, lag]: [f64; 3]) -> f
     };
     let (mut t, mut place, mut loss) = (begin, u(begin), 0.0);
     loop {
-        // stuck: the spring from its slider on
+        // stuck: the force of the spring
         let spring = |t: f64| kt * (u(t) - place);
         let slips = bisect(&|t| spring(t).abs() - mu * normal(t), t);
         let until = slips.unwrap_or(end);
@@ -449,7 +467,7 @@ fn loss_by_events(kt: f64, mu: f64, a: f64, [preload, load, lag]: [f64; 3]) -> f
         }
         let side = spring(until).signum();
         let limit = |t: f64| side * mu * normal(t);
-        // it slips on as long as the spring alone would pull harder
+        // slip ends when the force of the spring would change more slowly than the limit
         let slower = |t: f64| mu * -load * (t - lag).sin() - side * kt * -a * t.sin();
         let sticks = bisect(&slower, until).unwrap_or(end);
         loss += integral(|s| limit(until + s) * -a * (until + s).sin(), sticks - until, &[]);
@@ -460,9 +478,13 @@ fn loss_by_events(kt: f64, mu: f64, a: f64, [preload, load, lag]: [f64; 3]) -> f
     }
 }
 
-/// (11.11): "no force where the faces meet again" and "the slider keeps its place" are one law, whose steps count of the one in which contact closes only
-/// the closed part: they are right by their events to second order. Plain steps of either reading, which count all of it, tend to the same law to first
-/// order. In the first motion the faces stick where they meet, in the second they slip.
+/// (11.11): "no force when the faces meet again" and "the slider keeps its place" describe one
+/// law.
+///
+/// In the step in which contact closes, the law counts only the closed part of the step. It
+/// agrees with the computation by events to second order. Plain steps of either description
+/// count the whole step, and tend to the same law to first order. In the first motion the faces
+/// stick when they meet, in the second they slip.
 #[test]
 fn theory_11_11_both_readings_of_separation_are_one_law() {
     const FIRST_ORDER: std::ops::RangeInclusive<f64> = 1e-8..=9e-5;
@@ -502,7 +524,8 @@ fn theory_11_11_both_readings_of_separation_are_one_law() {
         assert!(errors[1] < errors[0] / 10.0 && errors[2] < errors[1] / 10.0, "of second order: {errors:?}");
         assert!(own(1 << 16) < 1e-8, "{:e}", own(1 << 16));
         for keeps in [false, true] {
-            // where in a step contact closes is chance
+            // the instant of closing within a step is arbitrary: take the largest error of
+            // several counts
             let largest = |near: usize| (0..8).map(|k| plain(keeps, near + 7 * k)).fold(0.0, f64::max);
             let [long, short] = [1 << 13, 1 << 16].map(largest);
             assert!(FIRST_ORDER.contains(&short), "{keeps}: {short:e}");
@@ -511,7 +534,8 @@ fn theory_11_11_both_readings_of_separation_are_one_law() {
     }
 }
 
-/// (11.14): below full slip the mean force of Iwan's model tells its history; amplitude and loss do not.
+/// (11.14): below full slip, only the mean force of Iwan's model depends on its history;
+/// amplitude and loss do not.
 #[test]
 fn theory_11_14_iwan_remembers_in_its_mean_alone() {
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 64 };
@@ -530,19 +554,20 @@ fn theory_11_14_iwan_remembers_in_its_mean_alone() {
     }
 }
 
-/// Between turning points `du = dy (1 - kappa y) / (lambda ((1 - y) - (Et/E0) (1 - kappa y)))`, whose integral is a logarithm.
+/// Between turning points `du = dy (1 - kappa y) / (lambda ((1 - y) - (Et/E0) (1 - kappa y)))`.
+/// The integral is a logarithm.
 #[test]
 fn valanis_turns_along_a_logarithm() {
     let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.7 };
     let (ratio, kappa, lambda) = (0.2, 0.7, 3.0);
-    // (1 - κ y) / (A - B y)
+    // `(1 - κ y) / (A - B y)`
     let (a, b) = (1.0 - ratio, 1.0 - ratio * kappa);
     let place = |y: f64| (kappa / b * y - (1.0 - kappa * a / b) / b * (1.0 - b / a * y).ln()) / lambda;
     for y in [0.1, 0.5, 0.85] {
         let u = place(y);
         let force = first(&law, View::Rate, &[0.0, u], 1024)[1024];
         near("first loading", force, 2.0 * u + 10.0 / 3.0 * y, 1e-9);
-        // back by as much as from -y to y: the same curve turned around
+        // back by the distance from -y to y: the mirrored curve
         let way = place(y) - place(-y);
         let back = first(&law, View::Rate, &[0.0, u, u - way], 1024)[2048];
         near("turned", back, 2.0 * (u - way) - 10.0 / 3.0 * y, 1e-9);
@@ -560,7 +585,7 @@ fn springs_of_any_shape_lose_nothing() {
         near(law.name(), loss, 0.0, 1e-12);
     }
     near("cubic", first(&cubic, View::Rate, &[0.0, 0.5], 1)[1], 0.375, 1e-15);
-    // closed while cos θ > gap / a: (k/π) (θ - sin θ cos θ)
+    // closed while `cos θ > gap / a`: `(k/π) (θ - sin θ cos θ)`
     let closed = (0.2f64 / 0.8).acos();
     let expected = 5.0 / PI * (closed - closed.sin() * closed.cos());
     close("gap", gap.linearised(0.8, 1.0).re, expected, 1e-14);
@@ -570,7 +595,7 @@ fn springs_of_any_shape_lose_nothing() {
 fn stribecks_describing_function_is_a_mean_of_its_curve() {
     let law = Stribeck { limit: 2.0, static_limit: 2.5, velocity: 0.01 };
     for (a, omega) in [(1e-4, 30.0), (1e-3, 10.0), (1e-3, 100.0)] {
-        // (4 / (π a)) ∫₀^{π/2} g(a Ω sin θ) sin θ dθ
+        // `(4 / (π a)) ∫₀^{π/2} g(a Ω sin θ) sin θ dθ`
         let friction = |theta: f64| {
             let share: f64 = a * omega * theta.sin() / 0.01;
             (2.0 + 0.5 * (-share * share).exp()) * theta.sin()

@@ -1,7 +1,10 @@
-//! What every law of the table must do, whatever it is, through each view that it offers: give no energy, stay at rest, have the derivatives that
-//! differences have, be what it says of itself, be the same in all views, tend to itself from its smooth neighbour, refuse wrong parameters.
+//! Conformance tests for every law of the table, through each view that it offers.
+//!
+//! A law creates no energy and stays at rest without motion. Its derivatives equal differences,
+//! and its own statements about itself hold. All of its views agree. The smoothed law tends to
+//! the law. It refuses invalid parameters.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,19 +18,20 @@ use stickslip::model::{GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip_verification::replay::{Instant, View, forces, lost, random_motion, steps, views};
 use stickslip_verification::{Random, exact, near};
 
-/// Samples of a period; fine enough for the smooth laws, whose steepest slope is a thousandth of their fastest motion.
+/// Samples of a period, fine enough for the smooth laws. Their steepest slope spans a
+/// thousandth of the largest velocity.
 const SAMPLES: usize = 2000;
 
-/// Share of the largest force times the way that the trapezoidal rule over the samples may seem to give; a spring, which loses nothing, seems to give
-/// 1e-6.
+/// Largest energy that the trapezoidal rule may seem to create, over the largest force times
+/// the path length. For a lossless spring the error is 1e-6.
 const QUADRATURE: f64 = 1e-5;
 
-/// Largest size of the forces.
+/// Returns the largest size of the forces.
 fn largest(forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
     forces.iter().flatten().fold(0.0, |most, force| most.max(force.abs()))
 }
 
-/// The length of the way in the last period.
+/// Returns the length of the path between the times.
 fn way(motion: &dyn Fn(f64) -> Instant, times: &[f64]) -> f64 {
     let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
     let each = |pair: &[[f64; MOST_DIRECTIONS]]| {
@@ -95,7 +99,7 @@ fn parameters_out_of_range_are_refused_with_their_key() {
             match (row.build(&values), parameter.default) {
                 (Ok(law), Some(default)) => assert_eq!(law.value(parameter.key), Some(default), "{}", row.name),
                 (Err(BuildError::Missing { keys, .. }), None) => assert_eq!(keys, [parameter.key]),
-                // a default may need another value beside it
+                // a default may require another value together with it
                 (Err(BuildError::Value(LawError::Inconsistent { .. })), Some(_)) => {}
                 (other, _) => panic!("{}: without `{}` {other:?}", row.name, parameter.key),
             }
@@ -103,7 +107,8 @@ fn parameters_out_of_range_are_refused_with_their_key() {
     }
 }
 
-/// In the fifth of equal periods the state repeats, and what is lost over it is never negative.
+/// In the fifth of equal periods the state repeats, and the energy lost over it is never
+/// negative.
 #[test]
 fn no_energy_is_created_over_closed_histories() {
     for row in TABLE {
@@ -127,7 +132,7 @@ fn no_energy_is_created_over_closed_histories() {
     }
 }
 
-/// Without motion there is no force, but for what presses at rest along a normal, and that stays as it is.
+/// Without motion the only force is a preload along a normal, and it stays constant.
 #[test]
 fn rest_stays_at_rest() {
     for row in TABLE {
@@ -143,7 +148,7 @@ fn rest_stays_at_rest() {
     }
 }
 
-/// A body at rest stays so in every law that `auto` takes along one direction.
+/// A body at rest stays at rest with every law of one direction that `auto` takes.
 #[test]
 fn bodies_without_a_force_stay_at_rest() {
     for row in TABLE {
@@ -166,7 +171,7 @@ fn bodies_without_a_force_stay_at_rest() {
     }
 }
 
-/// Laws that are sliders, in an orbit of the exact method, against a replay.
+/// For laws that consist of sliders, an orbit of the exact method agrees with a replay.
 #[test]
 fn exact_orbits_equal_the_replay_of_their_sliders() {
     for row in TABLE {
@@ -185,7 +190,8 @@ fn exact_orbits_equal_the_replay_of_their_sliders() {
             let place = |theta: f64| -> f64 {
                 motions.iter().map(|m| m.amplitude * (f64::from(m.harmonic) * theta + m.phase).cos()).sum()
             };
-            // from sample to sample, the second round being periodic; turning points between samples cost the square of the step
+            // step from sample to sample; the second period is periodic. Turning points between
+            // samples have an error of the square of the step
             let count = 200_000;
             let mut held = vec![0.0; sliders.len()];
             let (mut loss, mut before) = (0.0, place(0.0));
@@ -219,7 +225,8 @@ fn exact_orbits_equal_the_replay_of_their_sliders() {
     }
 }
 
-/// All views of a law tell the same force. A law with pieces or a step has no clock: its other views are the same at ten times the speed.
+/// All views of a law give the same force. A law with pieces or a step does not depend on time,
+/// so its other views agree at ten times the speed.
 #[test]
 fn views_agree_at_any_speed_that_they_know() {
     for row in TABLE {
@@ -237,7 +244,8 @@ fn views_agree_at_any_speed_that_they_know() {
                 for &speed in speeds {
                     let other = run(view, speed);
                     let differences = reference.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
-                    // single samples at a reversal of rigid faces may differ; the mean may not
+                    // single samples at a reversal of a rigid slider may differ; the mean may
+                    // not
                     let mean = differences.sum::<f64>() / reference.len() as f64;
                     assert!(mean <= 1e-3 * largest(&reference), "{}: {view:?} differs by {mean}", row.name);
                 }
@@ -246,7 +254,8 @@ fn views_agree_at_any_speed_that_they_know() {
     }
 }
 
-/// Derivatives against differences at random points, with a tolerance of the difference between both sides, which is large at a kink only.
+/// Compares a derivative with central differences. The tolerance is the difference between the
+/// one-sided differences, which is large only at a kink.
 fn derivative_is_difference(what: &str, value: impl Fn(f64) -> f64, derivative: f64, h: f64) {
     let [down, here, up] = [-h, 0.0, h].map(&value);
     let central = (up - down) / (2.0 * h);
@@ -318,7 +327,7 @@ fn derivatives_of_steps_are_differences() {
         let mut random = Random::new(8);
         for _ in 0..300 {
             let mut x: Vec<f64> = (0..2 * n).map(|_| random.between(-1e-3, 1e-3)).collect();
-            // within the limit that the contact has before the step, whatever it is: reached by a step from nothing
+            // states within the current limit of the contact: the result of a step from zero
             let places = |x: &[f64]| {
                 let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
                 from[..n].copy_from_slice(&x[..n]);
@@ -341,7 +350,8 @@ fn derivatives_of_steps_are_differences() {
             step.linearise(n, &from, &to, &x[2 * n..], &mut point);
             for out in 0..n + states {
                 let slopes = if out < n { point.force_slope(out) } else { point.state_slope(out - n) };
-                // a leg that is not there yet is no state to vary: one of either sign is another history
+                // do not vary an unused leg of a Masing history: a nonzero value of either sign
+                // would be another history
                 let varies = |k: &usize| *k < 2 * n || x[*k] != 0.0 || law.masing().is_none();
                 for k in (0..x.len()).filter(varies) {
                     let scale = if k < 2 * n { 1e-3 } else { step.state_scale() };
@@ -378,7 +388,7 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
                 (force, slope)
             };
             let (force, slope) = resolve(&y);
-            // the law at the velocity that the resolvent says
+            // compare with the law at the velocity that follows from the resolvent
             if n == 1
                 && let Some((at, _)) = prox.at_velocity((y[0] - force[0]) / penalty)
             {
@@ -399,8 +409,11 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
     }
 }
 
-/// What each law says of itself. Odd: forces change their sign with the motion, and where they do not, a motion shows it. Incrementally passive: from
-/// rest, the difference of two motions never gives back more than it took, `∫ δf · δu' dt ≥ 0`.
+/// The statements of each law about itself hold.
+///
+/// For an odd law, forces change their sign with the motion; for other laws, a motion shows
+/// that they do not. For an incrementally passive law, `∫ δf · δu' dt ≥ 0` from rest: the
+/// difference of two motions never gives back more energy than it took.
 #[test]
 fn what_laws_say_of_themselves() {
     for row in TABLE {
@@ -429,7 +442,8 @@ fn what_laws_say_of_themselves() {
                         let way = |motion: &dyn Fn(f64) -> Instant, a: usize| {
                             motion(times[k + 1]).0[a] - motion(times[k]).0[a]
                         };
-                        // forces after the step, as implicit steps have it: that keeps monotonicity
+                        // use the forces after the step, as implicit steps do; this preserves
+                        // monotonicity
                         taken +=
                             (0..3).map(|a| (f[k + 1][a] - g[k + 1][a]) * (way(&one, a) - way(&two, a))).sum::<f64>();
                         (least, most) = (least.min(taken), most.max(taken));
@@ -449,7 +463,8 @@ fn what_laws_say_of_themselves() {
     }
 }
 
-/// The smooth neighbour tends to the law as its width goes to zero: the mean difference of forces falls, by a third at least for a tenth of the width.
+/// The smoothed law tends to the law as its width goes to zero. At a tenth of the width, the
+/// mean difference of the forces is less than a third.
 #[test]
 fn smooth_neighbours_tend_to_the_law() {
     for row in TABLE {
@@ -474,7 +489,7 @@ fn smooth_neighbours_tend_to_the_law() {
     }
 }
 
-/// A law without a slip limit carries nothing.
+/// A law without a slip limit carries no force.
 #[test]
 fn free_laws_carry_no_force() {
     for row in TABLE {
@@ -487,13 +502,14 @@ fn free_laws_carry_no_force() {
     }
 }
 
-/// The describing function, in closed form or not, against the first harmonic of each view.
+/// The describing function, in closed form or not, equals the first harmonic of each view.
 #[test]
 fn describing_functions_are_first_harmonics() {
     for row in TABLE {
         let law = row.sample();
         for amplitude in [1e-4, 1e-3] {
-            // fast beside the width of the smooth laws, whose start is that of their exact neighbour
+            // fast compared with the width of the smooth laws; `linearised` uses their exact
+            // laws
             let omega = 300.0;
             let motion = |time: f64| {
                 let (sin, cos) = (omega * time).sin_cos();
@@ -515,7 +531,7 @@ fn describing_functions_are_first_harmonics() {
     }
 }
 
-/// A law as methods share it between threads.
+/// Threads can share a law.
 #[test]
 fn laws_are_shared() {
     fn shared<T: Send + Sync>(_: &T) {}

@@ -1,6 +1,7 @@
-//! Every law of the table in every method that takes it, against a motion in small steps that no method has a part in.
+//! Every law of the table in every method that takes it, against an independent integration in
+//! small steps.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -13,26 +14,29 @@ use stickslip::structure::Structure;
 use stickslip_verification::held::{OMEGA, held};
 use stickslip_verification::reference::Reference;
 
-/// A damping ratio of 0.1: a transient falls to 1e-8 in 30 periods.
+/// Damping for a ratio of 0.1: a transient falls to 1e-8 in 30 periods.
 const DAMPING: f64 = 28.0;
 
-/// Steps of a period of the reference, and of the coarser one beside it.
+/// Steps per period of the reference, and of a coarser one.
 const STEPS: usize = 2000;
 const COARSE: usize = 1000;
-/// Its periods, and the change from one to the next at which it is periodic, relative. What creeps as `1/t` still goes that change times the periods.
+/// Most periods of the reference, and the relative change per period at which it counts as
+/// periodic. A creep of order `1/t` still moves by this change times the periods.
 const PERIODS: usize = 60;
 const SETTLED: f64 = 1e-7;
-/// Distances of both references that the finer one may err by: one where its steps are of first order, as at kinks.
+/// Error of the finer reference in distances of the two references; two covers steps of first
+/// order, as at kinks.
 const ORDER: f64 = 2.0;
-/// The largest error of a reference that says anything, relative to the motion.
+/// Largest error of a useful reference, relative to the motion.
 const RESOLVED: f64 = 1e-3;
-/// What errors that a method estimates of the whole motion may come to in the amplitude of one place.
+/// Largest error of the amplitude of one place in estimated errors of the whole motion.
 const SHARE: f64 = 3.0;
-/// What the sampling of amplitudes errs by, both of the references and of the orbits: the square of half a step.
+/// Error of sampled amplitudes, of the references and of the orbits: the square of half a step.
 const SAMPLED: f64 = 5e-6;
 
-/// Amplitudes of the motion in so many steps of a period that begins as an orbit does, followed until it repeats, and how far from that it ends. From
-/// rest a smooth law creeps for thousands of periods; a motion that is no orbit leaves its beginning all the same.
+/// Returns the amplitudes of the motion that begins at an orbit, in `steps` steps per period,
+/// and its distance from a periodic motion. From rest, a smooth law would creep for thousands
+/// of periods; a motion that is not an orbit still leaves its start.
 fn followed(system: &System, steps: usize, orbit: &Orbit) -> (Vec<f64>, f64) {
     let begin = orbit.sample(0.0);
     let states = &orbit.start[2 * system.dofs()..];
@@ -58,7 +62,7 @@ fn every_law_in_every_method_moves_as_the_reference() {
             let method = (row.build)(&Options::new()).unwrap();
             let mut solver = match advised(&*method, &system) {
                 Ok(solver) => solver,
-                // refused by name, with what to use instead
+                // refused by name, with alternative methods
                 Err(MethodError { refusal: Refusal::Law { law, .. }, ways }) => {
                     assert!(law == info.name && !ways.methods.is_empty(), "{} in {}: {ways}", info.name, row.name);
                     continue;
@@ -77,8 +81,9 @@ fn every_law_in_every_method_moves_as_the_reference() {
     }
 }
 
-/// A steep law's steps are chosen anew in every period of a motion that is waited for, and what that does to the motion may go round for ever. It is
-/// no motion of several periods: Newton's method finds the orbit of one, from which the reference does not depart.
+/// Method `transient` chooses the steps of a steep law anew in every period, and their errors
+/// may keep the motion from settling. The solver must not report this as a motion of several
+/// periods. Newton's method finds the orbit of one period, and the reference confirms it.
 #[test]
 fn what_steps_do_is_no_motion_of_several_periods() {
     let one = |value: f64| DMatrix::from_element(1, 1, value);

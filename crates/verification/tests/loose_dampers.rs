@@ -1,10 +1,11 @@
-//! Dampers that nothing but contacts and a constant load holds, against an integration in time that shares no code with the
-//! library and begins at the same static equilibrium.
+//! Dampers that only contacts and a constant load hold. The reference is an integration in time
+//! that shares no code with the library and begins at the same static equilibrium.
 //!
-//! `STICKSLIP_LOOSE_DAMPERS=200` takes as many random ones, `STICKSLIP_LOOSE_FIRST=SEED` those from a seed on; it prints every point that differs, fails or
-//! cannot be judged, and the counts.
+//! `STICKSLIP_LOOSE_DAMPERS=200` sets the number of random dampers,
+//! `STICKSLIP_LOOSE_FIRST=SEED` the first seed. The test prints every point that differs, fails
+//! or cannot be judged, and the counts.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -13,33 +14,33 @@ use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip_verification::loose_dampers::{Course, LooseDamper, loose_damper, roof_damper};
 
-/// Random dampers by default.
+/// Default number of random dampers.
 const DAMPERS: u64 = 6;
-/// How the reference is followed, first as it is usual and then, where it differs, longer: what rings undamped on its contacts
-/// takes an excitation that grows slowly, and a resonance many steps.
+/// Settings of the reference, and longer ones for points that differ. Undamped ringing on the
+/// contacts needs an excitation that grows slowly, and a resonance needs many steps.
 const COURSES: [Course; 2] = [
     Course { steps: 1000, growth: 40, periods: 3000, settled: 1e-5 },
     Course { steps: 2000, growth: 1000, periods: 6000, settled: 2e-6 },
 ];
-/// Difference that is allowed in any case.
+/// Difference that is always allowed.
 const NEAR: f64 = 1e-3;
 
 fn variable(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// What became of the points.
+/// Numbers of points by result.
 #[derive(Debug, Default)]
 struct Counts {
     agree: usize,
-    /// Within the range that other histories of a stuck contact give.
+    /// The difference is within the range of other histories of a stuck contact.
     within_histories: usize,
     differ: usize,
-    /// No orbit, where the reference settles.
+    /// No orbit, but the reference settles.
     missed: usize,
-    /// No orbit, and the reference does not settle either.
+    /// No orbit, and the reference does not settle.
     unsettled: usize,
-    /// An orbit, to which the reference does not settle.
+    /// An orbit, but the reference does not settle.
     unjudged: usize,
     /// Reported error above 1 %.
     inaccurate: usize,
@@ -55,7 +56,8 @@ fn quantile(seconds: &mut [f64], share: f64) -> f64 {
     seconds.get((share * (seconds.len() as f64 - 1.0)).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// The largest difference of the blades' amplitudes from those of the reference, relative to the largest.
+/// Returns the largest difference of the blades' amplitudes from the reference, relative to the
+/// largest amplitude.
 fn apart(damper: &LooseDamper, amplitudes: &[f64], omega: f64, course: Course) -> Option<f64> {
     let reference = damper.settled(omega, course)?;
     let size = reference[..damper.blades].iter().copied().fold(f64::MIN_POSITIVE, f64::max);
@@ -108,7 +110,8 @@ fn judge(damper: &LooseDamper, name: &str, counts: &mut Counts) {
     }
 }
 
-/// Wedges, roofs and cylinders at 20 to 70 degrees, with friction of 0.1 to 0.6, pressed by 3 N to 3 kN, through full slip and lift-off.
+/// Wedges, roofs and cylinders at 20 to 70 degrees, with friction of 0.1 to 0.6. Loads of 3 N
+/// to 3 kN press them. The motions include full slip and lift-off.
 #[test]
 fn random_loose_dampers_vibrate_as_they_do_in_time() {
     let first = variable("STICKSLIP_LOOSE_FIRST", 0);
@@ -128,7 +131,8 @@ fn random_loose_dampers_vibrate_as_they_do_in_time() {
     assert!(counts.inaccurate as f64 <= 0.05 * found as f64, "{counts:?}");
 }
 
-/// Half of peak to peak of the first blade, contacts stuck, by an own integration in C.
+/// The first blade's amplitude with stuck contacts agrees with an independent integration in C.
+/// The solver finds orbits at all rotation speeds.
 #[test]
 fn a_roof_damper_has_its_orbits_at_all_speeds() {
     let damper = roof_damper(1000.0);

@@ -1,6 +1,8 @@
-//! Laws and a method that are stated here, in another crate than the library's: what it takes to add one, and that everything takes it.
+//! Laws and a method defined outside the library: the code that a new law needs, and its use in
+//! all methods.
 //!
-//! Nothing in the library names them: harmonic balance, shooting, transients and the linear start find their views by themselves.
+//! Nothing in the library names these laws. Harmonic balance, shooting, transients and the
+//! linear initial guess find their views.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -74,7 +76,8 @@ impl RateLaw for TwoSurfaces {
     }
 }
 
-/// A slider behind a spring whose limit hardens with the way that it has slid: linear kinematic hardening, a step law.
+/// A step law with linear kinematic hardening: a spring in series with a slider, and a spring
+/// parallel to the slider.
 #[derive(Debug)]
 struct Hardening {
     stiffness: f64,
@@ -104,7 +107,7 @@ impl Law for Hardening {
     fn is_odd(&self) -> bool {
         true
     }
-    /// Without a limit two springs in a row are left, which nothing bounds.
+    /// Without a limit the law is two springs in series, with an unbounded force.
     fn scale(&self) -> f64 {
         if self.limit > 0.0 { self.limit } else { f64::INFINITY }
     }
@@ -132,7 +135,7 @@ impl StepLaw for Hardening {
     }
 }
 
-/// Two masses, the law between them.
+/// Returns two masses with the law between them.
 fn model(law: SharedLaw) -> Model {
     let spring = |a: &str, b: &str| Spring { between: [a.into(), b.into()], stiffness: 2e4, damping: 8.0 };
     Model {
@@ -154,7 +157,8 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
         let system = model(law.clone()).assemble().unwrap();
         let omega = TAU * 24.0;
         let start = [0.0; 2];
-        // the reference shares no code with a method; its own error is of second order in 2000 steps
+        // the reference shares no code with a method; its error is of second order in 2000
+        // steps
         let (expected, change) = Reference::new(&system, omega, 2000, &start, &start).settle(80, 1e-6);
         assert!(change <= 1e-6, "{change}");
         let methods: [&dyn Method; 3] =
@@ -172,13 +176,14 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
             }
             assert!(orbit.joints[0].dissipation > 0.0 && orbit.energy.friction > 0.0);
         }
-        // a method that cannot take it says which view it misses, and names law and joint
+        // a method that cannot take the law names the missing view, the law and the joint
         let error = stickslip::method::event_driven::EventDriven.solver(&system).err().unwrap().to_string();
         assert!(error.contains(law.name()) && error.contains("rub"), "{error}");
     }
 }
 
-/// Without a limit the first law carries nothing and the second is two springs in a row: the motion is that of a linear structure, in closed form.
+/// Without a limit the first law carries nothing, and the second is two springs in series. The
+/// closed form of the linear structure gives the motion.
 #[test]
 fn laws_from_outside_without_a_limit_are_linear() {
     let omega = TAU * 24.0;
@@ -189,7 +194,7 @@ fn laws_from_outside_without_a_limit_are_linear() {
     ];
     for (law, spring) in laws {
         let system = model(law.clone()).assemble().unwrap();
-        // (k - m Ω² + i c Ω) x_a + spring (x_a - x_b) = F, and the same of b without F
+        // `(k - m Ω² + i c Ω) x_a + spring (x_a - x_b) = F`, and the equation of b without F
         let own = |mass: f64| Complex64::new(2e4 + spring - mass * omega * omega, 8.0 * omega);
         let (a, b) = (own(1.0), own(0.6));
         let determinant = a * b - spring * spring;
@@ -206,7 +211,7 @@ fn laws_from_outside_without_a_limit_are_linear() {
     }
 }
 
-/// A law that goes wrong: states of no size, or a force that is no number beyond a distance.
+/// An invalid law: states of invalid size, or a NaN force beyond a distance.
 #[derive(Debug)]
 struct Wrong {
     size: f64,
@@ -276,7 +281,8 @@ impl RateLaw for Wrong {
     }
 }
 
-/// States of no size are refused with the system; a force that is no number ends every search at once, with the joint and its law.
+/// Assembly refuses states of invalid size. A NaN force ends every search at once, with the
+/// names of the joint and its law.
 #[test]
 fn laws_that_give_no_numbers_are_named() {
     for by_rate in [false, true] {
@@ -284,7 +290,7 @@ fn laws_that_give_no_numbers_are_named() {
             let error = model(Arc::new(Wrong { size, reach: 1.0, by_rate })).assemble().unwrap_err().to_string();
             assert!(error.contains("wrong") && error.contains("state_scale"), "{error}");
         }
-        // the motion without a joint has an amplitude of some millimetres
+        // without the joint, the amplitude is some millimetres
         let system = model(Arc::new(Wrong { size: 1e-3, reach: 1e-4, by_rate })).assemble().unwrap();
         for method in [&Shooting::default() as &dyn Method, &Transient::default()] {
             let error = method.solver(&system).unwrap().orbit(TAU * 24.0, None).unwrap_err();
@@ -296,7 +302,7 @@ fn laws_that_give_no_numbers_are_named() {
     }
 }
 
-/// A spring that pulls on one side only, and says that it is odd.
+/// A spring that acts on one side only but claims to be odd.
 #[derive(Debug)]
 struct OneSided {
     by_rate: bool,
@@ -350,7 +356,8 @@ impl RateLaw for OneSided {
     }
 }
 
-/// A law that says of itself what is not true would be mirrored into a symmetric orbit that is none.
+/// A law with a false claim is refused. Its orbit would be mirrored into a symmetric motion
+/// that does not exist.
 #[test]
 fn a_law_that_is_not_odd_must_not_say_so() {
     for by_rate in [false, true] {
@@ -359,7 +366,7 @@ fn a_law_that_is_not_odd_must_not_say_so() {
     }
 }
 
-/// A method from outside: linear systems, solved harmonic by harmonic.
+/// A method outside the library: solves linear systems harmonic by harmonic.
 #[derive(Debug)]
 struct Linear;
 
@@ -448,7 +455,7 @@ fn a_method_from_outside_makes_orbits_with_evidence() {
     assert!(orbit.evidence.energy_gap < 1e-6, "{}", orbit.evidence.energy_gap);
 }
 
-/// The page of the book shows this code, and no other.
+/// Every Rust block of the book's page is code of this file.
 #[test]
 fn the_book_shows_the_code_of_this_file() {
     let page = include_str!("../../../docs/src/extending.md");

@@ -1,8 +1,10 @@
-//! The blade couple of Pust, Pesek, Radolfova (2015), exact law: theory sections 6.2 to 6.8.
+//! The blade couple of Pust, Pesek, Radolfova (2015) with the exact law: theory sections 6.2 to
+//! 6.8.
 //!
-//! Linear limits are solved here by complex 2 × 2 elimination; `data/smooth_orbits/stick_borders.csv` has them by NumPy.
+//! The tests compute the linear limits by complex 2 × 2 elimination;
+//! `data/smooth_orbits/stick_borders.csv` has them by NumPy.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -19,12 +21,13 @@ const B: f64 = 0.2;
 const KT: f64 = 1e4;
 const F0: f64 = 10.0;
 
-/// Orbit of a template with some parameters changed, at `hertz`.
+/// Returns the orbit of a template with some parameters changed, at `hertz`.
 fn orbit(name: &str, changes: &[(&str, f64)], hertz: f64) -> Orbit {
     exact(&template(name, changes), TAU * hertz)
 }
 
-/// Complex amplitudes of the blades and of the contact force while the contact sticks: the small mass rides on blade 1.
+/// Returns complex amplitudes of the blades and of the contact force in stick; the small mass
+/// moves with blade 1.
 fn stuck(m1: f64, hertz: f64) -> [Complex64; 3] {
     let (w, blade) = (TAU * hertz, M - m1 / 2.0);
     let a = Complex64::new(K + KT - (blade + m1) * w * w, w * B);
@@ -34,13 +37,14 @@ fn stuck(m1: f64, hertz: f64) -> [Complex64; 3] {
     [x1, x3, (KT - m1 * w * w) * x1 - KT * x3]
 }
 
-/// Complex amplitude of blade 1 without contact.
+/// Returns the complex amplitude of blade 1 without contact.
 fn free(m1: f64, hertz: f64) -> Complex64 {
     let w = TAU * hertz;
     F0 / Complex64::new(K - (M - m1 / 2.0) * w * w, w * B)
 }
 
-/// Amplitudes in cm against printed digits, which are maxima over samples: half a unit of the last digit and 3e-5 relative.
+/// Compares amplitudes in cm with printed digits. These are maxima over samples: half a unit of
+/// the last digit, and 3e-5 relative.
 fn check_cm(orbit: &Orbit, expected: &[f64]) {
     assert!(orbit.evidence.residual < 1e-11, "{:?}", orbit.evidence);
     for (place, expected) in orbit.places.iter().zip(expected) {
@@ -48,7 +52,8 @@ fn check_cm(orbit: &Orbit, expected: &[f64]) {
     }
 }
 
-/// Largest amplitude of a place in cm and its frequency in Hz, between 119.5 and 122.5 Hz.
+/// Returns the largest amplitude of a place in cm and its frequency in Hz, between 119.5 and
+/// 122.5 Hz.
 fn peak(solver: &mut dyn Solver, place: usize) -> (f64, f64) {
     let amplitude = |hertz: f64| 100.0 * solver.orbit(TAU * hertz, None).unwrap().places[place].amplitude();
     let (at, value) = maximum(amplitude, [119.5, 122.5], 150, 1e-7);
@@ -60,8 +65,9 @@ fn peaks(system: &System) -> Vec<(f64, f64)> {
     (0..system.dofs()).map(|place| peak(&mut *solver, place)).collect()
 }
 
-/// Peaks (cm, Hz) against printed ones. The printed ones are the largest values on a grid of 0.01 to 0.02 Hz: the amplitude at the
-/// printed frequency has the printed digits, and the true peak is higher by as much as a step of the grid can hide.
+/// Compares peaks (cm, Hz) with printed ones. The printed peaks are maxima on a grid of 0.01 to
+/// 0.02 Hz. The amplitude at the printed frequency has the printed digits, and the true peak
+/// exceeds it by at most the error of the grid.
 fn check_peaks(name: &str, changes: &[(&str, f64)], printed: &[(f64, f64)]) {
     let system = template(name, changes);
     let found = peaks(&system);
@@ -74,14 +80,14 @@ fn check_peaks(name: &str, changes: &[(&str, f64)], printed: &[(f64, f64)]) {
     }
 }
 
-/// How k and b were inferred from the paper's text.
+/// k and b follow from numbers in the paper's text.
 #[test]
 fn theory_6_1_parameters() {
     let (m, m1) = (0.182, 0.001_82);
     let k = |hertz: f64| (TAU * hertz).powi(2) * (m - m1 / 2.0);
     near("k from 121.25 Hz", k(121.25), 105_103.63, 0.5e-2);
     near("frequency of k = 105 000 N/m", (105e3f64 / (m - m1 / 2.0)).sqrt() / TAU, 121.190, 0.5e-3);
-    // a1 ~ (F0 - 4 Ft0/π)/(b w): 5 cm at 2 N gives b, and b = 0.2 kg/s gives 4.89 cm
+    // `a1 ~ (F0 - 4 Ft0/π)/(b w)`: 5 cm at 2 N gives b, and b = 0.2 kg/s gives 4.89 cm
     let w = TAU * 121.25;
     near("b from 5 cm", (F0 - 8.0 / PI) / (0.05 * w), 0.1957, 0.5e-4);
     let peak = peaks(&template("blade-couple", &[("Ft", 2.0)]))[0].0;
@@ -117,7 +123,8 @@ fn theory_6_3_event_driven_references() {
     check_cm(&orbit("blade-couple", &[("Ft", 4.0)], 120.75), &[1.47944, 1.47619, 1.35928]);
     check_cm(&orbit("blade-couple", &[("Ft", 8.0)], 121.0), &[2.01529, 1.31898, 1.27630]);
     check_cm(&orbit("symmetric-couple", &[("Ft", 2.0)], 120.93), &[4.81192, 5.07765, 1.86772, 1.76857]);
-    // the sensitivity to k that section 6.3 gives, 2e-4 at 121.25 Hz, is that of the larger limit; at 2 N it is a tenth of it
+    // section 6.3 gives a sensitivity to k of 2e-4 at 121.25 Hz; this holds at the larger
+    // limit, and at 2 N it is a tenth of it
     for (ft, expected) in [(4.0, 2e-4), (2.0, 2e-5)] {
         let a1 = |k: f64| orbit("blade-couple", &[("Ft", ft), ("k", k)], 121.25).places[0].amplitude();
         let change = (a1(105_103.63) / a1(105_103.0) - 1.0).abs();
@@ -126,7 +133,8 @@ fn theory_6_3_event_driven_references() {
     }
 }
 
-/// Without stick the passive blade and the contact do not know how strongly the first blade is driven.
+/// Without stick, the amplitudes of the passive blade and the contact do not depend on the
+/// force on the first blade.
 #[test]
 fn theory_6_4_passive_amplitudes_are_proportional_to_the_limit() {
     let reference = orbit("blade-couple", &[("Ft", 2.0)], 121.25);
@@ -142,9 +150,12 @@ fn theory_6_4_passive_amplitudes_are_proportional_to_the_limit() {
     }
 }
 
-/// The largest a3 at Ft0 = 2 N falls with a softer arctangent. Section 6.5 prints 1.0039, 0.9959, 0.9683, 0.8648 cm for alpha of
-/// 25 000, 250, 25, 2.5 s/m. The peak is a kink (slip begins at 120.6697 Hz), so values read off a grid are low: maximised over
-/// frequency they come out up to 0.8 % higher. The fall of 3.5 % for alpha = 25 instead of 25 000 s/m becomes 3.9 %.
+/// The largest a3 at Ft0 = 2 N decreases for a softer arctangent.
+///
+/// Section 6.5 prints 1.0039, 0.9959, 0.9683, 0.8648 cm for alpha of 25 000, 250, 25, 2.5 s/m.
+/// The peak is a kink (slip begins at 120.6697 Hz), so values on a grid are low. The maxima
+/// over frequency are up to 0.8 % higher. The decrease from alpha = 25 000 to 25 s/m is 3.9 %
+/// instead of 3.5 %.
 #[test]
 fn theory_6_5_sensitivity_to_alpha() {
     let (sharp, _) = peak(&mut *EventDriven.solver(&template("blade-couple", &[("Ft", 2.0)])).unwrap(), 2);
@@ -171,10 +182,13 @@ fn theory_6_5_sensitivity_to_alpha() {
     println!("exact law: {sharp:.6} cm");
 }
 
-/// The performance curve: the largest a1 over frequency, as a function of the limit. Section 6.6 has it from harmonic balance with
-/// the harmonics 1, 3, 5 on a grid of 0.02 Hz. With the exact law and maximised over frequency its values stand within 1 %, but
-/// not around the optimum, where the small mass is near its 1:3 resonance: 6 N is 5.4 % too low, 6.5 N 2.2 % too low, 7 N 1.2 %
-/// too high, and the optimum is not 1.956 cm at 6.5 N but 1.975 cm at 6.68 N, where two peaks of the curve are equally high.
+/// The performance curve: the largest a1 over frequency as a function of the limit.
+///
+/// Section 6.6 uses harmonic balance with the harmonics 1, 3, 5 on a grid of 0.02 Hz. With the
+/// exact law and maxima over frequency, its values are within 1 % away from the optimum. Near
+/// the optimum the small mass is near its 1:3 resonance. There 6 N is 5.4 % too low, 6.5 N
+/// 2.2 % too low, and 7 N 1.2 % too high. The optimum is not 1.956 cm at 6.5 N but 1.975 cm at
+/// 6.68 N, where the curve has two equally high peaks.
 #[test]
 fn theory_6_6_performance_curve() {
     let asymmetric = [
@@ -212,7 +226,7 @@ fn theory_6_6_performance_curve() {
     let lowest = |ft: f64| -peak(&mut *EventDriven.solver(&template("blade-couple", &[("Ft", ft)])).unwrap(), 0).0;
     let (ft, value) = maximum(lowest, [6.4, 7.0], 6, 1e-4);
     println!("optimum {:.6} cm at {ft:.4} N", -value);
-    // there the two peaks are equally high
+    // the two peaks are equally high at the optimum
     let system = template("blade-couple", &[("Ft", ft)]);
     let mut solver = EventDriven.solver(&system).unwrap();
     let mut a1 = |hertz: f64| 100.0 * solver.orbit(TAU * hertz, None).unwrap().places[0].amplitude();
@@ -258,13 +272,14 @@ fn theory_6_7_linear_limits() {
     }
 }
 
-/// Whether the contact slips at all.
+/// Returns true if the contact slips.
 fn slips(system: &System, hertz: f64) -> bool {
     exact(system, TAU * hertz).joints[0].slip_fraction > 0.0
 }
 
-/// The same close to `border` (Hz): within 1e-11 of it the contact force grazes its limit by less than its own rounding, and the
-/// method may say that the joint chatters. That counts as slip; further away it is a failure.
+/// Returns true if the contact slips, near the `border` (Hz). Within 1e-11 of the border the
+/// contact force exceeds its limit by less than rounding, and the method may report chatter.
+/// This counts as slip; at a larger distance an error is a failure.
 fn slips_near(system: &System, hertz: f64, border: f64) -> bool {
     match EventDriven.solver(system).unwrap().orbit(TAU * hertz, None) {
         Ok(orbit) => orbit.joints[0].slip_fraction > 0.0,
@@ -284,10 +299,10 @@ fn theory_6_8_stick_slip_borders() {
         };
         let (m1, ft) = (number(&row, "m1_kg"), number(&row, "Ft_N"));
         let printed = number(&row, "frequency_Hz");
-        // the border of the closed form
+        // border of the closed form
         let border = zero(|f| stuck(m1, f)[2].norm() - ft, [printed - 1e-3, printed + 1e-3]);
         close("border of NumPy", border, printed, 1e-12);
-        // the border of the orbits
+        // border of the orbits
         let system = template("blade-couple", &[("Ft", ft), ("m1", m1)]);
         let side = |f: f64| if slips_near(&system, f, border) == upwards { 1.0 } else { -1.0 };
         let found = zero(side, [border - 1e-3, border + 1e-3]);
@@ -297,7 +312,7 @@ fn theory_6_8_stick_slip_borders() {
     }
     println!("{rows} borders by bisection on orbits, largest relative error {worst:.1e}");
     assert_eq!(rows, 14);
-    // and at given frequencies the limit at which slip begins
+    // the limit at which slip begins, at given frequencies
     worst = 0.0;
     for m1 in [0.001_82, 0.000_91] {
         for hertz in [119.5, 120.0, 120.5, 120.9, 121.25, 122.0] {
@@ -353,7 +368,7 @@ fn theory_6_8_printed_borders() {
     for (m1, ft, printed) in borders {
         near("border", zero(|f| stuck(m1, f)[2].norm() - ft, [printed - 1e-3, printed + 1e-3]), printed, 0.5e-4);
     }
-    // states beside the borders
+    // states near the borders
     for (ft, hertz, slip) in [
         (2.0, 120.5, false),
         (2.0, 120.2, true),
@@ -372,7 +387,8 @@ fn theory_6_8_printed_borders() {
     }
 }
 
-/// Every stuck point of the paper's curves is the linear one, and above the largest contact force the whole curve is.
+/// Every stuck point of the paper's curves is linear; above the largest contact force, the
+/// whole curve is.
 #[test]
 fn theory_6_8_stuck_curves_are_exactly_linear() {
     let mut stuck_points = 0;
@@ -403,7 +419,8 @@ fn theory_6_8_stuck_curves_are_exactly_linear() {
     assert!(stuck_points > 2 * 241);
 }
 
-/// The same numbers by NumPy, all rows of `data/smooth_orbits/stick_borders.csv` that are no borders.
+/// All rows of `data/smooth_orbits/stick_borders.csv` except the borders, as NumPy computed
+/// them.
 #[test]
 fn theory_6_7_and_6_8_against_numpy() {
     let mut rows = 0;
@@ -415,7 +432,7 @@ fn theory_6_7_and_6_8_against_numpy() {
             "free_x1" => orbit("blade-couple", &[("Ft", 1e-9), ("m1", m1)], hertz).places[0].amplitude(),
             "contact_force" | "contact_force_maximum" | "contact_force_minimum" => {
                 let orbit = orbit("blade-couple", &[("Ft", 1e3), ("m1", m1)], hertz);
-                // a pure harmonic: two samples a quarter period apart have its amplitude
+                // a pure harmonic: two samples a quarter period apart give its amplitude
                 let force = |time: f64| orbit.sample(time).joints[0].force[0];
                 force(0.0).hypot(force(0.25 * orbit.period()))
             }
@@ -427,7 +444,7 @@ fn theory_6_7_and_6_8_against_numpy() {
     assert!(rows >= 48, "{rows}");
 }
 
-/// Friction never gives energy and the phase of the drive never matters: shifting the force shifts the orbit.
+/// The orbits are stable, and a shift of the force's phase shifts the orbit.
 #[test]
 fn theory_13_orbits_are_stable_and_shift_with_the_force() {
     for (ft, hertz) in [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0), (4.0, 121.1)] {
@@ -444,7 +461,7 @@ fn theory_13_orbits_are_stable_and_shift_with_the_force() {
     }
 }
 
-/// Dissipative and with one contact of constant limit: one orbit, whatever the start.
+/// A dissipative system with one contact of constant limit has one orbit for any start.
 #[test]
 fn theory_13_orbits_are_unique() {
     let mut random = Random::new(13);

@@ -1,4 +1,5 @@
-//! Contacts that move alike, by harmonic balance: they are one contact with the sum of their forces, and each has its share of it.
+//! Contacts with proportional motions in harmonic balance: they act as one contact with the sum
+//! of their forces, and each carries its share.
 
 use nalgebra::{DMatrix, dmatrix};
 use num_complex::Complex64;
@@ -14,10 +15,11 @@ use stickslip::orbit::{Accuracy, Orbit};
 use stickslip::structure::Structure;
 use stickslip_verification::{close, exact, near};
 
-/// A contact that moves so many times as far as the first axes, with its law.
+/// A contact with its law; its motion is this factor times the motion along the first axes.
 type Contact = (f64, SharedLaw);
 
-/// Relative difference of two solutions of equations that are the same but for roundings: both are solved to 1e-10, and the structures are near resonance.
+/// Relative difference of two solutions of equations that agree up to rounding. Both are solved
+/// to 1e-10, and the structures are near resonance.
 const SOLVED: f64 = 1e-8;
 
 fn balance(harmonics: usize) -> HarmonicBalance {
@@ -28,7 +30,8 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// Three coordinates with full matrices under a force, natural frequencies about 0.8, 1.3 and 1.8 rad/s.
+/// Returns three coordinates with full matrices under a force, with natural frequencies of
+/// about 0.8, 1.3 and 1.8 rad/s.
 fn structure(amplitude: f64) -> SystemBuilder {
     let stiffness = dmatrix![1.9, -0.5, 0.1; -0.5, 1.6, -0.4; 0.1, -0.4, 1.4];
     let mass = dmatrix![1.0, 0.2, 0.0; 0.2, 0.9, 0.1; 0.0, 0.1, 0.8];
@@ -44,7 +47,7 @@ fn structure(amplitude: f64) -> SystemBuilder {
 const LINE: [(usize, f64); 2] = [(0, 1.0), (2, -0.7)];
 const ACROSS: [(usize, f64); 2] = [(1, 1.0), (2, 0.4)];
 
-/// An axis so many times another, its rows the other way round where it points the other way.
+/// Returns a multiple of an axis; a negative factor also reverses the order of its rows.
 fn along(factor: f64, rows: &[(usize, f64)]) -> Axis {
     let mut rows: Vec<(usize, f64)> = rows.iter().map(|(row, weight)| (*row, factor * weight)).collect();
     if factor < 0.0 {
@@ -53,7 +56,7 @@ fn along(factor: f64, rows: &[(usize, f64)]) -> Axis {
     Axis::new(rows)
 }
 
-/// The structure with these contacts, and between them others that have a line of their own.
+/// Returns the structure with these contacts and two other joints among them.
 fn system(amplitude: f64, contacts: &[Contact]) -> System {
     let mut builder = structure(amplitude);
     let others: [SharedLaw; 2] = [Arc::new(Jenkins { stiffness: 0.5, limit: 0.1 }), Arc::new(Coulomb { limit: 0.05 })];
@@ -61,7 +64,7 @@ fn system(amplitude: f64, contacts: &[Contact]) -> System {
         let axes = [LINE, ACROSS][..law.directions()].iter().map(|rows| along(*factor, rows)).collect();
         builder = builder.joint(format!("j{j}"), law.clone(), axes);
         if let Some(other) = others.get(j) {
-            // the elastic one on the same line, the rigid one not
+            // the elastic one acts on the same line, the rigid one on another
             let rows: &[(usize, f64)] = if j == 0 { &LINE } else { &[(1, 1.0)] };
             builder = builder.joint(format!("other{j}"), other.clone(), vec![along(1.0, rows)]);
         }
@@ -72,8 +75,9 @@ fn system(amplitude: f64, contacts: &[Contact]) -> System {
     builder.build().unwrap()
 }
 
-/// What several contacts do is what the one does: motions, and of each joint its share of force and loss, by `shares` (force per force of the one).
-/// Returns the share of the period in which it sticks.
+/// Asserts that several contacts act as one: equal motions, and for each joint its share of
+/// force and loss. `shares` holds the factor of the motion and the force per force of the
+/// single contact. Returns the stick fraction.
 fn one_for_all(what: &str, [many, one]: [&System; 2], (harmonics, omega): (usize, f64), shares: &[(f64, f64)]) -> f64 {
     let method = balance(harmonics);
     let (many, one) = (orbit(&method, many, omega), orbit(&method, one, omega));
@@ -101,7 +105,7 @@ fn one_for_all(what: &str, [many, one]: [&System; 2], (harmonics, omega): (usize
         (0..32).map(|i| orbit.sample(orbit.period() * i as f64 / 32.0).joints[0].force[a].abs()).fold(0.0, f64::max)
     };
     for step in 0..16 {
-        // between the samples of a sweep around the period that all numbers of samples have
+        // instants that are no samples of the series
         let time = (f64::from(step) + 0.37) / 16.0 * TAU / omega;
         let (now, whole) = (many.sample(time), &one.sample(time).joints[0]);
         for (&j, (factor, share)) in mine.iter().zip(shares) {
@@ -125,7 +129,7 @@ fn coulomb(limit: f64) -> SharedLaw {
     Arc::new(Coulomb { limit })
 }
 
-/// Rigid contacts along one line, reversed, with levers, of any size beside each other.
+/// Rigid contacts along one line: reversed, with levers, and of very different sizes.
 #[test]
 fn rigid_contacts_along_one_line_are_one() {
     let cases: [(&str, &[(f64, f64)]); 4] = [
@@ -139,7 +143,7 @@ fn rigid_contacts_along_one_line_are_one() {
         let shares: Vec<(f64, f64)> =
             contacts.iter().map(|(factor, limit)| (*factor, factor.signum() * limit / sum)).collect();
         let list: Vec<Contact> = contacts.iter().map(|(factor, limit)| (*factor, coulomb(*limit))).collect();
-        // at two resonances: slip nearly all the time, stick and slip; and stick all the time
+        // at two resonances: almost permanent slip, stick and slip, and permanent stick
         for (amplitude, omega, sticks) in
             [(12.0, 1.31, 0.0..0.1), (4.0, 1.31, 0.1..0.9), (1.4, 1.9, 0.0..0.1), (1.5, 0.83, 1.0..2.0)]
         {
@@ -150,7 +154,7 @@ fn rigid_contacts_along_one_line_are_one() {
     }
 }
 
-/// The exact method shares in the same way, within the error of the series.
+/// The exact method gives the same shares, within the error of the series.
 #[test]
 fn the_exact_method_shares_alike() {
     let contacts = [(1.0, 0.2), (-2.0, 0.1), (0.3, 1.0)].map(|(factor, limit)| (factor, coulomb(limit)));
@@ -164,10 +168,11 @@ fn the_exact_method_shares_alike() {
     assert!(expected.joints[0].dissipation > 0.01 * expected.energy.work_in, "a test without slip tests nothing");
 }
 
-/// Other laws of velocity, as long as their forces are multiples of each other: in a plane, steep, falling, behind springs.
+/// Other laws of velocity with proportional forces: in a plane, steep, falling, and behind
+/// springs.
 #[test]
 fn laws_of_velocity_that_are_multiples_are_one() {
-    /// A law with so many times its usual forces.
+    /// A law with its usual forces times a factor.
     type OfSize = fn(f64) -> SharedLaw;
     let cases: [(&str, OfSize); 5] = [
         ("coulomb-2d", |share| Arc::new(Coulomb2d { limit: 0.7 * share })),
@@ -188,12 +193,13 @@ fn laws_of_velocity_that_are_multiples_are_one() {
     }
 }
 
-/// What is no multiple of the other, or moves faster while velocities count, keeps its own force.
+/// A contact whose force is not a multiple of the other one keeps its own force. This includes
+/// a faster motion if the force depends on velocity.
 #[test]
 fn what_differs_is_not_shared() {
     let law = |limit: f64, alpha: f64| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
     let of = |contacts: &[Contact]| orbit(&balance(15), &system(3.0, contacts), 1.31);
-    // twice as fast, which a law knows that is twice as steep
+    // twice the velocity is equivalent to a law that is twice as steep
     let (lever, steeper) =
         (of(&[(1.0, law(0.3, 5.0)), (2.0, law(0.1, 5.0))]), of(&[(1.0, law(0.3, 5.0)), (1.0, law(0.2, 10.0))]));
     for (a, b) in lever.places.iter().zip(&steeper.places) {
@@ -202,7 +208,8 @@ fn what_differs_is_not_shared() {
     near("loss", lever.joints[2].dissipation, steeper.joints[2].dissipation, SOLVED * lever.energy.work_in);
 }
 
-/// Modes without excitation: four quarters of a contact, some the other way round, have the frequency and the damping of the whole.
+/// Modes without excitation: four parts of a contact, some reversed, have the frequency and the
+/// damping of the whole.
 #[test]
 fn modes_are_those_of_the_one() {
     let parts = [(1.0, 0.25), (-1.0, 0.25), (2.0, 0.0625), (0.5, 0.75)].map(|(factor, limit)| (factor, coulomb(limit)));
@@ -218,7 +225,7 @@ fn modes_are_those_of_the_one() {
     assert!((0..15).map(damping).fold(0.0, f64::max) > 0.05, "a test without slip tests nothing");
 }
 
-/// Branches along frequency: the same points, with the shares.
+/// Branches along frequency have the same points, with the shares.
 #[test]
 fn branches_are_those_of_the_one() {
     let parts = [(1.0, 0.35), (-2.0, 0.15), (1.0, 0.35)].map(|(factor, limit)| (factor, coulomb(limit)));
@@ -247,7 +254,7 @@ fn between(a: &str, b: &str) -> [String; 2] {
     [a.to_owned(), b.to_owned()]
 }
 
-/// A ring of blades with these contacts between neighbours, in a wave.
+/// Returns a ring of blades with these contacts between neighbours, under a travelling wave.
 fn ring(sectors: usize, contacts: &[(bool, f64)]) -> Model {
     let spring =
         |a: &str, b: &str, stiffness: f64| Spring { between: between(a, b), stiffness, damping: 0.01 * stiffness };
@@ -266,8 +273,12 @@ fn ring(sectors: usize, contacts: &[(bool, f64)]) -> Model {
     disk.ring(|_| sector.clone()).unwrap()
 }
 
-/// In a wave, and on the whole ring of which nobody knows that it is one. Of two sectors the contacts of both lie along one line: on the whole ring they
-/// are one with the sum of both, so that the penalty is to that as it is to half of it in the wave, and both are as far apart as the series is short.
+/// Parallel contacts in a travelling wave, and on the whole ring without the information on its
+/// symmetry.
+///
+/// In a ring of two sectors, the contacts of both sectors lie along one line, so the whole ring
+/// groups them. The penalty per force then differs by a factor of two from the wave, and the
+/// results differ by the truncation error.
 #[test]
 fn rings_with_contacts_side_by_side() {
     let parts = [(false, 0.1), (true, 0.06), (false, 0.04)];
@@ -302,7 +313,8 @@ fn rings_with_contacts_side_by_side() {
     }
 }
 
-/// Two equal planes of rigid friction with as many harmonics as the tolerance asks for: before they were one, nothing decided what each carried.
+/// Two equal planes of rigid friction with automatic harmonics converge. Grouping determines
+/// the force of each, which the equations leave free.
 #[test]
 fn planes_side_by_side_converge_by_themselves() {
     let one = |value: f64| DMatrix::identity(2, 2) * value;

@@ -1,7 +1,10 @@
-//! The exact method with every piece: stops, alone and beside sliders, and sliders whose friction drops when they let go. Against closed forms,
-//! integration, and orbits that SciPy integrated (`data/static_friction`).
+//! The exact method with all kinds of pieces: stops, alone and with sliders, and sliders with a
+//! static limit above the dynamic one.
+//!
+//! References: closed forms, time integration, and orbits that SciPy integrated
+//! (`data/static_friction`).
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -15,7 +18,8 @@ use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
 use stickslip::orbit::{Orbit, Sample};
 use stickslip_verification::{close, exact, near, number, table};
 
-/// A mass of 1 kg on a spring (N/m) and a damper (kg/s) with these joints to the ground.
+/// Returns a mass of 1 kg on a spring (N/m) and a damper (kg/s), with these joints to the
+/// ground.
 fn oscillator(stiffness: f64, damping: f64, laws: &[SharedLaw]) -> Model {
     let between = || ["m".to_owned(), GROUND.to_owned()];
     let joint = |(i, law): (usize, &SharedLaw)| Joint { name: format!("j{i}"), between: between(), law: law.clone() };
@@ -31,7 +35,7 @@ fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
     Force { on: on.into(), amplitude, phase: 0.0, harmonic }
 }
 
-/// The displacements of the first place at these times of a free motion that begins at rest at `start`.
+/// Returns samples of the first displacement of a free motion from rest at `start`.
 fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
     let motion = TimeHistory {
         displacement: vec![start],
@@ -51,7 +55,8 @@ fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
     all
 }
 
-/// A free oscillator on one side of a stop is one sine, on the other side another: for a gap of zero the frequency is 2 w1 w2 / (w1 + w2).
+/// A free oscillator moves in one sine on each side of a stop. For a gap of zero its frequency
+/// is `2 w1 w2 / (w1 + w2)`.
 #[test]
 fn bilinear_oscillator_swings_with_its_frequency() {
     let (k, stop) = (100.0f64, 800.0);
@@ -64,12 +69,13 @@ fn bilinear_oscillator_swings_with_its_frequency() {
             near("after a period", *x, start, 1e-12 * (i + 1) as f64);
         }
     }
-    // the other turning point is lower by the frequencies
+    // the other turning point is lower by the ratio of the frequencies
     let turning = free(&model, -0.3, 0.5 * period, 0.5 * period);
     near("turning point", turning[1], 0.3 * w1 / w2, 1e-13);
 }
 
-/// The same with a gap, compressed at rest or open, and a constant force: sines about two equilibria, of one energy.
+/// With a gap, open or compressed at rest, and a constant force, the motion consists of two
+/// sines about two equilibria, with equal energy.
 #[test]
 fn preloaded_oscillator_swings_with_its_period() {
     let (k, stop) = (100.0f64, 800.0);
@@ -82,7 +88,7 @@ fn preloaded_oscillator_swings_with_its_period() {
         let (a, at) = (open - start, gap - open);
         let t1 = (at / -a).acos() / w1;
         let v = w1 * (a * a - at * at).sqrt();
-        // beyond the gap: x = closed + b sin(w2 t + p), its velocity v at the gap
+        // beyond the gap: `x = closed + b sin(w2 t + p)`, with the velocity v at the gap
         let b = (v * v / (w2 * w2) + (gap - closed).powi(2)).sqrt();
         let t2 = 0.5 * PI / w2 - ((gap - closed) / b).asin() / w2;
         let period = 2.0 * (t1 + t2);
@@ -94,7 +100,8 @@ fn preloaded_oscillator_swings_with_its_period() {
     }
 }
 
-/// Driven, with and without preload: the orbit of events and that of the integration of the law's rate are the same, and as stable.
+/// Under excitation, with and without preload, the event-driven orbit agrees with the
+/// integration of the law's rate. The stability agrees too.
 #[test]
 fn stops_agree_with_integration() {
     let (mut worst, mut unstable) = (0.0f64, 0);
@@ -115,13 +122,14 @@ fn stops_agree_with_integration() {
                 worst = worst.max((a - b).abs() / scale);
             }
             let largest = |orbit: &Orbit| orbit.multipliers().unwrap()[0].norm();
-            // the integration's derivative is that of steps which the kink of the force falls into
+            // the kink of the force falls inside a step of the integration, which limits its
+            // derivative
             near("multiplier", largest(&orbit), largest(&other), 1e-4);
             assert_eq!(orbit.is_stable(), other.is_stable());
             unstable += usize::from(orbit.is_stable() == Some(false));
             assert_eq!((orbit.joints[0].slip_fraction, orbit.joints[0].dissipation), (0.0, 0.0));
             assert!(!orbit.is_one_of_many(), "a stop does not stick");
-            // half of the drive's work goes into the damper, none into the stop
+            // all work of the excitation goes into the damper, none into the stop
             assert!(orbit.evidence.energy_gap < 1e-10, "{}", orbit.evidence.energy_gap);
             for i in 0..20 {
                 let at = &orbit.sample(orbit.period() * f64::from(i) / 20.0).joints[0];
@@ -136,7 +144,8 @@ fn stops_agree_with_integration() {
     assert!(unstable > 0, "no unstable orbit was met");
 }
 
-/// (11.13): where a motion of one period of the drive is unstable, it says so, and that of two is found and stable.
+/// (11.13): where the orbit of one period is unstable, it reports this, and the orbit of two
+/// periods is found and is stable.
 #[test]
 fn subharmonic_motion_beside_an_unstable_one() {
     let mut model = oscillator(1.0, 0.1, &[Arc::new(Gap { gap: 0.0, stiffness: 4.0 })]);
@@ -156,7 +165,8 @@ fn subharmonic_motion_beside_an_unstable_one() {
     multiplied(&double, [1.0, -1.0].map(|sign| Complex64::new(0.446_922_437_899_297, sign * 0.645_748_845_388_059)));
 }
 
-/// (11.13): where the motion of one period has just become unstable: a multiplier of -1.18, and with it `-e^{-c T}/1.18`.
+/// (11.13): an orbit of one period that has just become unstable. Its multipliers are -1.18 and
+/// `-e^{-c T}/1.18`.
 #[test]
 fn a_multiplier_of_1_18_is_unstable() {
     let mut model = oscillator(1.0, 0.1, &[Arc::new(Gap { gap: 0.0, stiffness: 4.0 })]);
@@ -165,7 +175,7 @@ fn a_multiplier_of_1_18_is_unstable() {
     let omega: f64 = 2.292_216_110_276_591;
     let start = [-0.427_335_512_599_994, 0.041_289_347_296_247_5];
     let shrinks = (-0.1 * TAU / omega).exp();
-    // of 127 harmonics: the kink of the force
+    // error of 127 harmonics, due to the kink of the force
     const SERIES: f64 = 1e-6;
     let balance = HarmonicBalance { harmonics: Some(127), ..HarmonicBalance::default() };
     for (method, digits) in [(&EventDriven as &dyn Method, PRINTED), (&balance, SERIES)] {
@@ -179,17 +189,19 @@ fn a_multiplier_of_1_18_is_unstable() {
     }
 }
 
-/// Starts and multipliers to fifteen digits: of the products of exponentials between the times of contact, closed by Newton's method in 25 digits (mpmath,
-/// apart from this code). Orbits are closed to some 1e-12.
+/// Tolerance on starts and multipliers, which are printed with fifteen digits. The printed
+/// values are products of exponentials between the times of contact, closed by Newton's method
+/// in 25 digits with mpmath, without this code. Orbits are closed to some 1e-12.
 const PRINTED: f64 = 1e-10;
 
-/// The multipliers of an orbit of one mass of 1 kg with one damper: these two, and their product is the shrinking of areas, `e^{-c T}`.
+/// Asserts the multipliers of an orbit of one mass of 1 kg with one damper. Their product is
+/// the contraction of areas, `e^{-c T}`.
 #[track_caller]
 fn multiplied(orbit: &Orbit, expected: [Complex64; 2]) {
     within(orbit, expected, PRINTED);
 }
 
-/// The same to fewer digits.
+/// Asserts the multipliers to a given tolerance.
 #[track_caller]
 fn within(orbit: &Orbit, expected: [Complex64; 2], digits: f64) {
     let found = orbit.multipliers().unwrap();
@@ -199,7 +211,8 @@ fn within(orbit: &Orbit, expected: [Complex64; 2], digits: f64) {
     }
 }
 
-/// (11.13): stable motions that repeat after one, three and five periods, side by side. Starts and multipliers as [`multiplied`] has them.
+/// (11.13): stable orbits of one, three and five periods coexist. Source of starts and
+/// multipliers: see [`PRINTED`].
 #[test]
 fn motions_of_one_three_and_five_periods_side_by_side() {
     let (omega, damping) = (4.9, 0.05);
@@ -229,8 +242,9 @@ fn motions_of_one_three_and_five_periods_side_by_side() {
     }
 }
 
-/// A motion that just touches the stop, or just does not, or presses a little: at the turning point velocity and depth vanish together, and the
-/// orbit is the linear one but for what the stop is pressed.
+/// A motion just touches the stop, just misses it, or presses it a little. Velocity and depth
+/// vanish together at the turning point. The orbit equals the linear one up to the compression
+/// of the stop.
 #[test]
 fn grazing_a_stop_is_no_jump() {
     let (omega, damping) = (0.5f64, 0.1);
@@ -240,7 +254,7 @@ fn grazing_a_stop_is_no_jump() {
         model.forces = vec![force("m", 1.0, 1)];
         let orbit = exact(&model.assemble().unwrap(), omega);
         let place = &orbit.places[0];
-        // the stop is pressed by less than it stands in the way
+        // the compression of the stop is less than the overlap
         let pressed = f64::max(-off, 0.0) * amplitude;
         near("largest", place.maximum, amplitude, pressed + 1e-10);
         near("smallest", place.minimum, -amplitude, pressed + 1e-10);
@@ -249,7 +263,7 @@ fn grazing_a_stop_is_no_jump() {
     }
 }
 
-/// A stop whose wall moves: imposed motion with a mean is a gap that is smaller by it.
+/// A stop with a moving wall: a mean imposed motion acts as a smaller gap.
 #[test]
 fn a_moved_wall_counts_with_its_mean() {
     let wall = |mean: f64, gap: f64| {
@@ -273,7 +287,7 @@ fn a_moved_wall_counts_with_its_mean() {
     close("work", a.energy.work_in, other.energy.work_in, 1e-6);
 }
 
-/// A law of a slider behind a spring, a rigid one and a stop side by side.
+/// A law of an elastic slider, a rigid slider and a stop in parallel.
 #[derive(Debug)]
 struct Mixed;
 
@@ -301,7 +315,7 @@ impl Law for Mixed {
     }
 }
 
-/// Pieces of one law are those of three joints side by side: motion, losses, slip.
+/// The pieces of one law act as three parallel joints: same motion, losses and slip.
 #[test]
 fn pieces_of_one_law_are_joints_side_by_side() {
     let apart: [SharedLaw; 3] = [
@@ -320,13 +334,14 @@ fn pieces_of_one_law_are_joints_side_by_side() {
         close("minimum", one.places[0].minimum, three.places[0].minimum, 1e-10);
         let loss: f64 = three.joints.iter().map(|joint| joint.dissipation).sum();
         close("loss", one.joints[0].dissipation, loss, 1e-10);
-        // the rigid slider slips whenever the other one does
+        // the rigid slider slips whenever the elastic one does
         close("slip", one.joints[0].slip_fraction, three.joints[2].slip_fraction, 1e-9);
         assert!(one.evidence.energy_gap < 1e-10, "{}", one.evidence.energy_gap);
     }
 }
 
-/// Friction that drops when a mass lets go: amplitudes, losses, slip and states of three orbits that SciPy integrated.
+/// Friction with a higher static limit: amplitudes, losses, slip and states of three orbits
+/// agree with SciPy.
 #[test]
 fn static_friction_agrees_with_scipy() {
     type Case = (&'static str, &'static [(f64, f64)], f64, f64);
@@ -367,7 +382,7 @@ fn static_friction_agrees_with_scipy() {
                 "return" => continue,
                 other => panic!("{other}"),
             };
-            // two runs of the integration differ by up to 2e-9
+            // two runs of the SciPy integration differ by up to 2e-9
             near(&format!("{name}: {} {}", row["quantity"], i + 1), found, expected, 1e-10 * (1.0 + expected.abs()));
         }
         assert!(orbit.evidence.energy_gap < 1e-10, "{}", orbit.evidence.energy_gap);
@@ -375,8 +390,8 @@ fn static_friction_agrees_with_scipy() {
     }
 }
 
-/// A mass, driven by a force, that rubs on another mass or on a place that is moved: joints with these limits (N, in slip and at rest), every
-/// third the other way round.
+/// Returns a driven mass that rubs on another mass, or on a moved place. The joints have these
+/// limits (N, in slip and at rest); every third joint is reversed.
 fn rubbing(limits: &[(f64, f64)], moved: bool) -> Model {
     let spring = |place: &str, stiffness: f64, damping: f64| {
         let between = [place.into(), GROUND.into()];
@@ -407,8 +422,9 @@ fn rubbing(limits: &[(f64, f64)], moved: bool) -> Model {
     model
 }
 
-/// What one contact with the sums of the limits carries, each of several side by side carries by its limits: in stick by the static ones, in slip
-/// its own. Its sign is that of its direction.
+/// Asserts that parallel contacts share the force of one contact with the summed limits. In
+/// stick the shares are proportional to the static limits; in slip each contact carries its own
+/// limit. The sign follows the direction of the joint.
 fn shares(what: &str, many: &Sample, one: &Sample, limits: &[(f64, f64)]) {
     let (whole, held) = (&one.joints[0], limits.iter().map(|limit| limit.1).sum::<f64>());
     for (i, (joint, &(limit, static_limit))) in many.joints.iter().zip(limits).enumerate() {
@@ -431,8 +447,8 @@ fn shares(what: &str, many: &Sample, one: &Sample, limits: &[(f64, f64)]) {
     }
 }
 
-/// Rigid contacts between the same places have one relative motion: they slip and stick together, as one contact with the sums of their limits
-/// does, however many they are and whatever their laws.
+/// Rigid contacts between the same two places have one relative motion. They slip and stick
+/// together, like one contact with the summed limits, for any number of contacts and any laws.
 #[test]
 fn rigid_contacts_side_by_side_are_one() {
     type Limits = fn(usize) -> (f64, f64);
@@ -444,7 +460,7 @@ fn rigid_contacts_side_by_side_are_one() {
     ];
     for (kind, limits) in kinds {
         for count in 2..=12usize {
-            // together they let go, however many they are
+            // the total limit does not depend on the number, so the contacts slip
             let scale = 5.0 / count as f64;
             let limits: Vec<_> = (0..count).map(limits).map(|(slip, rest)| (scale * slip, scale * rest)).collect();
             let sums = limits.iter().fold((0.0, 0.0), |sum, limit| (sum.0 + limit.0, sum.1 + limit.1));
@@ -467,7 +483,7 @@ fn rigid_contacts_side_by_side_are_one() {
                     assert_eq!(joint.switches, one.joints[0].switches, "{what}");
                 }
                 for step in 0..16 {
-                    // between the switches
+                    // times between the switches
                     let time = (f64::from(step) + 0.3711) / 16.0 * TAU / omega;
                     shares(&what, &many.sample(time), &one.sample(time), &limits);
                 }
@@ -477,7 +493,7 @@ fn rigid_contacts_side_by_side_are_one() {
     }
 }
 
-/// The same for motions that begin at rest, until they repeat.
+/// Parallel rigid contacts also act as one in motions from rest.
 #[test]
 fn rigid_contacts_side_by_side_start_as_one() {
     for count in [5, 7, 11] {
@@ -512,8 +528,9 @@ fn rigid_contacts_side_by_side_start_as_one() {
     }
 }
 
-/// An overdamped mass creeps towards the place where it would stop, for ever, and is there to all digits after a while: neither that nor a
-/// stop that is approached so is chatter. A mass that slides with `limit` ends where its spring holds that and the constant force.
+/// An overdamped mass creeps towards its final position and reaches it to all digits after a
+/// while. Neither this nor a slow approach to a stop is chatter. A mass that slides with
+/// `limit` ends where its spring balances the friction and the constant force.
 #[test]
 fn creeping_to_a_stop_is_no_chatter() {
     let limit = 0.1;
@@ -532,7 +549,7 @@ fn creeping_to_a_stop_is_no_chatter() {
                 if damping > 1.9 {
                     near(&format!("{law:?}, {damping} kg/s, {constant} N"), x, expected, 1e-9);
                 }
-                // in a drive that does nothing, too
+                // also under an excitation of zero amplitude
                 let system = model.assemble().unwrap();
                 let motion = TimeHistory {
                     displacement: vec![1.0],
@@ -549,7 +566,8 @@ fn creeping_to_a_stop_is_no_chatter() {
     }
 }
 
-/// Driven slowly, an overdamped mass creeps to rest twice a period. Its smooth neighbour moves alike.
+/// An overdamped mass under slow excitation creeps to rest twice a period. The smoothed law
+/// gives the same motion.
 #[test]
 fn creeping_orbits_are_found() {
     for (constant, omega, amplitude) in
@@ -566,7 +584,8 @@ fn creeping_orbits_are_found() {
     }
 }
 
-/// A body that nothing but friction holds against a mean force wanders off as soon as it slips: the reason is said. While it does not slip, it stays.
+/// A body that only friction holds drifts under a mean force as soon as it slips, and the error
+/// gives the reason. Without slip it stays.
 #[test]
 fn free_bodies_under_a_mean_force_drift() {
     for law in [Arc::new(Coulomb { limit: 0.1 }) as SharedLaw, Arc::new(Jenkins { stiffness: 2.0, limit: 0.1 })] {
@@ -588,7 +607,7 @@ fn free_bodies_under_a_mean_force_drift() {
     }
 }
 
-/// What the method cannot follow it refuses by the law's name.
+/// The method refuses a law that it cannot integrate, and names it.
 #[test]
 fn a_drop_behind_a_spring_is_refused() {
     #[derive(Debug)]

@@ -1,12 +1,12 @@
-//! Random models: every one ends in an orbit with its evidence, or in an error that says why.
+//! Random models: the solver returns an orbit with its evidence, or an error with a reason.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::time::Instant;
 use stickslip::method::{Method, event_driven::EventDriven};
 use stickslip_verification::random_model;
 
-/// Models tried.
+/// Number of models.
 const MODELS: u64 = 2000;
 
 #[test]

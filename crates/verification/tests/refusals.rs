@@ -1,4 +1,5 @@
-//! A method that refuses a system names those that take it, and these do; where it names none, none does.
+//! A method that refuses a system names the methods that take it, and these do. If it names
+//! none, no method takes the system.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -9,7 +10,8 @@ use stickslip::structure::Structure;
 
 const WIDTH_GIVEN: f64 = 2e-5;
 
-/// Every law of the table, and each again with one of those parameters at zero that may be.
+/// Returns every law of the table, and variants with one parameter at zero if its range allows
+/// it.
 fn laws() -> Vec<SharedLaw> {
     let mut laws = Vec::new();
     for row in TABLE {
@@ -26,7 +28,7 @@ fn laws() -> Vec<SharedLaw> {
     laws
 }
 
-/// Laws side by side, each between places of its own and the ground.
+/// Returns a system with these laws, each between its own places and the ground.
 fn system(laws: &[SharedLaw], mass: f64) -> System {
     let n: usize = laws.iter().map(|law| law.directions()).sum();
     let one = DMatrix::<f64>::identity(n, n);
@@ -42,7 +44,7 @@ fn system(laws: &[SharedLaw], mass: f64) -> System {
     builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
 }
 
-/// A width is one: without any a law is not smoothed.
+/// A width must be positive.
 #[test]
 fn a_width_is_more_than_nothing() {
     for name in ["shooting", "transient"] {
@@ -66,7 +68,8 @@ fn named(name: &str) -> &'static MethodInfo {
     method::find(name).expect("a method of the table")
 }
 
-/// Holds the refusals of every method to what the methods do; the numbers of refusals, and of those that know no way.
+/// Compares the refusals of all methods with what the methods do. Returns the number of
+/// refusals, and the number without an alternative.
 fn hold(system: &System) -> (usize, usize) {
     let (mut refused, mut hopeless) = (0, 0);
     for row in method::TABLE {
@@ -90,7 +93,8 @@ fn hold(system: &System) -> (usize, usize) {
                 if other.options.iter().any(|option| option.key == WIDTH) {
                     assert!(asked(other, true, system).is_err(), "{text}: {} does with a width", other.name);
                 }
-                // each says what it misses, but for one that only picks another
+                // each method states what it misses, except `auto`, which only picks another
+                // method
                 let why = asked(other, true, system).unwrap_err().alone().to_string();
                 let said = |(methods, said): &(Vec<&str>, String)| {
                     methods.contains(&other.name) && why == format!("{} {said}", other.name)
@@ -121,13 +125,14 @@ fn a_place_without_mass_has_ways_too() {
     for law in laws() {
         let (refused, hopeless) = hold(&system(std::slice::from_ref(&law), 0.0));
         assert!(refused > 0, "{}", law.name());
-        // balanced harmonics need no mass, unless they cannot take the law at all
+        // harmonic balance needs no mass, unless it cannot take the law at all
         let alone = asked(named("harmonic-balance"), false, &system(std::slice::from_ref(&law), 1.0));
         assert_eq!(hopeless > 0, alone.is_err(), "{}", law.name());
     }
 }
 
-/// No method takes friction that drops at once beside a law that has no exact motion; the words say what would help, and it does.
+/// No method takes friction with an immediate drop together with a law without exact motion.
+/// The message gives the remedy, and the remedy works.
 #[test]
 fn friction_that_drops_at_once_is_told_to_fall_over_a_velocity() {
     let cubic = stickslip::law::find("cubic").unwrap().sample();

@@ -1,6 +1,7 @@
-//! Similarity of the blade couple: theory section 5. Lengths scale with `F0/k`, times with `√(m/k)`.
+//! Similarity of the blade couple: theory section 5. Lengths scale with `F0/k`, times with
+//! `√(m/k)`.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,8 +11,9 @@ use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_verification::{close, exact, near, template, template_with};
 
-/// The couple with all groups of section 5 kept: `m` and `k` as given, forces scaled by `force`; returns it with its angular
-/// frequency for `hertz` of the paper's couple, and the factor of its displacements.
+/// Returns parameters of a couple with all groups of section 5 unchanged, for given `m` and `k`
+/// and forces scaled by `force`. Also returns the factors of its frequencies and of its
+/// displacements relative to the paper's couple.
 fn changes(m: f64, k: f64, force: f64, ft: f64) -> (Vec<(&'static str, f64)>, f64, f64) {
     let (m_ratio, k_ratio) = (m / 0.182, k / 105_103.0);
     let damping = 0.2 * (m_ratio * k_ratio).sqrt();
@@ -61,7 +63,8 @@ fn theory_5_exact_law_needs_no_condition() {
     }
 }
 
-/// Figs. 6 and 8: the smooth law at a tenth of the forces is the same picture only if alpha grows tenfold.
+/// Figs. 6 and 8: with the smooth law at a tenth of the forces, the curves agree only if alpha
+/// grows tenfold.
 #[test]
 fn theory_5_smooth_law_needs_alpha_scaled() {
     let couple = |ft: f64, f0: f64, alpha: f64| {
@@ -88,7 +91,8 @@ fn theory_5_smooth_law_needs_alpha_scaled() {
     }
     println!("alpha scaled: {same:.1e}; alpha kept: {other:?} of the largest a1, a2, a3");
     assert!(same < 1e-8, "{same}");
-    // not the same picture, though near it; section 5 has 4.6e-5, and 1.7e-4 on a3: not the largest, which stands near the kinks
+    // the curves differ slightly. Section 5 gives 4.6e-5, and 1.7e-4 for a3; these are not the
+    // largest differences, which occur near the kinks
     for (found, [low, high]) in other.iter().zip([[4.6e-5, 3e-4], [1.7e-4, 3e-3], [1.7e-4, 3e-3]]) {
         assert!(*found >= low && *found <= high, "{other:?}");
     }

@@ -1,7 +1,7 @@
-//! Shooting on the smooth law: against orbits that SciPy integrated (`data/smooth_orbits`), on every point of the paper's Fig. 6,
-//! and towards the exact law as the arctangent steepens.
+//! Shooting on the smooth law: against orbits that SciPy integrated (`data/smooth_orbits`), on
+//! every point of the paper's Fig. 6, and towards the exact law for a steep arctangent.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -20,7 +20,8 @@ fn shoot(system: &System, omega: f64, tolerance: f64) -> Orbit {
     Shooting { tolerance, width: None, ..Shooting::default() }.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// Amplitudes, phases, energies and the state at t = 0 of three orbits, one of them in stick-slip.
+/// Amplitudes, phases, energies and the state at t = 0 of three orbits, one of them in
+/// stick-slip.
 #[test]
 fn couple_agrees_with_scipy() {
     let rows = table("smooth_orbits/couple_arctan.csv");
@@ -66,8 +67,9 @@ fn couple_agrees_with_scipy() {
     }
 }
 
-/// Where stick ends, a step begins stiff and ends in slip: an error estimate that is filtered by its start alone passes steps that jump over that, and
-/// errs by 8e-8 here. The orbit in much shorter steps is the reference.
+/// At the end of stick a step begins stiff and ends in slip. An error estimate that is filtered
+/// by the start of the step alone accepts steps that jump over this, with an error of 8e-8
+/// here. The reference is the orbit in much shorter steps.
 #[test]
 fn the_end_of_stick_is_not_jumped_over() {
     let system = couple(8.0, 25e3);
@@ -81,7 +83,8 @@ fn the_end_of_stick_is_not_jumped_over() {
     assert!(worst < 1e-8, "{worst}");
 }
 
-/// How long a joint slips does not go with where steps end: changes are sought inside of them. Those of much shorter steps are the reference.
+/// The slip fraction does not depend on the ends of the steps, because changes are located
+/// inside the steps. The reference has much shorter steps.
 #[test]
 fn slip_fractions_do_not_depend_on_the_steps() {
     let (mut worst, mut changing) = (0.0f64, 0);
@@ -99,7 +102,7 @@ fn slip_fractions_do_not_depend_on_the_steps() {
     assert!(worst < 1e-5, "{worst}");
 }
 
-/// The paper's alpha on every point of Fig. 6, from point to point, without one failure.
+/// The paper's alpha on every point of Fig. 6, with warm starts, without a failure.
 #[test]
 fn figure_6_converges_on_every_point() {
     let begin = Instant::now();
@@ -124,7 +127,7 @@ fn figure_6_converges_on_every_point() {
     assert!(points == 4 * 241 && residual < 1e-9 && gap < 1e-6, "{residual} {gap}");
 }
 
-/// Every tenth point of Fig. 6 from nothing instead of from its neighbour: the same orbits.
+/// Every tenth point of Fig. 6 without a warm start gives the same orbits.
 #[test]
 fn figure_6_does_not_depend_on_the_start() {
     let mut worst = 0.0f64;
@@ -145,11 +148,14 @@ fn figure_6_does_not_depend_on_the_start() {
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// The smooth orbit tends to the exact one as alpha grows, with the order 1 without stick and 2/3 with stick.
+/// The smooth orbit tends to the exact one as alpha grows, with order 1 without stick and 2/3
+/// with stick.
 ///
-/// In slip the force is `2/(π alpha v)` of the limit too small: an impulse of order 1/alpha, with log(alpha) from the reversals,
-/// where v grows as the time t from it. Where stick ends, the load passes the limit as t and v grows only as t², so that slip
-/// takes over at t³ ~ 1/alpha: until then the force is wrong by about t, an impulse of order t² ~ alpha^(-2/3).
+/// In slip the force is too small by `2/(π alpha v)` of the limit. This is an impulse of order
+/// 1/alpha, with log(alpha) from the reversals, where v grows as the time t since the reversal.
+/// At the end of stick the load exceeds the limit as t, and v grows only as t². Slip therefore
+/// takes over at t³ ~ 1/alpha. Until then the force has an error of order t, which is an
+/// impulse of order t² ~ alpha^(-2/3).
 #[test]
 fn smooth_orbit_tends_to_the_exact_one() {
     for (ft, hertz, alphas, order) in [
@@ -189,7 +195,8 @@ fn width_is_one_over_alpha() {
     }
 }
 
-/// Waiting for the transient to die ends in the orbit that Newton's method finds, within what it says is missing; smooth and exact.
+/// Method `transient` finds the orbit of Newton's method within its own error estimate, for the
+/// smooth and the exact law.
 #[test]
 fn settling_agrees_with_newton_within_its_own_estimate() {
     for (smooth, omega) in [(false, TAU * 120.75), (true, TAU * 121.25)] {
@@ -205,7 +212,8 @@ fn settling_agrees_with_newton_within_its_own_estimate() {
         assert!(missing <= 1e-4, "{missing}");
         for (waited, found) in waited.places.iter().zip(&found.places) {
             let error = (waited.amplitude() / found.amplitude() - 1.0).abs();
-            // the estimate is of the whole state in the energy norm; a light place may be off by more
+            // the estimate is for the whole state in the energy norm; a light place may have a
+            // larger error
             assert!(error < 10.0 * missing, "{}: {error:e} against {missing:e}", found.name);
         }
     }

@@ -1,6 +1,7 @@
-//! Stability: the theorem against multipliers that are computed, what is not covered by it, and the models whose eigenvalues hung.
+//! Stability: the theorem against computed multipliers, systems that it does not cover, and
+//! difficult eigenvalue problems.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -40,7 +41,7 @@ fn series(harmonics: usize) -> HarmonicBalance {
     HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() }
 }
 
-/// One mass on ten parallel sliders that let go one after the other.
+/// Returns one mass on ten parallel sliders that slip one after the other.
 fn ten_sliders() -> System {
     Model {
         masses: vec![mass("m", 1.0)],
@@ -58,7 +59,8 @@ fn ten_sliders() -> System {
     .unwrap()
 }
 
-/// A ring of blades with joints from each to the next; `mistuning` is relative, `damping` in N s/m.
+/// Returns a ring of blades with a joint from each to the next; `mistuning` is relative,
+/// `damping` in N s/m.
 fn ring(count: usize, drive: f64, mistuning: f64, damping: f64) -> System {
     let mut random = Random::new(5);
     let name = |i: usize| format!("b{}", i % count);
@@ -80,7 +82,8 @@ fn ring(count: usize, drive: f64, mistuning: f64, damping: f64) -> System {
     .unwrap()
 }
 
-/// They hung: the return map of many sliders that stick or swallow is nilpotent in large parts.
+/// The eigenvalue iteration ends for return maps of many sliders, which are nilpotent in large
+/// parts.
 #[test]
 fn models_that_hung_end() {
     for (what, system, hertz) in
@@ -98,7 +101,7 @@ fn models_that_hung_end() {
     }
 }
 
-/// The theorem holds for a series that nobody could judge by its return map.
+/// The theorem applies to a series of a system that is too large for a return map.
 #[test]
 fn large_systems_are_stable_by_theorem() {
     let orbit = find(&series(3), &ring(36, 1.0, 0.01, 0.5), TAU * 115.0).unwrap();
@@ -117,7 +120,7 @@ fn random_law(random: &mut Random, smooth: bool) -> SharedLaw {
     }
 }
 
-/// Up to four masses, joints anywhere. Dampers are positive, or absent.
+/// Returns up to four masses with random joints. Damping is positive or zero.
 fn random_system(seed: u64, smooth: bool) -> System {
     let mut random = Random::new(seed);
     let count = 1 + (random.unit() * 4.0) as usize;
@@ -141,7 +144,7 @@ fn random_system(seed: u64, smooth: bool) -> System {
     model.assemble().unwrap()
 }
 
-/// Where the theorem says that no disturbance grows, no multiplier of the orbit is outside the unit circle.
+/// If the theorem proves stability, no multiplier of the orbit is outside the unit circle.
 #[test]
 fn theorem_against_multipliers() {
     let (mut compared, mut largest) = (0, 0.0f64);
@@ -162,12 +165,12 @@ fn theorem_against_multipliers() {
     assert!(compared >= 50, "{compared}");
 }
 
-/// A damper that gives energy is not covered by the theorem: the largest multiplier is that of the linear oscillator that no friction
-/// damps, of modulus `e^{-cT/2m}`.
+/// The theorem does not cover negative damping. The largest multiplier is that of a linear
+/// oscillator without friction, of modulus `e^{-cT/2m}`.
 #[test]
 fn negative_damping_is_computed() {
     for (c, stable) in [(-0.02, false), (0.02, true)] {
-        // the joint moves with the mass that nothing drives, and takes no part
+        // the joint acts on the undriven mass, and has no effect
         let system = Model {
             masses: vec![mass("driven", 1.0), mass("idle", 1.0)],
             springs: vec![spring("driven", GROUND, 1.0, c), spring("idle", GROUND, 1.0, 0.5)],
@@ -192,7 +195,8 @@ fn negative_damping_is_computed() {
     }
 }
 
-/// Two masses that a third, common one couples: `M x'' + K x = F cos Ωt` in closed form, by every method.
+/// Two masses coupled by an off-diagonal mass: all methods agree with the closed form of
+/// `M x'' + K x = F cos Ωt`.
 #[test]
 fn masses_that_couple_places() {
     let system = Model {
@@ -212,7 +216,7 @@ fn masses_that_couple_places() {
     let (aa, ab, bb) = (1.3 - square, -0.3 - 0.4 * square, 2.3 - 1.5 * square);
     let determinant = aa * bb - ab * ab;
     let expected = [bb / determinant, -ab / determinant];
-    // masses that are no masses make no structure
+    // an indefinite mass matrix is refused
     let indefinite = with_mass(&system, |mass| (mass[(0, 1)], mass[(1, 0)]) = (4.0, 4.0));
     assert_eq!(indefinite.unwrap_err(), StructureError::NegativeMass);
     for method in [&EventDriven as &dyn Method, &series(5), &series(1)] {
@@ -224,7 +228,8 @@ fn masses_that_couple_places() {
     }
 }
 
-/// Numbers that nobody means end within moments, in an orbit or in an error that says why: no method hangs, and none panics.
+/// Extreme numbers end quickly in an orbit or in an error with a reason. No method hangs or
+/// panics.
 #[test]
 fn absurd_numbers_end() {
     let smooth = |kt: f64, limit: f64| -> SharedLaw { Arc::new(JenkinsArctan { stiffness: kt, limit, alpha: 25e3 }) };
@@ -281,12 +286,16 @@ fn absurd_numbers_end() {
     }
     println!("{orbits} orbits, {errors} errors; slowest {:.3} s: {}", slowest.0, slowest.1);
     assert!(orbits > 60 && errors > 0, "{orbits} {errors}");
-    assert!(slowest.0 < 30.0, "{slowest:?}"); // a second on an idle machine
+    assert!(slowest.0 < 30.0, "{slowest:?}"); // one second on an idle machine
 }
 
-/// A spring whose slider carries its load up to the very limit beside a stop: harmonic balance has its state within an error, with which the slider
-/// slipped for an instant, and the multipliers were those of slip. Those of the stuck motion are what the exact method finds, and
-/// but for that of the stick offset, one, they multiply to `exp(-T tr(M⁻¹C))` (Liouville).
+/// A spring in series with a slider carries its load right up to the limit, together with a
+/// stop.
+///
+/// Within the error of harmonic balance, the slider would slip for an instant, and the
+/// multipliers would be those of slip. The multipliers must be those of the stuck motion, as
+/// the exact method finds them. Apart from the one of the stick offset, they multiply to
+/// `exp(-T tr(M⁻¹C))` (Liouville).
 #[test]
 fn what_sticks_up_to_its_limit_has_the_multipliers_of_stick() {
     let force = |on: &str, harmonic, amplitude, phase| Force { harmonic, ..force(on, amplitude, phase) };

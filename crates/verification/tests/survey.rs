@@ -1,4 +1,4 @@
-//! What is known of a model before anything is computed, against closed forms and against SciPy.
+//! The survey of a model before any solution, against closed forms and SciPy.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -47,10 +47,12 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-/// Eigenvalue solvers and linear solves at moderate condition keep twelve digits of small models.
+/// Relative rounding error of eigenvalues and linear solutions of small, well-conditioned
+/// models.
 const ROUNDING: f64 = 1e-11;
 
-/// `[K - ω²M]` of two coupled masses: the two roots of the quadratic equation.
+/// Returns the natural frequencies of two coupled masses: the roots of the quadratic equation
+/// of `[K - ω²M]`.
 fn two_masses(k1: f64, k2: f64, coupling: f64, m1: f64, m2: f64) -> [f64; 2] {
     let (a, b) = ((k1 + coupling) / m1, (k2 + coupling) / m2);
     let root = ((a - b) * (a - b) / 4.0 + coupling * coupling / (m1 * m2)).sqrt();
@@ -68,13 +70,13 @@ fn the_couple_free_and_stuck() {
     let alone = survey.free().elastic[1];
     assert!((alone.omega / TAU - 121.25).abs() < 1e-3);
     close(&[alone.damping], &[b / (2.0 * (k * star).sqrt())], ROUNDING);
-    // stuck, theory 6.7: the contact mass rides on blade 1
+    // stuck, theory 6.7: the contact mass moves with blade 1
     let stuck = two_masses(k, k, kt, star + m1, star);
     close(&omegas(survey.stuck()), &stuck, ROUNDING);
     assert_eq!((survey.free().rigid, survey.stuck().rigid, survey.loose().len()), (0, 0, 0));
 }
 
-/// Reads the only joint's onset.
+/// Returns the onset of the only joint.
 fn onset(survey: &Survey, from: f64, to: f64) -> Onset {
     survey.onset(from * TAU, to * TAU).unwrap().remove(0)
 }
@@ -102,7 +104,7 @@ fn the_couple_slips_where_the_stuck_force_exceeds_the_limit() {
 fn the_symmetric_couple_slips_in_the_antiphase_mode() {
     // theory 4.2
     let survey = couple("symmetric-couple", &[("Ft", 4.0)]);
-    // blades against each other, the contact at rest
+    // blades in antiphase, the contact at rest
     let antiphase = ((105_103.0f64 + 1e4) / (0.182 - 0.00091)).sqrt();
     assert!(survey.stuck().elastic.iter().any(|mode| (mode.omega / antiphase - 1.0).abs() < ROUNDING));
     close(&hertz(&onset(&survey, 110.0, 122.5).slips), &[119.7995, 122.5], PRINTED);
@@ -113,20 +115,23 @@ fn the_symmetric_couple_slips_in_the_antiphase_mode() {
 
 #[test]
 fn the_elements_of_the_paper() {
-    // without mass nothing vibrates; a moved place slips where its motion exceeds limit / stiffness
+    // without mass nothing vibrates; a moved place slips if its motion exceeds limit /
+    // stiffness
     let element = couple("element", &[]);
     assert_eq!((element.dofs(), element.free().elastic.len(), element.stuck().elastic.len()), (0, 0, 0));
     let (slip, at) = (&element.first_slip()[0], element.onset(1.0, 1.0).unwrap().remove(0));
     close(&[slip.limit, slip.displacement.unwrap(), at.largest], &[1e-3, 1e-3, 2.0], ROUNDING);
-    // with mass: sqrt(kt/m1) free (theory 3.3), and stuck the slider stands and carries kt a
+    // with mass: `sqrt(kt/m1)` free (theory 3.3); in stick the slider stands still and carries
+    // `kt a`
     let slider = couple("element-with-mass", &[]);
     close(&omegas(slider.free()), &[(1.0f64 / 0.002).sqrt()], ROUNDING);
     assert_eq!((slider.stuck().elastic.len(), slider.first_slip()[0].displacement), (0, None));
     close(&[slider.onset(1.0, 1.0).unwrap()[0].largest], &[2.0], 1e-9);
 }
 
-/// Four masses and a place without mass, a joint of each kind; expected values from SciPy 1.x (`eigh` of the structure
-/// condensed onto its masses, `numpy.linalg.solve` of the stuck structure, `brentq`).
+/// Returns four masses and a massless place, with one joint of each kind. The expected values
+/// are from SciPy 1.x: `eigh` of the structure condensed onto its masses, `numpy.linalg.solve`
+/// of the stuck structure, and `brentq`.
 fn network() -> Model {
     Model {
         masses: vec![mass("a", 0.5), mass("b", 1.2), mass("c", 0.8), mass("d", 2.0), mass("p", 0.0)],
@@ -155,16 +160,17 @@ fn a_network_agrees_with_scipy() {
     let damping = [0.0062285731892485876, 0.001210673343393055, 0.00651227517813112];
     close(&survey.stuck().elastic.iter().map(|m| m.damping).collect::<Vec<_>>(), &damping, ROUNDING);
     let onsets = survey.onset(20.0, 60.0).unwrap();
-    // golden section ends at 1e-5 of a step of a fifth of a rad/s, where the peak is flat
+    // golden-section search ends at 1e-5 of a step of 0.2 rad/s, where the peak is flat
     close(&[onsets[0].largest * 2.0, onsets[1].largest * 5.0], &[43.21330374376658, 113.21943727884297], 1e-9);
     close(&[onsets[0].at, onsets[1].at], &[32.544389554113806, 32.54237862334611], 1e-6);
     let flat = |slips: &[(f64, f64)]| slips.iter().flat_map(|(a, b)| [*a, *b]).collect::<Vec<_>>();
-    // the compliance that stands for rigid joints is 1e-10 of the structure's
+    // the compliance that represents rigid joints is 1e-10 of that of the structure
     close(&flat(&onsets[0].slips), &[28.081772350591542, 36.90272319394895], 1e-9);
     close(&flat(&onsets[1].slips), &[26.566375940502397, 36.23457606164326], 1e-9);
 }
 
-/// Rigid joints side by side carry a load by their limits and slip together; one with a static limit slips at that.
+/// Parallel rigid joints share a load in proportion to their limits and slip together; a static
+/// limit counts instead of the dynamic one.
 #[test]
 fn rigid_joints_along_one_line_slip_together() {
     let model = |limits: [(f64, f64); 3]| Model {
@@ -183,13 +189,14 @@ fn rigid_joints_along_one_line_slip_together() {
         let sum: f64 = limits.iter().map(|(_, holds)| holds).sum();
         let onsets = model(limits).survey().unwrap().onset(20.0, 150.0).unwrap();
         for onset in onsets {
-            // compliances of 1e-12 of the structure share the load to as many digits as they leave
+            // compliances of 1e-12 of the structure share the load to the remaining digits
             assert!((onset.largest * sum / 6.0 - 1.0).abs() < 1e-4, "{limits:?}: {} for {}", onset.largest, 6.0 / sum);
         }
     }
 }
 
-/// A chain of `n` equal masses, tied to the ground at both ends: `ω_i = 2 √(k/m) sin(iπ / (2(n + 1)))`.
+/// Returns a chain of `n` equal masses, connected to the ground at both ends:
+/// `ω_i = 2 √(k/m) sin(iπ / (2(n + 1)))`.
 fn chain(n: usize, m: f64, k: f64) -> Model {
     let name = |i: usize| if i == 0 || i == n + 1 { GROUND.to_owned() } else { format!("x{i}") };
     Model {
@@ -207,10 +214,10 @@ fn a_chain_of_five_hundred_masses_takes_below_a_second() {
         (1..n).map(|i| joint(format!("j{i}"), format!("x{i}"), format!("x{}", i + 1), jenkins(800.0, 1.0))).collect();
     let start = Instant::now();
     let survey = model.survey().unwrap();
-    // 0.7 s on a busy machine; the limit leaves room for slower ones
+    // 0.7 s on a busy machine; the bound leaves room for slower ones
     assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
     let expected: Vec<f64> = (1..=n).map(|i| 2.0 * 20.0 * (i as f64 * PI / (2.0 * (n + 1) as f64)).sin()).collect();
-    // the lowest squared frequency is 1e-5 of the highest, so that it keeps ten digits
+    // the lowest squared frequency is 1e-5 of the highest, so it has ten digits
     close(&omegas(survey.free()), &expected, 1e-9);
 }
 
@@ -229,16 +236,16 @@ fn what_nothing_holds_is_told_apart_from_what_friction_holds() {
         (&["a".into(), "b".into()][..], false)
     );
     close(&omegas(survey.free()), &[20.0], ROUNDING);
-    // a joint to the ground holds it while it sticks
+    // a joint to the ground holds the pair while it sticks
     model.joints.push(joint("j", "b", GROUND, jenkins(100.0, 1.0)));
     let survey = model.survey().unwrap();
     assert_eq!((survey.free().rigid, survey.stuck().rigid), (1, 0));
     assert!(survey.loose()[0].held_by_friction);
     close(&omegas(survey.stuck()), &two_masses(0.0, 100.0, 300.0, 1.0, 3.0), ROUNDING);
-    // rigidly: b is no degree of freedom any more
+    // rigidly: b is no longer a degree of freedom
     model.joints[0].law = coulomb(1.0);
     close(&omegas(model.survey().unwrap().stuck()), &[300f64.sqrt()], ROUNDING);
-    // a moved place holds as the ground does
+    // a moved place holds like the ground
     model.joints.clear();
     model.springs.push(spring("b", "mover", 100.0, 0.0));
     model.motions.push(Motion { on: "mover".to_owned(), amplitude: 1e-3, phase: 0.0, harmonic: 1 });
@@ -257,7 +264,7 @@ fn stiffnesses_of_any_size_keep_the_modes_below() {
             ..Model::default()
         };
         let modes = model.survey().unwrap().free().clone();
-        // the glue gives way by 400/glue, and six digits are left where it does not count as rigid
+        // the glue yields by 400/glue; six digits remain while it does not count as rigid
         close(&omegas(&modes), &[10.0, (glue * 4.0 / 3.0).sqrt()], 1e-6);
         close(&[modes.elastic[0].damping], &[0.8 / (2.0 * 10.0 * 4.0)], 1e-6);
         assert_eq!(modes.lost, 0);
@@ -269,7 +276,7 @@ fn places_without_mass_are_springs_in_series() {
     let series = Model {
         masses: vec![mass("a", 2.0), mass("p", 0.0), mass("q", 0.0)],
         springs: vec![spring("a", "p", 300.0, 0.0), spring("p", "q", 600.0, 0.0), spring("q", GROUND, 200.0, 0.0)],
-        // q also carries a joint, which adds its spring between q and the ground
+        // q also has a joint, which adds its spring between q and the ground
         joints: vec![joint("j", "q", GROUND, jenkins(400.0, 1.0))],
         ..Model::default()
     };
@@ -277,7 +284,7 @@ fn places_without_mass_are_springs_in_series() {
     let stiffness = |ground: f64| 1.0 / (1.0 / 300.0 + 1.0 / 600.0 + 1.0 / ground);
     close(&omegas(survey.free()), &[(stiffness(200.0) / 2.0).sqrt()], ROUNDING);
     close(&omegas(survey.stuck()), &[(stiffness(600.0) / 2.0).sqrt()], ROUNDING);
-    // a place that hangs on a joint alone does not count
+    // a place on a joint alone does not count
     let hanging = Model {
         masses: vec![mass("a", 2.0), mass("p", 0.0)],
         springs: vec![spring("a", GROUND, 300.0, 0.0)],
@@ -300,16 +307,17 @@ fn rigid_joints_in_a_ring_share_the_load() {
     };
     let survey = model.survey().unwrap();
     close(&omegas(survey.stuck()), &[10.0], ROUNDING);
-    // b and c move as a does, each by a third of the force; nothing passes between them
+    // b and c move like a, each with a third of the force; no force acts between them
     let onsets = survey.onset(7.0, 7.0).unwrap();
-    // the compliance that shares the load is 1e-10 of the structure's
+    // the compliance that shares the load is 1e-10 of that of the structure
     close(&[onsets[0].largest, onsets[2].largest], &[2.0, 2.0], 1e-8);
     assert!(onsets[1].largest < 1e-5, "{onsets:?}");
 }
 
 #[test]
 fn harmonics_add_up_over_the_period() {
-    // the joint stands alone between a moved place and the ground: u = cos τ + cos 3τ, twice the amplitude at τ = 0
+    // the joint alone between a moved place and the ground: `u = cos τ + cos 3τ`, twice the
+    // amplitude at τ = 0
     let motion = |harmonic, phase| Motion { on: "mover".to_owned(), amplitude: 1e-3, phase, harmonic };
     let model = |phase| Model {
         joints: vec![joint("j", "mover", GROUND, jenkins(1000.0, 1.0))],
@@ -318,14 +326,15 @@ fn harmonics_add_up_over_the_period() {
     };
     let largest = |phase| model(phase).survey().unwrap().onset(5.0, 5.0).unwrap()[0].largest;
     close(&[largest(0.0)], &[2.0], ROUNDING);
-    // in antiphase cos τ - cos 3τ = 4 cos τ sin² τ, at most 8/(3√3) where cos² τ = 1/3; met to the distance of the
-    // instants
+    // in antiphase `cos τ - cos 3τ = 4 cos τ sin² τ`, at most `8/(3√3)` at `cos² τ = 1/3`; the
+    // error is due to the distance of the instants
     close(&[largest(PI)], &[8.0 / (3.0 * 3f64.sqrt())], 1.3e-3);
 }
 
 #[test]
 fn a_mode_slips_first_at_the_amplitude_of_its_joint() {
-    // one mass, modal amplitude √m times the displacement; a spring gives way at limit / stiffness
+    // one mass, modal amplitude `√m` times the displacement; a spring slips at limit /
+    // stiffness
     let one = |law| Model {
         masses: vec![mass("a", 4.0)],
         springs: vec![spring("a", GROUND, 100.0, 0.0)],
@@ -335,11 +344,11 @@ fn a_mode_slips_first_at_the_amplitude_of_its_joint() {
     let survey = one(jenkins(300.0, 6.0)).survey().unwrap();
     close(&[survey.slip_amplitude(0).unwrap()], &[2.0 * 6.0 / 300.0], ROUNDING);
     assert_eq!((survey.slip_amplitude(1), one(coulomb(6.0)).survey().unwrap().slip_amplitude(0)), (None, None));
-    // the couple: blade 1 with the contact mass and blade 3; in the higher mode they move against each other
+    // the couple: blade 1 with the contact mass, and blade 3; the higher mode is in antiphase
     let survey = couple("blade-couple", &[("Ft", 3.0)]);
     let (star, m1, k, kt) = (0.182 - 0.00091, 0.00182, 105_103.0, 1e4);
     let omega = two_masses(k, k, kt, star + m1, star)[1];
-    // (k + kt - ω²(m* + m1)) x1 = kt x3; force = (kt - ω² m1) x1 - kt x3, theory 6.8
+    // `(k + kt - ω²(m* + m1)) x1 = kt x3`; force = `(kt - ω² m1) x1 - kt x3`, theory 6.8
     let x3 = (k + kt - omega * omega * (star + m1)) / kt;
     let force = (kt - omega * omega * m1) - kt * x3;
     let modal = ((star + m1) + star * x3 * x3).sqrt();
@@ -353,7 +362,8 @@ fn models_that_are_too_large_say_so() {
     assert_eq!((survey.free().elastic.len(), survey.free().lost), (0, 701));
 }
 
-/// A node with the directions of a law, on springs of 1000 N/m, and the law between it and the ground.
+/// Returns a node with the directions of a law, on springs of 1000 N/m, with the law between
+/// the node and the ground.
 fn on_springs(law: SharedLaw) -> Model {
     let names: Vec<String> = ["x", "y", "z"].iter().take(law.directions()).map(|name| (*name).to_owned()).collect();
     let several = names.len() > 1;
@@ -380,12 +390,13 @@ fn no_law_is_stiffer_at_rest_than_its_stiffnesses() {
         }
         let onsets = survey.onset(20.0, 40.0).unwrap();
         for (axis, (slip, onset)) in survey.first_slip().iter().zip(&onsets).enumerate() {
-            // what presses neither slips nor has a limit, what does not has no load that presses
+            // a normal direction has a preload and no slip; other directions have no preload
             assert_eq!(law.normal() == Some(axis), slip.pressed.is_some(), "{}", row.name);
             if slip.pressed.is_some() {
                 assert_eq!((onset.largest, onset.slips.len()), (0.0, 0), "{}", row.name);
             }
-            // a displacement at which it gives way is no longer than its limit over what it can be stiff
+            // the displacement at slip is at least the limit over the largest possible
+            // stiffness
             if let Some(displacement) = slip.displacement.filter(|u| u.is_finite()) {
                 assert!(displacement * most >= slip.limit * (1.0 - ROUNDING), "{}: {slip:?}", row.name);
             }
@@ -401,7 +412,7 @@ fn a_pressed_contact_holds_as_its_springs() {
     let slips = survey.first_slip();
     close(&[slips[0].limit, slips[0].displacement.unwrap()], &[2.0, 2.0 / 300.0], ROUNDING);
     assert_eq!((slips[0].pressed, slips[1].pressed), (None, Some(5.0)));
-    // apart, it is pressed with nothing; stuck means closed all the same
+    // open: the preload is zero, but "stuck" still means closed
     let survey = on_springs(Arc::new(contact(-5.0))).survey().unwrap();
     close(&omegas(survey.stuck()), &[1300f64.sqrt(), 1800f64.sqrt()], ROUNDING);
     assert_eq!(survey.first_slip()[1].pressed, Some(0.0));

@@ -1,8 +1,9 @@
 //! The blade couple with a symmetric element (the paper's Figs. 9, 10): theory section 4.
 //!
-//! Half the sum of the blades' motions is linear whatever the contact does; only half their difference rubs.
+//! Half the sum of the blades' motions is linear for any contact; only half their difference
+//! rubs.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -21,19 +22,20 @@ const F0: f64 = 10.0;
 /// Mass on each side: `m1 / 2` and `m1`.
 const MU: [f64; 2] = [0.000_91, 0.001_82];
 
-/// `S(w)` of 4.1.
+/// Returns `S(w)` of 4.1.
 fn sum_response(mu: f64, hertz: f64) -> Complex64 {
     let w = TAU * hertz;
     0.5 * F0 / Complex64::new(K + KT - (M - mu) * w * w - KT * KT / (KT - mu * w * w), w * B)
 }
 
-/// Half the difference of the blades while the contact sticks: the small masses rest, `kt` acts as a spring to the ground.
+/// Returns half the difference of the blades in stick: the small masses rest, and `kt` acts as
+/// a spring to the ground.
 fn stuck_difference(mu: f64, hertz: f64) -> Complex64 {
     let w = TAU * hertz;
     0.5 * F0 / Complex64::new(K + KT - (M - mu) * w * w, w * B)
 }
 
-/// Amplitude of the contact force while it sticks, 4.2.
+/// Returns the amplitude of the contact force in stick, 4.2.
 fn stuck_force(mu: f64, hertz: f64) -> f64 {
     KT * stuck_difference(mu, hertz).norm()
 }
@@ -42,7 +44,8 @@ fn couple(mu: f64, ft: f64) -> System {
     template("symmetric-couple", &[("Ft", ft), ("mu", mu)])
 }
 
-/// Half the sum of the blades against `S(w)`: its first harmonic, and the whole motion, so that there is no other harmonic.
+/// Compares half the sum of the blades with `S(w)`: its first harmonic, and the whole motion,
+/// so that no other harmonic exists.
 fn check_sum(orbit: &Orbit, mu: f64, hertz: f64, tolerance: f64) {
     let expected = sum_response(mu, hertz);
     let first = 0.5 * (orbit.places[0].first_harmonic + orbit.places[3].first_harmonic);
@@ -106,12 +109,12 @@ fn theory_4_2_contact_force_and_onset_of_slip() {
         let orbit = exact(&couple(mu, 1e3), TAU * hertz);
         let force = |time: f64| orbit.sample(time).joints[0].force[0];
         close("contact force", force(0.0).hypot(force(0.25 * orbit.period())), stuck_force(mu, hertz), 1e-8);
-        // slip begins where the limit falls below it
+        // slip begins where the limit falls below the contact force
         let slips = |ft: f64| match EventDriven.solver(&couple(mu, ft)).unwrap().orbit(TAU * hertz, None) {
             Ok(orbit) if orbit.joints[0].slip_fraction == 0.0 => -1.0,
             Ok(_) => 1.0,
             Err(error) => {
-                // the contact grazes its limit by less than rounding
+                // the contact force exceeds its limit by less than rounding
                 assert!((ft / stuck_force(mu, hertz) - 1.0).abs() < 1e-9, "{error}");
                 1.0
             }
@@ -120,7 +123,8 @@ fn theory_4_2_contact_force_and_onset_of_slip() {
         close("onset of slip", found, stuck_force(mu, hertz), 1e-8);
     }
     let resonance = ((K + KT) / (M - mu)).sqrt() / TAU;
-    near("anti-phase resonance", resonance, 126.88, 0.01); // 126.887: the printed digits are cut, not rounded
+    // 126.887: the printed digits are truncated, not rounded
+    near("anti-phase resonance", resonance, 126.88, 0.01);
     for (ft, printed, digit) in [(6.0, 122.208, 0.5e-3), (4.0, 119.7995, 0.5e-4), (2.0, 112.26, 0.5e-2)] {
         let border = zero(|f| stuck_force(mu, f) - ft, [100.0, 126.0]);
         near("printed border", border, printed, digit);
@@ -142,7 +146,7 @@ fn theory_4_2_contact_force_and_onset_of_slip() {
     }
 }
 
-/// Fig. 10 with the exact law: all points, the stuck ones exactly linear.
+/// Fig. 10 with the exact law: all points converge, and the stuck ones are exactly linear.
 #[test]
 fn theory_4_2_stuck_curves_are_exactly_linear() {
     let (mut points, mut stuck) = (0, 0);
@@ -174,7 +178,8 @@ fn theory_4_2_stuck_curves_are_exactly_linear() {
     assert_eq!(points, 2 * 4 * 241);
 }
 
-/// The floor of 4.3: friction damps only the difference, so the larger of the blades cannot fall below the sum's resonance.
+/// The lower bound of 4.3: friction damps only the difference, so the larger blade amplitude
+/// cannot fall below the sum's resonance.
 #[test]
 fn theory_4_3_friction_cannot_damp_the_sum() {
     let mu = MU[0];

@@ -1,9 +1,11 @@
-//! Orbits without stick of any linear structure with one Coulomb contact: theory section 8, written here from the matrix
-//! exponential (own arithmetic, nothing of the library) and from the Fourier series 8.4, against event-driven orbits.
+//! Orbits without stick of any linear structure with one Coulomb contact: theory section 8
+//! against event-driven orbits.
 //!
-//! Source: Den Hartog (1931) and Ferri and Dowell (1988), with damping and many degrees of freedom.
+//! The closed form here uses the matrix exponential (without the library's numerics) and the
+//! Fourier series 8.4. Source: Den Hartog (1931) and Ferri and Dowell (1988), with damping and
+//! many degrees of freedom.
 
-#![allow(clippy::print_stdout)] // tests say what they measured
+#![allow(clippy::print_stdout)] // tests print measured values
 
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -12,10 +14,11 @@ use stickslip_verification::{close, exact, near, template, zero};
 
 type Matrix<T> = Vec<Vec<T>>;
 
-/// Parts of half a period over which the closed form is scanned for turning points and for a return of the sliding velocity.
+/// Intervals of half a period in which the closed form is scanned for turning points and for
+/// reversals of the sliding velocity.
 const NODES: usize = 400;
 
-/// Solves `A X = B` by elimination with row exchanges.
+/// Solves `A X = B` by Gaussian elimination with partial pivoting.
 fn solve(a: &Matrix<Complex64>, b: &Matrix<Complex64>) -> Matrix<Complex64> {
     let (n, mut a, mut b) = (a.len(), a.clone(), b.clone());
     for k in 0..n {
@@ -52,7 +55,7 @@ fn times(a: &Matrix<f64>, x: &[f64]) -> Vec<f64> {
     a.iter().map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum()).collect()
 }
 
-/// `exp(A t)`: Taylor series of the matrix halved until its norm is small, then squared back.
+/// Returns `exp(A t)` by scaling and squaring of the Taylor series.
 fn exponential(a: &Matrix<f64>, t: f64) -> Matrix<f64> {
     let n = a.len();
     let norm = a.iter().map(|row| row.iter().map(|x| (x * t).abs()).sum::<f64>()).fold(0.0, f64::max);
@@ -76,7 +79,8 @@ fn exponential(a: &Matrix<f64>, t: f64) -> Matrix<f64> {
     sum
 }
 
-/// `z' = A z + g cos(wt) - h s(t)`, with displacements before velocities and the sliding velocity `c z`.
+/// `z' = A z + g cos(wt) - h s(t)`, with displacements before velocities and the sliding
+/// velocity `c z`.
 #[derive(Clone)]
 struct Line {
     n: usize,
@@ -87,7 +91,8 @@ struct Line {
 }
 
 impl Line {
-    /// Displacements are scaled by `rate`, so that they and velocities are of one size.
+    /// Builds the equations. Displacements are scaled by `rate`, so that they have the size of
+    /// velocities.
     fn new(system: &System, rate: f64) -> Line {
         let n = system.dofs();
         assert_eq!(system.joints().len(), 1);
@@ -121,14 +126,14 @@ struct Closed {
 }
 
 impl Closed {
-    /// Scaled state at `t` in `[0, T/2]` after the reversal.
+    /// Returns the scaled state at `t` in `[0, T/2]` after the reversal.
     fn at(&self, t: f64) -> Vec<f64> {
         let free = times(&exponential(&self.line.a, t), &self.y0);
         let turn = Complex64::from_polar(1.0, self.psi + self.omega * t);
         (0..free.len()).map(|i| free[i] + self.q[i] + (self.zp[i] * turn).re).collect()
     }
 
-    /// Scaled states at `NODES + 1` instants over `[0, T/2]`.
+    /// Returns the scaled states at `NODES + 1` instants over `[0, T/2]`.
     fn nodes(&self) -> Vec<Vec<f64>> {
         let step = PI / self.omega / NODES as f64;
         let (carry, mut free) = (exponential(&self.line.a, step), self.y0.clone());
@@ -141,7 +146,7 @@ impl Closed {
         nodes
     }
 
-    /// Displacement (m) and velocity of place `i` at the time `t` of the drive.
+    /// Returns displacement (m) and velocity of place `i` at the time `t` of the excitation.
     fn motion(&self, i: usize, t: f64) -> (f64, f64) {
         let half = PI / self.omega;
         let since = (t - self.psi / self.omega).rem_euclid(2.0 * half);
@@ -150,7 +155,7 @@ impl Closed {
         (sign * z[i] / self.omega, sign * z[self.line.n + i])
     }
 
-    /// Largest displacement: zeros of the velocity between the nodes.
+    /// Returns the largest displacement, from zeros of the velocity between the nodes.
     fn amplitude(&self, i: usize) -> f64 {
         let (step, n, nodes) = (PI / self.omega / NODES as f64, self.line.n, self.nodes());
         let mut largest = 0.0f64;
@@ -165,7 +170,7 @@ impl Closed {
     }
 }
 
-/// The orbit of section 8 with its stick-free conditions 8.2 and 8.3; `None` if there is none.
+/// Returns the orbit of section 8 if the conditions 8.2 and 8.3 for motion without stick hold.
 fn two_reversals(system: &System, omega: f64) -> Option<Closed> {
     let line = Line::new(system, omega);
     let size = 2 * line.n;
@@ -174,7 +179,7 @@ fn two_reversals(system: &System, omega: f64) -> Option<Closed> {
     };
     let column = |v: &[f64]| -> Matrix<Complex64> { v.iter().map(|x| vec![Complex64::new(*x, 0.0)]).collect() };
     let real = |m: Matrix<Complex64>| -> Vec<f64> { m.into_iter().map(|row| row[0].re).collect() };
-    // rest positions under constant friction of one sign
+    // equilibrium under constant friction of one sign
     let q = real(solve(&complex(&line.a), &column(&line.h)));
     let mut dynamic = complex(&line.a);
     for i in 0..size {
@@ -205,7 +210,8 @@ fn two_reversals(system: &System, omega: f64) -> Option<Closed> {
     None
 }
 
-/// Compares an event-driven orbit with the closed form: amplitudes, the motion, the reversals, the loss.
+/// Compares an event-driven orbit with the closed form: amplitudes, motion, reversals, loss.
+/// Returns false if the closed form does not exist.
 fn compare(system: &System, hertz: f64) -> bool {
     let omega = TAU * hertz;
     let orbit = exact(system, omega);
@@ -228,7 +234,7 @@ fn compare(system: &System, hertz: f64) -> bool {
             near("velocity", sample.velocity[i], v, 1e-8 * largest * omega);
         }
     }
-    // 4 Ft0 times the amplitude of the sliding displacement
+    // `4 Ft0` times the amplitude of the sliding displacement
     let slide = 0.5 * {
         let [a, b] = [0.0, PI / omega].map(|t| {
             let z = closed.at(t);
@@ -275,7 +281,7 @@ fn theory_8_1_to_8_3_symmetric_couple_and_den_hartog_with_damping() {
     assert!(without_stick > 10);
 }
 
-/// The checked point of section 8: amplitudes and energies at 4 N, 121.25 Hz.
+/// The verified point of section 8: amplitudes and energies at 4 N, 121.25 Hz.
 #[test]
 fn theory_8_printed_point() {
     let orbit = exact(&template("blade-couple", &[("Ft", 4.0)]), TAU * 121.25);
@@ -289,7 +295,8 @@ fn theory_8_printed_point() {
     close("4 Ft0 a_rel", orbit.energy.friction, 16.0 * slide, 1e-9);
 }
 
-/// 8.4: the same phase from the mobility of the contact and the Fourier series of the friction force.
+/// (8.4): the phase follows also from the mobility of the contact and the Fourier series of the
+/// friction force.
 #[test]
 fn theory_8_4_fourier_form() {
     for (ft, hertz) in [(2.0, 121.25), (4.0, 121.25), (1.0, 121.0)] {
@@ -297,7 +304,7 @@ fn theory_8_4_fourier_form() {
         let omega = TAU * hertz;
         let orbit = exact(&system, omega);
         let n = system.dofs();
-        // displacements from a unit force on blade 1 and from a unit contact force, at a frequency
+        // displacements due to a unit force on blade 1 or a unit contact force, at a frequency
         let response = |w: f64, unit: &dyn Fn(usize) -> f64| -> Vec<Complex64> {
             let s = Complex64::new(0.0, w);
             let dynamic: Matrix<Complex64> = (0..n)
@@ -316,20 +323,22 @@ fn theory_8_4_fourier_form() {
         let w = |i: usize| system.joints()[0].axes()[0].dense(system.dofs())[i];
         let slide = |x: &[Complex64]| -> Complex64 { (0..n).map(|i| x[i] * w(i)).sum() };
         let drive = slide(&response(omega, &|i| if i == 0 { 10.0 } else { 0.0 })) * Complex64::new(0.0, omega);
-        // s(t) = (4/pi) sum over odd h of sin(h w (t - t0))/h: at t0 its part of the velocity is sum of Im(Y_h)/h, and the
-        // sum converges as 1/h^2 because Re Y, Im Y fall as 1/h^3, 1/h; the tail follows from Y ~ 1/(jw m)
+        // `s(t) = (4/pi) Σ sin(h w (t - t0))/h` over odd h. At t0 its part of the velocity is
+        // the sum of `Im(Y_h)/h`. It converges as 1/h², because Re Y and Im Y fall as 1/h³ and
+        // 1/h. The tail follows from `Y ~ 1/(jw m)`
         let mut sum = 0.0;
         let inverse_mass: f64 = (0..n).map(|i| w(i) * w(i) / system.structure().mass()[(i, i)]).sum();
         let last = 20_001u32;
         for h in (1..=last).step_by(2) {
             let rate = f64::from(h) * omega;
             let mobility = slide(&response(rate, &w)) * Complex64::new(0.0, rate);
-            // velocity from -Ft0 s(t): -Ft0 (4/pi) Im(Y e^{jh w (t - t0)})/h
+            // velocity due to `-Ft0 s(t)`: `-Ft0 (4/pi) Im(Y e^{jh w (t - t0)})/h`
             sum += mobility.im / f64::from(h);
         }
-        sum += -inverse_mass / omega / (2.0 * f64::from(last + 1)); // tail of sum 1/h^2 over odd h
+        // tail of the sum of 1/h² over odd h
+        sum += -inverse_mass / omega / (2.0 * f64::from(last + 1));
         let friction = -ft * 4.0 / PI * sum;
-        // psi: Re(drive e^{j psi}) + friction = 0 at the reversal to positive sliding
+        // psi: `Re(drive e^{j psi}) + friction = 0` at the reversal to positive sliding
         let t0 = orbit
             .switch_times()
             .into_iter()

@@ -1,14 +1,16 @@
-//! What to use instead of a method that cannot take a system or finds nothing: every method of the list is asked.
+//! Alternative methods for a method that refuses a system or finds no orbit.
+//!
+//! The functions try to make a solver of every method in the list.
 
 use super::list::LIST;
 use super::{Method, MethodError, MethodInfo, Options, OrbitError, Solver, WIDTH, Ways, event_driven, transient};
 use crate::model::System;
 use crate::orbit::Orbit;
 
-/// The solver of a method for one system, with errors that name the methods to use instead.
+/// Makes the solver of a method for one system, with errors that name alternative methods.
 ///
 /// # Errors
-/// As [`Method::solver`], with the methods that take the system.
+/// Same as [`Method::solver`], and the error also names the methods that take the system.
 ///
 /// # Example
 /// ```
@@ -28,22 +30,23 @@ pub fn advised<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn So
     Ok(Box::new(Advised { solver, system }))
 }
 
-/// A velocity, m/s, over which friction is smoothed to see whether it can be: laws have smooth neighbours of every width or of none.
+/// A width (m/s) with which to test for smoothing. Laws can be smoothed over every width or
+/// over none.
 const ANY_WIDTH: f64 = 1e-3;
 
-/// Asks every method of the list which of them take a system.
+/// Returns the methods of the list that take a system.
 pub fn ways(system: &System) -> Ways {
     among(system, |_| true)
 }
 
-/// Asks the methods whose names `asked` accepts.
+/// Tests the methods with names that `asked` accepts.
 fn among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
     let mut ways = Ways::default();
     for row in LIST.iter().filter(|row| asked(row.name)) {
         let plain = Options::new();
         let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
         let smooths = row.options.iter().any(|option| option.key == WIDTH);
-        // what a method misses in smoothed laws is what is really in its way
+        // the refusal of smoothed laws names the real obstacle
         let last = if smooths { &smoothed } else { &plain };
         match (refusal(row, &plain, system), refusal(row, last, system)) {
             (None, _) => ways.methods.push(row.name),
@@ -63,7 +66,7 @@ fn among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
     ways
 }
 
-/// A solver whose errors name the methods that may find what it did not: only such as take the system.
+/// A solver whose errors name other methods that take the system and may find the orbit.
 struct Advised<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     system: &'a System,
@@ -84,10 +87,11 @@ impl Solver for Advised<'_> {
     }
 }
 
-/// Degrees of freedom beyond which no other method is fast enough to be named, and to ask all of them takes a tenth of a second.
+/// Errors of larger systems name no alternatives: no other method is fast enough there, and
+/// testing all methods takes 0.1 s.
 const ASKED: usize = 200;
 
-/// An error with what to use instead.
+/// Adds alternative methods to an error.
 fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
     if system.dofs() > ASKED {
         return error;
@@ -97,7 +101,7 @@ fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
         if ways.any() { format!(", or {ways}") } else { String::new() }
     };
     match &mut error {
-        // waiting is the last resort; who was asked already is not named again
+        // `transient` is the last resort; the method that failed is not named again
         OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. }
             if instead.is_empty() =>
         {
@@ -112,7 +116,7 @@ fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
     error
 }
 
-/// Why a method refuses a system, if it does.
+/// Returns the reason for which a method refuses a system, or `None` if it accepts the system.
 fn refusal(row: &MethodInfo, options: &Options, system: &System) -> Option<String> {
     let solver = (row.build)(options).and_then(|method| method.solver(system).map(drop));
     solver.err().map(|error| error.alone().to_string())
@@ -125,7 +129,8 @@ mod tests {
     use crate::method::harmonic_balance::HarmonicBalance;
     use std::sync::Arc;
 
-    /// A tolerance that no series of this length reaches: what is named takes the law, and what does not take it is not named.
+    /// No series of this length reaches the tolerance. The error names methods that take the
+    /// law, and no method that refuses it.
     #[test]
     fn errors_name_methods_that_take_the_system() {
         let exact: SharedLaw = Arc::new(Coulomb { limit: 4.0 });

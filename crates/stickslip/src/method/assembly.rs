@@ -1,4 +1,5 @@
-//! A system as flows in steps see it: full matrices, axes side by side, laws with the numbers of their axes and states.
+//! The system in the form that the time integrations use: full matrices, joint axes, and laws
+//! with the indices of their axes and states.
 
 use super::drive::Drive;
 use super::{Breakdown, MethodError};
@@ -9,26 +10,26 @@ use nalgebra::DMatrix;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// Matrices, axes and laws; independent of the drive.
+/// Matrices, axes and laws, independent of the excitation.
 #[derive(Debug, Clone)]
 pub(crate) struct Assembly {
-    /// Degrees of freedom.
+    /// Number of degrees of freedom n.
     pub n: usize,
-    /// Of the structure, shared with it.
+    /// Mass, damping and stiffness, shared with the structure.
     matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    /// The axes of all joints, in their order.
+    /// Axes of all joints, in the order of the joints.
     pub axes: Vec<Axis>,
-    /// The same as columns, n × axes.
+    /// The axes as columns, n × axes.
     pub directions: DMatrix<f64>,
     pub joints: Vec<PlacedLaw>,
-    /// Internal states of all laws.
+    /// Number of internal states of all laws.
     pub internal: usize,
-    /// Names of places, and where they are in the coordinates.
+    /// Names of the places, and their axes in the coordinates.
     seen: Vec<(String, Axis)>,
 }
 
-/// A law with its place among axes and states.
+/// A law with the indices of its axes and states.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedLaw {
     /// Name of the joint.
@@ -39,32 +40,34 @@ pub(crate) struct PlacedLaw {
     /// Index of its first internal state.
     pub first_state: usize,
     pub states: usize,
-    /// Size of its states in motion.
+    /// Typical size of its internal states.
     pub state_scale: f64,
 }
 
 impl PlacedLaw {
-    /// Its axes.
+    /// Returns the indices of its axes.
     pub fn axes(&self) -> std::ops::Range<usize> {
         self.first_axis..self.first_axis + self.directions
     }
-    /// Its internal states.
+    /// Returns the indices of its internal states.
     pub fn internal(&self) -> std::ops::Range<usize> {
         self.first_state..self.first_state + self.states
     }
-    /// Derivative of an answer with these `slopes` by `(u₀, u₀', z₀, u₁, u₁')` by the velocity along direction `e` at the end of a step of average
-    /// acceleration of length `h`.
+    /// Returns the derivative of an output by the final velocity along direction `e`, for a
+    /// step of average acceleration of length `h`.
+    ///
+    /// `slopes` holds the derivatives by `(u₀, u₀', z₀, u₁, u₁')`.
     pub fn by_end(&self, slopes: &[f64], e: usize, h: f64) -> f64 {
         let after = 2 * self.directions + self.states;
         0.5 * h * slopes[after + e] + slopes[after + self.directions + e]
     }
-    /// It answers by what is no number.
+    /// Returns the error that the law answers with NaN or infinity.
     pub fn no_number(&self, time: f64) -> Breakdown {
         Breakdown::NoNumber { time, joint: self.joint.clone(), law: self.law.name() }
     }
 }
 
-/// Mass, damping and stiffness are read as its own.
+/// Gives access to mass, damping and stiffness as fields.
 impl Deref for Assembly {
     type Target = Matrices;
     fn deref(&self) -> &Matrices {
@@ -73,10 +76,11 @@ impl Deref for Assembly {
 }
 
 impl Assembly {
-    /// `states` tells the law that a joint is followed with, the number of its states and their size; or what is missed in it.
+    /// Assembles the system. For each joint, `states` returns the law to integrate, the number
+    /// of its states and their size, or the missing property of the law.
     ///
     /// # Errors
-    /// A joint that is refused by `states`; a place without mass; a mass matrix that has no inverse.
+    /// Fails if `states` refuses a joint, a place has no mass, or the mass matrix is singular.
     pub fn new(
         system: &System,
         method: &'static str,
@@ -121,26 +125,27 @@ impl Assembly {
         })
     }
 
-    /// Length of the state `(x, v, internal states)`.
+    /// Returns the length of the state `(x, v, internal states)`.
     pub fn states(&self) -> usize {
         2 * self.n + self.internal
     }
 
-    /// The place that is farthest from its origin.
+    /// Returns the place with the largest displacement.
     pub fn farthest(&self, state: &[f64]) -> Option<String> {
         let far = |axis: &Axis| axis.along(&state[..self.n]).abs();
         let farthest = self.seen.iter().max_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
         farthest.map(|(place, _)| place.clone())
     }
 
-    /// Relative displacement and velocity along an axis.
+    /// Returns the relative displacement and velocity along an axis.
     pub fn relative(&self, axis: usize, state: &[f64], drive: &Drive, time: f64) -> (f64, f64) {
         let (g, speed) = drive.relative_at(axis, time);
         let (x, v) = state.split_at(self.n);
         (self.axes[axis].along(x) + g, self.axes[axis].along(v) + speed)
     }
 
-    /// Acceleration of a state (length n) under loads and joint forces; `left` is the loads, and becomes what the masses are left with.
+    /// Computes the acceleration (length n) of a state under loads and joint forces. `left`
+    /// enters as the loads and leaves as the resulting forces on the masses.
     pub fn accelerate(&self, state: &[f64], left: &mut [f64], force: &[f64], out: &mut [f64]) {
         let n = self.n;
         let (x, v) = state.split_at(n);
@@ -160,25 +165,28 @@ impl Assembly {
         }
     }
 
-    /// The largest acceleration that forces along the axes give to the masses, m/s².
+    /// Returns the largest acceleration of the masses due to forces along the axes, m/s².
     pub fn pushed(&self, force: &[f64]) -> f64 {
         let on_masses = &self.directions * nalgebra::DVectorView::from_slice(force, force.len());
         if self.n == 0 { 0.0 } else { (&self.inverse_mass * on_masses).amax() }
     }
 
-    /// The excitation at `omega` (rad/s) along the axes; at zero only constant forces are left.
+    /// Returns the excitation at `omega` (rad/s) along the axes; at zero, only the constant
+    /// forces.
     pub fn drive(&self, system: &System, omega: f64) -> Drive {
         let axes: Vec<usize> = (0..self.axes.len()).collect();
         Drive::at(system, &axes, omega)
     }
 
-    /// Square root of an energy that the loads can give, √J.
+    /// Returns the square root of an energy that the loads can supply, √J.
     pub fn energy_scale(&self, drive: &Drive) -> f64 {
         drive.energy_scale(&self.mass, &self.stiffness)
     }
 
-    /// Weights of the energy norm under a drive: each displacement with the larger of its stiffness and its inertia, internal states with the
-    /// scale of the motion.
+    /// Returns the weights of the energy norm.
+    ///
+    /// A displacement is weighted by the larger of its stiffness and its inertia, an internal
+    /// state by the scale of the motion.
     pub fn weights(&self, drive: &Drive) -> Vec<f64> {
         let (n, omega, rest) = (self.n, drive.omega, NEAR_REST * self.energy_scale(drive));
         let mut weights = vec![1.0; self.states()];
@@ -194,11 +202,12 @@ impl Assembly {
         weights
     }
 
-    /// Scales of displacement and velocity for error norms: of the state, of the imposed motion, and of what the loads can do.
+    /// Returns the scales of displacement and velocity for error norms. They cover the state,
+    /// the imposed motion and the response to the loads.
     pub fn scales(&self, state: &[f64], drive: &Drive) -> (f64, f64) {
         let n = self.n;
         let natural = (0..n).map(|i| (self.stiffness[(i, i)] / self.mass[(i, i)]).sqrt());
-        // without a drive the structure's own frequencies set the time scale
+        // without excitation, the structure's natural frequencies set the time scale
         let rate = if drive.omega > 0.0 { drive.omega } else { natural.fold(f64::MIN_POSITIVE, f64::max) };
         let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
         let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
@@ -209,10 +218,11 @@ impl Assembly {
     }
 }
 
-/// A state counts as rest below this fraction of what the loads could cause.
+/// A state smaller than this fraction of the response to the loads counts as at rest.
 pub(crate) const NEAR_REST: f64 = 1e-3;
 
-/// Whether a law carries no force: it says so, or all that it has are sliders without a limit.
+/// Returns true if a law carries no force: it is free, or it consists only of sliders with zero
+/// limit.
 pub(crate) fn carries_nothing(law: &SharedLaw) -> bool {
     law.is_free() || law.sliders().is_some_and(|sliders| sliders.is_empty())
 }

@@ -1,4 +1,7 @@
-//! Picks a method: event-driven for exact laws, shooting for smooth ones, harmonic balance where it costs less and for waves around a disk.
+//! Method `auto`: picks a method by the laws and the size of the system.
+//!
+//! It picks event-driven for exact laws and shooting for smooth laws. It picks harmonic balance
+//! for cheaper or other systems, and for travelling waves on a disk.
 
 use super::followed::Kind;
 use super::harmonic_balance::HarmonicBalance;
@@ -22,20 +25,26 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     build: |_| Ok(Box::new(Auto)),
 };
 
-/// Joints with smooth laws up to which shooting follows the motion: it carries a sensitivity as wide as the state, whose cost is the cube of the size, that
-/// of harmonic balance the first power.
+/// Most joints with smooth laws for shooting. The cost of its sensitivity grows with the cube
+/// of the state size; the cost of harmonic balance grows linearly.
 const FOLLOWED: usize = 12;
-/// Degrees of freedom up to which it does. Measured on chains with two joints, seconds a point: 0.014, 0.1, 0.5, 2.3 with 30, 60, 100, 150 of them;
-/// harmonic balance 0.004 to 0.009. A chain of 60 by its matrices with a `bouc-wen` took minutes, and 1.3 s as a series.
+/// Most degrees of freedom for shooting. Measured on chains with two joints and 30, 60, 100 and
+/// 150 degrees of freedom: 0.014, 0.1, 0.5 and 2.3 s per point; harmonic balance takes 0.004 to
+/// 0.009 s. A chain of 60 given by matrices, with a `bouc-wen`, takes minutes; harmonic balance
+/// takes 1.3 s.
 const DOFS: usize = 24;
-/// Multiplications for an orbit beyond which nothing is followed from event to event, whatever the other way costs: a minute.
+/// Most multiplications per orbit for event-driven, about one minute, whatever the other
+/// methods cost.
 const DEAREST: f64 = 3e11;
-/// The same of a point that another method did not find: seconds. Measured: a chain of 40 masses 1.2 s a point, of 80, which are above it, ten and more.
+/// Most multiplications for event-driven as the second method, a few seconds. Measured: a chain
+/// of 40 masses takes 1.2 s per point. A chain of 80 masses is above the bound and takes ten
+/// seconds or more.
 const SECOND: f64 = 1e10;
-/// How far apart orbits are is not known: between near and alone.
+/// Factor on the cost of an orbit with a close warm start. The spacing of the orbits is unknown
+/// here, so the factor lies between that cost and the cost without a warm start.
 const APART: f64 = 2.0;
 
-/// The choice by the laws of a system's joints and their number.
+/// Picks a method by the laws and the number of joints.
 ///
 /// # Example
 /// ```
@@ -47,23 +56,24 @@ const APART: f64 = 2.0;
 pub struct Auto;
 
 impl Auto {
-    /// The method and why; where harmonic balance refuses a law, one that takes the system.
+    /// Returns the picked method and the reason. If harmonic balance is picked and refuses a
+    /// law, returns another method that takes the system.
     fn chosen(system: &System) -> (Box<dyn Method>, String) {
         let (method, because) = Auto::by_laws(system);
         if method.name() != harmonic_balance::NAME || HarmonicBalance::takes_laws(system) {
             return (method, because);
         }
         let methods = ways(system).methods;
-        // waiting is the last resort
+        // `transient` is the last resort
         let other = methods.iter().find(|name| **name != transient::INFO.name).or(methods.first());
         match other.and_then(|name| named(name)) {
             Some(other) => (other, format!("{} refuses a law", harmonic_balance::NAME)),
-            // who refuses says what else there is
+            // the error of the refusing method lists the alternatives
             None => (method, because),
         }
     }
 
-    /// The choice by laws and sizes.
+    /// Picks a method by the laws and sizes.
     fn by_laws(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints().len();
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
@@ -103,7 +113,8 @@ impl Auto {
     }
 }
 
-/// Whether friction falls with velocity somewhere, of which a series needs many harmonics.
+/// Returns true if the friction of a joint falls with velocity; a series then needs many
+/// harmonics.
 fn falls(system: &System) -> bool {
     let falls = |law: &dyn Law| law.sliding().is_some() && !law.is_incrementally_passive();
     system.joints().iter().any(|joint| falls(&**joint.law()))
@@ -127,21 +138,23 @@ impl Method for Auto {
     }
 }
 
-/// The method that was chosen, and where it finds nothing the next one that takes the system within seconds.
+/// The picked method, and a second method that takes over if the first finds no orbit. The
+/// second method must take the system and need only seconds.
 struct WithSecond<'a> {
     first: Box<dyn Solver + Send + 'a>,
     chosen: &'static str,
     system: &'a System,
-    /// Once it was needed, with its name; `None` inside if there is none.
+    /// The second method and its name, made at the first use; the inner value is `None` if none
+    /// exists.
     second: Option<Option<(&'static str, Box<dyn Solver + Send + 'a>)>>,
-    /// The start of the last orbit that the second one found, which says nothing to the first.
+    /// State of the last orbit that the second method found; the first method cannot use it.
     last: Option<Vec<f64>>,
-    /// The work of those that were asked for the last orbit.
+    /// Work of the methods that searched for the last orbit.
     effort: f64,
 }
 
 impl<'a> WithSecond<'a> {
-    /// The method to ask next. Waiting for a transient takes minutes.
+    /// Returns the second method. It is never `transient`, which can take minutes.
     fn next(&self) -> Option<(&'static str, Box<dyn Solver + Send + 'a>)> {
         let (system, joints) = (self.system, self.system.joints().len());
         let cheap = |name: &str| match name {
@@ -156,7 +169,8 @@ impl<'a> WithSecond<'a> {
         Some((name, named(name)?.solver(system).ok()?))
     }
 
-    /// By the first method, and by the second one where that finds nothing that it may have missed.
+    /// Searches with the first method, and with the second if the first reports an error that
+    /// the second may avoid.
     fn seek(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
         let by = |solver: &mut (dyn Solver + Send + 'a), start| match between {
             true => solver.between(omega, start),
@@ -183,12 +197,12 @@ impl<'a> WithSecond<'a> {
     }
 }
 
-/// The method of the list with this name, without options.
+/// Builds the method with this name from the list, without options.
 fn named(name: &str) -> Option<Box<dyn Method>> {
     (LIST.iter().find(|row| row.name == name)?.build)(&Options::new()).ok()
 }
 
-/// Whether another method may find what this one says that it did not.
+/// Returns true if another method may find an orbit after this error.
 fn misses(error: &OrbitError) -> bool {
     matches!(
         error,
@@ -234,7 +248,7 @@ mod tests {
         }
     }
 
-    /// A ring of masses that differ, with this law between neighbours.
+    /// Returns a ring of unequal masses with this law between neighbours.
     fn ring(masses: usize, law: &SharedLaw) -> Model {
         let name = |i: usize| format!("b{}", i % masses);
         let spring = |between, stiffness| Spring { between, stiffness, damping: 1.0 };
@@ -249,8 +263,11 @@ mod tests {
         model
     }
 
-    /// What was measured, seconds a point in a sweep: `coulomb` 0.068 from event to event and more than 1.3 as a series for 36 masses, 6 to 15 and 1 to 12
-    /// for 100; `jenkins` 0.0021 and 0.0013, 0.0106 and 0.0047, 0.44 and 0.012 for 4, 12 and 36; as a series 0.13 for 200 of them.
+    /// Measured seconds per point in a sweep, event-driven and harmonic balance.
+    ///
+    /// - `coulomb`, 36 masses: 0.068 and more than 1.3; 100 masses: 6 to 15 and 1 to 12.
+    /// - `jenkins`, 4 masses: 0.0021 and 0.0013; 12 masses: 0.0106 and 0.0047; 36 masses: 0.44
+    ///   and 0.012; 200 masses, harmonic balance alone: 0.13.
     #[test]
     fn the_faster_method_is_chosen() {
         let rigid: SharedLaw = Arc::new(Coulomb { limit: 2.0 });
@@ -268,7 +285,8 @@ mod tests {
         }
     }
 
-    /// Harmonic balance takes places without mass, and event-driven a static limit above the dynamic one at any number of joints.
+    /// Harmonic balance takes places without mass. Event-driven takes a static limit above the
+    /// dynamic one at any number of joints.
     #[test]
     fn what_the_first_choice_refuses_goes_to_who_takes_it() {
         let mut massless = example::blade_couple();
@@ -281,7 +299,7 @@ mod tests {
         }
     }
 
-    /// Finds nothing, and has to be asked without the start that another method left.
+    /// A solver that finds no orbit. It asserts that it gets no warm start from another method.
     struct Nothing;
 
     impl Solver for Nothing {
@@ -304,7 +322,7 @@ mod tests {
         }
     }
 
-    /// What both were asked for in vain sends nobody from one to the other.
+    /// After both methods failed, the error advises neither of them.
     #[test]
     fn who_was_asked_in_vain_is_not_advised() {
         let system = example::blade_couple().assemble().unwrap();
@@ -315,7 +333,8 @@ mod tests {
         assert!(said.ends_with("; `harmonic-balance` finds none either"), "{said}");
     }
 
-    /// A tolerance that no series which a point can pay for reaches is refused after a few short ones, with how many harmonics it would take.
+    /// No affordable series reaches this tolerance. The solver refuses it after a few short
+    /// series and reports the required number of harmonics.
     #[test]
     fn rigid_friction_that_needs_too_many_harmonics_is_refused_early() {
         let mut model = ring(36, &(Arc::new(Coulomb { limit: 0.3 }) as SharedLaw));

@@ -1,5 +1,7 @@
-//! What a motion does that is followed in time from static equilibrium, where no orbit was found: whether it settles, repeats after several periods, moves on, or
-//! does none of these. An orbit to which it settles can be searched for anew from it.
+//! Classification of the motion from static equilibrium where no orbit was found.
+//!
+//! The motion is integrated in time. It settles, repeats after several periods, drifts away, or
+//! does none of these. If it settles, the caller can search for the orbit again from its end.
 
 use super::flow::Flow;
 use super::followed::Kind;
@@ -11,30 +13,34 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Systems that are followed: each step multiplies full matrices.
+/// Limits of the systems that are integrated; each step multiplies full matrices.
 const LARGEST: usize = 100;
 const JOINTS: usize = 60;
-/// Steps per period: enough for what a motion does, not for its digits.
+/// Steps per period: enough to classify the motion, too few for accurate values.
 const STEPS: usize = 256;
-/// Periods after which it is looked at for the first time; where it has not settled by then it is followed twice as long,
-/// and again, up to [`MOST_PERIODS`]: that is ten times the decay of a mode with 0.1 % of critical damping.
+/// Periods until the first classification. While the motion has not settled, the number doubles
+/// up to [`MOST_PERIODS`]. This is ten times the decay time of a mode with 0.1 % of critical
+/// damping.
 const PERIODS: usize = 80;
 const MOST_PERIODS: usize = 1280;
-/// Periods at the end that are looked at.
+/// Number of last returns that the classification uses.
 const WINDOW: usize = 33;
-/// Periods after which a motion may repeat.
+/// Largest number of periods after which a motion may repeat.
 const REPEATS: usize = 8;
-/// Distance of two returns, relative to the swing, below which they are the same: the rest of a transient, and the error of the steps.
+/// Relative distance, in amplitudes, below which two returns count as equal. It covers the end
+/// of a transient and the error of the steps.
 const SAME: f64 = 2e-3;
-/// What is left of the distance of two returns half a window later, at most, where a motion settles: beats leave more now and then, and twice by chance
-/// in rare cases only.
+/// Largest ratio of the distances between returns, half a window apart, of a settling motion.
+/// Beats exceed it now and then; the test applies it twice to make errors rare.
 const CALMS: f64 = 0.9;
-/// Way in the window, relative to the swing, beyond which a place has moved on.
+/// Displacement over the window, in amplitudes, above which a place drifts.
 const MOVED: f64 = 2.0;
-/// Instants of the last period at which contacts are asked.
+/// Instants of the last period at which the contacts are sampled.
 const INSTANTS: usize = 128;
 
-/// The course of the motion from a state, and its last period; `None` where no flow in steps follows the system, or where it breaks down.
+/// Classifies the motion from a state and returns it with its last period.
+///
+/// Returns `None` if no integration in equal steps takes the system, or if it breaks down.
 pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option<(Course, Arc<dyn Path>)> {
     if system.dofs() > LARGEST || system.joints().len() > JOINTS || Kind::of(system, None) != Kind::Incremental {
         return None;
@@ -94,7 +100,7 @@ fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64
     let widest = (0..system.joints().len()).map(|j| (j, open(j))).fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
     let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
     let share = widest.1;
-    // both halves of the window lead the same way
+    // a drift has the same direction in both halves of the window
     let moved = |axis: &Axis, from: usize, to: usize| axis.along(&returns[to][..n]) - axis.along(&returns[from][..n]);
     let displacements = system.seen().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
     let farthest = displacements.map(|(axis, place)| {
@@ -121,7 +127,9 @@ mod tests {
 
     const OMEGA: f64 = 200.0;
 
-    /// A mass of a kilogram along (x, z) on a contact of 10 N and friction 0.5, with a harmonic force of 1 N along x and `load` along both.
+    /// Returns a mass of 1 kg along (x, z) on a contact with a preload of 10 N and a friction
+    /// coefficient of 0.5. A harmonic force of 1 N acts along x, and the constant `load` along
+    /// both.
     fn block(load: [f64; 2]) -> System {
         let law = FrictionContact { tangential: 1e5, normal: 2e5, friction: 0.5, preload: 10.0, tangents: 1 };
         let names = vec!["x".into(), "z".into()];
@@ -135,8 +143,9 @@ mod tests {
         builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
     }
 
-    /// On its foot it settles; dragged by 2 N more than friction holds it goes at `2 N/(60 kg/s)`, lifted by 3 N at `3 N/(60 kg/s)`, as damping
-    /// alone then balances what is left of the load.
+    /// The block settles on its foot. A drag of 2 N above the friction moves it at
+    /// `2 N/(60 kg/s)`; a lift of 3 N moves it at `3 N/(60 kg/s)`. Damping alone then balances
+    /// the excess load.
     #[test]
     fn a_block_stays_slides_or_leaves() {
         assert_eq!(course(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, Course::Settles);
@@ -151,7 +160,8 @@ mod tests {
         }
     }
 
-    /// Returns that are the same every third time, and none that are.
+    /// The classification distinguishes a motion that repeats every third period from a slowly
+    /// settling and from an irregular one.
     #[test]
     fn what_repeats_is_told_from_what_does_not() {
         let system = block([0.0, 10.0]);

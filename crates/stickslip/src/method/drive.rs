@@ -1,28 +1,30 @@
-//! The excitation at one drive frequency, as functions of time.
+//! The excitation at one frequency, as functions of time.
 
 use crate::model::{Axis, System};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// The excitation at one drive frequency.
+/// The excitation at one frequency.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drive {
-    /// Drive frequency Ω, rad/s.
+    /// Excitation frequency Ω, rad/s.
     pub omega: f64,
-    /// Frequencies hΩ of the harmonics that occur, rad/s, rising.
+    /// Frequencies hΩ of the harmonics that occur, rad/s, in rising order.
     pub rates: Vec<f64>,
-    /// Force amplitudes, per harmonic, N.
+    /// Force amplitudes by harmonic, N.
     pub forces: Vec<DVector<Complex64>>,
     /// Constant force, N.
     pub constant: DVector<f64>,
-    /// Imposed relative motion per harmonic and contact, m (without its constant part).
+    /// Imposed relative motion by harmonic and contact, m, without its constant part.
     pub imposed: Vec<Vec<Complex64>>,
-    /// The constant part, m: it changes nothing for friction, only for laws that know a position.
+    /// Constant part of the imposed motion, m. It affects only laws that depend on position,
+    /// not friction.
     pub offset: Vec<f64>,
 }
 
 impl Drive {
-    /// `contacts` lists the axis that each contact (slider, or axis itself) acts along, among the axes of all joints.
+    /// Collects the excitation. `contacts` gives, for each contact (a slider or an axis), the
+    /// index of its axis among the axes of all joints.
     pub fn new(system: &System, contacts: &[usize], omega: f64) -> Self {
         let n = system.dofs();
         let excitation = system.excitation(omega);
@@ -46,12 +48,12 @@ impl Drive {
         }
     }
 
-    /// At this frequency, or without a drive if it is zero.
+    /// Collects the excitation at this frequency; at zero, only the constant forces.
     pub fn at(system: &System, contacts: &[usize], omega: f64) -> Self {
         if omega > 0.0 { Drive::new(system, contacts, omega) } else { Drive::without_harmonics(system, contacts) }
     }
 
-    /// No drive: only the constant forces are left.
+    /// Collects the constant forces alone.
     fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
         let mut drive = Drive::new(system, contacts, 0.0);
         drive.rates.clear();
@@ -60,8 +62,9 @@ impl Drive {
         drive
     }
 
-    /// Square root of an energy that the loads can give to a structure with these masses and stiffnesses, √J: the scale of a
-    /// vibration near rest. Constant forces count where no other acts.
+    /// Returns the square root of an energy that the loads can supply to a structure with these
+    /// matrices, √J. It scales vibrations near rest. Constant forces count only if no other
+    /// force acts.
     pub fn energy_scale(&self, mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> f64 {
         let held = |i: usize| stiffness[(i, i)].max(self.omega * self.omega * mass[(i, i)]).sqrt();
         let energy = |force: &dyn Fn(usize) -> f64| (0..mass.nrows()).map(|i| force(i) / held(i)).sum::<f64>();
@@ -69,13 +72,13 @@ impl Drive {
         if moving > 0.0 { moving } else { energy(&|i| self.constant[i].abs()) }
     }
 
-    /// The largest velocity among the imposed relative motions, m/s.
+    /// Returns the largest velocity among the imposed relative motions, m/s.
     pub fn imposed_velocity(&self) -> f64 {
         let rates = self.imposed.iter().zip(&self.rates);
         rates.flat_map(|(g, rate)| g.iter().map(move |g| g.norm() * rate)).fold(0.0, f64::max)
     }
 
-    /// The k-th time derivative of the force at `time`, added to `out`.
+    /// Adds the k-th time derivative of the force at `time` to `out`.
     pub fn add_force(&self, time: f64, derivative: u32, out: &mut DVector<f64>) {
         if derivative == 0 {
             *out += &self.constant;
@@ -88,7 +91,8 @@ impl Drive {
         }
     }
 
-    /// Relative displacement, with its constant part, and velocity that are imposed on a contact.
+    /// Returns the imposed relative displacement of a contact, with its constant part, and its
+    /// velocity.
     pub fn relative_at(&self, contact: usize, time: f64) -> (f64, f64) {
         let mut out = (self.offset[contact], 0.0);
         for (rate, imposed) in self.rates.iter().zip(&self.imposed) {
@@ -102,7 +106,7 @@ impl Drive {
         out
     }
 
-    /// Loads at `time` into `out`, length n.
+    /// Writes the loads at `time` into `out`, length n.
     pub fn load(&self, time: f64, out: &mut [f64]) {
         out.copy_from_slice(self.constant.as_slice());
         for (rate, force) in self.rates.iter().zip(&self.forces) {
@@ -111,14 +115,15 @@ impl Drive {
         }
     }
 
-    /// The k-th time derivative of the imposed motion of a contact, without its constant part.
+    /// Returns the k-th time derivative of the imposed motion of a contact, without its
+    /// constant part.
     pub fn imposed_at(&self, contact: usize, time: f64, derivative: u32) -> f64 {
         let moving = self.rates.iter().zip(&self.imposed).filter(|(_, g)| g[contact] != Complex64::new(0.0, 0.0));
         moving.map(|(rate, g)| (g[contact] * phasor(*rate, time, derivative)).re).sum()
     }
 }
 
-/// `(jω)^k e^{jωt}`
+/// Returns `(jω)^k e^{jωt}`.
 fn phasor(rate: f64, time: f64, derivative: u32) -> Complex64 {
     let (sin, cos) = (rate * time).sin_cos();
     let turn = Complex64::new(cos, sin);

@@ -1,32 +1,32 @@
-//! Why a method cannot take a system.
+//! Reasons why a method cannot take a system.
 
 use super::Ways;
 use crate::model::{System, SystemJoint};
 use crate::structure::MOST_IN_FULL;
 
-/// A method cannot take a system.
+/// Error of a method that cannot take a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{refusal}{}", .ways.behind())]
 pub struct MethodError {
-    /// Why.
+    /// The reason.
     pub refusal: Refusal,
-    /// What to use instead, once that was asked for: see [`advised`](super::advised).
+    /// Alternative methods; empty until [`advised`](super::advised) fills them in.
     pub ways: Box<Ways>,
 }
 
-/// Why a method cannot take a system.
+/// The reason why a method cannot take a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// A law lacks the view that the method needs.
     #[error("{method} cannot take the law `{law}` of joint `{joint}`: {misses}")]
     Law {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// Its law.
+        /// Name of its law.
         law: &'static str,
-        /// What the method misses in it.
+        /// Missing property of the law.
         misses: &'static str,
     },
     /// A place has no mass.
@@ -34,120 +34,123 @@ pub enum Refusal {
         "{method} needs a mass above zero at `{place}` (the law `jenkins` stands for a spring, a massless place and a slider)"
     )]
     NeedsMass {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// The place.
+        /// Name of the place.
         place: String,
     },
-    /// A place that has nothing but joints.
+    /// A place has no mass, spring or damper, only joints.
     #[error(
         "{method} needs a mass, a spring or a damper at `{place}`: nothing else says how it moves between its joints; of joints in series make one, as \
          of two `jenkins`, which have the smaller limit and the springs of both in series"
     )]
     Empty {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// The place.
+        /// Name of the place.
         place: String,
     },
-    /// A place so light between rigid joints that its inertia is lost.
+    /// A place between rigid joints is so light that rounding removes its inertia.
     #[error(
         "{method} loses the inertia of `{place}`, which is {ratio:.0e} times lighter than what it rubs on at joint `{joint}` and rubs on something else, \
          too: of rigid joints in series the weaker one slips, so leave the other and the place out, or give it {least:.0e} of that mass"
     )]
     Light {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// The place.
+        /// Name of the place.
         place: String,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The other mass by its own.
+        /// Mass on the other side of the joint over the mass of the place.
         ratio: f64,
-        /// The share of the other mass that is enough.
+        /// Smallest sufficient fraction of the other mass.
         least: f64,
     },
-    /// More degrees of freedom than the method's full matrices may have.
+    /// The system has more degrees of freedom than the full matrices of the method may have.
     #[error("{method} carries full matrices over at most {most} places, and there are {dofs}")]
     TooLarge {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
         /// Degrees of freedom of the system.
         dofs: usize,
-        /// Most that the method takes.
+        /// Most degrees of freedom that the method takes.
         most: usize,
     },
     /// A matrix is not positive definite.
     #[error("{method} needs a positive definite {matrix} matrix")]
     NotPositive {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: &'static str,
     },
-    /// An option has an impossible value.
+    /// An option has an invalid value.
     #[error("option `{key}` of {method}: {message}")]
     Option {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// The key.
+        /// Key of the option.
         key: &'static str,
-        /// What is expected.
+        /// Expected values.
         message: String,
     },
 }
 
 impl MethodError {
-    /// `method` misses something in the law of a joint.
+    /// Returns the error that `method` needs a property that the law of `joint` lacks.
     pub fn law(method: &'static str, joint: &SystemJoint, misses: &'static str) -> Self {
         let (joint, law) = (joint.name().to_owned(), joint.law().name());
         Refusal::Law { method, joint, law, misses }.into()
     }
 
-    /// `method` needs a mass where a system has none.
+    /// Returns the error that `method` needs a mass at the place with this index.
     pub(crate) fn needs_mass(method: &'static str, system: &System, place: usize) -> Self {
         Refusal::NeedsMass { method, place: system.structure().places()[place].clone() }.into()
     }
 
-    /// `method` needs anything but joints at a place: whether a system has one without.
+    /// Returns the error that `method` needs more than joints at a place, if the system has a
+    /// place with joints alone.
     pub(crate) fn empty(method: &'static str, system: &System) -> Option<Self> {
         let mut empty: Vec<bool> = (0..system.dofs()).map(|row| system.structure().own_mass(row) == 0.0).collect();
         if !empty.contains(&true) {
-            return None; // what has mass is not looked through
+            return None; // every place has mass
         }
         system.structure().entries().for_each(|(row, _, _)| empty[row] = false);
         let place = system.structure().places()[empty.iter().position(|empty| *empty)?].clone();
         Some(Refusal::Empty { method, place }.into())
     }
 
-    /// `method` carries full matrices: whether those of a system are too large for it.
+    /// Returns the error that the full matrices of a system are too large for `method`, if they
+    /// are.
     pub(crate) fn too_large(method: &'static str, system: &System) -> Option<Self> {
         let (dofs, most) = (system.dofs(), MOST_IN_FULL);
         (dofs > most).then(|| Refusal::TooLarge { method, dofs, most }.into())
     }
 
-    /// An option of `method` has an impossible value.
+    /// Returns the error that an option of `method` has an invalid value.
     pub(crate) fn option(method: &'static str, key: &'static str, message: String) -> Self {
         Refusal::Option { method, key, message }.into()
     }
 
-    /// `method` needs a positive definite mass matrix.
+    /// Returns the error that `method` needs a positive definite mass matrix.
     pub(crate) fn mass_not_positive(method: &'static str) -> Self {
         Refusal::NotPositive { method, matrix: "mass" }.into()
     }
 
-    /// What to use instead; `None` where another value of an option is all that is needed.
+    /// Returns the alternative methods; `None` if another value of an option is enough.
     pub fn ways(&self) -> Option<&Ways> {
         (!matches!(self.refusal, Refusal::Option { .. })).then_some(&*self.ways)
     }
 
-    /// The same refusal, without what to use instead.
+    /// Returns the same refusal without alternative methods.
     #[must_use]
     pub fn alone(self) -> MethodError {
         self.refusal.into()
     }
 
-    /// The same refusal, with what to use instead, unless another value of an option is all that is needed.
+    /// Returns the same refusal with alternative methods, unless another value of an option is
+    /// enough.
     #[must_use]
     pub fn with(self, instead: Ways) -> MethodError {
         match self.refusal {

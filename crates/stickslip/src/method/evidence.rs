@@ -1,11 +1,14 @@
-//! What an independent flow says of an orbit: whether its state at t = 0 returns, and what becomes of small disturbances.
+//! Evidence for an orbit from an independent time integration: its return defect and the
+//! derivative of its return.
 //!
-//! A series that solves its own equations proves nothing by that. The motion that starts at the orbit's state is therefore followed over one
-//! return, exactly for laws that are exact and by implicit integration for others. How far it comes back from the start is the return
-//! defect; its derivative is the return map that stability asks for, where no theorem answers it ([`System::contracts`]).
+//! A series that solves its own equations does not prove that the motion exists. This file
+//! therefore integrates the motion from the orbit's state at t = 0 over one return. Exact laws
+//! are integrated exactly, other laws implicitly. The return defect is the distance between the
+//! start and the end. The derivative of the return gives the stability where no theorem
+//! ([`System::contracts`]) proves it.
 //!
-//! A ring in a travelling wave returns to itself, turned by some sectors, after a fraction of the
-//! period already.
+//! A travelling wave on a ring returns, rotated by some sectors, after a fraction of the
+//! period.
 
 use super::assembly::NEAR_REST;
 use super::flow::Flow;
@@ -20,27 +23,35 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
 
-/// Degrees of freedom up to which orbits are judged without being asked: the return map is dense, and its cost grows with the cube. Beyond, one period
-/// of motion takes ten times as long as its orbit by harmonic balance, and [`crate::orbit::Orbit::return_defect`] follows it when it is asked.
+/// Most degrees of freedom for which every orbit is checked. The return map is dense, and its
+/// cost grows with the cube of the size. In larger systems one period of integration takes ten
+/// times as long as the orbit by harmonic balance. [`crate::orbit::Orbit::return_defect`]
+/// integrates those on request.
 const LARGEST: usize = 24;
-/// Joints up to which the return of a motion whose stability is proven is followed all the same.
+/// Most joints for which the return is integrated although stability is proven.
 const JOINTS: usize = 12;
-/// What the limits of joints that never slip are multiplied by where the derivative of the return is sought: a power of two, which leaves no rounding.
+/// Factor on the limits of permanently stuck joints while the derivative of the return is
+/// computed. A power of two avoids rounding.
 const HELD: f64 = 2.0;
-/// Distance of the largest multiplier from one, in return defects, within which it may be on the other side: multipliers where stops open and close err by two to
-/// three times the error of the motion.
+/// Distance of the largest multiplier from one, in return defects, below which its side of one
+/// is uncertain. With stops that open and close, multipliers err by two to three times the
+/// error of the motion.
 const MARGIN: f64 = 10.0;
-/// Newton steps from there to the orbit of the flow: each leaves the square of what was missing.
+/// Newton steps from the given state to the orbit of the time integration; convergence is
+/// quadratic.
 const STEPS_NEARER: usize = 3;
-/// Share of the distance from its return that such a step leaves at most.
+/// Largest ratio of the distances from the return after and before such a step.
 const LEFT: f64 = 0.5;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
-/// Equal steps per return for laws that know only steps: they follow the motion to about 1e-6.
+/// Equal steps per return for laws with a step only; they follow the motion to about 1e-6.
 const STEPS: usize = 4096;
 
-/// Equal steps in which the return of each orbit by harmonic balance is followed, which takes longer than the orbit itself, and whether with their
-/// derivatives; none where it is not followed, or by longer steps.
+/// Returns the number of equal steps in which each orbit by harmonic balance is integrated, and
+/// true if the derivatives are integrated too.
+///
+/// This integration takes longer than the orbit itself. Returns `None` if the orbit is not
+/// integrated, or not in equal steps.
 ///
 /// # Example
 /// ```
@@ -56,20 +67,21 @@ pub fn evidence_steps(system: &System) -> Option<(usize, bool)> {
     judge.flow.as_ref().map(|_| (STEPS, !judge.proven))
 }
 
-/// The flow of a system between two returns.
+/// Integrates a system over one return and compares the end with the start.
 pub(crate) struct Judge {
-    /// `None` if the system is too large, or if no flow takes its laws.
+    /// `None` if the system is too large, or if no integration takes its laws.
     flow: Option<Box<dyn Flow>>,
-    /// No two motions separate.
+    /// True if stability is proven: no two motions of the system separate.
     proven: bool,
 }
 
-/// What a flow says of an orbit.
+/// Evidence from the time integration of an orbit.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Judged {
-    /// Derivative of the return with respect to the state at t = 0; `None` where stability is proven, or where no flow follows the motion.
+    /// Derivative of the return by the state at t = 0. `None` if stability is proven, or if no
+    /// integration follows the motion.
     pub derivative: Option<DMatrix<f64>>,
-    /// Distance between the state and its return, relative to the vibration, in the energy norm.
+    /// Distance between the state and its return in the energy norm, relative to the vibration.
     pub defect: Option<f64>,
 }
 
@@ -82,9 +94,10 @@ impl Judge {
         Judge { proven, ..Judge::of_any_size(system) }
     }
 
-    /// A flow, also where it is not needed or long.
+    /// Makes a [`Judge`] for any system, even where stability is proven or the integration is
+    /// slow.
     pub fn of_any_size(system: &System) -> Self {
-        let name = "the judge of stability"; // no error of it is ever shown
+        let name = "the judge of stability"; // this name appears in no message
         let flow: Option<Box<dyn Flow>> = match Kind::of(system, None) {
             _ if system.dofs() == 0 => None,
             Kind::Incremental => IncrementalFlow::new(system, None, name).ok().map(|mut flow| -> Box<dyn Flow> {
@@ -96,12 +109,13 @@ impl Judge {
         Judge { flow, proven: false }
     }
 
-    /// Whether stability is proven.
+    /// Returns true if stability is proven.
     pub fn proves(&self) -> bool {
         self.proven
     }
 
-    /// The motion to which one from `start` comes after so many returns, over one period; `None` where no flow follows the system.
+    /// Integrates from `start` over this number of returns, then records one period. Returns
+    /// `None` if no integration follows the system.
     pub fn approach(
         &mut self,
         system: &System,
@@ -127,7 +141,8 @@ impl Judge {
         Some(flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period))
     }
 
-    /// Follows the return of a path, in which the joints `stuck` never slip, from its state at t = 0, which begins with `start`.
+    /// Checks the return of a path from its state at t = 0, which begins with `start`. The
+    /// joints `stuck` are permanently stuck.
     pub fn judge(
         &mut self,
         system: &System,
@@ -139,7 +154,8 @@ impl Judge {
         self.follow(system, omega, (path, symmetry), start, (!self.proven).then_some(stuck))
     }
 
-    /// How far the motion from `start` is from it after a return, relative to its vibration, without the derivative that costs most.
+    /// Returns the distance of `start` from its return, relative to the vibration, without the
+    /// expensive derivative.
     pub fn defect(
         &mut self,
         system: &System,
@@ -175,7 +191,8 @@ impl Judge {
         if flow.run(&mut state, duration, alone).is_err() {
             return Judged::default();
         }
-        // what sticks up to its very limit slips for an instant by the error of the orbit, and the derivative would be that of slip
+        // a joint may stick right up to its limit. The error of the orbit would make it slip
+        // for an instant, and the derivative would be that of slip
         if !stuck.is_empty() {
             let mut again = start.to_vec();
             again.resize(states, 0.0);
@@ -184,11 +201,13 @@ impl Judge {
             flow.strengthen(stuck, 1.0 / HELD);
             derivative = derivative.filter(|_| run.is_ok());
         }
-        // states that the method does not know begin wrong, and their return says nothing of the orbit
+        // internal states that the method does not compute start wrong; their return does not
+        // test the orbit
         let known = start.len() == states;
         let end = back.returned(&state, system.dofs());
         let mut gap = DVector::from_iterator(start.len(), start.iter().zip(&end).map(|(start, end)| start - end));
-        // a history told by return points has many faces: a loop that just closes, or just does not. What it does to the motion counts
+        // return points can describe the same history in several ways, as a loop may or may not
+        // just close; only the effect on the motion counts
         if system.joints().iter().any(|joint| joint.law().masing().is_some()) {
             gap.iter_mut().skip(2 * system.dofs()).for_each(|gap| *gap = 0.0);
         }
@@ -207,18 +226,18 @@ impl Judge {
     }
 }
 
-/// After which share of the period a motion comes back to its start, and as what: its opposite, or
-/// a ring turned by some sectors.
+/// The fraction of a period after which a motion returns, and the transformation of the return:
+/// a sign, or a rotation of a ring by some sectors.
 struct Return {
-    /// Share of the period.
+    /// Fraction of the period.
     part: f64,
-    /// Share of the steps of a period that it is followed in.
+    /// Fraction of the steps of a full period.
     share: f64,
     sign: f64,
-    /// Sectors of a ring, or one, and by how many of them what comes back is turned.
+    /// Number of sectors of a ring, or one; and the rotation of the return in sectors.
     sectors: usize,
     turned: usize,
-    /// Returns after which everything is where it was, up to a turn.
+    /// Number of returns after which the motion is back at its start up to a rotation.
     times: usize,
 }
 
@@ -228,8 +247,8 @@ impl Return {
         match (symmetry, system.cyclic()) {
             (Symmetry::HalfPeriod, _) => Return { part: 0.5, sign: -1.0, ..whole },
             (Symmetry::FullPeriod, Some(Cyclic { sectors, order })) if order > 0 => {
-                // a sector does what the first one does, earlier by `order/sectors` of a period
-                // for every sector between them
+                // each sector repeats the motion of the first, `order/sectors` of a period
+                // earlier per sector
                 let (mut a, mut b) = (sectors, order);
                 while b > 0 {
                     (a, b) = (b, a % b);
@@ -242,8 +261,8 @@ impl Return {
         }
     }
 
-    /// Where a coordinate of a state stands after a turn by so many sectors: displacements,
-    /// velocities and states of joints stand sector by sector.
+    /// Returns the index of a coordinate of a state after a rotation by this number of sectors.
+    /// Displacements, velocities and joint states are stored sector by sector.
     fn place(&self, at: usize, (dofs, states): (usize, usize), turned: usize) -> usize {
         let (first, length) = match at / dofs.max(1) {
             0 => (0, dofs),
@@ -253,14 +272,14 @@ impl Return {
         first + (at - first + turned * (length / self.sectors)) % length
     }
 
-    /// What the end of a return is compared with the start as.
+    /// Transforms the end of a return so that it can be compared with the start.
     fn returned(&self, end: &[f64], dofs: usize) -> Vec<f64> {
         let mut out = vec![0.0; end.len()];
         end.iter().enumerate().for_each(|(i, z)| out[self.place(i, (dofs, end.len()), self.turned)] = self.sign * z);
         out
     }
 
-    /// The derivative of a return that is turned like this, without its sign.
+    /// Rotates the rows of the derivative of a return like the return, without its sign.
     fn derivative(&self, derivative: &DMatrix<f64>, dofs: usize) -> DMatrix<f64> {
         self.rows_turned(derivative, dofs, self.turned)
     }
@@ -272,7 +291,7 @@ impl Return {
         out
     }
 
-    /// The derivative over as many returns as bring everything back to where it was.
+    /// Returns the derivative over all returns that bring the ring back to its start.
     fn whole(&self, of_return: &DMatrix<f64>, dofs: usize) -> DMatrix<f64> {
         let power = (1..self.times).fold(of_return.clone(), |power, _| &power * of_return);
         let back = self.sectors - self.turned * self.times % self.sectors;
@@ -280,8 +299,10 @@ impl Return {
     }
 }
 
-/// The derivative of the return at the orbit of the flow beside `start`, whose `gap` from its return and derivative are given; `None` where Newton's method does
-/// not come nearer to one.
+/// Returns the derivative of the return at the integration's orbit near `start`.
+///
+/// `gap` and `of_series` are the return defect and the derivative at `start`. Returns `None` if
+/// Newton's method does not reduce the gap.
 fn of_the_orbit_beside(
     flow: &mut dyn Flow,
     (start, mut gap, of_series): (&[f64], DVector<f64>, &DMatrix<f64>),
@@ -322,8 +343,9 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// What a series lacks is seen by its return, for exact and for smooth laws, with states and without; more harmonics leave less. The sharper
-    /// the law, the more a short series lacks.
+    /// The return defect shows the truncation of a series, for exact and smooth laws, with and
+    /// without internal states. More harmonics reduce it. A sharper law makes the truncation of
+    /// a short series larger.
     #[test]
     fn a_short_series_does_not_return() {
         let omega = TAU * 120.75;
@@ -344,8 +366,9 @@ mod tests {
         }
     }
 
-    /// Many bodies on springs and joints in a row are not followed at every point of a curve, and are where an orbit is asked for its return: what a
-    /// series lacks is seen there too, and a motion from event to event returns to itself.
+    /// A long chain of bodies is not integrated at every point of a curve, only on request. The
+    /// return defect shows the truncation of a series there too, and an event-driven orbit
+    /// returns to itself.
     #[test]
     fn an_orbit_of_many_bodies_is_followed_when_it_is_asked() {
         let name = |i: usize| format!("b{i}");
@@ -375,9 +398,9 @@ mod tests {
         assert_eq!(orbit.return_defect(), Some(orbit.evidence.residual));
     }
 
-    /// A ring of six nodes in a plane with contacts between them, whose wave goes round twice:
-    /// known to be one, it is followed for a third of the period, and is
-    /// told the same as for the whole of it.
+    /// A ring of six nodes in a plane has contacts between them and a wave of order two. As a
+    /// travelling wave it is integrated over a third of the period. The results agree with
+    /// those of the full period.
     #[test]
     fn a_travelling_wave_returns_after_a_part_of_the_period() {
         let (nodes, waves) = (6, 2);
@@ -407,19 +430,21 @@ mod tests {
         let (part, all) = (judged(&wave), judged(&whole));
         let largest = |judged: &Judged| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
         let (of_part, of_all) = (largest(&part), largest(&all));
-        // the motion that is followed is beside the orbit by the defect, in which the parts of the
-        // period differ
+        // the integrated motion differs from the orbit by the defect, and the parts of the
+        // period differ by that
         let defect = all.defect.unwrap();
         assert!(defect > 1e-9 && defect < 1e-2, "{defect}");
         assert!((of_part - of_all).abs() < 10.0 * defect * of_all, "{of_part} {of_all} {defect}");
         let apart = (part.derivative.unwrap() - all.derivative.unwrap()).amax();
         assert!(apart < 0.05, "{apart}");
-        // three parts of the period may leave three times as much as one, or a third
+        // three parts of the period may have three times the defect of one part, or a third of
+        // it
         let left = part.defect.unwrap();
         assert!(left < 3.0 * defect && 3.0 * left > defect, "{left} {defect}");
     }
 
-    /// A state that is none of an orbit does not return, by as much as it is off; one that has not all states says nothing.
+    /// A state that belongs to no orbit has a return defect of the size of its error. An
+    /// incomplete state gives no defect.
     #[test]
     fn a_wrong_orbit_is_caught() {
         let system = couple(Arc::new(Jenkins { stiffness: 2e4, limit: 4.0 }));
@@ -431,7 +456,7 @@ mod tests {
             |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;
         assert!(defect(&orbit.start).unwrap() < 1e-11);
         let wrong: Vec<f64> = orbit.start.iter().map(|z| 1.5 * z).collect();
-        // the transient of a structure with Q of some hundreds dies by a hundredth per return, friction takes more
+        // a transient decays by 1 % per return at a Q of some hundreds; friction adds to that
         assert!(defect(&wrong).unwrap() > 1e-3, "{:?}", defect(&wrong));
         assert_eq!(defect(&orbit.start[..4]), None);
     }

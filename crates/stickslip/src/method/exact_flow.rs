@@ -1,4 +1,4 @@
-//! The motion between switches as one of the flows.
+//! Event-driven motion as a [`Flow`].
 
 use super::Breakdown;
 use super::drive::Drive;
@@ -9,7 +9,7 @@ use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Follows systems of ideal sliders by events.
+/// Integrates systems of ideal sliders from event to event.
 pub(crate) struct ExactFlow {
     segments: SegmentedMotion,
 }
@@ -45,7 +45,8 @@ impl Flow for ExactFlow {
     fn strengthen(&mut self, joints: &[usize], factor: f64) {
         self.segments.mechanics.strengthen(joints, factor);
     }
-    fn keep(&mut self, _keep: bool) {} // segments are always kept: they are what it computes with
+    // the computation needs the segments, so it always records them
+    fn keep(&mut self, _keep: bool) {}
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
         Arc::new(ExactPath::new(system.clone(), &self.segments, symmetry, period))
     }

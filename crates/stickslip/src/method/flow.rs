@@ -1,6 +1,7 @@
-//! Motion in time, whatever follows it: between two returns for periodic motion, stretch by stretch for transients.
+//! The trait of all time integrations: motion over one return for orbits, or over successive
+//! intervals for transients.
 //!
-//! [`super::followed`] tells which flow a system's laws ask for.
+//! [`super::followed`] chooses the integration by the laws of a system.
 
 use super::Breakdown;
 use crate::model::System;
@@ -8,37 +9,40 @@ use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Follows the motion of one system.
+/// Integrates the motion of one system.
 pub(crate) trait Flow: Send {
-    /// Length of its state: displacements, velocities, states of the joints.
+    /// Returns the length of the state: displacements, velocities, states of the joints.
     fn states(&self) -> usize;
-    /// Sets the drive frequency, rad/s; at zero only constant forces are left.
+    /// Sets the excitation frequency, rad/s; at zero, only the constant forces act.
     fn set_drive(&mut self, system: &System, omega: f64);
-    /// Weights of the energy norm under the drive, one for each state.
+    /// Returns the weights of the energy norm under the excitation, one per state.
     fn weights(&self) -> Vec<f64>;
-    /// Square root of an energy that the loads can give, √J.
+    /// Returns the square root of an energy that the loads can supply, √J.
     fn energy_scale(&self) -> f64;
-    /// Sets the error per step, relative to the state, of a flow that chooses its steps by it.
+    /// Sets the error per step, relative to the state, of a flow with controlled steps.
     fn set_tolerance(&mut self, _tolerance: f64) {}
-    /// Takes only this share of the steps of a run, of a flow in equal steps: a run that is as
-    /// much shorter then has steps of the same length.
+    /// Sets the fraction of the steps of a full run, for a flow in equal steps. A run over the
+    /// same fraction of the duration then keeps the step length.
     fn set_share(&mut self, _share: f64) {}
-    /// Runs from `state`, which becomes the end state, over `duration` (s) from the instant at which the drive has phase zero. `sensitivity`,
-    /// if given, is multiplied from the left by the derivative of the end state with respect to the initial state.
+    /// Integrates from `state` over `duration` (s), beginning at excitation phase zero, and
+    /// replaces `state` by the end state. `sensitivity`, if given, is multiplied from the left
+    /// by the derivative of the end state by the initial state.
     fn run(
         &mut self,
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), Breakdown>;
-    /// Runs with an error that the flow itself keeps small: for a motion that is followed, and not closed.
+    /// Integrates with an error that the flow controls, for a motion that is not closed to an
+    /// orbit.
     fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), Breakdown> {
         self.run(state, duration, None)
     }
-    /// Multiplies the slip limits of these joints by a factor, until it is divided by it again.
+    /// Multiplies the slip limits of these joints by a factor, until a call with the inverse
+    /// factor.
     fn strengthen(&mut self, _joints: &[usize], _factor: f64) {}
-    /// Whether runs from now on are kept for [`Flow::path`].
+    /// Switches the recording of later runs for [`Flow::path`] on or off.
     fn keep(&mut self, keep: bool);
-    /// The motion of the last kept run, which repeats after `period` (s).
+    /// Returns the motion of the last recorded run, with the period `period` (s).
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path>;
 }

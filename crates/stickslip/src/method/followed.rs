@@ -1,11 +1,13 @@
-//! Which flow a system is followed by.
+//! Choice of the time integration for a system.
 //!
-//! | flow | laws | motion |
-//! | --- | --- | --- |
-//! | [`ExactFlow`](super::exact_flow::ExactFlow) | sliders and stops | closed forms between switches |
-//! | [`SmoothFlow`](super::smooth::flow::SmoothFlow) | rate | Radau IIA-9 with controlled steps |
-//! | [`SwitchedFlow`](super::switched::flow::SwitchedFlow) | friction that slides along a smooth curve, beside laws with a rate | the same between located switches |
-//! | [`IncrementalFlow`](super::incremental::flow::IncrementalFlow) | step and rate side by side | average acceleration on equal steps |
+//! - [`ExactFlow`](super::exact_flow::ExactFlow): laws of sliders and stops; closed forms
+//!   between switches.
+//! - [`SmoothFlow`](super::smooth::flow::SmoothFlow): laws with a rate; Radau IIA-9 with
+//!   controlled steps.
+//! - [`SwitchedFlow`](super::switched::flow::SwitchedFlow): friction that slides along a smooth
+//!   curve, together with laws with a rate; Radau IIA-9 between located switches.
+//! - [`IncrementalFlow`](super::incremental::flow::IncrementalFlow): laws with a step and laws
+//!   with a rate together; average acceleration in equal steps.
 
 use super::MethodError;
 use super::assembly::carries_nothing;
@@ -18,10 +20,13 @@ use super::switched::{self, flow::SwitchedFlow};
 use crate::law::SharedLaw;
 use crate::model::System;
 
-/// The flow that a system's laws ask for; smooth laws are integrated with this relative error per step, and `width` (m/s) smooths exact ones.
+/// Makes the integration for the laws of a system.
+///
+/// `tolerance` is the relative error per step for smooth laws. `width` (m/s) smooths exact
+/// laws.
 ///
 /// # Errors
-/// A joint whose law no flow takes; a place without mass.
+/// Fails if no integration takes the law of a joint, or if a place has no mass.
 pub(crate) fn of(
     system: &System,
     width: Option<f64>,
@@ -36,7 +41,7 @@ pub(crate) fn of(
     }
 }
 
-/// Which flow a system is followed by.
+/// The kind of time integration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Exact,
@@ -46,10 +51,11 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Sliders and stops alone are followed exactly, laws with a rate alone by integration, and between switches beside friction
-    /// that slides along a smooth curve, everything else in small steps.
+    /// Chooses the exact integration for sliders and stops alone, and controlled steps for laws
+    /// with a rate alone. Friction on a smooth curve together with laws with a rate is
+    /// integrated between switches; all other systems in equal steps.
     pub fn of(system: &System, width: Option<f64>) -> Kind {
-        // a width that smooths no law asks for nothing
+        // a width that smooths no law has no effect
         let smooths = |width| system.joints().iter().any(|joint| joint.law().regularised(width).is_some());
         if !width.is_some_and(smooths) && system.joints().iter().all(|joint| takes(joint.law().as_ref())) {
             return Kind::Exact;
@@ -57,11 +63,12 @@ impl Kind {
         Kind::integrated(system, width)
     }
 
-    /// The same without the exact one, unless all laws are sliders, which nothing integrates.
+    /// Chooses among the integrations with steps. Returns [`Kind::Exact`] only for sliders
+    /// without a width.
     pub fn integrated(system: &System, width: Option<f64>) -> Kind {
         let all = |has: &dyn Fn(&SharedLaw) -> bool| system.joints().iter().all(|joint| has(joint.law()));
         let regular = |law: &SharedLaw| width.and_then(|width| law.regularised(width));
-        // a law that carries nothing has a rate without saying so
+        // a law that carries no force counts as smooth even without a rate
         let smooth = |law: &SharedLaw| regular(law).as_ref().unwrap_or(law).rate().is_some() || carries_nothing(law);
         if all(&smooth) {
             Kind::Smooth
@@ -95,16 +102,18 @@ mod tests {
     use std::sync::Arc;
     use stickslip_numerics::dual::Real;
 
-    /// Laws that only these tests need.
+    /// Laws for these tests alone.
     #[derive(Debug, Clone, Copy)]
     enum Sample {
         /// `f = 3 u + 0.2 u'` in a plane.
         Plane,
-        /// Two springs in series with dampers, side by side: `f = Σ k z`, `z' = u' - z/τ`.
+        /// Two parallel branches, each a spring in series with a damper: `f = Σ k z`,
+        /// `z' = u' - z/τ`.
         Relaxing,
-        /// A plane law with two states and everything coupled.
+        /// A plane law with two states, fully coupled.
         Coupled,
-        /// A spring of stiffness 5 before a slider of limit 0.4 in a plane, by radial return.
+        /// A spring of stiffness 5 in series with a slider of limit 0.4 in a plane, by radial
+        /// return.
         Sliding,
     }
 
@@ -115,7 +124,7 @@ mod tests {
         sample: &[1.0],
         build: |_| Arc::new(Sample::Plane),
     };
-    /// (k, τ) of the relaxing law.
+    /// Pairs (k, τ) of the relaxing law.
     const RELAXING: [(f64, f64); 2] = [(0.7, 0.5), (1.3, 2.0)];
     const SLIDING: (f64, f64) = (5.0, 0.4);
 
@@ -185,7 +194,7 @@ mod tests {
         }
     }
 
-    /// Two places that share mass, on springs and dampers.
+    /// Returns a structure of two places with coupled masses, on springs and dampers.
     fn structure() -> Structure {
         let names = vec!["x".to_owned(), "z".to_owned()];
         let (mass, damping) = (dmatrix![1.0, 0.3; 0.3, 1.5], dmatrix![0.05, -0.02; -0.02, 0.08]);
@@ -208,7 +217,7 @@ mod tests {
         assert!((a - b).abs() <= tolerance * (a.abs() + b.abs()), "{a} and {b}");
     }
 
-    /// The derivative of a run is what a small change of its start does to its end.
+    /// Checks the derivative of a run against central differences of its end by its start.
     fn check_derivative(flow: &mut dyn Flow, system: &System, start: &[f64]) {
         let states = flow.states();
         flow.set_drive(system, 1.3);
@@ -241,7 +250,8 @@ mod tests {
         flow.run(&mut start.to_vec(), 2.0, None).unwrap();
         flow.lengths = super::super::smooth::flow::Lengths::Repeated;
         check_derivative(&mut flow, &smooth, &start);
-        // all views side by side; the sliders slip on the way, and do not at the changed starts elsewhere
+        // all views together; the sliders slip during the run, at the same times for the
+        // changed starts
         let jenkins = (Arc::new(Jenkins { stiffness: 4.0, limit: 0.3 }) as SharedLaw, vec![Axis::new(vec![(0, 1.0)])]);
         let gap = (Arc::new(Gap { gap: 0.1, stiffness: 2.0 }) as SharedLaw, vec![Axis::new(vec![(0, 1.0), (1, -1.0)])]);
         let mixed = system(&[joint, (Arc::new(Sample::Sliding), plane()), jenkins, gap, relaxing]);
@@ -251,7 +261,7 @@ mod tests {
         check_derivative(&mut flow, &mixed, &start);
     }
 
-    /// Amplitudes of the two places with these complex stiffnesses along axes of the structure.
+    /// Returns the amplitudes of the two places with these complex stiffnesses along axes.
     fn linear(omega: f64, stiff: &[(Complex64, &Axis)]) -> DVector<Complex64> {
         let structure = structure();
         let s = Complex64::new(0.0, omega);
@@ -269,7 +279,7 @@ mod tests {
         Shooting::default().solver(system).unwrap().orbit(omega, None).unwrap()
     }
 
-    /// A width is for laws that it smooths: springs and stops alone are followed exactly whatever it is.
+    /// A width affects only laws that it smooths. A stop is integrated exactly at any width.
     #[test]
     fn a_width_that_smooths_nothing_changes_nothing() {
         let of = |law: SharedLaw| Kind::of(&system(&[(law, vec![Axis::new(vec![(0, 1.0)])])]), Some(1e-3));
@@ -277,7 +287,8 @@ mod tests {
         assert_eq!(of(Arc::new(Coulomb { limit: 0.1 })), Kind::Smooth);
     }
 
-    /// Linear laws of one and two directions, without and with states, have a linear response, over full mass matrices; in both flows.
+    /// Linear laws of one and two directions, with and without states, give the linear
+    /// response. The mass matrix is full, and both integrations are tested.
     #[test]
     fn linear_laws_give_the_linear_response() {
         let omega = 1.3;
@@ -299,12 +310,13 @@ mod tests {
         };
         let orbit = shoot(&system(&joints), omega);
         check(&orbit, &linear(omega, &parts), 1e-7);
-        // the loss in the joints: ω c |u|² π along each axis, and of the relaxing ones by their loss stiffness
+        // loss in the joints: `π ω c |u|²` along each axis; the relaxing joints lose by their
+        // loss stiffness
         let x = linear(omega, &parts);
         let loss: f64 = parts.iter().map(|(k, axis)| TAU / 2.0 * k.im * axis.along_complex(&x).norm_sqr()).sum();
         near(orbit.energy.friction, loss, 1e-7);
         near(orbit.joints[0].displacement[1].1, axes[1].along_complex(&x).norm(), 1e-7);
-        // a slider behind a spring that never slips asks for equal steps
+        // a slider behind a spring that never slips requires equal steps
         let held = Axis::new(vec![(0, 1.0)]);
         joints.push((Arc::new(Jenkins { stiffness: 4.0, limit: 100.0 }), vec![held.clone()]));
         parts.push((Complex64::new(4.0, 0.0), &held));
@@ -323,8 +335,8 @@ mod tests {
         }
     }
 
-    /// A slider in a plane that is led round a circle: its spring is stretched by r = limit/stiffness at right angles to its path, whose
-    /// radius is √(a² - r²), so that it loses 2π limit √(a² - r²) in a cycle.
+    /// A slider in a plane follows a circle. Its spring is stretched by r = limit/stiffness at
+    /// right angles to its path of radius √(a² - r²). It loses 2π limit √(a² - r²) per cycle.
     #[test]
     fn a_slider_led_round_a_circle_loses_what_it_must() {
         let a = 0.3;
@@ -343,8 +355,10 @@ mod tests {
         }
     }
 
-    /// Led round a circle that is a little smaller than its slider holds a contact sticks, however near its limit it is; round one that is a little
-    /// larger it slips all the time. The first cycle leaves a smaller one beside the middle, where it touches the limit at one instant.
+    /// A contact moves around a circle. It sticks if the circle is 1 % smaller than the
+    /// slider's reach, and slips all the time if the circle is 1 % larger. After the first
+    /// cycle the slider's offset leaves a smaller, off-centre circle that touches the limit at
+    /// one instant.
     #[test]
     fn what_stays_below_its_limit_sticks() {
         let (stiffness, limit, preload) = (4.0, 0.3, 1.0);
@@ -368,14 +382,14 @@ mod tests {
         }
     }
 
-    /// Jenkins elements in equal steps come to the exact orbit as fast as is estimated.
+    /// Jenkins elements in equal steps converge to the exact orbit within the estimated error.
     #[test]
     fn equal_steps_come_to_the_exact_orbit() {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
         let jenkins: SharedLaw = Arc::new(Jenkins { stiffness: 4.0, limit: 0.3 });
         let exact_system = system(&[(jenkins.clone(), along(0))]);
         let exact = event_driven::EventDriven.solver(&exact_system).unwrap().orbit(1.3, None).unwrap();
-        // a law that carries nothing, and is none of sliders
+        // a law that carries no force and does not consist of sliders
         let idle: SharedLaw = Arc::new(Gap { gap: 1e3, stiffness: 1.0 });
         let orbit = shoot(&system(&[(jenkins, along(0)), (idle, along(1))]), 1.3);
         let estimate = orbit.evidence.truncation.unwrap();
@@ -386,12 +400,12 @@ mod tests {
         near(orbit.joints[0].dissipation, exact.joints[0].dissipation, 10.0 * estimate);
         assert!((orbit.joints[0].slip_fraction - exact.joints[0].slip_fraction).abs() < 1e-2);
         let largest = |orbit: &Orbit| orbit.multipliers().unwrap()[0].norm();
-        // in the exact system the motion returns after half a period, in the other after a whole one
+        // the exact motion returns after half a period, the other one after a whole period
         near(largest(&orbit), largest(&exact), 1e-3);
     }
 
-    /// A contact that sticks leaves an offset open, with which motions of different steps begin alike: what their amplitudes are off by is in the
-    /// estimate all the same.
+    /// A stuck contact leaves its offset free, so motions in different steps may begin with
+    /// equal states. The estimate still covers the error of their amplitudes.
     #[test]
     fn an_open_offset_hides_no_error() {
         let law = FrictionContact { tangential: 5e3, normal: 2e4, friction: 0.3, preload: 1e5, tangents: 1 };
@@ -422,7 +436,8 @@ mod tests {
         }
     }
 
-    /// A transient in equal steps goes as the exact one: at the ends of the periods, within the error of a period each, and between them.
+    /// A transient in equal steps agrees with the exact one, at the ends of the periods and
+    /// between them. The allowed error grows by one period's error per period.
     #[test]
     fn transients_in_equal_steps_go_as_the_exact_one() {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
@@ -461,10 +476,10 @@ mod tests {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
         let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.3 });
         let system = system(&[(rigid.clone(), along(0)), (Arc::new(Sample::Sliding), plane())]);
-        // beside a smooth law its switches are located
+        // next to a smooth law, the switches of the rigid slider are located
         let smooth = self::system(&[(rigid, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
         assert_eq!((Kind::of(&smooth, None), Kind::of(&system, None)), (Kind::Switched, Kind::Incremental));
-        // a joint that carries nothing is in nobody's way
+        // a joint that carries no force does not matter
         let idle: SharedLaw = Arc::new(Coulomb { limit: 0.0 });
         let beside = self::system(&[(idle, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
         assert_eq!(Kind::of(&beside, None), Kind::Smooth);
@@ -478,12 +493,12 @@ mod tests {
         assert!(smoothed.solver(&system).is_ok());
     }
 
-    /// `x'' + 0.1 x' + x + k max(x, 0) = cos Ωt`, on one place.
+    /// Returns `x'' + 0.1 x' + x + k max(x, 0) = cos Ωt` with one place.
     fn stopped(k: f64) -> System {
         damped(0.1, k)
     }
 
-    /// The same with another damping.
+    /// Returns this system with another damping.
     fn damped(c: f64, k: f64) -> System {
         let one = |value: f64| DMatrix::from_element(1, 1, value);
         let structure = Structure::new(vec!["m".into()], one(1.0), one(c), one(1.0)).unwrap();
@@ -492,7 +507,8 @@ mod tests {
         System::builder(structure).joint("stop", stop, axes).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
     }
 
-    /// The same equation by the classical Runge-Kutta method: largest displacement, and the states after the last periods of the drive.
+    /// Integrates the equation by the classical Runge-Kutta method. Returns the largest
+    /// displacement and the states after the last periods.
     fn followed(k: f64, omega: f64) -> (f64, Vec<f64>) {
         let steps = 2000;
         let h = TAU / omega / f64::from(steps);
@@ -514,8 +530,8 @@ mod tests {
         (largest, ends.split_off(394))
     }
 
-    /// Where the motion takes two or three periods of the drive, such orbits are found, and are stable; the one that repeats after one period
-    /// is not, and says so.
+    /// Orbits of two and three excitation periods are found and are stable. The orbit that
+    /// repeats after one period reports that it is unstable.
     #[test]
     fn motions_of_several_periods_are_found() {
         for (k, omega, periods) in [(4.0, 2.6, 2), (10.0, 2.2, 3)] {
@@ -528,7 +544,7 @@ mod tests {
                 let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
                 assert_eq!(orbit.periods, periods);
                 near(orbit.period(), periods as f64 * TAU / omega, 1e-14);
-                // the grid of the other integration misses the turning point by up to (h v')²
+                // the Runge-Kutta grid misses the turning point by up to (h v')²
                 near(orbit.places[0].maximum, largest, 1e-5);
                 assert_eq!(orbit.is_stable(), Some(true));
                 let T { start, later } = T::of(&orbit, omega);
@@ -542,7 +558,8 @@ mod tests {
         }
     }
 
-    /// A sweep comes to the motions of two periods along the orbit that repeats after one, which is unstable there, and leaves it.
+    /// A sweep reaches the orbits of two periods along the orbit of one period, which is
+    /// unstable there, and leaves it.
     #[test]
     fn a_neighbour_does_not_keep_a_search_on_an_unstable_orbit() {
         let system = stopped(4.0);
@@ -562,7 +579,8 @@ mod tests {
         near(amplitudes[2], amplitudes[0], 1e-3);
     }
 
-    /// Who waits for an orbit that nothing is attracted by ends with the reason: a motion of two periods, or next to no damping.
+    /// A search by waiting ends with the reason if nothing attracts the motion: an orbit of
+    /// several periods, or almost no damping.
     #[test]
     fn waiting_ends_where_nothing_settles() {
         let wait = |system: &System, omega: f64| {
@@ -576,7 +594,7 @@ mod tests {
         assert_eq!(wait(&damped(1e-7, 0.5), 1.7), (4096, None));
     }
 
-    /// Displacements at the start and one period of the drive later.
+    /// Displacements at the start and one excitation period later.
     struct T {
         start: f64,
         later: f64,

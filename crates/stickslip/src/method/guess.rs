@@ -1,5 +1,8 @@
-//! A first guess of an orbit: every joint as the complex stiffness that its first harmonic has. A law of several directions that has a
-//! stiffness at rest is taken with that; one that has none, rigid friction, with the same complex stiffness along all of them.
+//! Initial guess of an orbit by describing functions: each joint acts as the complex stiffness
+//! of its first harmonic.
+//!
+//! A law of several directions uses its small-motion stiffness. Rigid friction in several
+//! directions uses the same complex stiffness along all of them.
 
 use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 use crate::model::System;
@@ -7,20 +10,20 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
-/// Rounds of the fixed-point iteration; it only has to come near.
+/// Most rounds of the fixed-point iteration; a rough result is enough.
 const ROUNDS: usize = 60;
-/// The guess has settled when no joint's amplitude changes by more than this fraction.
+/// The iteration stops when no amplitude of a joint changes by more than this fraction.
 const SETTLED: f64 = 1e-3;
 
-/// Displacements per harmonic and joint forces per harmonic.
+/// Displacements by harmonic, and the stiffness of each joint.
 pub(crate) struct Guess {
-    /// (frequency hΩ, complex displacements).
+    /// Pairs of the frequency hΩ and the complex displacements.
     pub harmonics: Vec<(f64, DVector<Complex64>)>,
     /// Complex stiffness of each joint, directions × directions.
     pub joints: Vec<DMatrix<Complex64>>,
 }
 
-/// Complex stiffness at amplitude `a`, directions × directions, N/m.
+/// Returns the complex stiffness at amplitude `a`, directions × directions, N/m.
 fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
     let d = law.directions();
     let along = match law.prox() {
@@ -34,7 +37,8 @@ fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
     DMatrix::from_diagonal_element(d, d, along)
 }
 
-/// Complex stiffness of small motions about rest, directions × directions, N/m; zero of a law that tells none.
+/// Returns the complex stiffness of small motions about rest, directions × directions, N/m. It
+/// is zero for a law without a step and a rate.
 pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
     let d = law.directions();
     let zero = Complex64::new(0.0, 0.0);
@@ -51,7 +55,7 @@ pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
     rate.linearise(d, &Relative { displacement: rest, velocity: rest }, &vec![0.0; states], &mut point);
     let s = Complex64::new(0.0, omega);
     let by_motion = |slope: &[f64], b: usize| s * slope[d + b] + slope[b];
-    // s z = g_u u + g_v s u + g_z z
+    // `s z = g_u u + g_v s u + g_z z`
     let matrix =
         DMatrix::from_fn(states, states, |i, k| (if i == k { s } else { zero }) - point.rate_slope(i)[2 * d + k]);
     let right = DMatrix::from_fn(states, d, |i, b| by_motion(point.rate_slope(i), b));
@@ -64,7 +68,8 @@ pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
 }
 
 impl Guess {
-    /// Describing-function iteration at drive frequency `omega`; zero displacements where it fails.
+    /// Iterates the describing functions at the excitation frequency `omega`. The displacements
+    /// are zero where the linear system is singular.
     pub fn new(system: &System, omega: f64) -> Guess {
         let n = system.dofs();
         let excitation = system.excitation(omega);
@@ -119,7 +124,7 @@ impl Guess {
     fn response(&self, system: &System, h: u32, omega: f64, mut force: DVector<Complex64>) -> DVector<Complex64> {
         let n = system.dofs();
         if n == 0 {
-            return force; // a joint that is only moved; an elimination without unknowns is refused below
+            return force; // no structure, only a moved joint; the elimination below needs unknowns
         }
         let s = Complex64::new(0.0, f64::from(h) * omega);
         let mut dynamic = DMatrix::from_fn(n, n, |i, k| {
@@ -147,7 +152,7 @@ impl Guess {
             .unwrap_or_else(|| DVector::from_element(n, Complex64::new(0.0, 0.0)))
     }
 
-    /// Force along an axis of a joint, by their numbers, at a harmonic and its displacements, N.
+    /// Returns the force along an axis of a joint at a harmonic with its displacements, N.
     pub fn force(
         &self,
         system: &System,
@@ -158,7 +163,7 @@ impl Guess {
         axes.map(|(b, along)| self.joints[joint][(axis, b)] * (along.along_complex(x) + along.imposed_at(h))).sum()
     }
 
-    /// Displacements and velocities at t = 0, length 2n.
+    /// Returns displacements and velocities at t = 0, length 2n.
     pub fn state(&self, n: usize) -> Vec<f64> {
         let mut state = vec![0.0; 2 * n];
         for (rate, x) in &self.harmonics {

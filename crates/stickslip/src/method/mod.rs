@@ -1,8 +1,10 @@
-//! Methods: from a system and a drive frequency to an orbit.
+//! Methods that turn a system and an excitation frequency into an orbit.
 //!
-//! A method is named with options in a study file; [`TABLE`] lists them: `auto`, which picks one, and those of `list.rs`. To add one: write its file,
-//! then one line there.
-//! Of a [`Method`], [`Method::solver`] makes a [`Solver`] for one system, which keeps what can be reused from orbit to orbit.
+//! A study file names a method with its options. [`TABLE`] lists `auto`, which picks a method,
+//! and the methods of `list.rs`. To add a method, write its file and add one line to `list.rs`.
+//!
+//! [`Method::solver`] makes a [`Solver`] for one system. The solver keeps data that it can
+//! reuse from orbit to orbit.
 
 mod advice;
 mod assembly;
@@ -45,7 +47,7 @@ pub use static_equilibrium::StaticEquilibrium;
 pub use traits::{Choice, Method, MethodInfo, Solver};
 pub use ways::Ways;
 
-/// Every method there is.
+/// All methods: `auto` and the rows of `list.rs`.
 pub const TABLE: &[MethodInfo] = &{
     let mut table = [auto::INFO; 1 + LIST.len()];
     let mut row = 0;
@@ -56,7 +58,7 @@ pub const TABLE: &[MethodInfo] = &{
     table
 };
 
-/// The method with this name.
+/// Returns the method with this name, or `None` if the table has no such row.
 pub fn find(name: &str) -> Option<&'static MethodInfo> {
     TABLE.iter().find(|method| method.name == name)
 }

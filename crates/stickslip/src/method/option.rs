@@ -1,4 +1,4 @@
-//! Options of methods: keys in `[method]`, and those that several of them have.
+//! Options of methods: keys in `[method]`, and the options that several methods share.
 
 use super::MethodError;
 use crate::dimension::Dimension;
@@ -11,13 +11,13 @@ pub struct MethodOption {
     pub key: &'static str,
     /// Physical dimension.
     pub dimension: Dimension,
-    /// Whether it is a count: a whole number from 1.
+    /// True if the value is a count: a whole number from 1.
     pub count: bool,
-    /// One line, with what happens when it is absent.
+    /// One line that says what the option does, and its default.
     pub doc: &'static str,
 }
 
-/// How many periods of the drive an orbit takes.
+/// The option for the number of excitation periods in one period of the orbit.
 pub(super) const PERIOD: MethodOption = MethodOption {
     key: "period",
     dimension: Dimension::NONE,
@@ -25,10 +25,10 @@ pub(super) const PERIOD: MethodOption = MethodOption {
     doc: "periods of the drive after which the motion repeats; motions that repeat earlier are found too; 1 when absent",
 };
 
-/// Most periods of the drive that one of the motion may take: more are another motion than one that repeats.
+/// Upper bound of [`PERIOD`]; a longer motion does not count as periodic.
 const MOST_PERIODS: f64 = 100.0;
 
-/// The option [`PERIOD`] of a method.
+/// Reads the option [`PERIOD`] of a method.
 pub(super) fn periods(method: &'static str, options: &Options) -> Result<usize, MethodError> {
     let periods = options.get(PERIOD.key).copied().unwrap_or(1.0);
     if (1.0..=MOST_PERIODS).contains(&periods) {
@@ -38,10 +38,10 @@ pub(super) fn periods(method: &'static str, options: &Options) -> Result<usize, 
     Err(MethodError::option(method, PERIOD.key, message))
 }
 
-/// The key of the velocity over which exact laws are smoothed, of the methods that can do so.
+/// Key of the velocity over which methods smooth exact laws.
 pub const WIDTH: &str = "width";
 
-/// The option [`WIDTH`] of a method, m/s.
+/// Reads the option [`WIDTH`] of a method, m/s.
 pub(super) fn width(method: &'static str, options: &Options) -> Result<Option<f64>, MethodError> {
     match options.get(WIDTH).copied() {
         Some(width) if !(width.is_finite() && width > 0.0) => {
@@ -53,5 +53,5 @@ pub(super) fn width(method: &'static str, options: &Options) -> Result<Option<f6
     }
 }
 
-/// Options of a method that were given, by key, SI.
+/// The given options of a method: SI values by key.
 pub type Options = BTreeMap<String, f64>;

@@ -1,8 +1,10 @@
-//! Newton's method on the return map: the state that comes back to itself after a period, or to its mirror image after half.
+//! Newton's method on the return map: `z = R(z)` after one period, or `z = -R(z)` after half a
+//! period.
 //!
-//! Friction only dissipates, so the return map `R` does not increase the energy distance of two motions and `I - R` is monotone.
-//! Newton's method uses its exact derivative; where the map has kinks and the step does not help, iterating the map itself
-//! (letting the transient die) always comes closer, and Newton goes on from there.
+//! Friction only dissipates, so the return map `R` does not increase the energy distance of two
+//! motions, and `I - R` is monotone. Newton's method uses the exact derivative of `R`. At kinks
+//! of the map a Newton step may fail. The solver then iterates the map itself, which lets the
+//! transient decay, and starts Newton's method again.
 
 use super::{Breakdown, OrbitError};
 use crate::model::System;
@@ -11,31 +13,37 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 use stickslip_numerics::eigen;
 
-/// A flow that can be returned.
+/// A map from a state to its state after one return.
 pub(crate) trait ReturnMap {
-    /// Replaces `state` by its return, and `derivative` by that of the return with respect to the state.
+    /// Replaces `state` by its return, and `derivative` by the derivative of the return by the
+    /// state.
     fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown>;
-    /// Weights of the energy norm, one per state.
+    /// Returns the weights of the energy norm, one per state.
     fn weights(&self) -> &[f64];
-    /// Tells it that the last return changed the state by `change`, relative; infinite before the first. Who chooses steps anew in every return
-    /// errs otherwise in each, so that a motion may go round in what steps do, for ever: when it moves by no more, it must go in the same steps.
+    /// Reports the relative change of the state in the last return; infinite before the first.
+    ///
+    /// A flow that chooses new steps in every return has a different error in each, so the
+    /// iteration may never settle. Once the change is as small as this error, the flow must
+    /// keep its steps.
     fn moves(&mut self, _change: f64) {}
 }
 
-/// What the iteration aims at, and how long it may take.
+/// Targets of the iteration.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Aim {
-    /// Name, for errors.
+    /// Name of the method, for errors.
     pub method: &'static str,
-    /// Drive frequency, rad/s.
+    /// Excitation frequency, rad/s.
     pub omega: f64,
-    /// Residual relative to the state at which the orbit is closed.
+    /// Residual, relative to the state, at which the orbit is closed.
     pub residual: f64,
-    /// Estimated distance to the orbit, relative to the state, above which a closed one is brought nearer by one more step.
+    /// Estimated distance to the orbit, relative to the state, above which a closed orbit gets
+    /// one more Newton step.
     pub distance: f64,
-    /// +1: the return is the state; -1: its mirror image.
+    /// +1 if the return equals the state, -1 if it equals its mirror image.
     pub sign: f64,
-    /// Energy norm below which a state counts as rest, √J: residuals are relative to the state or to this.
+    /// Energy norm below which a state counts as at rest, √J. Residuals are relative to the
+    /// larger of this and the norm of the state.
     pub rest: f64,
 }
 
@@ -43,32 +51,35 @@ pub(crate) struct Aim {
 #[derive(Debug)]
 pub(crate) struct Closed {
     pub state: Vec<f64>,
-    /// The state less what returns.
+    /// The state minus its return.
     pub gap: DVector<f64>,
-    /// Derivative of the return map (with its sign as it is, not mirrored).
+    /// Derivative of the return map, without the sign of the mirror image.
     pub derivative: DMatrix<f64>,
     pub residual: f64,
     pub iterations: usize,
-    /// Estimated distance to the orbit relative to the state, where the search stopped before it was at rounding.
+    /// Estimated distance to the orbit, relative to the state, if the search stopped before
+    /// rounding.
     pub missing: Option<f64>,
 }
 
-/// How the state that returns to itself is looked for.
+/// The algorithm that searches for the closed orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Search {
     /// Newton's method.
     Newton,
-    /// Waiting until the transient has died.
+    /// Iteration of the map until the transient has decayed.
     Settle {
-        /// Estimated distance to the orbit, relative to the state, at which it counts as dead.
+        /// Estimated distance to the orbit, relative to the state, at which the transient
+        /// counts as decayed.
         tolerance: f64,
-        /// Returns after which the search is given up.
+        /// Most returns.
         returns: usize,
     },
 }
 
 impl Search {
-    /// The return that is closed. A stuck contact keeps its offset, which half a period would mirror for ever: who waits, waits for whole periods.
+    /// Returns the symmetry of the return. A stuck contact keeps its offset, and half a period
+    /// would mirror it in every return; iteration therefore uses whole periods.
     pub fn symmetry(self, system: &System, periods: usize) -> Symmetry {
         match self {
             Search::Newton => Symmetry::of(system, periods),
@@ -76,7 +87,7 @@ impl Search {
         }
     }
 
-    /// The search of a vibration that has this share of the size of its states.
+    /// Returns the search for a vibration that is this fraction of the size of its states.
     pub fn of_share(self, share: f64) -> Search {
         match self {
             Search::Newton => Search::Newton,
@@ -84,8 +95,9 @@ impl Search {
         }
     }
 
-    /// From the state of a neighbouring orbit if there is one of the right length and it leads anywhere, else from a first guess, and from rest where
-    /// that is far beyond what the loads do and leads nowhere: a resonance that friction holds does not get there.
+    /// Searches from the neighbour's state if it has the right length, else or on failure from
+    /// the initial guess. If that fails too and the guess is far beyond the response to the
+    /// loads, searches from zero: friction may suppress the resonance of the guess.
     pub fn find<M: ReturnMap>(
         self,
         map: &mut M,
@@ -108,7 +120,7 @@ impl Search {
         }
     }
 
-    /// From `start` to the closed orbit.
+    /// Closes the orbit from `start`.
     pub fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
         match self {
             Search::Newton => close(map, start, aim),
@@ -117,11 +129,11 @@ impl Search {
     }
 }
 
-/// Returns by which a motion comes near an orbit that repeats after several periods, before Newton's method begins: it would find one that
-/// repeats after one period first.
+/// Number of returns before Newton's method for an orbit of several periods. Newton's method
+/// alone would first find an orbit of one period.
 pub(crate) const APPROACH: usize = 60;
 
-/// The state to which one comes by itself after a while.
+/// Iterates the map [`APPROACH`] times and returns the state.
 pub(crate) fn approached(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64) -> Vec<f64> {
     for _ in 0..APPROACH {
         let mut next = state.clone();
@@ -133,15 +145,18 @@ pub(crate) fn approached(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64
     state
 }
 
-/// Returns over which the rate of decay is measured: beats of neighbouring modes average out.
+/// Most returns over which the decay is measured; beats of neighbouring modes average out.
 const DECAY_WINDOW: usize = 256;
-/// The first, short window, and by how much windows grow: who has died early is not waited for. Beats do not average out over it, so that the
-/// derivative of the return is asked too.
+/// The first window, so that a fast decay ends the search early. Beats do not average out over
+/// it, so the derivative of the return is checked too.
 const FIRST_WINDOW: usize = 8;
 
-/// Iterates the return map. "The period changed by little" proves nothing where a motion creeps: with the decay rate `ρ` per return, measured
-/// over a window, a change `d` leaves about `d ρ / (1 - ρ)` to go, and that is what must be small. Windows grow up to [`DECAY_WINDOW`]; what a
-/// shorter one says must also be what the derivative of the return says, which knows of beats and of creeping.
+/// Iterates the return map until the transient has decayed.
+///
+/// A small change per return proves nothing if the motion creeps. With the decay rate `ρ` per
+/// return, measured over a window, a change `d` leaves a distance of about `d ρ / (1 - ρ)`.
+/// This distance must be small. Windows grow up to [`DECAY_WINDOW`]. The estimate of a shorter
+/// window must agree with that of the derivative of the return, which covers beats and creep.
 fn settle(
     map: &mut dyn ReturnMap,
     start: &[f64],
@@ -152,7 +167,7 @@ fn settle(
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let n = start.len();
     let mut state = start.to_vec();
-    let mut changes = Vec::new(); // of every return, relative to the state
+    let mut changes = Vec::new(); // relative change of the state in every return
     let mut last_states = VecDeque::with_capacity(MOST_REPEATS + 1);
     let mut hopeless = 0;
     let mut smallest = f64::INFINITY;
@@ -168,7 +183,8 @@ fn settle(
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let residual = norm(map.weights(), &change) / size;
         if residual.is_nan() {
-            return Err(broke(Breakdown::OutOfRange { time: 0.0 })); // no later return has a size either
+            // later returns have no size either
+            return Err(broke(Breakdown::OutOfRange { time: 0.0 }));
         }
         if too_large(size, aim) {
             return Err(OrbitError::not_converged(aim.method, aim.omega, count, 1.0));
@@ -183,7 +199,7 @@ fn settle(
                 let apart: Vec<f64> = state.iter().zip(earlier).map(|(a, b)| a - aim.sign * b).collect();
                 norm(map.weights(), &apart) / size
             };
-            // the first of them is one return ago
+            // the first of these states is one return old
             let repeats = last_states.iter().position(|earlier| distance(earlier) <= REPEATS * residual);
             let needed = returns_needed(&changes, tolerance);
             hopeless = if needed <= (returns - count) as f64 { 0 } else { hopeless + 1 };
@@ -204,7 +220,7 @@ fn settle(
         let Some(window) = window(count) else { continue };
         let of = |last: usize| changes[count - last - window..count - last].iter().sum::<f64>();
         let (earlier, last) = (of(window), of(0));
-        // the decay of a whole window; all later windows together move the state by a geometric series of this one
+        // decay over a whole window; all later changes form a geometric series
         let decay: f64 = if earlier > 0.0 { last / earlier } else { 0.0 };
         let mut missing = if decay < 1.0 { last * decay / (1.0 - decay) } else { f64::INFINITY };
         let at_rounding = last <= window as f64 * ROUNDING;
@@ -227,7 +243,8 @@ fn settle(
     Err(OrbitError::not_converged(aim.method, aim.omega, returns, smallest))
 }
 
-/// The window over which the decay is measured after so many returns: half of them while they are few, and then every [`DECAY_WINDOW`].
+/// Returns the window for the decay after this number of returns: half of them at first, then
+/// [`DECAY_WINDOW`].
 fn window(count: usize) -> Option<usize> {
     if count >= 2 * DECAY_WINDOW {
         return count.is_multiple_of(DECAY_WINDOW).then_some(DECAY_WINDOW);
@@ -235,16 +252,18 @@ fn window(count: usize) -> Option<usize> {
     count.is_multiple_of(2 * FIRST_WINDOW).then_some(count / 2)
 }
 
-/// Returns after which it is first asked whether the motion settles at all, and then whenever they have doubled. It must look hopeless so many
-/// times in a row: beats of neighbouring modes rise and fall, and do not over windows that grow.
+/// Number of returns before the first check for progress; later checks follow whenever it
+/// doubles. The search fails after [`HOPELESS`] negative checks in a row. Beats of neighbouring
+/// modes rise and fall, but not over growing windows.
 const PATIENCE: usize = 1024;
 const HOPELESS: usize = 3;
-/// Returns that are looked at for a motion that repeats after several, and share of the change of one return below which it does.
+/// Most periods of a repeating motion that the check detects, and the largest distance of two
+/// repetitions relative to the change of one return.
 const MOST_REPEATS: usize = 8;
 const REPEATS: f64 = 1e-3;
 
-/// Returns after which a motion reaches the tolerance if its changes go on to fall as they fell over the last half of all
-/// returns; infinite where they did not fall.
+/// Returns the number of further returns to the tolerance if the changes keep their decay over
+/// the last half of all returns. Infinite if they do not decay.
 fn returns_needed(changes: &[f64], tolerance: f64) -> f64 {
     let window = changes.len() / 4;
     let of = |last: usize| changes[changes.len() - last - window..changes.len() - last].iter().sum::<f64>();
@@ -260,32 +279,35 @@ fn returns_needed(changes: &[f64], tolerance: f64) -> f64 {
     (window as f64 * (missing / tolerance).ln() / -decay.ln()).max(0.0)
 }
 
-/// A change per return below this is rounding.
+/// A change per return below this value is rounding.
 const ROUNDING: f64 = 1e-14;
 
-/// Newton iterations in all; a warm start takes 2 to 4, a cold one 5 to 15.
+/// Most Newton iterations. A search takes 2 to 4 with a warm start and 5 to 15 without.
 const ITERATIONS: usize = 60;
-/// Times that the transient is let die before the search is given up.
+/// Most phases of iterating the map before the search fails.
 const RESCUES: usize = 6;
-/// Halvings of a Newton step before the transient is let die instead.
+/// Most halvings of a Newton step before a phase of iterating the map.
 const HALVINGS: i32 = 4;
-/// Returns by which the transient dies between Newton attempts.
+/// Number of returns in the first phase; each later phase is longer by half.
 const RETURNS: usize = 40;
-/// A state this many times larger than rest (10^7 times what the loads do statically) is no orbit that could be checked.
+/// A state larger than rest by this factor (10^7 times the static response) cannot be checked.
 const LARGEST: f64 = 1e10;
-/// A first guess this many times larger than rest (10^3 times what the loads do statically) may be a resonance that friction does not let happen.
+/// An initial guess larger than rest by this factor (10^3 times the static response) may be a
+/// resonance that friction suppresses.
 const FAR: f64 = 1e6;
 
-/// Whether a state is so large that the work of the loads drowns in rounding, and a return changes nothing of it: an undamped resonance.
+/// Returns true if the state of an undamped resonance is so large that the work of the loads is
+/// lost in rounding.
 fn too_large(size: f64, aim: Aim) -> bool {
     aim.rest > 0.0 && size > LARGEST * aim.rest
 }
-/// A step must leave at most this share of the residual.
+/// A Newton step must leave at most this fraction of the residual.
 const DECREASE: f64 = 0.95;
 /// Singular values below this fraction of the largest belong to the continuum of stick offsets.
 const CONTINUUM: f64 = 1e-10;
 
-/// Newton's method, and where it comes no further, letting the transient die before the next attempt.
+/// Closes an orbit by Newton's method. Where it stalls, lets the transient decay before the
+/// next attempt.
 pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
@@ -312,8 +334,11 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
     Err(OrbitError::not_converged(aim.method, aim.omega, iterations, smallest))
 }
 
-/// A closed orbit with one more step where its estimated distance to the orbit asks for it: near a resonance residuals are a small share of that, and
-/// curves would go with the way on which they were closed.
+/// Adds one Newton step to a closed orbit if its estimated distance to the orbit exceeds
+/// `aim.distance`.
+///
+/// Near a resonance the residual is a small fraction of that distance, and the result would
+/// depend on the path of the iteration.
 fn nearer(map: &mut dyn ReturnMap, closed: Closed, aim: Aim) -> Result<Closed, OrbitError> {
     if closed.residual <= ROUNDING || aim.distance == f64::INFINITY {
         return Ok(closed);
@@ -331,38 +356,47 @@ fn nearer(map: &mut dyn ReturnMap, closed: Closed, aim: Aim) -> Result<Closed, O
             return Ok(Closed { state, gap, derivative, residual, iterations: closed.iterations + 1, missing: None });
         }
     }
-    // the last run is that of the closed state
+    // the last run must be that of the closed state
     derivative.fill_with_identity();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     evaluate(map, &closed.state, aim, &mut derivative).map_err(broke)?;
     Ok(closed)
 }
 
-/// What one whole step may multiply the residual by: beyond a kink the next one mostly arrives, where shortened ones would creep up to it. Where
-/// shortened steps have success the residual of the whole ones grows to less than twice.
+/// Largest factor by which one full step may increase the residual. Beyond a kink the next step
+/// mostly converges, where shortened steps would creep up to the kink. Where shortened steps
+/// succeed, the full steps increase the residual less than twofold.
 const WILD: f64 = 3.0;
 
-/// Share of the residual that a whole step leaves before a double root: a quarter where the distance is halved, a third where the period begins in slip.
-/// Such a root is the edge of a continuum of stick offsets: a motion that creeps towards it slips by the square of what is missing, so that the residual
-/// is at rounding where half of the digits are, and what slip is left fails the energy balance.
+/// Range of the residual ratio of a full step near a double root: 1/4 where the distance
+/// halves, 1/3 where the period begins in slip.
+///
+/// Such a root is the edge of a continuum of stick offsets. A motion that creeps towards it
+/// slips by the square of its distance. The residual reaches rounding when only half of the
+/// digits are correct, and the remaining slip fails the energy balance.
 const HALVES: std::ops::Range<f64> = 0.2..0.4;
-/// After two such steps in a row, how many of them are taken at once: two to the root, and a little on to where the contact sticks. What returns from
-/// there is at rest.
+/// Number of full steps taken at once after two such steps in a row: two lead to the root, the
+/// rest into the range where the contact sticks. The return from there is at rest.
 const ONTO: f64 = 2.125;
-/// Share of the residual that this must leave at most: a contact that sticks leaves nothing, one that slips on the other side some thousandths.
+/// Largest ratio of the residuals after and before this step. A stuck contact leaves no
+/// residual; a contact that slips on the other side leaves some thousandths.
 const MOSTLY: f64 = 1e-3;
 
-/// What is done where a whole step multiplies the residual by more than [`WILD`].
+/// Reaction to a full step that increases the residual by more than [`WILD`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Beyond {
-    /// The step is shortened.
+    /// The solver shortens the step.
     Shortens,
-    /// The search ends: steps of an integration that jump over the layers of a law, so that its derivative means nothing.
+    /// The search ends. The integration steps jump over the layers of a law, so the derivative
+    /// is meaningless.
     Ends,
 }
 
-/// Steps of Newton's method, shortened where they do not help, until the orbit is closed, no step leaves less of the residual, one goes too far for
-/// `beyond`, or `iterations` have been used up: how far it came. One whole step may multiply the residual by [`WILD`].
+/// Takes Newton steps, shortened where they fail, and returns the last state.
+///
+/// It stops when the orbit is closed, when no step reduces the residual enough, when a step
+/// goes too far for `beyond`, or after [`ITERATIONS`]. One full step may increase the residual
+/// by [`WILD`].
 pub(crate) fn descended(
     map: &mut dyn ReturnMap,
     start: &[f64],
@@ -372,12 +406,13 @@ pub(crate) fn descended(
 ) -> Result<Closed, OrbitError> {
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
-    // a motion that is integrated may take for ever from where a bold step leads, unless the search ends there
+    // a single increase is allowed only for cheap maps: an integration may take forever from a
+    // remote state
     let (mut state, mut bold) = (start.to_vec(), beyond == Beyond::Ends || aim.distance.is_finite());
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
-    let mut left = None; // where the bold step began, until another has come nearer than that
-    let mut shares = [1.0; 2]; // of the residual, which the last two steps left
+    let mut left = None; // state before the single increase, until the residual is below that again
+    let mut shares = [1.0; 2]; // residual ratios of the last two steps
     loop {
         *iterations += 1;
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
@@ -424,7 +459,7 @@ pub(crate) fn descended(
             }
         }
         if !accepted {
-            // a bold step that led nowhere is taken back
+            // undo the single increase, since no later step improved on it
             if residual > aim.residual
                 && *iterations < ITERATIONS
                 && beyond == Beyond::Shortens
@@ -438,7 +473,7 @@ pub(crate) fn descended(
     }
 }
 
-/// `z - sign · R(z)`, with the derivative of R.
+/// Returns `z - sign · R(z)` and the derivative of R.
 fn evaluate(
     map: &mut dyn ReturnMap,
     state: &[f64],
@@ -453,10 +488,10 @@ fn evaluate(
     Ok(DVector::from_iterator(state.len(), state.iter().zip(&end).map(|(z, e)| z - aim.sign * e)))
 }
 
-/// `-(I - sign · R')⁻¹ gap`; of least energy norm where the matrix is singular.
+/// Returns `-(I - sign · R')⁻¹ gap`, of least energy norm if the matrix is singular.
 pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights: &[f64]) -> DVector<f64> {
     let n = gap.len();
-    // in energy coordinates, so that singular values and the least norm mean something
+    // energy coordinates give the singular values and the least norm a meaning
     let scaled = || {
         DMatrix::from_fn(n, n, |i, j| {
             let identity = if i == j { 1.0 } else { 0.0 };
@@ -470,7 +505,8 @@ pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f
     let solution = if n > 0 && least > CONTINUUM * most {
         lu.solve(&right)
     } else {
-        // numbers out of range have no least step: the transient is let die instead
+        // values out of range have no singular value decomposition; the step is then one
+        // iteration of the map
         eigen::singular(scaled()).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
     };
     let mut step = solution.unwrap_or_else(|| right.clone());
@@ -480,7 +516,7 @@ pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f
     step
 }
 
-/// Energy norm.
+/// Returns the energy norm.
 pub(crate) fn norm(weights: &[f64], vector: &[f64]) -> f64 {
     weights.iter().zip(vector).map(|(w, z)| (w * z) * (w * z)).sum::<f64>().sqrt()
 }

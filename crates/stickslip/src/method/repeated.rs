@@ -1,12 +1,14 @@
-//! Motions that repeat after several periods of the drive, sought again where the neighbour leads to an unstable one.
+//! Second search for orbits of several excitation periods, used where a warm start leads to an
+//! unstable orbit.
 //!
-//! The orbit that repeats after one period is there at all frequencies, and a search that starts from its neighbour stays on it, also where it is
-//! unstable and the motion that is stable repeats after several. A search without a neighbour follows the motion in time for a while first.
+//! The orbit that repeats after one period exists at all frequencies. A warm-started search
+//! stays on it even where it is unstable and the stable orbit repeats after several periods. A
+//! search without a warm start first integrates the motion for a while.
 
 use super::{OrbitError, Solver};
 use crate::orbit::Orbit;
 
-/// A solver of orbits of several periods that looks afresh where it finds an unstable one from a neighbour.
+/// A solver that searches again without a warm start if the warm-started orbit is unstable.
 pub(crate) struct Afresh<S>(pub S);
 
 impl<S: Solver> Solver for Afresh<S> {
@@ -15,7 +17,8 @@ impl<S: Solver> Solver for Afresh<S> {
         if start.is_none() || near.is_stable() != Some(false) {
             return Ok(near);
         }
-        // of two unstable ones that which takes all the periods that were asked for: the other is known to lead away from itself
+        // prefer, of two unstable orbits, the one of more periods; the motion is known to leave
+        // the other
         let better = |afresh: &Orbit| afresh.is_stable() == Some(true) || afresh.repeats() > near.repeats();
         Ok(self.0.orbit(omega, None).ok().filter(better).unwrap_or(near))
     }

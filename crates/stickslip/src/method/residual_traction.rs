@@ -1,11 +1,16 @@
-//! Which orbit of a continuum: sliders that never slip stay where static equilibrium has left them.
+//! Choice of one orbit from a continuum: permanently stuck sliders keep their static
+//! equilibrium.
 //!
-//! A slider behind a spring that does not slip over the whole period, `kt (u_max - u_min) <= 2 limit`, remembers for ever where its spring is
-//! relaxed: the return map has a multiplier of one, and every such place `o` within reach has its orbit. Where the motion is its own mirror image
-//! `o` is zero; elsewhere the mean depends on it, and where a gap or another law knows positions so does everything else. All methods choose
-//! `o = u_s - f_s/kt` of static equilibrium ([`super::static_equilibrium`]), or the nearest place at which the limit is not passed. Harmonic
-//! balance finds this orbit by itself; Newton's method on a return map comes to any of them, and is led to this one here, with the rows of
-//! such sliders replaced by `z = kt (u - o)`, and `o` iterated.
+//! Consider a slider behind a spring that does not slip over the whole period:
+//! `kt (u_max - u_min) <= 2 limit`. It keeps the place `o` at which its spring is relaxed. The
+//! return map then has a multiplier of one, and every possible `o` has its own orbit. If the
+//! motion is its own mirror image, `o` is zero. Otherwise the mean depends on `o`; with a gap
+//! or another law of position, so does the whole motion.
+//!
+//! All methods choose `o = u_s - f_s/kt` of static equilibrium ([`super::static_equilibrium`]),
+//! or the nearest place that respects the limit. Harmonic balance finds this orbit directly.
+//! Newton's method on a return map may find any orbit of the continuum. This file replaces the
+//! rows of such sliders by `z = kt (u - o)` and iterates `o`.
 
 use super::OrbitError;
 use super::periodic::{Aim, Closed, ReturnMap, close};
@@ -15,36 +20,39 @@ use crate::orbit::{Breakdown, Orbit, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::eigen;
 
-/// Rounds of the iteration on the places where springs are relaxed; without gaps one or two are enough, with them a few more.
+/// Most rounds of the iteration for the relaxed places. One or two are enough without gaps, a
+/// few more with gaps.
 const ROUNDS: usize = 40;
-/// Force by which a spring may miss its place, in slip limits: a hundred times what orbits of equal steps are closed to.
+/// Tolerance on the force of a spring, in slip limits: 100 times the residual of orbits in
+/// equal steps.
 const RELAXED: f64 = 1e-8;
-/// Rounds that are looked back at to extrapolate: more than there are gaps that open and close is of no use.
+/// Most earlier rounds for the extrapolation; more are useless with few gaps that open and
+/// close.
 const LOOK_BACK: usize = 4;
-/// Differences between rounds below this fraction of the largest are no direction of their own.
+/// Differences between rounds below this fraction of the largest count as zero.
 const SAME: f64 = 1e-8;
-/// While a slider is held its limit is so many times higher: on the way it may pass what it must not in the end.
+/// Factor on the limit of a held slider, which may pass its limit during the iteration.
 const HOLDS: f64 = 1e3;
 
-/// A slider behind a spring in a flow.
+/// A slider in series with a spring, in a flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ElasticSlider {
     pub joint: usize,
     /// Index of its force in the state of the flow.
     pub state: usize,
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness: f64,
-    /// N.
+    /// Slip limit, N.
     pub limit: f64,
 }
 
-/// A slider that is held for the whole period, and where its spring is relaxed.
+/// A slider that is held for the whole period, and the place of its relaxed spring.
 #[derive(Debug, Clone)]
 struct Pin {
     spring: ElasticSlider,
-    /// Of the displacements onto the joint.
+    /// Projection of the displacements onto the joint's axis.
     direction: DVector<f64>,
-    /// Displacement at which the spring is relaxed, less what is imposed at t = 0, m.
+    /// Displacement of the relaxed spring minus the imposed motion at t = 0, m.
     place: f64,
 }
 
@@ -55,11 +63,12 @@ impl Pin {
     }
 }
 
-/// A return map with held sliders: instead of returning, their forces are what their places ask for.
+/// A return map with held sliders: their forces follow from the given places instead of the
+/// return.
 struct Pinned<'m> {
     map: &'m mut dyn Closing,
     pins: &'m [Pin],
-    /// The derivative of the last return as it is, without pins.
+    /// Derivative of the last return without the held sliders.
     own: DMatrix<f64>,
 }
 
@@ -87,18 +96,21 @@ impl ReturnMap for Pinned<'_> {
     }
 }
 
-/// A return map that can make orbits of closed states.
+/// A return map that can make orbits from closed states.
 pub(super) trait Closing: ReturnMap {
-    /// Its sliders behind springs.
+    /// Returns its sliders in series with springs.
     fn springs(&self) -> Vec<ElasticSlider>;
-    /// Gives these, which are all of [`Closing::springs`], the limits that they state.
+    /// Sets the limits of the sliders to those in `springs`, which lists all of
+    /// [`Closing::springs`].
     fn limit(&mut self, springs: &[ElasticSlider]);
-    /// The orbit of a state that was closed last.
+    /// Makes the orbit of the last closed state.
     fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError>;
 }
 
-/// The orbit of the continuum that `first` is of in which held sliders stand as in static equilibrium, or unloaded without
-/// one; closed with the same aim. `first` itself if it is alone, or if that orbit is not found.
+/// Returns the orbit of the continuum around `first` in which held sliders keep their static
+/// equilibrium, or are unloaded without one. Closes it with the same targets.
+///
+/// Returns `first` if it is a single orbit, or if the iteration fails.
 pub(super) fn as_in_equilibrium(
     map: &mut dyn Closing,
     (system, equilibrium): (&System, Option<&StaticEquilibrium>),
@@ -163,7 +175,7 @@ struct Held {
     spring: ElasticSlider,
     /// Relative displacement at t = 0, m.
     begin: f64,
-    /// Where its spring is relaxed, and where it ought to be, m.
+    /// Actual and required displacement of the relaxed spring, m.
     is: f64,
     ought: f64,
 }
@@ -174,7 +186,7 @@ impl Held {
     }
 }
 
-/// Where the spring of a slider is relaxed in static equilibrium, m.
+/// Returns the displacement of the relaxed spring of a slider in static equilibrium, m.
 fn place(system: &System, equilibrium: Option<&StaticEquilibrium>, spring: &ElasticSlider) -> f64 {
     let Some(known) = equilibrium else { return 0.0 };
     let axis = &system.joints()[spring.joint].axes()[0];
@@ -194,7 +206,7 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<He
             if high - low > 2.0 * reach {
                 return None;
             }
-            // a slider that stands exactly at its limit slips by rounding
+            // rounding makes a slider slip that is exactly at its limit
             let reach = (reach * (1.0 - 2.0 * RELAXED)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
             let is = begin - orbit.start[spring.state] / spring.stiffness;
@@ -203,7 +215,7 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<He
         .collect()
 }
 
-/// The rounds so far, for as long as the same sliders are held: places and gaps.
+/// Places and gaps of the rounds in which the same sliders are held.
 #[derive(Default)]
 struct Rounds {
     states: Vec<usize>,
@@ -212,7 +224,7 @@ struct Rounds {
 }
 
 impl Rounds {
-    /// The places to try next: where a linear map from places to gaps, as the last rounds show it, has none.
+    /// Returns the next places: those at which a linear map through the last rounds has no gap.
     ///
     /// Source: Walker and Ni (2011), "Anderson acceleration for fixed-point iterations".
     fn next(&mut self, held: &[Held]) -> DVector<f64> {

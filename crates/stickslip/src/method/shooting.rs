@@ -1,8 +1,9 @@
-//! Newton's method on the period of an integration: stiff and of high order for smooth laws, in equal steps for laws that know only steps and for
-//! mixtures.
+//! Shooting: Newton's method on the return map of a time integration.
 //!
-//! The arctan law creeps in stick with time constants of seconds, so that waiting for a transient to die proves nothing; the
-//! return map of the integrator with its exact derivative is closed by Newton's method instead.
+//! Smooth laws use a stiff integration of high order. Laws with a step only, and mixtures, use
+//! equal steps. The arctan law creeps during stick with time constants of seconds, so waiting
+//! for the transient to decay proves nothing. Newton's method with the exact derivative of the
+//! integrator's return map closes the orbit instead.
 
 use super::assembly::{Assembly, NEAR_REST};
 use super::event_driven::MISSING_WORK;
@@ -28,37 +29,47 @@ use std::sync::Arc;
 
 const NAME: &str = "shooting";
 
-/// Relative error per step when none is given: orbits of the paper's couple are then within 1e-7 (see the verification tests).
+/// Default relative error per step. Orbits of the paper's couple are then within 1e-7 (see the
+/// verification tests).
 const TOLERANCE: f64 = 1e-8;
-/// A step with the derivative of that search leaves at most this share of what the one before moved.
+/// Largest ratio of successive steps that reuse the derivative of the search.
 const CLOSER: f64 = 0.3;
-/// Residual of the first search, in which every run chooses its steps anew: the map is then smooth only to about their error.
+/// Residual of the first search. Every run chooses its own steps there, so the map is smooth
+/// only to about their error.
 const NEAR: f64 = 1e-6;
-/// Relative error per step, and residual, of the approach before that search, for orbits that are asked for in shorter steps. Longer ones jump over
-/// layers, and would take two thirds of the time of these.
+/// Smallest relative error per step, and residual, of the coarse search before orbits with
+/// shorter steps. Longer steps jump over the layers of a law and would still take two thirds of
+/// the time.
 const LONG_STEPS: f64 = 1e-8;
 const COARSE_RESIDUAL: f64 = 1e-5;
-/// Residual at which the orbit is closed on the steps of the last free run, on which the map is smooth.
+/// Residual at which the orbit is closed on the fixed steps of the last free run; the map is
+/// smooth on them.
 const CLOSED: f64 = 1e-11;
-/// The same of an orbit between located switches, where every run chooses its steps.
+/// Residual at which an orbit between located switches is closed; every run chooses its own
+/// steps.
 const CLOSED_SWITCHED: f64 = 1e-10;
-/// Meshes made for one orbit: the first is as good as the first search, the second nearly always enough.
+/// Most meshes of steps for one orbit. The first is as good as the first search; the second is
+/// nearly always enough.
 const MESHES: usize = 6;
-/// A mesh is good when closing the orbit on it moves the state by at most this many times the error per step: that is what the
-/// choice of the steps alone does. A motion that is waited for and changes by no more from one return to the next goes on in the same steps.
+/// Largest move, in errors per step, of the state when the orbit is closed on a good mesh. The
+/// choice of the steps alone moves the state by this much. When a settling motion changes by
+/// less per return, it keeps its steps.
 const SETTLED: f64 = 100.0;
-/// Energy gap above which an orbit is not reported as converged, and what the last mesh may move it by, relative.
+/// Largest relative energy gap of a converged orbit, and largest relative move on the last
+/// mesh.
 const ENERGY_GAP: f64 = 1e-5;
-/// Error of an orbit in equal steps, in errors per step of the stiff integration: 1e-5 of the motion when no tolerance is given.
+/// Error of an orbit in equal steps, in errors per step of the stiff integration: 1e-5 of the
+/// motion by default.
 const EQUAL_STEPS: f64 = 1e3;
 /// Residual at which an orbit in equal steps is closed.
 const CLOSED_STEPS: f64 = 1e-10;
-/// Relative error per step, and distance to the orbit, with which a motion is waited for at first: no digits are needed on the way.
+/// Smallest relative error per step, and distance to the orbit, of the first phase of waiting,
+/// which needs no accuracy.
 const COARSE: f64 = 1e-5;
-/// Returns for which it is waited so. What is not near the orbit by then is followed as exactly as the orbit from the start.
+/// Most returns of this phase. If it fails, the motion is integrated accurately from the start.
 const COARSE_RETURNS: usize = 1024;
-/// Orbits in steps of twice the length differ by less than this share of the motion where they are the same one: 256 steps of a period err by 1e-3
-/// at a Q of ten, and in proportion to it.
+/// Largest distance between the same orbit in steps of length h and 2h, relative to the motion.
+/// 256 steps per period have an error of 1e-3 at a Q of ten; the error is proportional to Q.
 const NEIGHBOUR: f64 = 0.1;
 /// Instants of a return at which such orbits are compared.
 const INSTANTS: usize = 8;
@@ -92,7 +103,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     },
 };
 
-/// Shooting on smooth laws.
+/// Method `shooting`: Newton's method on the period of an integration.
 ///
 /// # Example
 /// ```
@@ -109,9 +120,9 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 pub struct Shooting {
     /// Relative error per step of the integration.
     pub tolerance: f64,
-    /// Velocity over which exact laws are smoothed, m/s; without it exact laws are refused.
+    /// Velocity over which exact laws are smoothed, m/s; without it, exact laws are refused.
     pub width: Option<f64>,
-    /// Periods of the drive after which the motion repeats.
+    /// Excitation periods after which the motion repeats.
     pub period: usize,
 }
 
@@ -131,7 +142,7 @@ impl Method for Shooting {
     }
 }
 
-/// How the motion is integrated.
+/// The time integration.
 enum Stepping {
     Smooth(Box<SmoothFlow>),
     Switched(Box<SwitchedFlow>),
@@ -164,17 +175,17 @@ impl Stepping {
     }
 }
 
-/// Finds orbits by integration, with either search.
+/// Finds orbits by time integration, by Newton's method or by waiting until the motion settles.
 pub(super) struct Shooter<'a> {
     system: &'a System,
     shared: Arc<System>,
-    /// The method that it works for.
+    /// Name of the method that uses this solver.
     name: &'static str,
-    /// Search, and relative error per step, of the vibration.
+    /// Search and relative error per step, relative to the vibration.
     asked: (Search, f64),
-    /// The vibration's share of the size of its states.
+    /// Size of the vibration over the size of its states.
     share: f64,
-    /// The same search and error relative to the states.
+    /// Search and relative error per step, relative to the states.
     search: Search,
     tolerance: f64,
     periods: usize,
@@ -182,10 +193,10 @@ pub(super) struct Shooter<'a> {
     weights: Vec<f64>,
     omega: f64,
     duration: f64,
-    /// Energy norm below which a state counts as rest, √J.
+    /// Energy norm below which a state counts as at rest, √J.
     rest: f64,
     contracts: bool,
-    /// Where a motion begins; none where no constant load acts.
+    /// Static equilibrium from which motions begin; `None` if no constant load acts.
     equilibrium: Option<StaticEquilibrium>,
 }
 
@@ -226,12 +237,12 @@ impl Closing for Shooter<'_> {
 
 impl<'a> Shooter<'a> {
     /// # Errors
-    /// A law that no integration takes, a place without mass.
+    /// Fails if no integration takes a law, or if a place has no mass.
     pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
         let stepping = match Kind::integrated(system, options.width) {
             Kind::Incremental => Stepping::Incremental(Box::new(IncrementalFlow::new(system, options.width, name)?)),
             Kind::Switched => Stepping::Switched(Box::new(SwitchedFlow::new(system, options.tolerance, name)?)),
-            // exact laws, if they are meant to be smoothed, are told so by the assembly
+            // the assembly smooths exact laws if a width is given, else it refuses them
             Kind::Smooth | Kind::Exact => {
                 let assembly = super::smooth::assembly(system, options.width, name)?;
                 Stepping::Smooth(Box::new(SmoothFlow::new(assembly, options.tolerance)))
@@ -251,7 +262,7 @@ impl<'a> Shooter<'a> {
             omega: 0.0,
             duration: 0.0,
             rest: 0.0,
-            // smooth neighbours are passive where the exact laws are
+            // the smoothed laws are passive if the exact laws are
             contracts: system.contracts(),
             equilibrium: StaticEquilibrium::under_load(system),
         })
@@ -266,7 +277,7 @@ impl<'a> Shooter<'a> {
         state
     }
 
-    /// The orbit of the search.
+    /// Returns the orbit that the search finds.
     fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: Aim) -> Result<Orbit, OrbitError> {
         let closed = match self.stepping {
             Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
@@ -276,7 +287,8 @@ impl<'a> Shooter<'a> {
         Ok(self.orbit_of(aim.omega, symmetry, closed))
     }
 
-    /// The vibration's share of the size of the state at t = 0; less than `rest` (√J) counts as that.
+    /// Returns the size of the vibration over the size of the state at t = 0; both are at least
+    /// `rest` (√J).
     fn share_in(&self, orbit: &Orbit, rest: f64) -> f64 {
         vibration::share(orbit.path.as_ref(), (orbit.symmetry, orbit.period()), &orbit.start, (&self.weights, rest))
     }
@@ -286,12 +298,14 @@ impl<'a> Shooter<'a> {
         move |cause| OrbitError::Breakdown { method, omega, cause }
     }
 
-    /// The vibration is so small a share of its state that the digits are missing.
+    /// Returns the error that the vibration is too small a fraction of its state to have
+    /// accurate digits.
     fn lost(&self, omega: f64, share: f64) -> OrbitError {
         self.broke(omega)(Breakdown::Offset { share })
     }
 
-    /// The orbit of the stiff integration: searched, brought near, and closed on the steps of one run.
+    /// Finds the orbit of the stiff integration: a search, steps with the derivative of the
+    /// search, and closing on fixed steps.
     fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
         let search = self.search;
         self.set_lengths(Lengths::Chosen);
@@ -305,7 +319,7 @@ impl<'a> Shooter<'a> {
                 Err(error @ OrbitError::Unsettled { .. }) => return Err(error),
                 near => near.ok().map(|near| near.state),
             };
-            // a settled motion is left as it is: nothing but time has found it
+            // a settled motion stays as it is, independent of Newton's method
             let closed = search.find(self, near.as_deref().or(start), |shooter| shooter.first_state(aim.omega), aim)?;
             self.record(&closed)?;
             return Ok(closed);
@@ -325,7 +339,8 @@ impl<'a> Shooter<'a> {
             Some(state) => (state, true),
             None => (near.state, false),
         };
-        // steps made for a state close the orbit only as well as they fit it: make them anew until that moves it no more
+        // the orbit on fixed steps is as good as the fit of the steps to the state: make new
+        // steps until the state no longer moves
         let mut mesh = 0;
         loop {
             mesh += 1;
@@ -342,7 +357,7 @@ impl<'a> Shooter<'a> {
             let moved: Vec<f64> = closed.state.iter().zip(&state).map(|(a, b)| a - b).collect();
             let moved = norm(&self.weights, &moved) / self.size(&closed.state, aim);
             if moved <= SETTLED * self.tolerance || (mesh == MESHES && moved <= ENERGY_GAP) {
-                // the last run of the iteration was that of the closed state
+                // the last run was that of the closed state
                 return Ok(Closed { iterations, ..closed });
             }
             if mesh == MESHES {
@@ -352,7 +367,8 @@ impl<'a> Shooter<'a> {
         }
     }
 
-    /// The orbit between located switches: the return is smooth to the error of its steps.
+    /// Finds the orbit between located switches. The return map is smooth to the error of its
+    /// steps.
     fn switched_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
         let aim = Aim { residual: CLOSED_SWITCHED * self.share, ..aim };
         let closed = self.search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
@@ -360,12 +376,12 @@ impl<'a> Shooter<'a> {
         Ok(closed)
     }
 
-    /// Relative error per step of the approach.
+    /// Returns the relative error per step of the coarse search.
     fn long_steps(&self) -> f64 {
         self.tolerance.max(LONG_STEPS * self.share)
     }
 
-    /// How near to the orbit one comes in long steps; `None` where they lead nowhere.
+    /// Approaches the orbit with long steps; returns `None` if they fail.
     fn coarsely(&mut self, start: Option<&[f64]>, aim: Aim, iterations: &mut usize) -> Option<Closed> {
         let first = match start.filter(|state| state.len() == self.weights.len()) {
             Some(start) => start.to_vec(),
@@ -377,8 +393,11 @@ impl<'a> Shooter<'a> {
         near.ok()
     }
 
-    /// From the orbit that the search has found to a state for which the steps of the last run were made, with the derivative of the search and
-    /// runs that carry none; `None` if that does not come closer. If the search was `fine`, its own last run is the first of them.
+    /// Moves the state of the search to one that fits the steps of the last run.
+    ///
+    /// It reuses the derivative of the search; its runs carry none. If the search was `fine`,
+    /// the last run of the search is the first of these. Returns `None` if the steps do not
+    /// shrink fast enough.
     fn brought_near(&mut self, (near, fine): (&Closed, bool), aim: Aim, iterations: &mut usize) -> Option<Vec<f64>> {
         let (mut state, mut before) = (near.state.clone(), f64::INFINITY);
         let mut known = fine.then(|| near.gap.clone());
@@ -406,12 +425,12 @@ impl<'a> Shooter<'a> {
         None
     }
 
-    /// Energy norm of a state, or of rest.
+    /// Returns the energy norm of a state, at least that of rest.
     fn size(&self, state: &[f64], aim: Aim) -> f64 {
         norm(&self.weights, state).max(aim.rest).max(f64::MIN_POSITIVE)
     }
 
-    /// Runs from a closed state and keeps the motion.
+    /// Runs from a closed state and records the motion.
     fn record(&mut self, closed: &Closed) -> Result<(), OrbitError> {
         self.stepping.flow().keep(true);
         let kept = self.returned(&mut closed.state.clone(), None);
@@ -425,7 +444,7 @@ impl<'a> Shooter<'a> {
         }
     }
 
-    /// Sets the relative error per step; returns what it was.
+    /// Sets the relative error per step and returns the old one.
     fn set_tolerance(&mut self, tolerance: f64) -> f64 {
         match &mut self.stepping {
             Stepping::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
@@ -434,7 +453,7 @@ impl<'a> Shooter<'a> {
         }
     }
 
-    /// Takes the vibration for this share of the size of its states.
+    /// Sets the vibration's fraction of the size of its states.
     fn set_share(&mut self, share: f64) {
         let (search, tolerance) = self.asked;
         (self.share, self.search, self.tolerance) = (share, search.of_share(share), share * tolerance);
@@ -447,14 +466,15 @@ impl<'a> Shooter<'a> {
         }
     }
 
-    /// The orbit in equal steps, which are halved until that changes it by less than the tolerance.
+    /// Finds the orbit in equal steps, and halves the steps until the estimated error is below
+    /// the tolerance.
     fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
         let tolerance = EQUAL_STEPS * self.tolerance;
         let aim = Aim { residual: CLOSED_STEPS, ..aim };
         let search = self.search;
         let mut count = FIRST * self.periods;
         self.set_count(count);
-        // steps that are too long for a law's states are no reason to give up
+        // steps too long for the states of a law are not a failure: halve them
         let mut coarse = loop {
             match search.find(self, start, |shooter| shooter.first_state(aim.omega), aim) {
                 Err(OrbitError::Breakdown {
@@ -492,8 +512,11 @@ impl<'a> Shooter<'a> {
         }
     }
 
-    /// Displacements and velocities of a closed motion, which is kept, at instants of its return: where a contact that sticks leaves an offset open,
-    /// two motions may begin alike and differ.
+    /// Records a closed motion and returns its displacements and velocities at instants of its
+    /// return.
+    ///
+    /// With the free offset of a stuck contact, two different motions may begin with equal
+    /// states.
     fn instants(&mut self, closed: &Closed) -> Result<Vec<Vec<f64>>, OrbitError> {
         self.record(closed)?;
         let path = self.stepping.path(&self.shared, Symmetry::FullPeriod, self.duration);
@@ -504,7 +527,8 @@ impl<'a> Shooter<'a> {
         Ok((0..INSTANTS).map(at).collect())
     }
 
-    /// The orbit to which a motion has settled, in finer steps: Newton's method takes it there, and not to another one.
+    /// Finds the settled orbit in finer steps by Newton's method; returns `None` if that fails
+    /// or leads to another orbit.
     fn refined(&mut self, settled: &Closed, aim: Aim) -> Option<Closed> {
         if self.search == Search::Newton {
             return None;
@@ -513,22 +537,24 @@ impl<'a> Shooter<'a> {
         (self.apart(&fine.state, &settled.state, aim) <= NEIGHBOUR).then_some(fine)
     }
 
-    /// Distance of two states, or of their displacements and velocities, relative to the first.
+    /// Returns the distance of two states, or of their displacements and velocities, relative
+    /// to the first.
     fn apart(&self, state: &[f64], other: &[f64], aim: Aim) -> f64 {
         let change: Vec<f64> = state.iter().zip(other).map(|(a, b)| a - b).collect();
         norm(&self.weights, &change) / self.size(state, aim)
     }
 
-    /// Puts the orbit together from its last, kept run.
+    /// Makes the orbit from its last recorded run.
     fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
         let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
-        // of what sticks up to its very limit the derivative is that of an instant of slip, and says nothing of the neighbours that stick
+        // a joint may stick right up to its limit. Its derivative is then that of an instant of
+        // slip, which does not hold for nearby motions that stick
         let at_its_limit =
             measured.joints.iter().any(|joint| joint.slip_fraction > 0.0 && measured.stuck.contains(&joint.name));
-        // what closing leaves of a state may have worked on a vibration as small as rest
+        // the residual of the closed state may do work on a vibration as small as rest
         let left = CLOSED * norm(&self.weights, &closed.state) * self.rest;
         let least = f64::max(NO_WORK * self.rest * self.rest, left / ENERGY_GAP);
         Orbit {
@@ -590,10 +616,10 @@ impl Solver for Shooter<'_> {
         } else {
             known
         };
-        // neighbours vibrate by much the same share
+        // neighbouring orbits have almost the same fraction of vibration
         self.set_share(if known.is_some() { self.share } else { 1.0 });
         let mut orbit = match self.found(start, symmetry, aim) {
-            // the neighbour's share may be too small for this one
+            // the neighbour's fraction may be too small for this orbit
             Err(_) if self.share < 1.0 => {
                 self.set_share(1.0);
                 self.found(start, symmetry, aim)?
@@ -602,7 +628,7 @@ impl Solver for Shooter<'_> {
         };
         while let Some(share) = vibration::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))? {
             self.set_share(share);
-            // what is found as a state and not as a vibration lacks the digits of that
+            // an orbit accurate as a state but not as a vibration has too few digits
             orbit = self.found(Some(&orbit.start), symmetry, aim).map_err(|_| self.lost(omega, share))?;
         }
         if self.search == Search::Newton {
@@ -630,7 +656,8 @@ mod tests {
     use crate::law::Gap;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 
-    /// A constant force presses a mass against a stop: it rests at `(f + k₂ gap) / (k + k₂)`, and nothing works.
+    /// A constant force presses a mass against a stop. It rests at `(f + k₂ gap) / (k + k₂)`,
+    /// and no force does work.
     #[test]
     fn rest_under_a_constant_force_balances() {
         let between = || ["m".to_owned(), GROUND.to_owned()];

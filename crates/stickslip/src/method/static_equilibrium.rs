@@ -1,11 +1,12 @@
 //! Static equilibrium under the constant loads, from which every method begins.
 //!
-//! Where a contact sticks for a whole period, its mean friction force is that of its past: the same vibration has many
-//! solutions. All methods choose one by the same rule. Constant forces and preloads grow from zero in one ramp, joints slip
-//! on the way where their limits ask for it, and the vibration then begins from there: a slider that it does not move stays
-//! where the ramp has left it, and one that it does goes only as far as it must.
-//!
 //! `K x + W f(0 → Wᵀx) = F₀`, solved by harmonic balance of order zero.
+//!
+//! A contact that is stuck for a whole period keeps the mean friction force of its past, so the
+//! same vibration has many solutions. All methods choose one by the same rule. Constant forces
+//! and preloads grow from zero in one ramp, and joints slip where their limits require it. The
+//! vibration then begins from there. A slider that the vibration does not move stays where the
+//! ramp left it; another slider moves only as far as necessary.
 
 use super::harmonic_balance;
 use super::incremental::law;
@@ -17,8 +18,8 @@ use num_complex::Complex64;
 /// Displacements, joint states and joint forces under the constant loads.
 ///
 /// # Example
-/// A mass of 1 kg on a spring of 1000 N/m, with a Jenkins joint of the same stiffness that slips at 2 N, under 10 N: the joint
-/// slips, and the spring carries the other 8 N.
+/// A mass of 1 kg hangs on a spring of 1000 N/m and a Jenkins joint of the same stiffness that
+/// slips at 2 N. Under 10 N the joint slips, and the spring carries 8 N.
 /// ```
 /// use std::sync::Arc;
 /// use stickslip::law::Jenkins;
@@ -38,42 +39,44 @@ use num_complex::Complex64;
 /// ```
 #[derive(Debug, Clone)]
 pub struct StaticEquilibrium {
-    /// An orbit on which nothing moves.
+    /// An orbit without motion.
     orbit: Orbit,
     dofs: usize,
 }
 
 impl StaticEquilibrium {
-    /// The static equilibrium of a system; `None` where nothing carries a constant load, or where the iteration finds none.
+    /// Computes the static equilibrium of a system. Returns `None` if no stiffness carries a
+    /// constant load, or if the iteration does not converge.
     pub fn of(system: &System) -> Option<Self> {
         let orbit = harmonic_balance::static_equilibrium_of(system)?;
         Some(StaticEquilibrium { orbit, dofs: system.dofs() })
     }
 
-    /// The same; `None` also where no constant force, imposed displacement or preload acts, so that nothing is loaded.
+    /// Computes the static equilibrium; returns `None` also if no constant force, imposed
+    /// displacement or preload acts.
     pub fn under_load(system: &System) -> Option<Self> {
         let constant = system.harmonics_of_excitation(|z| z != Complex64::ZERO).contains(&0);
         let loaded = constant || system.joints().iter().any(|joint| is_preloaded(&**joint.law()));
         if loaded { StaticEquilibrium::of(system) } else { None }
     }
 
-    /// Displacements of all degrees of freedom, m.
+    /// Returns the displacements of all degrees of freedom, m.
     pub fn displacement(&self) -> &[f64] {
         &self.orbit.start[..self.dofs]
     }
 
-    /// Forces of each joint along its directions, N.
+    /// Returns the forces of each joint along its directions, N.
     pub fn forces(&self) -> Vec<[f64; MOST_DIRECTIONS]> {
         self.orbit.sample(0.0).joints.iter().map(|joint| joint.force).collect()
     }
 
-    /// The internal states of all joints, in their order.
+    /// Returns the internal states of all joints, in the order of the joints.
     pub fn joint_states(&self) -> &[f64] {
         &self.orbit.start[2 * self.dofs..]
     }
 }
 
-/// Whether a law has a force where its joint has not moved.
+/// Returns true if a law has a force before its joint moves.
 fn is_preloaded(law: &dyn Law) -> bool {
     let rest = [0.0; MOST_DIRECTIONS];
     let force = match (law.step(), law.rate()) {
@@ -88,9 +91,12 @@ fn is_preloaded(law: &dyn Law) -> bool {
     force != rest || law.pieces().is_some_and(|pieces| pieces.iter().any(pressed))
 }
 
-/// The internal states of all joints at other displacements (m), after a straight and slow way there from static equilibrium.
-/// Without one nothing is loaded before it vibrates, and joints begin unloaded there. Imposed motions are at the phase zero of a
-/// drive. `count`: how many states the flow that begins there has; where its joints keep others than these all of them are zero.
+/// Returns the internal states of all joints at other displacements (m), after a straight and
+/// slow path from static equilibrium.
+///
+/// Imposed motions are at phase zero of the excitation. `count` is the number of states that
+/// the caller's integration has. Without a static equilibrium, or if the joints have another
+/// number of states, all states are zero.
 pub(crate) fn states_at(
     equilibrium: Option<&StaticEquilibrium>,
     system: &System,

@@ -1,4 +1,4 @@
-//! A motion that was integrated in steps: what it is at any time, and its numbers.
+//! The motion of an integration in steps, evaluated at any time, and its measured quantities.
 
 use super::assembly::{Assembly, PlacedLaw};
 use super::drive::Drive;
@@ -12,10 +12,11 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use stickslip_numerics::radau::quintic;
 
-/// Share of a law's scale by which its forces may pass it by rounding.
+/// Fraction of a law's scale by which rounding may exceed it.
 const ROUNDED: f64 = 1e-9;
 
-/// Halvings of the time between two nodes at which a joint does not do the same: a millionth of it is left.
+/// Halvings of the interval between two nodes with different contact states; a millionth
+/// remains.
 const HALVED: usize = 20;
 
 pub(crate) struct SteppedPath {
@@ -28,7 +29,7 @@ pub(crate) struct SteppedPath {
 }
 
 impl SteppedPath {
-    /// Of the record of a run that repeats after `period`.
+    /// Makes the path of a recorded run that repeats after `period`.
     pub fn new(
         (system, assembly): (&Arc<System>, &Assembly),
         drive: &Drive,
@@ -45,12 +46,14 @@ impl SteppedPath {
         }
     }
 
-    /// Value, slope and curvature at both ends of a step of what `of` reads off the degrees of freedom.
+    /// Returns value, slope and curvature at both ends of a step for the quantity that `of`
+    /// computes from the degrees of freedom.
     fn ends(&self, step: usize, of: impl Fn(&[f64]) -> f64) -> [[f64; 3]; 2] {
         self.steps.ends(step).map(|instant| [instant.displacement, instant.velocity, instant.acceleration].map(&of))
     }
 
-    /// The same along an axis.
+    /// Returns relative displacement, velocity and acceleration along an axis at both ends of a
+    /// step.
     fn relative_ends(&self, step: usize, axis: usize) -> [[f64; 3]; 2] {
         let (start, length) = self.steps.spans[step];
         let end = |instant: Instant, time: f64| {
@@ -63,7 +66,8 @@ impl SteppedPath {
         [end(from, start), end(to, start + length)]
     }
 
-    /// Least and largest value over all steps, each a quintic between its ends.
+    /// Returns the least and largest value over all steps; each step is a quintic between its
+    /// ends.
     fn range_of(&self, ends: impl Fn(usize) -> [[f64; 3]; 2]) -> (f64, f64) {
         extremes(self.steps.spans.iter().enumerate().map(|(step, (_, length))| {
             let [from, to] = ends(step);
@@ -71,8 +75,12 @@ impl SteppedPath {
         }))
     }
 
-    /// Force along an axis at `s` in [0, 1] of a step: the polynomial through its values at the step's start and at the nodes. It may overshoot at a
-    /// layer, where a law that keeps to its `scale` does not; one with a stiffness or damping beyond its slip limit keeps to none.
+    /// Returns the force along an axis at `s` in [0, 1] of a step. It is the polynomial through
+    /// the values at the step's start and at the nodes.
+    ///
+    /// The polynomial may overshoot at a layer, so it is clamped to the law's `scale` if the
+    /// values respect that. A law with a stiffness or damping on top of its slip limit does
+    /// not.
     fn force_between(&self, step: usize, axis: usize, s: f64, scale: f64) -> f64 {
         let count = self.steps.nodes.len();
         let node = |i: usize| if i == 0 { 0.0 } else { self.steps.nodes[i - 1].0 };
@@ -88,19 +96,20 @@ impl SteppedPath {
         if largest > scale * (1.0 + ROUNDED) { between } else { between.clamp(-scale, scale) }
     }
 
-    /// Forces of a joint at `s` in [0, 1] of a step, where it moves so.
+    /// Returns the forces of a joint at `s` in [0, 1] of a step with the given relative motion.
     fn forces(&self, joint: &PlacedLaw, (step, s): (usize, f64), motion: &Relative<f64>) -> [f64; MOST_DIRECTIONS] {
         if let Some(rate) = joint.law.rate().filter(|_| joint.states == 0 && self.steps.nodes.len() > 1) {
             return rate.value(motion, &[], &mut []);
         }
         let mut force = [0.0; MOST_DIRECTIONS];
-        // a limit bounds the force of one direction; of several it bounds their sum of squares or less
+        // a limit bounds the force along one direction; along several it bounds at most their
+        // norm
         let scale = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
         joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, scale));
         force
     }
 
-    /// What a joint does at `s` in [0, 1] of a step.
+    /// Returns the contact state of a joint at `s` in [0, 1] of a step.
     fn contact(&self, joint: usize, (step, s): (usize, f64)) -> Contact {
         if self.steps.jumps {
             return self.steps.contact_at_end(step)[joint];
@@ -115,7 +124,8 @@ impl SteppedPath {
         joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
     }
 
-    /// Where in a step, in [0, 1], a joint ceases to do what it does `from` there on, at `to` at the latest.
+    /// Returns the first `s` in [0, 1], at most `to`, at which a joint leaves the contact state
+    /// of `from`.
     fn change(&self, joint: usize, step: usize, from: (f64, Contact), to: f64) -> f64 {
         let (mut low, mut high) = (from.0, to);
         for _ in 0..HALVED {
@@ -125,8 +135,9 @@ impl SteppedPath {
         high
     }
 
-    /// Shares of the time between nodes of a step, of whom the first comes at its start: what a joint does at both is so between them, and where it is
-    /// not the same, up to a change that is sought.
+    /// Returns the contact states between the nodes of a step and their durations. The state is
+    /// constant between nodes with equal states, and changes once, at a bisected instant,
+    /// between others.
     fn stretches(&self, joint: usize, step: usize) -> impl Iterator<Item = (Contact, f64)> {
         let (count, length) = (self.steps.nodes.len(), self.steps.spans[step].1);
         let mut last = (0.0, self.contact(joint, (step, 0.0)));
@@ -138,7 +149,8 @@ impl SteppedPath {
         })
     }
 
-    /// The joints at `s` in [0, 1] of a step, at `time`, where the structure has this state; mirrored if `sign` is -1.
+    /// Returns the motion of the joints at `s` in [0, 1] of a step, for this time and state of
+    /// the structure; mirrored if `sign` is -1.
     fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
         let sample = |(q, joint): (usize, &PlacedLaw)| {
@@ -210,7 +222,7 @@ impl Path for SteppedPath {
     }
 }
 
-/// Displacement of the moved places at one instant, and the forces that move them.
+/// Returns the displacements of the moved places at one instant and the forces that move them.
 fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64]; 4]) -> Vec<(f64, f64)> {
     let motion: Vec<[f64; 3]> = system
         .moved()
@@ -239,7 +251,7 @@ fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64];
     system.moved().iter().enumerate().map(reaction).collect()
 }
 
-/// Signals are their values at the nodes.
+/// A signal is the list of its values at the nodes.
 impl Signals for SteppedPath {
     type Signal = Vec<f64>;
     type Error = Infallible;

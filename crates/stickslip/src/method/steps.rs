@@ -1,23 +1,27 @@
-//! The record of a run in steps: the motion at instants, and at the nodes of a quadrature between them.
+//! The record of an integration in steps: the motion at instants, and at the quadrature nodes
+//! between them.
 
 use super::assembly::Assembly;
 use crate::law::Contact;
 
-/// The record of a run: the state at instants, and values at the nodes of a quadrature between them. One run after the other fills the same memory.
+/// The record of a run: the state at instants, and values at the quadrature nodes between them.
+/// Successive runs reuse the memory.
 #[derive(Debug, Clone)]
 pub(crate) struct Steps {
-    /// Nodes and weights of the quadrature within a step, over its length; the last node is its end.
+    /// Nodes and weights of the quadrature in a step, relative to its length; the last node is
+    /// the end.
     pub nodes: Vec<(f64, f64)>,
     /// Start and length of every step, s.
     pub spans: Vec<(f64, f64)>,
-    /// Degrees of freedom, axes of joints, joints.
+    /// Numbers of degrees of freedom, axes and joints.
     size: [usize; 3],
-    /// What [`Instant`] says, instant after instant, one more than there are steps, or two for each.
+    /// The values of [`Instant`], instant by instant: one more than there are steps, or two per
+    /// step with `jumps`.
     instants: Vec<f64>,
-    /// Whether forces may jump from one step to the next, so that each has both of its ends, and joints do the same
-    /// throughout a step.
+    /// True if forces may jump between steps. Each step then stores both of its ends, and a
+    /// contact state holds for a whole step.
     pub jumps: bool,
-    /// What [`Node`] says but for the contacts, node after node.
+    /// The values of [`Node`] without contact states, node by node.
     values: Vec<f64>,
     contacts: Vec<Contact>,
 }
@@ -37,14 +41,15 @@ pub(crate) struct Instant<'a> {
 pub(crate) struct Node<'a> {
     pub displacement: &'a [f64],
     pub velocity: &'a [f64],
-    /// Relative velocity and force along the axes.
+    /// Relative velocities and forces along the axes.
     pub relative: &'a [f64],
     pub force: &'a [f64],
-    /// What the joints do.
+    /// Contact states of the joints.
     pub contact: &'a [Contact],
 }
 
-/// What two solutions of second order, the finer one in half the steps, say of the limit: `fine + (fine - coarse) / 3`, into `coarse`.
+/// Extrapolates two solutions of second order, the finer one in half the steps, to the limit:
+/// `fine + (fine - coarse) / 3`, into `coarse`.
 pub(crate) fn extrapolate(coarse: &mut [f64], fine: &[f64]) {
     coarse.iter_mut().zip(fine).for_each(|(coarse, fine)| *coarse = fine + (fine - *coarse) / 3.0);
 }
@@ -56,7 +61,7 @@ impl Steps {
         Steps { nodes, spans: Vec::new(), size, instants, jumps: false, values, contacts: Vec::new() }
     }
 
-    /// The same of a run whose forces may jump.
+    /// Makes the record of a run with forces that may jump.
     pub fn with_jumps(nodes: Vec<(f64, f64)>, assembly: &Assembly) -> Self {
         Steps { jumps: true, ..Steps::new(nodes, assembly) }
     }
@@ -68,7 +73,8 @@ impl Steps {
         self.contacts.clear();
     }
 
-    /// Appends an instant at which the state begins with displacements and velocities; returns where its accelerations go.
+    /// Appends an instant with the displacements and velocities of `state`; returns the memory
+    /// for its accelerations.
     pub fn keep_instant(&mut self, state: &[f64], force: &[f64]) -> &mut [f64] {
         let [n, axes, _] = self.size;
         self.instants.extend_from_slice(&state[..2 * n]);
@@ -99,7 +105,7 @@ impl Steps {
         Instant { displacement, velocity, acceleration, force: &rest[..axes] }
     }
 
-    /// Both ends of a step.
+    /// Returns both ends of a step.
     pub fn ends(&self, step: usize) -> [Instant<'_>; 2] {
         let first = if self.jumps { 2 * step } else { step };
         [self.instant(first), self.instant(first + 1)]
@@ -114,35 +120,36 @@ impl Steps {
         Node { displacement, velocity, relative, force: &rest[..axes], contact }
     }
 
-    /// How many nodes there are.
+    /// Returns the number of nodes.
     pub fn count(&self) -> usize {
         self.spans.len() * self.nodes.len()
     }
 
-    /// Every node.
+    /// Returns all nodes in order.
     pub fn each(&self) -> impl Iterator<Item = Node<'_>> {
         (0..self.count()).map(|at| self.node(at))
     }
 
-    /// What the joints do at the end of a step.
+    /// Returns the contact states of the joints at the end of a step.
     pub fn contact_at_end(&self, step: usize) -> &[Contact] {
         self.node((step + 1) * self.nodes.len() - 1).contact
     }
 
-    /// Time and weight of a node, s.
+    /// Returns the time and weight of a node, s.
     pub fn time(&self, at: usize) -> (f64, f64) {
         let ((start, length), (node, weight)) = (self.spans[at / self.nodes.len()], self.nodes[at % self.nodes.len()]);
         (start + node * length, weight * length)
     }
 
-    /// The record of a run in steps of one node with what one in halves of them, `fine`, says of their error.
+    /// Extrapolates the record of a run with one node per step, with `fine` as the run in half
+    /// the steps.
     pub fn extrapolated(mut self, fine: &Steps) -> Steps {
         let [n, axes, joints] = self.size;
         let length = 3 * n + axes;
         for (i, instant) in self.instants.chunks_exact_mut(length.max(1)).enumerate() {
             extrapolate(instant, &fine.instants[2 * i * length..]);
         }
-        // the node of a step is its end, which is that of every second half
+        // the node of a step is its end, which is the end of every second half step
         let length = 2 * (n + axes);
         for (i, node) in self.values.chunks_exact_mut(length.max(1)).enumerate() {
             extrapolate(node, &fine.values[(2 * i + 1) * length..]);

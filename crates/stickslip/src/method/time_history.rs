@@ -1,7 +1,9 @@
-//! Motion in time from given displacements: free decay, switched-on drive, run-up.
+//! Motion in time from given displacements: free decay, constant excitation, run-up.
 //!
-//! Exact laws are followed by events, smooth laws by stiff integration, others and mixtures in equal steps, all in stretches of one drive
-//! period. In a run-up every cycle has its own frequency, constant over the cycle and continuous in phase, as in a stepped-sine test.
+//! Exact laws are integrated from event to event, smooth laws by a stiff integration, other
+//! laws and mixtures in equal steps. The motion is computed in intervals of one excitation
+//! period. In a run-up, every cycle has a constant frequency, and the phase is continuous, as
+//! in a stepped-sine test.
 
 use super::flow::Flow;
 use super::{Breakdown, MethodError, followed, ways};
@@ -14,59 +16,60 @@ const NAME: &str = "transient";
 
 /// Relative error per step for smooth laws.
 const TOLERANCE: f64 = 1e-9;
-/// A free decay is followed in stretches of this many samples.
+/// Samples per interval of a free decay.
 const STRETCH: usize = 64;
 
-/// What drives the motion.
+/// The excitation of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Excitation {
-    /// Nothing but constant forces.
+    /// Constant forces only.
     Free,
-    /// A constant drive frequency, rad/s.
+    /// A constant excitation frequency, rad/s.
     Steady(f64),
-    /// A drive frequency that changes linearly from `from` to `to` (rad/s) within `duration` (s).
+    /// A frequency that changes linearly from `from` to `to` (rad/s) within `duration` (s).
     RunUp {
         /// First frequency, rad/s.
         from: f64,
         /// Last frequency, rad/s.
         to: f64,
-        /// Time between them, s.
+        /// Duration of the change, s.
         duration: f64,
     },
 }
 
-/// A motion to be computed.
+/// A motion to compute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeHistory {
     /// Displacements at the start, length n, m.
     pub displacement: Vec<f64>,
     /// Velocities at the start, length n, m/s.
     pub velocity: Vec<f64>,
-    /// Internal states of the joints at the start, as [`StaticEquilibrium`](super::StaticEquilibrium) has them; empty: joints
-    /// carry nothing there.
+    /// Internal states of the joints at the start, in the form of
+    /// [`StaticEquilibrium`](super::StaticEquilibrium). If empty, the joints start unloaded.
     pub states: Vec<f64>,
-    /// What drives it.
+    /// The excitation.
     pub excitation: Excitation,
-    /// Time to be computed, s.
+    /// Length of the computed motion, s.
     pub duration: f64,
-    /// Distance of the samples, s.
+    /// Time between samples, s.
     pub step: f64,
-    /// Velocity over which exact laws are smoothed, m/s; exact when absent.
+    /// Velocity over which exact laws are smoothed, m/s; without it, they stay exact.
     pub width: Option<f64>,
 }
 
-/// Why a transient was not computed, or not to its end.
+/// The reason why a motion was not computed, or not to its end.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TimeHistoryError {
-    /// The laws do not fit together.
+    /// No integration takes the system.
     #[error(transparent)]
     Method(#[from] MethodError),
-    /// The motion broke down; the samples before were handed on, and are good.
+    /// The motion broke down. The visitor has received all samples before that, and they are
+    /// valid.
     #[error("{cause}; {}", good(*.last))]
     Breakdown {
-        /// Time of the last good sample, s; none where the motion breaks down before the first.
+        /// Time of the last valid sample, s; `None` if the motion breaks down before the first.
         last: Option<f64>,
-        /// Why, and when.
+        /// The cause, with its time.
         cause: Breakdown,
     },
 }
@@ -75,45 +78,49 @@ fn good(last: Option<f64>) -> String {
     last.map_or("no sample before is good".to_owned(), |last| format!("the samples until t = {last:.6e} s are good"))
 }
 
-/// Times that a stretch in which the motion broke down is followed anew, each time up to where it broke down, or half as far where the reason
-/// names no time: enough to find one of [`STRETCH`] samples.
+/// Most attempts to recompute an interval in which the motion broke down. Each attempt ends
+/// where the last one broke down, or at half of its length if the cause names no time. This is
+/// enough to find one of [`STRETCH`] samples.
 const SHORTENED: usize = 6;
 
-/// Motion over a stretch of time that begins at `begin` (s).
+/// The motion in an interval that starts at `begin` (s).
 struct Stretch {
     begin: f64,
     length: f64,
-    /// Index of the last sample in it, if there is one.
+    /// Index of its last sample, if it has one.
     last: Option<usize>,
     path: Arc<dyn Path>,
 }
 
-/// A sample of the motion, and the motion since the sample before it.
+/// A sample of the motion, and the motion since the previous sample.
 pub struct Instant<'a> {
     /// Time, s.
     pub time: f64,
-    /// Drive frequency, rad/s; zero if free.
+    /// Excitation frequency, rad/s; zero if free.
     pub omega: f64,
     /// The state.
     pub state: &'a Sample,
-    /// The state at any time (s) between the sample before this one and this one, by the motion
-    /// itself.
+    /// Returns the state at any time (s) between the previous sample and this one, from the
+    /// computed motion.
     pub since: &'a dyn Fn(f64) -> Sample,
 }
 
 impl Stretch {
-    /// The state at a time, s, of this stretch.
+    /// Returns the state at a time of this interval, s.
     fn at(&self, time: f64) -> Sample {
         self.path.sample((time - self.begin).clamp(0.0, self.length))
     }
 }
 
 impl TimeHistory {
-    /// Computes the motion; `sample` receives time (s), drive frequency (rad/s, zero if free) and state, and stops the motion by
-    /// returning false.
+    /// Computes the motion.
+    ///
+    /// `sample` receives the time (s), the excitation frequency (rad/s, zero if free) and the
+    /// state. It stops the computation by returning false.
     ///
     /// # Errors
-    /// [`TimeHistoryError`].
+    /// Returns [`TimeHistoryError`] if no integration takes the system, or if the motion breaks
+    /// down.
     ///
     /// # Example
     /// A sliding oscillator loses `4 F/k` of amplitude per cycle.
@@ -142,10 +149,10 @@ impl TimeHistory {
         self.visit(system, &mut |instant| sample(instant.time, instant.omega, instant.state))
     }
 
-    /// The same for a visitor that also looks at the motion between two samples.
+    /// Computes the motion for a visitor that also needs the motion between two samples.
     ///
     /// # Errors
-    /// [`TimeHistoryError`].
+    /// Same as [`TimeHistory::run`].
     pub fn visit(&self, system: &System, visitor: &mut dyn FnMut(Instant<'_>) -> bool) -> Result<(), TimeHistoryError> {
         let shared = Arc::new(system.clone());
         let mut flow = TimeHistory::flow(system, self.width)?;
@@ -162,7 +169,7 @@ impl TimeHistory {
         while next <= samples {
             let omega = self.frequency(begin);
             let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
-            // of a cycle that outlasts the motion only what is asked for
+            // shorten a cycle that outlasts the motion
             let length = if length > self.duration { self.duration + self.step } else { length };
             flow.set_drive(system, omega);
             let start = state.clone();
@@ -200,8 +207,10 @@ impl TimeHistory {
         Ok(())
     }
 
-    /// What there is of a stretch before the motion breaks down in it, up to a sample: it begins at `begin` from the state `start`, and has the
-    /// samples `first` to `last`. `None` where there is no motion at all before, or no sample.
+    /// Recomputes the part of an interval before a breakdown, up to a sample.
+    ///
+    /// The interval begins at `begin` from the state `start` and has the samples `first` to
+    /// `last`. Returns `None` if it has no motion or no sample before the breakdown.
     fn before(
         &self,
         system: &Arc<System>,
@@ -214,9 +223,9 @@ impl TimeHistory {
         for _ in 0..SHORTENED {
             let reached = cause.time().unwrap_or(0.5 * since(last + 1));
             last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
-            // a sample at the very beginning needs some motion behind it
+            // a sample at the very start needs a short motion behind it
             let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
-            // one that knows nothing of the attempt that broke down
+            // a new flow, without memory of the failed attempt
             let mut flow = TimeHistory::flow(system, self.width).ok()?;
             flow.keep(true);
             flow.set_drive(system, self.frequency(begin));
@@ -231,10 +240,11 @@ impl TimeHistory {
         None
     }
 
-    /// Whether such motions of a system can be followed, with laws smoothed over `width` (m/s) if it is given.
+    /// Checks that motions of a system can be computed, with laws smoothed over `width` (m/s)
+    /// if given.
     ///
     /// # Errors
-    /// [`MethodError`], as [`TimeHistory::run`].
+    /// Returns [`MethodError`] if no integration takes the system.
     pub fn check(system: &System, width: Option<f64>) -> Result<(), MethodError> {
         TimeHistory::flow(system, width).map(drop)
     }
@@ -243,8 +253,10 @@ impl TimeHistory {
         followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
     }
 
-    /// Drive frequency of the cycle that begins at `time`: of a run-up the one with which the cycle ends when that of the frequency that
-    /// changes all the time does, so that the phase never runs late.
+    /// Returns the excitation frequency of the cycle that begins at `time`.
+    ///
+    /// In a run-up, this constant frequency ends the cycle at the same time as the continuously
+    /// changing frequency, so the phase never lags.
     fn frequency(&self, time: f64) -> f64 {
         match self.excitation {
             Excitation::Free => 0.0,
@@ -255,13 +267,13 @@ impl TimeHistory {
                     return to;
                 }
                 let begin = from + rate * time;
-                // ω τ + ½ ω' τ² = 2π
+                // `ω τ + ½ ω' τ² = 2π`
                 let discriminant = begin * begin + 2.0 * TAU * rate;
                 let whole = 2.0 * TAU / (begin + discriminant.max(0.0).sqrt());
                 if discriminant >= 0.0 && whole <= left {
                     return TAU / whole;
                 }
-                // the rest of the cycle has the last frequency
+                // the last frequency applies after the end of the change
                 let turned = begin * left + 0.5 * rate * left * left;
                 TAU / (left + (TAU - turned) / to)
             }
@@ -277,8 +289,9 @@ mod tests {
     use crate::structure::Structure;
     use nalgebra::dmatrix;
 
-    /// A contact that is pressed before anything moves sets off from rest. While it stays closed and its tangent is not moved, its normal is
-    /// a spring: `x = x₀ (1 - cos ωt)` with `x₀ = preload/(k + kn)` about the static position.
+    /// A contact with preload sets off from rest. While it stays closed and its tangent does
+    /// not move, its normal acts as a spring: `x = x₀ (1 - cos ωt)`, with
+    /// `x₀ = preload/(k + kn)` about the static position.
     #[test]
     fn a_pressed_contact_sets_off_from_rest() {
         let (mass, k, kn, preload) = (2.0, 3e4, 5e3, 40.0);
@@ -302,7 +315,8 @@ mod tests {
             step: TAU / omega / 40.0,
             width: None,
         };
-        let static_position = -preload / (k + kn); // its force pushes against the direction of closing
+        // the preload pushes against the closing direction
+        let static_position = -preload / (k + kn);
         let mut worst = 0.0f64;
         let run = motion.run(&system, &mut |time, _, sample| {
             let expected = static_position * (1.0 - (omega * time).cos());
@@ -313,7 +327,8 @@ mod tests {
         assert!(run.is_ok() && worst < 1e-4, "{run:?} {worst}");
     }
 
-    /// `x'' + x - 2 x³ = 0` from rest at 1 is `1/cos t`, which is infinite at π/2: in the second stretch, as 100 samples fit before.
+    /// `x'' + x - 2 x³ = 0` from rest at 1 is `1/cos t`. It is infinite at π/2, in the second
+    /// interval, after 100 samples.
     #[test]
     fn a_motion_that_escapes_is_followed_until_it_does() {
         let between = || ["m".to_owned(), GROUND.to_owned()];
@@ -336,7 +351,7 @@ mod tests {
         let mut count = 0;
         let run = motion.run(&model.assemble().unwrap(), &mut |time, _, sample| {
             let expected = 1.0 / time.cos();
-            // what is left until infinity loses as many digits as the motion gained
+            // the remaining time to infinity loses as many digits as the motion gained
             let error = (sample.displacement[0] / expected - 1.0).abs();
             assert!(error < 1e-6, "{time}: {error:e}");
             count += 1;
@@ -348,14 +363,15 @@ mod tests {
         };
         assert_eq!((count, place.as_deref()), (101, Some("m")));
         assert!((last - 100.0 * motion.step).abs() < 1e-12, "{last}");
-        // it is named once it is 1e5 times as fast as where the stretch began, at 64 samples: the velocity is 1/(π/2 - t)²
+        // the breakdown is reported at 1e5 times the velocity at the start of the interval (64
+        // samples); the velocity is 1/(π/2 - t)²
         let began = 64.0 * motion.step;
         let left = (began.cos().powi(2) / began.sin() / 1e5).sqrt();
         assert!((0.0..left).contains(&(end - time)), "{time}");
     }
 
-    /// Three rigid joints in a triangle share what they carry in no unique way as soon as all stick: what was computed before is the motion of a
-    /// shorter run, and the time is that of the motion.
+    /// Three rigid joints in a triangle share their forces in no unique way once all stick. The
+    /// samples before that equal those of a shorter run, and the error carries the time.
     #[test]
     fn what_comes_before_a_breakdown_is_handed_on() {
         let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
@@ -407,8 +423,8 @@ mod tests {
         }
     }
 
-    /// A linear oscillator run up through its resonance, against the classical Runge-Kutta method with the phase of a frequency that
-    /// changes all the time.
+    /// A linear oscillator runs up through its resonance. The reference is the classical
+    /// Runge-Kutta method with the phase of a continuously changing frequency.
     #[test]
     fn a_run_up_has_the_phase_of_its_frequency() {
         let between = || ["m".to_owned(), GROUND.to_owned()];
@@ -456,7 +472,8 @@ mod tests {
                     state = std::array::from_fn(|k| state[k] + small / 6.0 * (a[k] + 2.0 * b[k] + 2.0 * c[k] + d[k]));
                 }
             }
-            // within a cycle the frequency is held, and the phase is off by its change over a quarter of a cycle
+            // the frequency is constant in a cycle, so the phase error is the change over a
+            // quarter of a cycle
             let change = (to - from).abs() / duration * (TAU / from.min(to)).powi(2) / 8.0;
             assert!(worst < (0.002 + change) * largest, "{from} {duration}: {worst} of {largest}, {change}");
         }

@@ -1,34 +1,40 @@
-//! What a method is and what its solvers do, and how a table knows them.
+//! The traits of methods and solvers, and the row of the table of methods.
 
 use super::{MethodError, MethodOption, Options, OrbitError};
 use crate::model::System;
 use crate::orbit::Orbit;
 
-/// Turns systems into orbits.
+/// A method: makes solvers that find the orbits of a system.
 pub trait Method: Send + Sync + std::fmt::Debug {
-    /// Name in study files.
+    /// Returns the name in study files.
     fn name(&self) -> &'static str;
-    /// What finds the orbits of this system: the method itself, unless it picks another one.
+    /// Returns the method that finds the orbits of this system: this method, unless it picks
+    /// another.
     fn choice(&self, _system: &System) -> Choice {
         Choice { method: self.name(), because: None }
     }
-    /// Whether its orbits of this system are motions in time that were closed: their residual then is their return defect. A series is none.
+    /// Returns true if the method closes motions in time, so that their residual is a return
+    /// defect. Harmonic balance returns false: its residual is not a return defect.
     fn closes_motions(&self, _system: &System) -> bool {
         true
     }
-    /// Its solver for one system. [`advised`](super::advised) gives the same with errors that say what to use instead.
+    /// Makes the solver for one system.
+    ///
+    /// [`advised`](super::advised) makes the same solver, with errors that name alternative
+    /// methods.
     ///
     /// # Errors
-    /// The system is none that this method can take: [`MethodError`] names the joint or place, and what the method misses.
+    /// Returns [`MethodError`] if the method cannot take the system. The error names the joint
+    /// or place and the missing property.
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError>;
 }
 
 /// The method that finds the orbits of a system.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Choice {
-    /// Its name.
+    /// Name of the method.
     pub method: &'static str,
-    /// Why it was picked, if it was.
+    /// Reason for the choice; `None` if the user named the method.
     pub because: Option<String>,
 }
 
@@ -43,28 +49,35 @@ impl std::fmt::Display for Choice {
 
 /// Finds orbits of one system.
 pub trait Solver {
-    /// The orbit at drive frequency `omega` (rad/s, positive), from the state `start` of a neighbouring orbit if given.
+    /// Finds the orbit at the excitation frequency `omega` (rad/s, positive).
+    ///
+    /// `start` is the warm start: the state of a neighbouring orbit.
     ///
     /// # Errors
-    /// No orbit was found: [`OrbitError`] says how far the method got and what to try. A motion that did not converge is never
-    /// returned as an orbit.
+    /// Returns [`OrbitError`] if the solver finds no orbit. The error says how far the solver
+    /// got and what to try. A motion that did not converge is never returned as an orbit.
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError>;
 
-    /// The same orbit without an estimate of its error, where that costs extra: for searches between orbits whose errors are known.
+    /// Finds the same orbit, but skips an error estimate that costs extra.
+    ///
+    /// Use it for searches between orbits with known errors.
     ///
     /// # Errors
-    /// As [`Solver::orbit`].
+    /// Same as [`Solver::orbit`].
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.orbit(omega, start)
     }
 
-    /// The work of the last search as a share of what one point may take, of methods that count it: a way of many searches ends by it, and not by the
-    /// clock.
+    /// Returns the work of the last search as a fraction of the work limit of one point.
+    ///
+    /// Methods that do not count work return zero. A search through many orbits stops by this
+    /// number, not by the clock, so its result does not depend on the machine.
     fn effort(&self) -> f64 {
         0.0
     }
 
-    /// Says at which frequency (rad/s) the state `start` is an orbit from which others will be sought, to whoever goes on along its branch.
+    /// Announces that the next searches continue along the branch of the orbit with the state
+    /// `start` at the frequency `omega` (rad/s).
     fn begin_at(&mut self, _omega: f64, _start: &[f64]) {}
 }
 
@@ -73,9 +86,9 @@ pub trait Solver {
 pub struct MethodInfo {
     /// Name in study files.
     pub name: &'static str,
-    /// One line of what it is.
+    /// One line that describes the method.
     pub summary: &'static str,
-    /// Its options, all optional.
+    /// Options of the method, all optional.
     pub options: &'static [MethodOption],
     /// Builds the method from its options.
     pub build: fn(&Options) -> Result<Box<dyn Method>, MethodError>,

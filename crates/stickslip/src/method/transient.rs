@@ -1,9 +1,13 @@
-//! Brute force: the motion is followed until its transient has died.
+//! Method `transient`: integrates the motion until its transient has decayed.
 //!
-//! Exact laws are followed by events, smooth ones by stiff integration, others and mixtures in equal steps. What is still missing when the search
-//! stops is estimated from the measured decay, and from the derivative of a return where the decay was measured over few, and reported as the
-//! orbit's truncation: a lightly damped structure needs hundreds of periods per digit, and a smooth law creeps for seconds. Which orbit that is,
-//! nothing but time tells, so it is an independent check of the other methods; in equal steps Newton's method then finds it again in finer ones.
+//! Exact laws are integrated from event to event, smooth laws by a stiff integration, other
+//! laws and mixtures in equal steps. When the search stops, the measured decay gives the
+//! remaining distance to the orbit. If the decay was measured over few returns, the derivative
+//! of a return is used too. The orbit reports this distance as its truncation. A lightly damped
+//! structure needs hundreds of periods per digit, and a smooth law creeps for seconds.
+//!
+//! The motion itself selects the orbit, so the method is an independent check of the others. In
+//! equal steps, Newton's method then finds the same orbit in finer steps.
 
 use super::event_driven::Exact;
 use super::followed::Kind;
@@ -16,9 +20,9 @@ use crate::model::System;
 
 const NAME: &str = "transient";
 
-/// Estimated distance to the orbit, relative to it, at which a motion counts as settled when none is given.
+/// Default distance to the orbit, relative to the orbit, at which a motion counts as settled.
 const TOLERANCE: f64 = 1e-7;
-/// Periods after which the search is given up when none are given: ten times what a structure with Q of 700 takes.
+/// Default for the most periods: ten times the need of a structure with a Q of 700.
 const PERIODS: usize = 50_000;
 
 /// The row of this method in [`super::TABLE`].
@@ -58,7 +62,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     },
 };
 
-/// Waiting for the transient to die.
+/// Method `transient`: waits until the transient has decayed.
 ///
 /// # Example
 /// ```
@@ -73,11 +77,11 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 pub struct Transient {
     /// Estimated relative distance to the orbit at which the motion counts as settled.
     pub tolerance: f64,
-    /// Periods after which the search is given up.
+    /// Most periods before the search fails.
     pub periods: usize,
-    /// Velocity over which exact laws are smoothed, m/s; they are followed exactly without it.
+    /// Velocity over which exact laws are smoothed, m/s; without it, they stay exact.
     pub width: Option<f64>,
-    /// Periods of the drive after which the motion repeats.
+    /// Excitation periods after which the motion repeats.
     pub period: usize,
 }
 

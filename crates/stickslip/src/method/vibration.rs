@@ -1,24 +1,29 @@
-//! How much of a motion vibrates.
+//! The vibration's fraction of the size of a state.
 //!
-//! States are measured from where nothing loads the structure, so that a blade that is bent by a constant force, or a joint that sticks away from its
-//! middle, has a state that is large beside its vibration. What is asked for and what is told is relative to the vibration: a search that works on
-//! states is told its share of them.
+//! States are measured from the unloaded structure. A blade bent by a constant force, or a
+//! joint stuck away from its middle, therefore has a state much larger than its vibration.
+//! Tolerances and reported errors are relative to the vibration. A search on states receives
+//! tolerances multiplied by this fraction.
 
 use super::Breakdown;
 use super::periodic::norm;
 use crate::orbit::{Evidence, Path, Symmetry};
 
-/// Instants of a period at which the motion is looked at: energy goes to and fro between them, and their largest has it within some percent.
+/// Instants per period at which the motion is sampled. The energy oscillates between
+/// displacement and velocity; the largest sample is accurate to some percent.
 const INSTANTS: usize = 32;
-/// A search that took the vibration for so many times its share of the state, or less, has done what was asked for.
+/// A search is repeated if it assumed a fraction larger than the actual one by more than this
+/// factor.
 const NEARLY: f64 = 2.0;
-/// The least share that leaves a vibration the nine digits that its search asks for at least, of the sixteen of its state.
+/// Smallest fraction. It leaves the vibration at least the nine digits that its search needs,
+/// of the sixteen of the state.
 const LEAST: f64 = 1e-6;
-/// Share below which work that does not balance is that of lost digits.
+/// Fraction below which an energy imbalance is attributed to lost digits.
 pub(super) const SMALL: f64 = 1e-3;
 
-/// The vibration's share of the size of a state `start`, in the energy norm of `weights` (displacements, velocities, states of the joints); what is
-/// smaller than `rest` counts as that (√J).
+/// Returns the size of the vibration over the size of the state `start`, in the energy norm
+/// with `weights` (displacements, velocities, states of the joints). Sizes below `rest` (√J)
+/// count as `rest`.
 pub(super) fn share(
     path: &dyn Path,
     (symmetry, period): (Symmetry, f64),
@@ -26,12 +31,12 @@ pub(super) fn share(
     (weights, rest): (&[f64], f64),
 ) -> f64 {
     if symmetry == Symmetry::HalfPeriod {
-        return 1.0; // its mean is zero
+        return 1.0; // the mean of this motion is zero
     }
     let instants: Vec<_> = (0..INSTANTS).map(|k| path.sample(period * k as f64 / INSTANTS as f64)).collect();
     let n = instants[0].displacement.len();
     if n == 0 {
-        return 1.0; // joints that are only moved: their states go round with the motion
+        return 1.0; // no structure: the states of the joints follow the imposed motion
     }
     let mean = |row: usize| instants.iter().map(|at| at.displacement[row]).sum::<f64>() / INSTANTS as f64;
     let mean: Vec<f64> = (0..n).map(mean).collect();
@@ -44,10 +49,11 @@ pub(super) fn share(
     if vibration < state { vibration / state } else { 1.0 }
 }
 
-/// The share with which a search goes on that took the vibration for `taken` of the state where it is `found` to be; `None` if it need not.
+/// Returns the fraction for the next search, after a search that assumed `taken` and gave
+/// `found`. Returns `None` if no other search is necessary.
 ///
 /// # Errors
-/// A vibration that has too few of the digits of its state.
+/// Fails if the vibration has too few digits of its state.
 pub(super) fn next(taken: f64, found: f64) -> Result<Option<f64>, Breakdown> {
     match taken <= NEARLY * found {
         true => Ok(None),
@@ -56,7 +62,7 @@ pub(super) fn next(taken: f64, found: f64) -> Result<Option<f64>, Breakdown> {
     }
 }
 
-/// Evidence relative to the state becomes relative to the vibration.
+/// Converts evidence relative to the state into evidence relative to the vibration.
 pub(super) fn relate(evidence: &mut Evidence, share: f64) {
     evidence.residual /= share;
     for relative in [&mut evidence.truncation, &mut evidence.return_defect] {
@@ -79,7 +85,8 @@ mod tests {
     const JOINT: f64 = 2e3;
     const CUBIC: f64 = 1e9;
 
-    /// One mass of 1 kg on a spring and joints, under a constant force and a small one that vibrates.
+    /// Returns a mass of 1 kg on a spring and joints, under a constant force and a small
+    /// harmonic force.
     fn pushed(laws: &[SharedLaw], constant: f64, vibrating: f64) -> System {
         let force = |amplitude, harmonic| Force { on: "m".into(), amplitude, phase: 0.0, harmonic };
         let joint = |(j, law): (usize, &SharedLaw)| Joint {
@@ -102,13 +109,15 @@ mod tests {
         force / (stiffness - omega * omega).hypot(omega * DAMPING)
     }
 
-    /// A vibration that is small beside its mean has its digits all the same, and its evidence is its own: a joint that has slipped to where the
-    /// constant force took it, and sticks there, by events; a cubic spring about its rest position, by integration; both in equal steps.
+    /// A vibration much smaller than its mean has accurate digits, and its evidence is relative
+    /// to the vibration. Cases: a joint that slipped under the constant force and then sticks,
+    /// event-driven; a cubic spring about its static equilibrium, integrated; both together, in
+    /// equal steps.
     #[test]
     fn a_small_vibration_about_a_large_mean_keeps_its_digits() {
         let jenkins: SharedLaw = Arc::new(Jenkins { stiffness: JOINT, limit: 1.0 });
         let cubic: SharedLaw = Arc::new(Cubic { stiffness: CUBIC });
-        // where the cubic spring rests: k x + k3 x³ = F
+        // static equilibrium of the cubic spring: `k x + k3 x³ = F`
         let tangent = |force: f64| {
             let mut rest = 1e-3;
             for _ in 0..50 {
@@ -135,15 +144,16 @@ mod tests {
             for method in [&EventDriven as &dyn Method, &Transient::default(), &HarmonicBalance::default()] {
                 near(method, &stuck, expected, 1e-6);
             }
-            // 0.7 mm and 0.1 µm: what the spring is not linear by is the square of their ratio
+            // 0.7 mm and 0.1 µm: the nonlinearity of the spring is the square of their ratio
             let bent = pushed(std::slice::from_ref(&cubic), 10.0, 1e-3);
             let expected = closed_form(STIFFNESS + tangent(10.0), omega, 1e-3);
             for method in [&Shooting::default() as &dyn Method, &Transient::default(), &HarmonicBalance::default()] {
                 near(method, &bent, expected, 1e-6);
             }
-            // equal steps err by 1e-5
+            // equal steps have an error of 1e-5
             let both = pushed(&[jenkins.clone(), cubic.clone()], 10.0, 1e-3);
-            // the joint has slipped under the constant force, and carries its limit of 1 N at the highest point
+            // the joint has slipped under the constant force, and carries its limit of 1 N at
+            // the highest point
             let both_expected = |amplitude: f64| {
                 let stiffness = STIFFNESS + JOINT + tangent(9.0 + JOINT * amplitude);
                 closed_form(stiffness, omega, 1e-3)

@@ -1,31 +1,32 @@
-//! What to use instead of a method that cannot take a system.
+//! The methods that can take a system instead of one that cannot.
 
 use std::fmt;
 
-/// The methods that take a system, those that pick another one left out.
+/// The methods that take a system, without `auto`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ways {
-    /// Those that take it as it is.
+    /// Methods that take the system unchanged.
     pub methods: Vec<&'static str>,
-    /// Those that take it only with a `width`, which smooths its laws.
+    /// Methods that take the system only with a `width`, which smooths its laws.
     pub with_width: Vec<&'static str>,
-    /// What every method misses, where none takes it: methods, and what all of them say.
+    /// Reasons of all methods if none takes the system: the methods with the same reason, and
+    /// the reason.
     pub missing: Vec<(Vec<&'static str>, String)>,
 }
 
 impl Ways {
-    /// Whether a method takes it.
+    /// Returns true if at least one method takes the system.
     pub fn any(&self) -> bool {
         !(self.methods.is_empty() && self.with_width.is_empty())
     }
 
-    /// In words, behind a sentence that says what is wrong; empty where nobody has asked.
+    /// Returns the text that follows an error message; empty if no methods are known.
     pub(super) fn behind(&self) -> String {
         if *self == Ways::default() { String::new() } else { format!("; {self}") }
     }
 }
 
-/// `` `a`, `b` or `c` ``.
+/// Formats names as `` `a`, `b` or `c` ``.
 fn one_of(names: &[&str]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     match quoted.split_last() {
