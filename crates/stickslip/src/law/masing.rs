@@ -94,10 +94,10 @@ pub(super) fn first_that_goes_on<S: Real>(legs: &[S]) -> Option<usize> {
     (1..legs.len()).find(|&k| legs[k].re() * legs[k - 1].re() > 0.0)
 }
 
-/// Replaces four consecutive legs by two, where neighbouring loops differ least. The two legs
-/// have the same total displacement and the same total force as the four, so the force does not
-/// jump. Their lengths lie between those that they replace. `force` returns the contribution of
-/// a leg from its index and length.
+/// Replaces four consecutive legs by two, at the position at which legs of the same sign differ
+/// least in length. The two legs have the same total displacement and the same total force as
+/// the four, so the force does not jump. Their lengths lie between those that they replace.
+/// `force` returns the contribution of a leg from its index and length.
 fn forget<S: Real>(legs: &mut [S], force: impl Fn(usize, f64) -> f64) {
     let apart = |k: usize| 1.0 - (legs[k + 2].re() / legs[k].re()).abs();
     let Some(first) = (1..legs.len() - 3).min_by(|a, b| apart(*a).total_cmp(&apart(*b))) else { return };

@@ -95,7 +95,8 @@ pub trait Step: Debug + Send + Sync {
     /// `states` holds two arrays. The first contains the states at the first point, before and
     /// after the cycle. The second contains the states at all points, `[point][state]`, from the
     /// previous cycle on this path, or NaN. Without `rows`, the cycle ends early when its states
-    /// equal those of the previous cycle: the remaining forces are then already correct.
+    /// equal those of the previous cycle: the remaining forces are then already correct. With
+    /// `rows`, the second array is set to NaN.
     fn around(
         &self,
         directions: usize,

@@ -91,22 +91,22 @@ impl Law for Stribeck {
     fn scale(&self) -> f64 {
         self.static_limit
     }
-    /// A slider with two limits, if `velocity` is zero.
+    /// A slider with two limits. Available if `velocity` is zero or the limits are equal.
     fn pieces(&self) -> Option<Vec<Piece>> {
         let slider = Slider { stiffness: None, limit: self.limit, static_limit: self.static_limit };
         (self.velocity == 0.0 || self.is_constant()).then(|| vec![Piece::Slider(slider)])
     }
-    /// Available if `velocity` is positive. At zero, no penalty makes the resolvent
-    /// single-valued.
+    /// Available if `velocity` is positive or the limits are equal. Otherwise no penalty makes
+    /// the resolvent single-valued.
     fn prox(&self) -> Option<&dyn Prox> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
-    /// Available under the condition of the resolvent.
+    /// Available under the same condition as the resolvent.
     fn sliding(&self) -> Option<&dyn Sliding> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
-    /// Available if `velocity` is positive. No smooth law with a single width has both a static
-    /// and a dynamic limit.
+    /// Available if `velocity` is positive or the limits are equal. Otherwise no smooth law with
+    /// a single width has both limits.
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
         let Stribeck { limit, static_limit, velocity } = *self;
         if self.is_constant() {
