@@ -39,7 +39,7 @@ impl Adaptive {
     /// returns true, the points so far are returned.
     ///
     /// # Errors
-    /// The method cannot take the system.
+    /// The method does not support the system.
     ///
     /// # Example
     /// ```

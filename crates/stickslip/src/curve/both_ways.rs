@@ -82,7 +82,7 @@ impl BothWays {
     /// order of the forward sweep. Ends early if `stop` is true.
     ///
     /// # Errors
-    /// The method cannot take the system.
+    /// The method does not support the system.
     pub fn others(&self, method: &dyn Method, system: &System, stop: &AtomicBool) -> Result<Vec<Other>, MethodError> {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
         let mut solver = advised(method, system)?;

@@ -97,7 +97,7 @@ pub struct ModeRequest {
     pub range: (f64, f64),
     /// Number of points, equally spaced in the logarithm of the amplitude.
     pub points: usize,
-    /// Highest harmonic; only odd harmonics are used.
+    /// Highest harmonic. If all laws are odd, only odd harmonics are used.
     pub harmonics: usize,
     /// Samples per period.
     pub samples: usize,

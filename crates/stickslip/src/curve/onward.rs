@@ -36,7 +36,7 @@ pub fn is_followed(system: &System) -> bool {
 /// solver.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = advised(method, system)?;
     Ok(if is_followed(system) {

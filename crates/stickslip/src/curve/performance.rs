@@ -96,7 +96,7 @@ pub enum PerformanceError<E> {
         /// Cause of the failure.
         cause: E,
     },
-    /// The method cannot take the system.
+    /// The method does not support the system.
     #[error(transparent)]
     Method(MethodError),
 }
@@ -109,7 +109,7 @@ impl<E: Send> Performance<'_, E> {
     /// Computes the peak at one value of the parameter.
     ///
     /// # Errors
-    /// The system cannot be built, or the method cannot take it.
+    /// The system cannot be built, or the method does not support it.
     pub fn peak(&self, value: f64) -> Result<Row, PerformanceError<E>> {
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
         let mut solver = onward::solver(self.method, &system).map_err(PerformanceError::Method)?;
@@ -156,7 +156,7 @@ impl<E: Send> Performance<'_, E> {
     /// Computes the curve over `values` (in increasing order) and its optimum.
     ///
     /// # Errors
-    /// The system cannot be built at some value, or the method cannot take it.
+    /// The system cannot be built at some value, or the method does not support it.
     ///
     /// # Example
     /// ```

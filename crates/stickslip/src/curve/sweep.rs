@@ -31,7 +31,7 @@ pub struct Watch<'a> {
 /// each outcome into the stored result.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 ///
 /// # Example
 /// ```
@@ -79,7 +79,7 @@ pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 /// branch of its initial guess in smaller steps before it changes to another branch.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     onward::solver(method, system)
 }
@@ -127,7 +127,7 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
 /// skipped, and the next one is solved without initial guess.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 pub fn back(
     method: &dyn Method,
     system: &System,

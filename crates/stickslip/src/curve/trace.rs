@@ -74,7 +74,7 @@ impl Branch {
 /// Why no branch was computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TraceError {
-    /// The method cannot take the system.
+    /// The method does not support the system.
     #[error(transparent)]
     Method(#[from] MethodError),
     /// No orbit was found at the start.
@@ -163,8 +163,8 @@ impl Trace<'_> {
     /// return.
     ///
     /// # Errors
-    /// The method cannot take the system, or no orbit is found at the start. A branch that fails
-    /// later is returned up to this point.
+    /// The method does not support the system, or no orbit is found at the start. A branch that
+    /// fails later is returned up to this point.
     ///
     /// # Example
     /// ```

@@ -113,8 +113,8 @@ impl Iwan {
     }
 
     /// Returns the force of first loading (N) at a non-negative displacement. With a limit of
-    /// `STUCK` or more, the law is the linear spring `KT`. Otherwise a distribution with χ near
-    /// -1 would slip in part at any displacement.
+    /// `STUCK` or more, the law is the linear spring `KT`. Without this special case, a
+    /// distribution with χ near -1 would slip in part at any displacement.
     fn first_loading<S: Real>(&self, u: S) -> S {
         let far = self.slips_at();
         if self.limit >= STUCK {

@@ -43,8 +43,8 @@ pub struct Evidence {
     pub accuracy: Accuracy,
     /// Distance between the state at t = 0 and its return under an independent time integration,
     /// relative to the vibration, in the energy norm. It equals the residual if time integration
-    /// found the orbit. `None` if no integrator takes the system, or if the system is too large
-    /// for an automatic check (see [`Orbit::return_defect`](super::Orbit::return_defect)).
+    /// found the orbit. `None` if no integrator supports the system, or if the system is too
+    /// large for an automatic check (see [`Orbit::return_defect`](super::Orbit::return_defect)).
     pub return_defect: Option<f64>,
     /// Names of joints that stick for the whole period. Their offset is not unique, and the
     /// orbit belongs to a continuum. (It is the symmetric one with

@@ -60,7 +60,7 @@ pub trait Path: Send + Sync {
     }
     /// Returns the distance between an independently integrated motion from `start` and the
     /// orbit after a return, relative to the vibration. For methods without time integration.
-    /// `None` if no integrator takes the system.
+    /// `None` if no integrator supports the system.
     fn return_defect(&self, _start: &[f64], _symmetry: Symmetry) -> Option<f64> {
         None
     }

@@ -78,7 +78,7 @@ impl Orbit {
     /// integration, relative to the vibration, in the energy norm
     /// ([`super::Evidence::return_defect`]). It works for systems of any size: if the defect is
     /// not known yet, this call integrates the motion over one return. `None` if no integrator
-    /// takes the laws of the system.
+    /// supports the laws of the system.
     pub fn return_defect(&self) -> Option<f64> {
         self.evidence.return_defect.or_else(|| self.path.return_defect(&self.start, self.symmetry))
     }

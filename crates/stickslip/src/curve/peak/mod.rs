@@ -109,7 +109,7 @@ pub fn held(system: &System, omega: f64) -> f64 {
 /// in order of frequency. `points` are in order of frequency.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 ///
 /// # Example
 /// ```
