@@ -1,7 +1,8 @@
-//! Physical dimensions of the quantities that a model is made of.
+//! Physical dimensions of model quantities.
 //!
-//! A dimension is four integer exponents: kilogram, metre, second, radian. The radian counts as a base unit here, because
-//! a drive frequency of 121 Hz and one of 121 rad/s must never be taken for each other (1 Hz is 2π rad/s).
+//! A dimension is four integer exponents: kilogram, metre, second, radian. The radian counts as
+//! a base unit, so that an excitation frequency of 121 Hz cannot be confused with 121 rad/s (1
+//! Hz is 2π rad/s).
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -29,7 +30,7 @@ macro_rules! named {
             $(#[doc = concat!($name, ", SI unit ", $unit)]
             pub const $constant: Dimension = Dimension { kg: $kg, m: $m, s: $s, rad: $rad };)*
 
-            /// Name and SI unit of a dimension that has a name here.
+            /// Returns the name and the SI unit of a dimension that is listed here.
             pub fn name_and_unit(self) -> Option<(&'static str, &'static str)> {
                 $(if self == Self::$constant { return Some(($name, $unit)); })*
                 None
@@ -60,7 +61,8 @@ named! {
 }
 
 impl Dimension {
-    /// This dimension to a power; `None` if the power is not whole, or too high for the exponents.
+    /// Raises this dimension to a power. Returns `None` if the power is not an integer or if an
+    /// exponent overflows.
     ///
     /// # Example
     /// ```
@@ -72,7 +74,7 @@ impl Dimension {
         if power.fract() != 0.0 || power.abs() > f64::from(i8::MAX) {
             return None;
         }
-        let power = power as i8; // whole and within its range
+        let power = power as i8; // an integer within the range of i8
         Some(Dimension {
             kg: self.kg.checked_mul(power)?,
             m: self.m.checked_mul(power)?,

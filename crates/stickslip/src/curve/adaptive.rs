@@ -1,7 +1,9 @@
-//! A curve whose points lie where it bends: closer at peaks and at the borders of stick and slip, wider where a straight line does.
+//! A curve with adaptive points: dense at peaks and at transitions between stick and slip,
+//! sparse elsewhere.
 //!
-//! Every interval is halved until the orbit in its middle lies where the straight line between its ends says it does. Intervals are
-//! halved level by level, so that the points are the same on any number of threads.
+//! Each interval is bisected until the orbit in its middle agrees with the straight line between
+//! its ends. Bisection proceeds level by level, so the points are identical for any number of
+//! threads.
 
 use super::onward;
 use super::peak::Point;
@@ -10,32 +12,34 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use rayon::prelude::*;
 
-/// What is asked for.
+/// Specification of an adaptive curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
     /// First and last frequency, rad/s.
     pub range: (f64, f64),
-    /// Distance of the curve from its polygon, as a share of the largest value of each quantity.
+    /// Permitted distance between the curve and its polygon, relative to the largest value of
+    /// each quantity.
     pub tolerance: f64,
 }
 
-/// Intervals to begin with.
+/// Number of initial intervals.
 pub const FIRST: usize = 64;
-/// Halvings of an interval: its parts are then a four-thousandth of it, below the width of any peak that two points of the first grid
-/// could tell of.
+/// Number of bisections of an initial interval. The resulting width, 1/4096 of it, is below the
+/// width of any peak that the initial grid can indicate.
 const LEVELS: usize = 12;
-/// Points beyond which no interval is halved any more.
+/// No interval is bisected beyond this number of points.
 pub const MOST: usize = 20_000;
 
-/// A point of the curve with what is kept of it.
+/// A point of the curve, with the result of `keep`.
 pub type Kept<R> = (Point, R);
 
 impl Adaptive {
-    /// The points, rising in frequency. `quantities` of an orbit are those whose polygon is judged; `keep` turns each outcome into what
-    /// is kept. When `stop` says so, what is there is returned.
+    /// Computes the points in order of frequency. The polygon must be accurate for all
+    /// `quantities` of an orbit. `keep` converts each outcome into the stored result. If `stop`
+    /// returns true, the points so far are returned.
     ///
     /// # Errors
-    /// The method cannot take the system.
+    /// The method does not support the system.
     ///
     /// # Example
     /// ```
@@ -46,7 +50,7 @@ impl Adaptive {
     /// let curve = Adaptive { range, tolerance: 0.01 }
     ///     .curve(&EventDriven, &system, &|orbit| vec![orbit.places[0].amplitude()], &|_| (), &|| false)
     ///     .unwrap();
-    /// // the resonance at 121.25 Hz is 0.2 Hz wide: an even grid that shows it as well takes a thousand points
+    /// // the resonance at 121.25 Hz is 0.2 Hz wide; a uniform grid takes 1000 points
     /// assert!(curve.len() < 200);
     /// ```
     pub fn curve<R: Send>(
@@ -57,10 +61,13 @@ impl Adaptive {
         keep: &(dyn Fn(Result<&Orbit, &OrbitError>) -> R + Sync),
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Kept<R>>, MethodError> {
-        // where laws allow several orbits at a frequency, what is found alone need not be what the points before lead to: one after the other then
+        // If the laws allow several orbits at a frequency, a search without initial guess can
+        // find another orbit than the branch of the previous points. All points are then solved
+        // in sequence.
         let chunk = if system.has_passive_joints() { CHUNK } else { MOST };
         let solve = |omegas: &[(f64, Option<&[f64]>)]| -> Result<Vec<Kept<R>>, MethodError> {
-            // a solver for every few points: its memory pays, and the chunks are the same on any number of threads
+            // One solver per chunk, because its stored data save work. The chunks are identical
+            // for any number of threads.
             let chunks: Vec<Result<Vec<Kept<R>>, MethodError>> = omegas
                 .par_chunks(chunk)
                 .map(|chunk| {
@@ -116,7 +123,8 @@ impl Adaptive {
         Ok(points)
     }
 
-    /// The points with those in the middle of the open intervals, and which of the new intervals are still open.
+    /// Inserts the middle points of the open intervals. Returns all points, and which of the new
+    /// intervals are open.
     fn joined<R>(&self, points: Vec<Kept<R>>, open: &[bool], middles: Vec<Kept<R>>) -> (Vec<Kept<R>>, Vec<bool>) {
         let all = || points.iter().chain(&middles).map(|(point, _)| &point.values);
         let count = all().map(Vec::len).max().unwrap_or(0);
@@ -127,7 +135,8 @@ impl Adaptive {
         let allowed: Vec<f64> = (0..count).map(|quantity| self.tolerance * largest(quantity)).collect();
         let bends = |a: &Point, middle: &Point, b: &Point| {
             let [a, middle, b] = [a, middle, b].map(|point| &point.values);
-            // beside a failed point nothing is known; the failure is a point of the curve already
+            // Next to a failed point the shape of the curve is unknown. The failure is already a
+            // point of the curve.
             !a.is_empty()
                 && !middle.is_empty()
                 && !b.is_empty()
@@ -166,7 +175,7 @@ mod tests {
     use crate::method::event_driven::EventDriven;
     use std::f64::consts::TAU;
 
-    /// The polygon is as near to the curve as was asked, judged at frequencies that it has no points at.
+    /// The polygon has the requested accuracy at frequencies between its points.
     #[test]
     fn the_polygon_is_near_the_curve() {
         let mut couple = crate::model::example::blade_couple();

@@ -1,4 +1,5 @@
-//! A curve followed in both directions, where several orbits may exist at one frequency: what its points do not show.
+//! Bidirectional sweep: a reverse sweep finds orbits that the forward sweep missed, if several
+//! orbits may exist at one frequency.
 
 pub use super::onward::is_followed;
 use super::peak::{Point, held};
@@ -8,16 +9,18 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
 
-/// Orbits are others whose amplitudes differ by more than this share of the largest, and by more than so many of their estimated errors.
+/// Two orbits differ if their amplitudes differ by more than `OTHER` times the largest
+/// amplitude, and by more than `ERRORS` times the estimated error.
 const OTHER: f64 = 1e-2;
 const ERRORS: f64 = 3.0;
-/// Amplitudes below this share of a mean are its rounding.
+/// Amplitudes below this fraction of a mean are rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// The points of a curve, as they were found on the way there.
+/// The points of a curve, as the forward sweep found them.
 ///
 /// # Example
-/// A softening spring bends the resonance towards lower frequencies; on the way there the curve steps onto the high branch late.
+/// A softening spring bends the resonance to lower frequencies. The forward sweep jumps to the
+/// branch of high amplitudes late.
 /// ```
 /// use std::sync::{Arc, atomic::AtomicBool};
 /// use stickslip::curve::both_ways::BothWays;
@@ -48,49 +51,52 @@ pub struct BothWays {
     points: Vec<Point>,
 }
 
-/// An orbit of the way back at a frequency where the way there has another one.
+/// An orbit of the reverse sweep at a frequency at which the forward sweep found another one.
 #[derive(Debug, Clone)]
 pub struct Other {
-    /// It.
+    /// The orbit of the reverse sweep.
     pub orbit: Orbit,
-    /// Its largest amplitude over that of the other one.
+    /// Ratio of its largest amplitude to that of the orbit of the forward sweep.
     pub ratio: f64,
 }
 
 impl BothWays {
-    /// `None` where there is one orbit at a frequency, or the system is large.
+    /// Returns `None` if the system has one orbit per frequency, or is large.
     pub fn of(system: &System) -> Option<Self> {
         is_followed(system).then(Self::default)
     }
 
-    /// The next point.
+    /// Adds the next point.
     pub fn add(&mut self, omega: f64, outcome: Result<&Orbit, &OrbitError>) {
         self.add_point(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
     }
 
-    /// The next point, with the sizes of all places, m, or without an orbit.
+    /// Adds the next point. Its values are the amplitudes of all places (m), or none without an
+    /// orbit.
     pub fn add_point(&mut self, point: Point) {
         self.points.push(point);
     }
 
-    /// Follows the points back, from what is found alone at the last one: the other orbits that are found, in the order of the way there. When `stop` is
-    /// true it ends early.
+    /// Sweeps the points in reverse, beginning at the last one with an orbit that is found
+    /// without initial guess. Returns the orbits that differ from the forward sweep, in the
+    /// order of the forward sweep. Ends early if `stop` is true.
     ///
     /// # Errors
-    /// The method cannot take the system.
+    /// The method does not support the system.
     pub fn others(&self, method: &dyn Method, system: &System, stop: &AtomicBool) -> Result<Vec<Other>, MethodError> {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
         let mut solver = advised(method, system)?;
-        // what is found there alone need not be what the points before lead to
+        // A search without initial guess can find another orbit than the forward sweep.
         let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.start);
         let mut omegas = self.points.iter().rev().map(|point| point.omega);
         let mut others = Vec::new();
         back(method, system, start, &mut omegas, stop, &mut |orbit| {
             let Some(point) = self.points.iter().find(|point| point.omega == orbit.omega) else { return };
             let held = held(system, orbit.omega);
-            // the way back asks for no errors: of an orbit that is shown they are known
+            // The reverse sweep estimates no errors, so an orbit that is reported is solved
+            // again with an error estimate.
             let shown = other(point, orbit, held).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
-            // no motion stays on what is unstable, however it began
+            // unstable orbits are not reported, because no motion stays on them
             let shown = shown.filter(|orbit| orbit.is_stable() != Some(false));
             others.extend(shown.and_then(|orbit| other(point, &orbit, held).map(|ratio| Other { orbit, ratio })));
         })?;
@@ -99,8 +105,9 @@ impl BothWays {
     }
 }
 
-/// The stretches of the way back on which it has other orbits, the points `others`, than the way there, whose points are `there`: each with its neighbours,
-/// which both ways have.
+/// Returns the frequency intervals in which the reverse sweep has other orbits. `there` are the
+/// points of the forward sweep, `others` the other orbits of the reverse sweep. Each interval
+/// includes its two neighbours, which both sweeps share.
 pub fn stretches(there: &[Point], others: &[Point]) -> Vec<Vec<Point>> {
     let mut stretches: Vec<Vec<Point>> = Vec::new();
     let mut others = others.iter().peekable();
@@ -124,8 +131,9 @@ fn amplitudes(orbit: &Orbit) -> Vec<f64> {
     orbit.places.iter().map(|place| place.size()).collect()
 }
 
-/// Largest amplitude of an orbit over that of a point at its frequency, if it is another one. What friction holds, or nothing drives, moves by rounding, of
-/// its mean or of `held`, m.
+/// Returns the ratio of the largest amplitude of an orbit to that of a point at the same
+/// frequency, if the two orbits differ. Amplitudes below `held` (m), or below the rounding of
+/// the means, count as zero.
 fn other(point: &Point, orbit: &Orbit, held: f64) -> Option<f64> {
     if point.values.is_empty() {
         return None;

@@ -1,4 +1,5 @@
-//! Families of orbits along a parameter.
+//! Families of orbits along a parameter: sweeps, peaks, branches, performance curves, nonlinear
+//! modes.
 
 pub mod adaptive;
 pub mod both_ways;

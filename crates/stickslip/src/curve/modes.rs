@@ -1,18 +1,24 @@
-//! Nonlinear modes: frequency and equivalent damping of a free vibration over its amplitude, and self-excited orbits.
+//! Nonlinear modes: frequency and equivalent damping of a free vibration as functions of its
+//! amplitude, and self-excited orbits.
 //!
-//! At small amplitude joints stick and the mode is the linear one with their springs, or with rigid contacts closed; at large amplitude
-//! it is the linear one without joints. A mode is *followed* from an amplitude at which friction hardly matters, by arc length, in steps
-//! that its own curve decides: neither the range that is asked for nor its points change them. Where all joints stick, every smaller motion
-//! is a multiple of the last one. The points above are solved for, each from the followed states
-//! beside it. Where a mode ends above the smallest
-//! amplitude, what lies below is followed from there upwards, from the mode of the same number
-//! with all joints as they hold in small motion.
+//! At small amplitudes the joints stick, and the mode is the linear mode with their springs, or
+//! with rigid contacts closed. At large amplitudes it is the linear mode without joints.
 //!
-//! Where friction pulls two frequencies together, two modes nearly become one: [`Mode::merges`]. Below there are two again, in other motions,
-//! and little decides which mode goes on to which, the number of harmonics for example. There the curve may also turn: its amplitude grows
-//! again before it falls for good, and the motion at the next smaller amplitude is another one ([`Mode::turns`]); or it does not come back at
-//! all, and the mode is [`Lost`].
-//! The equations are those of the extended periodic motion concept, Krack (2015).
+//! The continuation begins at an amplitude at which friction is negligible, and proceeds to
+//! smaller amplitudes by arc length. Its steps depend on the curve alone, not on the requested
+//! range or points. Once all joints stick, every smaller motion is a multiple of the last one.
+//! The requested points are solved from neighbouring states of the continuation.
+//! If the curve ends above the smallest amplitude, a second continuation proceeds upwards from
+//! the smallest amplitude. It begins at the mode of the same number with all joints linearized
+//! for small motion.
+//!
+//! Friction can bring two frequencies together, so that two modes nearly coalesce:
+//! [`Mode::merges`]. Below this amplitude there are two modes again, with other shapes. Small
+//! effects, such as the number of harmonics, decide which mode continues which. The curve may
+//! also turn there. Its amplitude then grows again before it falls, and the motion at the next
+//! smaller amplitude is a different one ([`Mode::turns`]). If the curve does not return, the
+//! mode ends ([`Lost`]).
+//! Source: the extended periodic motion concept of Krack (2015).
 
 mod follow;
 
@@ -32,19 +38,21 @@ pub struct ModePoint {
     pub amplitude: f64,
     /// Frequency, rad/s.
     pub omega: f64,
-    /// Equivalent damping ratio ζ: that of the linear oscillator that loses the same share of energy per cycle. It contains the viscous
-    /// dampers; it is negative where the structure takes up more energy than friction destroys.
+    /// Equivalent damping ratio ζ: that of a linear oscillator with the same relative energy
+    /// loss per cycle. It includes the viscous dampers. It is negative if the structure absorbs
+    /// more energy than friction dissipates.
     pub damping: f64,
-    /// The part of it that the viscous dampers have in this motion; the rest is the joints'.
+    /// Contribution of the viscous dampers to the damping ratio; the joints contribute the rest.
     pub viscous: f64,
-    /// First harmonic of every place, m: the shape, with the phases that friction leaves.
+    /// First harmonic of every place, m: the shape with its phases.
     pub places: Vec<Complex64>,
-    /// Half of the way from one end of the motion to the other of every place, m, with all harmonics.
+    /// Half of the peak-to-peak displacement of every place, m, with all harmonics.
     pub amplitudes: Vec<f64>,
 }
 
 impl ModePoint {
-    /// Phases of the places against the one that moves most, rad; of equal ones the first has the phase zero.
+    /// Returns the phases of the places relative to the place with the largest motion, rad.
+    /// Among equal ones, the first has phase zero.
     ///
     /// # Example
     /// ```
@@ -63,63 +71,66 @@ impl ModePoint {
 /// A nonlinear mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mode {
-    /// Points by rising amplitude.
+    /// Points in order of amplitude.
     pub points: Vec<ModePoint>,
-    /// Where the damping ratio is largest within the range, between the points too.
+    /// Point with the largest damping ratio within the range, also between the requested points.
     pub largest: Option<ModePoint>,
-    /// Modal amplitudes within the range at which it nearly becomes one with another mode, by falling amplitude, m √kg.
+    /// Modal amplitudes within the range at which the mode nearly coalesces with another one, in
+    /// decreasing order, m √kg.
     pub merges: Vec<f64>,
-    /// Where its curve turns within the range, by falling amplitude.
+    /// Turning points of the curve within the range, in decreasing order of amplitude.
     pub turns: Vec<Turn>,
-    /// Amplitudes among those asked for at which no motion was found beside the followed ones.
+    /// Requested amplitudes on the curve at which no motion was found.
     pub missing: Vec<f64>,
-    /// Where and why it ended above the smallest amplitude, if it did.
+    /// Amplitude and cause of the end, if the mode ends above the smallest amplitude.
     pub lost: Option<Lost>,
-    /// Whether it is one of the two waves of a pair of equal modes.
+    /// True if the mode is one of the two travelling waves of a pair of equal modes.
     pub travels: bool,
 }
 
-/// Which mode, and with how many harmonics.
+/// Specification of a nonlinear mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModeRequest {
-    /// Number of the mode by rising frequency, from 0.
+    /// Number of the mode in order of frequency, from 0.
     pub mode: usize,
-    /// Modal amplitudes between which it is followed, m √kg; both positive.
+    /// Range of modal amplitudes, m √kg; both positive.
     pub range: (f64, f64),
-    /// Points, evenly spaced in the logarithm of the amplitude.
+    /// Number of points, equally spaced in the logarithm of the amplitude.
     pub points: usize,
-    /// Highest harmonic; odd ones are used.
+    /// Highest harmonic. If all laws are odd, only odd harmonics are used.
     pub harmonics: usize,
     /// Samples per period.
     pub samples: usize,
 }
 
-/// Share of a mode's largest coordinate up to which what places see of it is rounding.
+/// Displacements of places below this fraction of a mode's largest coordinate are rounding.
 const UNSEEN: f64 = 1e-12;
 
-/// Whether a system can have nonlinear modes.
+/// Checks that a system can have nonlinear modes.
 ///
 /// # Errors
-/// A place without mass, or a law that cannot be followed.
+/// A place without mass, or a law that is not supported.
 pub fn check(system: &System) -> Result<(), MethodError> {
     equations(system, 1, 8).map(drop)
 }
 
-/// The equations of the modes of a system, or what else takes it.
+/// Returns the mode equations of a system. The error names alternative methods.
 fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEquations<'_>, MethodError> {
     ModeEquations::new(system, harmonics, samples).map_err(|error| error.with(ways(system)))
 }
 
-/// Follows a mode from an amplitude at which friction hardly matters downwards.
+/// Computes a nonlinear mode, from an amplitude at which friction is negligible to smaller
+/// amplitudes.
 ///
 /// # Errors
-/// A law with several directions, a place without mass, a mass matrix that is not positive definite.
+/// A law with several directions, a place without mass, a mass matrix that is not positive
+/// definite.
 ///
 /// # Example
 /// ```
 /// use stickslip::curve::modes::{ModeRequest, mode};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
-/// // the mode in which the blades move against each other is the only one that friction knows
+/// // friction affects only the mode in which the blades move in antiphase
 /// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
 /// let mode = mode(&system, request).unwrap();
 /// assert!(mode.lost.is_none());
@@ -155,8 +166,8 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     Ok(mode)
 }
 
-/// The curve of a mode: what is followed from its large end, and from its small end where the
-/// other one does not come there.
+/// The curve of a mode: a branch from large amplitudes downwards. A branch from small amplitudes
+/// upwards is added if the first one does not reach them.
 struct Followed {
     falling: Option<ModeCurve>,
     rising: Option<ModeCurve>,
@@ -165,8 +176,8 @@ struct Followed {
 impl Followed {
     fn new(equations: &mut ModeEquations<'_>, request: ModeRequest) -> Self {
         let (low, high) = request.range;
-        // the only mode is that of its number at both ends: of a law with memory, which is dear to
-        // follow through large motions, its small end comes first
+        // A single mode has the same number at both ends. For a law with memory, large motions
+        // are expensive, so the branch from small amplitudes is tried first.
         let rising = match equations.is_alone_with_memory() {
             true => ModeCurve::from_rest(equations, request.mode, request.range),
             false => None,
@@ -185,13 +196,14 @@ impl Followed {
         self.falling.iter().chain(&self.rising)
     }
 
-    /// Whether one of them has passed an amplitude.
+    /// Tells whether a branch passes an amplitude.
     fn passes(&self, amplitude: f64) -> bool {
         self.falling.as_ref().is_some_and(|curve| amplitude > curve.end())
             || self.rising.as_ref().is_some_and(|curve| amplitude < curve.top())
     }
 
-    /// Where and why the mode ends above the smallest amplitude, of those up to `high`.
+    /// Returns amplitude and cause of the end of the mode, if it ends above the smallest
+    /// amplitude. Amplitudes above `high` are not considered.
     fn lost(&self, high: f64) -> Option<Lost> {
         let falling = self.falling.as_ref()?;
         let lost = falling.lost?;
@@ -205,11 +217,12 @@ impl Followed {
     }
 }
 
-/// Modal amplitude (m √kg) of mode `index` of the structure without its joints where the place that moves most in it has an amplitude of one
-/// metre; `None` if there is no such mode, or if it moves no place.
+/// Returns the modal amplitude (m √kg) at which the place with the largest motion has an
+/// amplitude of 1 m, in mode `index` of the structure without its joints. `None` if there is no
+/// such mode, or if it moves no place.
 ///
 /// # Errors
-/// As [`mode()`].
+/// See [`mode()`].
 pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     let equations = equations(system, 1, 8)?;
     let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
@@ -223,22 +236,23 @@ pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     }))
 }
 
-/// Self-excited orbits along a mode: the amplitudes at which its damping changes its sign. Stable ones have rising damping there.
+/// Computes self-excited orbits along a mode: the amplitudes at which its damping changes sign.
+/// An orbit is stable if the damping rises with amplitude there.
 ///
 /// # Errors
-/// As [`mode()`].
+/// See [`mode()`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let path = ModeCurve::follow(&mut equations, request.mode, request.range);
     let mut orbits = Vec::new();
     for pair in path.within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
-        // between states that are not neighbours the curve turns: the damping jumps
+        // The curve turns between states that are not consecutive, and the damping jumps.
         if (upper.damping < 0.0) == (lower.damping < 0.0) || k - i > 1 {
             continue;
         }
         let mut found = None;
-        // regula falsi on the logarithm of the amplitude, with the Illinois weight
+        // regula falsi in the logarithm of the amplitude, with the Illinois weight
         let (mut a, mut fa, mut b, mut fb) = (below.ln(), lower.damping, above.ln(), upper.damping);
         for _ in 0..100 {
             let c = (a * fb - b * fa) / (fb - fa);
@@ -280,12 +294,14 @@ mod tests {
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
     use std::f64::consts::PI;
 
-    /// What the energy of an exact orbit and the amplitudes of its places may differ by from a mode with 31 harmonics: rigid friction makes
-    /// the error of a series fall as 1/H, and a motion close to where two modes become one magnifies it.
+    /// Tolerance between the exact orbit and a mode with 31 harmonics, in energy and amplitudes.
+    /// For rigid friction, the error of a series decreases as 1/H, and a motion near the
+    /// coalescence of two modes amplifies it.
     const SERIES: f64 = 0.02;
 
-    /// Equal blades in a ring have modes in pairs, and while their dampers stick every mixture of two is a motion. The frequency is that of
-    /// the wave with one nodal diameter, `√((k + 4 kt sin²(π/N))/m)`.
+    /// A ring of equal blades has modes in pairs, and any combination of a pair is a motion
+    /// while the dampers stick. The frequency is that of the wave with one nodal diameter,
+    /// `√((k + 4 kt sin²(π/N))/m)`.
     #[test]
     fn the_modes_of_a_tuned_ring_go_down_to_where_all_sticks() {
         let (blades, k, kt) = (6, 4.0, 0.8);
@@ -300,7 +316,8 @@ mod tests {
         }
     }
 
-    /// Blades (1 kg, 4 N/m and 0.01 kg/s to the ground) in a ring, each joined to the next by 0.8 N/m that slips at 0.2 N.
+    /// Blades (1 kg, 4 N/m and 0.01 kg/s to the ground) in a ring; joints of 0.8 N/m with a slip
+    /// limit of 0.2 N connect neighbours.
     fn ring(blades: usize) -> System {
         let mut model = Model::default();
         let name = |i: usize| format!("b{}", i % blades);
@@ -313,10 +330,13 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// Of two equal modes of a ring the waves are followed, `ω² m = k + 4 sin²(θ/2) Re K`, `2 ζ ω² m = ω c + 4 sin²(θ/2) Im K`, with the dynamic
-    /// stiffness K of a Jenkins element at the relative amplitude `D = 2 a sin(θ/2)`: for `D > d = limit/kt` and `cos ψ = 1 - 2 d/D`,
-    /// `Re K = kt (ψ - sin ψ cos ψ)/π`, `Im K = 4 limit (1 - d/D)/(π D)`. With a quarter of the blades as nodal diameters the phase between every
-    /// other joint is open, and the wave is one of a continuum.
+    /// For two equal modes of a ring, the solver follows the travelling waves:
+    /// `ω² m = k + 4 sin²(θ/2) Re K`, `2 ζ ω² m = ω c + 4 sin²(θ/2) Im K`. K is the dynamic
+    /// stiffness of a Jenkins element at the relative amplitude `D = 2 a sin(θ/2)`. For
+    /// `D > d = limit/kt` and `cos ψ = 1 - 2 d/D`: `Re K = kt (ψ - sin ψ cos ψ)/π`,
+    /// `Im K = 4 limit (1 - d/D)/(π D)`. If the number of blades is four times the nodal
+    /// diameter, the phase between every other joint is undetermined. The wave then belongs to a
+    /// continuum.
     #[test]
     fn the_waves_of_a_tuned_ring_have_the_closed_form_at_every_diameter() {
         for blades in [4, 8] {
@@ -325,7 +345,8 @@ mod tests {
                 let sine = (PI * diameter as f64 / blades as f64).sin();
                 for index in [2 * diameter - 1, 2 * diameter] {
                     let unit = unit(&system, index).unwrap().unwrap();
-                    // blades that no spring joins are told apart by the trace of the joints, 1e-9, which rounding blurs
+                    // Only 1e-9 of the joints' stiffness distinguishes the modes of blades
+                    // without coupling springs, and rounding disturbs it.
                     assert!(
                         (unit / (blades as f64).sqrt() - 1.0).abs() < 1e-6,
                         "a wave moves all blades alike: {unit}"
@@ -361,12 +382,14 @@ mod tests {
         }
     }
 
-    /// What 1024 samples of a period leave of a turning force.
+    /// Error of a travelling force that is sampled 1024 times per period.
     const SAMPLED: f64 = 1e-4;
 
-    /// `x'' + k x + b x³ = 0` at amplitude A: `x = A cn(Ω t, m)`, `Ω² = k + b A²`, `m = b A²/(2 Ω²)`, of period `4 K(m)/Ω` and with the first
-    /// harmonic `A 2π √q/(√m K (1 + q))`, `q = exp(-π K(1-m)/K(m))`; K by the arithmetic-geometric mean. A spring that is a million times as stiff
-    /// as the linear one is no neighbour of the linear mode.
+    /// `x'' + k x + b x³ = 0` at amplitude A: `x = A cn(Ω t, m)`, `Ω² = k + b A²`,
+    /// `m = b A²/(2 Ω²)`, with the period `4 K(m)/Ω`. The first harmonic is
+    /// `A 2π √q/(√m K (1 + q))`, `q = exp(-π K(1-m)/K(m))`; K by the arithmetic-geometric mean.
+    /// At a cubic stiffness of a million times the linear one, the linear mode is not a useful
+    /// initial guess.
     #[test]
     fn a_cubic_spring_is_followed_to_where_it_is_all_there_is() {
         let (k, b) = (1e4, 1e9);
@@ -396,7 +419,8 @@ mod tests {
             let mode = mode(&system, request).unwrap();
             assert_eq!((mode.lost, &mode.missing[..], mode.points.len()), (None, &[][..], 15), "{harmonics}");
             for point in mode.points.iter().filter(|point| harmonics > 3 && point.amplitude > 1e-5) {
-                // the largest displacement that has this first harmonic, by bisection: it grows with it
+                // Find the largest displacement with this first harmonic by bisection; the
+                // harmonic increases with the displacement.
                 let (mut low, mut high) = (0.5 * point.amplitude, 2.0 * point.amplitude);
                 for _ in 0..100 {
                     let middle = 0.5 * (low + high);
@@ -413,8 +437,8 @@ mod tests {
         }
     }
 
-    /// A mass on rigid friction that falls with velocity does not vibrate where friction is thousands of times its spring: the curve ends there,
-    /// after some hundred steps.
+    /// A mass with rigid friction that falls with velocity does not vibrate if friction is
+    /// thousands of times the spring force. The curve ends there after some hundred steps.
     #[test]
     fn a_mode_is_left_where_nothing_vibrates() {
         let mut model = Model::default();
@@ -428,13 +452,14 @@ mod tests {
         let mode = mode(&system, request).unwrap();
         let lost = mode.lost.unwrap();
         assert_eq!(lost.reason, Reason::Overdamped);
-        // 4/π 1 N against 2 · 1e4 N/m · a: a damping ratio of one at 0.06 mm
+        // (4/π · 1 N) / (2 · 1e4 N/m · a) is a damping ratio of one at a = 0.06 mm
         assert!(lost.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{lost:?}");
     }
 
-    /// A mode is the forced vibration under the forces `2 ζ ω M x'`, all harmonics of them. The exact method, which knows nothing of modes,
-    /// finds the mode's amplitudes and its loss of energy `2 π ζ ω² Σ h² Xₕᴴ M Xₕ` under these forces. With positive damping its orbit is the
-    /// only one.
+    /// A mode equals the forced vibration under the forces `2 ζ ω M x'` with all their
+    /// harmonics. The exact method, which is independent of modes, finds the mode's amplitudes
+    /// and its energy loss `2 π ζ ω² Σ h² Xₕᴴ M Xₕ` under these forces. With positive damping
+    /// its orbit is unique.
     #[test]
     fn the_exact_orbit_under_the_forces_of_a_mode_is_the_mode() {
         let mut couple = example::blade_couple();

@@ -1,36 +1,42 @@
-//! The next orbit of a curve, on the branch of the last one.
+//! Branch following: finds the next orbit of a curve on the branch of the previous one.
 //!
-//! Where several orbits exist at a frequency, a search that begins too far from its own branch ends on another, and a curve falls off between two of its
-//! points although its branch goes on. Where an orbit differs much from that of its start the way there is gone in smaller steps: either these arrive, or the
-//! branch ends between both.
+//! If several orbits exist at a frequency, a search from a distant initial guess can converge to
+//! another branch. The curve then jumps although its branch continues. If an orbit differs much
+//! from its initial guess, the solver repeats the interval in smaller steps. Either these steps
+//! reach the frequency, or the branch ends between both frequencies.
 
 use crate::method::{Method, MethodError, OrbitError, Solver, advised};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
 
-/// Amplitudes of two orbits on one branch, and their first harmonics, which have a phase, differ by no more than this share of the largest from one step to the
-/// next.
+/// Largest difference between two consecutive orbits of a branch, relative to the largest
+/// amplitude. It applies to amplitudes and to first harmonics, which include the phase.
 const STRIDE: f64 = 0.2;
-/// Share of the way to the next frequency below which a step is not halved again: the branch ends there, or turns.
+/// A step below this fraction of the interval is not halved again: the branch ends or turns
+/// there.
 const FINEST: f64 = 1.0 / 512.0;
-/// Steps to the next frequency at most.
+/// Maximum number of steps in an interval.
 const MOST: usize = 80;
-/// What the searches on one way may take together, as a share of what a point may: where each takes long, no way is gone after it.
+/// Work limit of all steps in an interval, as a fraction of the work limit of a point. After it
+/// is exceeded, no interval is repeated in smaller steps.
 const EFFORT: f64 = 0.3;
-/// Degrees of freedom and directions of joints beyond which branches are not followed, nor the way back: it takes as long as the curve.
+/// Largest number of degrees of freedom plus joint directions for branch following and the
+/// reverse sweep, which takes as much time as the curve.
 const LARGE: usize = 24;
 
-/// Whether curves of a system are followed along their branch, and both ways: several orbits may exist at a frequency, and it is small.
+/// Tells whether curves of a system use branch following and the reverse sweep: the system is
+/// small, and several orbits may exist at a frequency.
 pub fn is_followed(system: &System) -> bool {
     let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
     system.dofs() + directions <= LARGE && !system.contracts()
 }
 
-/// A solver whose orbits follow each other along a branch, of systems that are followed both ways; of others the method's own.
+/// Returns a solver with branch following for systems that use it; otherwise the method's own
+/// solver.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = advised(method, system)?;
     Ok(if is_followed(system) {
@@ -43,30 +49,31 @@ pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<
 struct Onward<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     last: Option<Last>,
-    /// What it was told of.
+    /// The orbit that [`Solver::begin_at`] announced.
     told: Option<Last>,
-    /// Where smaller steps did not go on.
+    /// The end of a branch at which smaller steps failed.
     end: Option<End>,
-    /// Whether the searches on a way took too long: no way is gone after that.
+    /// True after the steps in an interval exceeded the work limit. No interval is repeated
+    /// after that.
     spent: bool,
 }
 
-/// The end of a branch: its last orbit that was found, and a frequency (rad/s) close to that at
-/// which it has none.
+/// The end of a branch: the last orbit on it, and a nearby frequency (rad/s) at which the branch
+/// has no orbit.
 struct End {
     last: Last,
     beyond: f64,
 }
 
 impl End {
-    /// Whether the way from an orbit to a frequency leads over this end.
+    /// Tells whether the interval from an orbit to a frequency contains this end.
     fn lies_between(&self, from: &Last, omega: f64) -> bool {
         let ahead = (self.beyond - self.last.omega).signum();
         (self.beyond - from.omega) * ahead > 0.0 && (omega - self.beyond) * ahead >= 0.0 && from.is_near(&self.last)
     }
 }
 
-/// Where a curve has arrived.
+/// The last orbit of a curve.
 #[derive(Clone)]
 struct Last {
     omega: f64,
@@ -81,12 +88,12 @@ impl Last {
         Last { omega: orbit.omega, start: orbit.start.clone(), places }
     }
 
-    /// Whether an orbit may be the next one of the branch.
+    /// Tells whether an orbit can be the next one of the branch.
     fn leads_to(&self, orbit: &Orbit) -> bool {
         self.is_near(&Last::new(orbit))
     }
 
-    /// Whether no amplitude or phase differs much.
+    /// Tells whether amplitudes and phases differ little.
     fn is_near(&self, other: &Last) -> bool {
         let pairs = || self.places.iter().zip(&other.places);
         let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
@@ -114,7 +121,7 @@ impl Onward<'_> {
         found
     }
 
-    /// The orbit at which smaller steps arrive; `None` if they do not.
+    /// Returns the orbit at `omega` if smaller steps reach it.
     fn followed(&mut self, mut last: Last, omega: f64, between: bool) -> Option<Orbit> {
         let from = last.omega;
         let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
@@ -170,7 +177,8 @@ mod tests {
     use crate::method::event_driven::EventDriven;
     use std::f64::consts::TAU;
 
-    /// Finds orbits where it is asked for them; between these each search takes so much, and finds nothing if that is all that a point may.
+    /// Finds the requested orbits. Each search between them takes `effort`, and fails if that is
+    /// the whole work limit of a point.
     struct Slow<'a> {
         solver: Box<dyn Solver + Send + 'a>,
         effort: f64,
@@ -194,7 +202,7 @@ mod tests {
         }
     }
 
-    /// Searches between three orbits that are far apart, each with so much work.
+    /// Counts the searches between three orbits that are far apart, for a given effort.
     fn searches(effort: f64) -> usize {
         let system = crate::model::example::blade_couple().assemble().unwrap();
         let asked = std::sync::Arc::default();
@@ -212,7 +220,7 @@ mod tests {
         asked.load(std::sync::atomic::Ordering::Relaxed)
     }
 
-    /// The orbits of a branch that ends at a frequency, and those of another one beyond it.
+    /// A branch that ends at a frequency, and another branch beyond it.
     struct Ends<'a> {
         solver: Box<dyn Solver + Send + 'a>,
         end: f64,
@@ -243,8 +251,8 @@ mod tests {
             onward.between(from + beyond, Some(&start)).unwrap();
             count() - before
         };
-        // from the orbit itself, and again beyond the end that is known; nearer to it the way is
-        // gone anew
+        // The first interval locates the end. The next two contain the known end and take one
+        // search each. A target before the recorded frequency is followed again.
         let found = [1.0, 0.9, 0.5].map(&mut searches);
         assert!(found[0] > 6 && found[1..] == [1, 1], "{found:?}");
         assert!(searches(0.2001) > 1);

@@ -1,7 +1,9 @@
-//! Performance curves: the resonance peak as a function of a design parameter, and the best value of the parameter.
+//! Performance curves: the resonance peak as a function of a design parameter, and the optimal
+//! value of the parameter.
 //!
-//! For every value the peak is maximised over frequency; the optimum over the values is then refined. With a slip limit as the
-//! parameter this is the classical curve of friction damping: free at the left, stuck at the right, a minimum between.
+//! For every value, the peak is maximised over frequency; the optimum over the values is then
+//! refined. With a slip limit as the parameter, this is the classical curve of a friction
+//! damper: free at the left, stuck at the right, with a minimum between.
 //! Source: Griffin (1980), Fig. 4.
 
 use super::both_ways::{BothWays, stretches};
@@ -15,18 +17,20 @@ use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use stickslip_numerics::maximum::maximum;
 
-/// What is computed.
+/// Specification of a performance curve.
 #[derive(Clone, Copy)]
 pub struct Performance<'a, E> {
-    /// The system at a value of the parameter.
+    /// Returns the system at a value of the parameter.
     pub system: &'a (dyn Fn(f64) -> Result<System, E> + Sync),
     /// The method that finds the orbits.
     pub method: &'a dyn Method,
-    /// Frequencies between which the peak is sought, rad/s.
+    /// Frequency range of the peak search, rad/s.
     pub range: (f64, f64),
-    /// Grid points over the range, from which the peak is refined; their distance must not exceed the width of the peak.
+    /// Number of grid points over the range, from which the peak is refined. Their spacing must
+    /// not exceed the width of the peak.
     pub points: usize,
-    /// What is maximised over frequency, for example amplitudes, m: of several quantities, always as many, the one with the highest peak counts.
+    /// The quantities to maximise over frequency, for example amplitudes, m. Their number must
+    /// be constant. The one with the highest peak counts.
     pub quantities: &'a (dyn Fn(&Orbit) -> Vec<f64> + Sync),
 }
 
@@ -37,33 +41,36 @@ pub struct Row {
     pub value: f64,
     /// The highest peak; `None` if no orbit converged.
     pub peak: Option<Peak>,
-    /// Whether only the way back from the last frequency to the first has it, where a system allows several orbits at one ([`super::both_ways`]).
+    /// True if only the reverse sweep has this peak, in a system that allows several orbits at a
+    /// frequency ([`super::both_ways`]).
     pub way_back: bool,
-    /// Orbits of the grid that were not found.
+    /// Number of grid orbits that were not found, plus one if the peak is unsettled.
     pub failed: usize,
-    /// Orbits of the grid whose series is too short for the tolerance, or whose error was not estimated.
+    /// Number of grid orbits whose series is too short for the tolerance, or whose error was not
+    /// estimated.
     pub inaccurate: usize,
 }
 
 /// A performance curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerformanceCurve {
-    /// One row per value, in the order given.
+    /// One row per value, in the given order.
     pub rows: Vec<Row>,
-    /// The value with the lowest peak, refined between its neighbours; `None` if the lowest row stands at an end, or others are as low.
+    /// The value with the lowest peak, refined between its neighbours. `None` if the lowest row
+    /// is the first or the last one, or if several rows are equally low.
     pub optimum: Option<Row>,
 }
 
-/// Peaks that differ by less than this share of the highest are the same: orbits are known to about 1e-10, and a share above that of no value
-/// matters to a design.
+/// Peaks that differ by less than this fraction of the highest are equal. Orbits are accurate to
+/// about 1e-10, and smaller differences do not matter to a design.
 const SAME: f64 = 1e-9;
 
-/// Height of a row; one without a peak is no candidate.
+/// Returns the height of a row; infinity without a peak.
 fn height(row: &Row) -> f64 {
     row.peak.map_or(f64::INFINITY, |peak| peak.value)
 }
 
-/// The rows whose peaks are as low as the lowest.
+/// Returns the rows with the lowest peak.
 fn lowest(rows: &[Row]) -> Vec<usize> {
     let heights = || rows.iter().map(height).filter(|height| height.is_finite());
     let (least, most) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));
@@ -71,13 +78,14 @@ fn lowest(rows: &[Row]) -> Vec<usize> {
 }
 
 impl PerformanceCurve {
-    /// The rows whose peaks are as low as the lowest: more than one where the parameter makes no difference, or where nothing moves.
+    /// Returns the rows with the lowest peak. There are several if the parameter has no
+    /// influence, or if nothing moves.
     pub fn lowest(&self) -> Vec<usize> {
         lowest(&self.rows)
     }
 }
 
-/// Why no curve was made.
+/// Why no curve was computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PerformanceError<E> {
     /// The system could not be built.
@@ -85,22 +93,23 @@ pub enum PerformanceError<E> {
     System {
         /// Value of the parameter.
         value: f64,
-        /// The cause.
+        /// Cause of the failure.
         cause: E,
     },
-    /// The method cannot take the system.
+    /// The method does not support the system.
     #[error(transparent)]
     Method(MethodError),
 }
 
-/// Relative width at which the search for the optimum ends: the peak is known to 1e-10, and flat to second order or kinked there.
+/// Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10, and the
+/// curve is flat to second order or kinked at the optimum.
 const BRACKET: f64 = 1e-7;
 
 impl<E: Send> Performance<'_, E> {
-    /// The peak at one value of the parameter.
+    /// Computes the peak at one value of the parameter.
     ///
     /// # Errors
-    /// The system cannot be built, or the method cannot take it.
+    /// The system cannot be built, or the method does not support it.
     pub fn peak(&self, value: f64) -> Result<Row, PerformanceError<E>> {
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
         let mut solver = onward::solver(self.method, &system).map_err(PerformanceError::Method)?;
@@ -139,15 +148,15 @@ impl<E: Send> Performance<'_, E> {
                 }
             }
         }
-        // a peak that is left open counts as one that was not found
+        // an unsettled peak counts as not found
         failed += usize::from(peak.is_some_and(|peak| peak.unsettled.is_some()));
         Ok(Row { value, peak, way_back, failed, inaccurate })
     }
 
-    /// The curve over `values` (rising), and its optimum.
+    /// Computes the curve over `values` (in increasing order) and its optimum.
     ///
     /// # Errors
-    /// The system cannot be built at some value, or the method cannot take it.
+    /// The system cannot be built at some value, or the method does not support it.
     ///
     /// # Example
     /// ```
@@ -180,7 +189,8 @@ impl<E: Send> Performance<'_, E> {
         Ok(PerformanceCurve { rows, optimum })
     }
 
-    /// Golden-section search: the lowest of two rising branches is a kink as often as it is smooth.
+    /// Refines the optimum by golden-section search, because the minimum can be smooth or a kink
+    /// between two branches.
     fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
         let mut best = middle;
         let close = |a: f64, b: f64| b - a <= BRACKET * (a.abs() + b.abs());

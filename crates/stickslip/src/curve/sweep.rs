@@ -1,10 +1,12 @@
-//! Orbits at given frequencies, each started from its neighbour.
+//! Orbits at given frequencies, each with its neighbour as initial guess.
 //!
-//! The frequencies are cut into blocks of fixed length; a block starts cold and runs in order, and blocks run in parallel. The
-//! start of every point is thus the same on any number of threads, and so are its bits.
+//! The frequencies are divided into blocks of fixed length. A block begins without initial guess
+//! and runs in order; blocks run in parallel. The initial guess of every point is therefore the
+//! same for any number of threads, and the results are identical in all bits.
 //!
-//! A point that its neighbour does not lead to, on either side, is sought alone. Where a curve has a fold, the points beyond it have no orbit near the last one: they are sought again from behind, from the first orbit
-//! that is found after them.
+//! At a fold of the curve, the points beyond it have no orbit near the previous one. They are
+//! then solved in reverse, from the first orbit found after them. A point that is found from
+//! neither side is solved without initial guess.
 
 use super::onward;
 use crate::method::{Method, MethodError, OrbitError, Solver};
@@ -13,22 +15,23 @@ use crate::orbit::Orbit;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Points per block. A cold start costs about as much as five warm points.
+/// Points per block. A start without initial guess costs about as much as five points with one.
 pub const BLOCK: usize = 61;
 
-/// What happens while a sweep runs.
+/// Progress and cancellation of a sweep.
 #[derive(Clone, Copy)]
 pub struct Watch<'a> {
     /// Called once per finished point, from any thread.
     pub finished: &'a (dyn Fn() + Sync),
-    /// When true the sweep ends early; points that were not reached are `None`.
+    /// If true, the sweep ends early; points that were not reached are `None`.
     pub stop: &'a AtomicBool,
 }
 
-/// Runs `system` over the frequencies `omega(0), …, omega(count - 1)` (rad/s); `row` turns each outcome into what is kept.
+/// Solves `system` at the frequencies `omega(0), …, omega(count - 1)` (rad/s). `row` converts
+/// each outcome into the stored result.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 ///
 /// # Example
 /// ```
@@ -69,23 +72,24 @@ pub fn sweep<R: Send>(
     Ok(all)
 }
 
-/// Looks at an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
+/// Receives an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
 pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 
-/// A solver for [`stretch`]: where several orbits exist at a frequency, on systems that are followed both ways, it goes on along the branch of its start in
-/// smaller steps before it changes to another.
+/// Returns a solver for [`stretch`]. For systems that use branch following, it continues the
+/// branch of its initial guess in smaller steps before it changes to another branch.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     onward::solver(method, system)
 }
 
-/// Runs the system of `solver` over some frequencies (rad/s), one after the other, each started from the one before, and those that have no orbit from
-/// there from the one behind; `see` looks at each outcome, in order.
+/// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as initial
+/// guess. Points without an orbit from there are solved in reverse from the next orbit. `see`
+/// receives the outcomes in order.
 pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, watch: Watch<'_>, see: &mut See<'_>) {
     let mut start: Option<Vec<f64>> = None;
-    // points that were not found, until an orbit is found behind them
+    // points without an orbit, until the next orbit is found
     let mut missing: Vec<Missing> = Vec::new();
     let mut omegas = omegas.peekable();
     while let Some(omega) = omegas.next() {
@@ -96,7 +100,8 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
         }
         let (outcome, led) = (solver.orbit(omega, start.as_deref()), start.is_some());
         (watch.finished)();
-        // after a failure the next point starts cold: the last good orbit may be far away
+        // After a failure, the next point has no initial guess, because the last orbit may be
+        // far away.
         start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
         let found = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
         missing.push(Missing { omega, outcome, led });
@@ -115,13 +120,14 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
     }
 }
 
-/// Follows a curve the other way: seeks orbits at some frequencies (rad/s), one after the other, the first one from the orbit of `start`, each of the
-/// others from the one before. Where several orbits exist a curve that was found in one direction may have stepped from one branch to another; in
-/// the other direction it steps elsewhere. `see` looks at the orbits that are found; their errors are not estimated. A point that is not found is left
-/// out, and the next one is sought alone.
+/// Performs a reverse sweep: solves at some frequencies (rad/s) in sequence. The first search
+/// begins from the orbit `start`, each other one from the previous orbit. If several orbits
+/// exist, the reverse sweep jumps between branches at other frequencies than the forward sweep.
+/// `see` receives the orbits that are found; their errors are not estimated. A failed point is
+/// skipped, and the next one is solved without initial guess.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 pub fn back(
     method: &dyn Method,
     system: &System,
@@ -143,21 +149,21 @@ pub fn back(
     Ok(())
 }
 
-/// A point that is not seen yet.
+/// A point whose outcome is not yet reported.
 struct Missing {
     omega: f64,
     outcome: Result<Orbit, OrbitError>,
-    /// It was sought from the orbit before it.
+    /// True if the search began from the previous orbit.
     led: bool,
 }
 
 impl Missing {
-    /// Whether another start may lead to an orbit: a series that is too short is so from every side.
+    /// Tells whether another initial guess may help. It does not for a series that is too short.
     fn is_sought_again(&self) -> bool {
         self.outcome.as_ref().is_err_and(|error| !matches!(error, OrbitError::Truncation { .. }))
     }
 
-    /// What its neighbours lead away from may be found without them.
+    /// Solves the point without initial guess, if the searches from its neighbours failed.
     fn seek_alone(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
         if self.led && self.is_sought_again() && !watch.stop.load(Ordering::Relaxed) {
             self.outcome = solver.orbit(self.omega, None).or(self.outcome.clone());
@@ -165,7 +171,7 @@ impl Missing {
     }
 }
 
-/// Seeks the missing points from the orbit behind them, the last one first, until one is not found from there either.
+/// Solves the missing points in reverse from the next orbit, until one of them fails.
 fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing], watch: Watch<'_>) {
     let mut start = behind.to_vec();
     for Missing { omega, outcome, led } in missing.iter_mut().rev().take_while(|point| point.is_sought_again()) {
@@ -178,7 +184,7 @@ fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing],
                 *outcome = Ok(orbit);
             }
             Err(error) => {
-                // a search that took all that a point may is not made a third time
+                // a search that exhausted the work limit is not repeated
                 *led &= !matches!(error, OrbitError::NotConverged { spent: true, .. });
                 return;
             }
@@ -191,7 +197,7 @@ mod tests {
     use super::*;
     use crate::method::event_driven::EventDriven;
 
-    /// Finds nothing between the frequencies of `fold` unless it comes from above.
+    /// Finds no orbit between the frequencies of `fold` unless the search begins from above.
     #[derive(Debug)]
     struct Folded {
         fold: (f64, f64),
@@ -243,7 +249,7 @@ mod tests {
         let omegas: Vec<f64> = (0..8).map(|i| 750.0 + 5.0 * f64::from(i)).collect();
         let found = outcomes((757.0, 773.0), &omegas);
         assert_eq!(found, omegas.iter().map(|omega| (*omega, true)).collect::<Vec<_>>());
-        // nothing lies behind the last one
+        // no orbit follows the last point
         let lost = outcomes((777.0, 1e3), &omegas);
         assert_eq!(lost, omegas.iter().map(|omega| (*omega, *omega < 777.0)).collect::<Vec<_>>());
     }

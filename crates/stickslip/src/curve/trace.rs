@@ -1,13 +1,14 @@
-//! Branches of orbits by arc length: along the drive frequency, or along any parameter.
+//! Branches of orbits by arc-length continuation, along the excitation frequency or any other
+//! parameter.
 //!
-//! A branch is followed around turning points; its maxima are refined. A kink (the onset of slip) is stepped over: the corrector
-//! converges on either side of it, with steps that are halved until it does, or with a search of its own a little further on.
+//! The continuation passes turning points; maxima of the branch are refined. A kink (the onset
+//! of slip) is stepped over. The corrector converges on either side of it, with a step size that
+//! is halved as necessary. If that fails, a separate search finds a point slightly further on.
 //!
-//! Where several orbits exist at an end of the range, the curve leaves the range there and may
-//! come back on another orbit. It is followed outside as
-//! well, up to half of the range beyond either end; its points outside are not reported. What part
-//! of the range it still does not have is sought from
-//! an orbit at the other end.
+//! If several orbits exist at an end of the range, the curve leaves the range there and may
+//! return on another orbit. The continuation therefore also follows it outside, up to half of
+//! the range beyond either end. Points outside are not reported. If the curve does not reach the
+//! other end, a second continuation begins there.
 
 use crate::method::harmonic_balance::{BranchEquations, HarmonicBalance};
 use crate::method::{MethodError, OrbitError};
@@ -19,18 +20,18 @@ use stickslip_numerics::maximum::maximum;
 
 pub use stickslip_numerics::continuation::End;
 
-/// What is followed.
+/// Specification of a branch.
 #[derive(Clone, Copy)]
 pub struct Trace<'a> {
-    /// System and drive frequency (rad/s) at a value of the parameter.
+    /// Returns system and excitation frequency (rad/s) at a value of the parameter.
     pub at: &'a dyn Fn(f64) -> (System, f64),
-    /// Harmonic balance with a fixed number of harmonics (15 if it names none).
+    /// Harmonic balance with a fixed number of harmonics (15 by default).
     pub method: HarmonicBalance,
-    /// From which value to which; falling if the second is less.
+    /// First and last value of the parameter; decreasing if the second is smaller.
     pub range: (f64, f64),
-    /// Longest step along the parameter.
+    /// Longest step in the parameter.
     pub step: f64,
-    /// What has peaks.
+    /// The quantity whose peaks are reported.
     pub quantity: &'a dyn Fn(&Orbit) -> f64,
 }
 
@@ -39,26 +40,26 @@ pub struct Trace<'a> {
 pub struct TracePoint {
     /// Value of the parameter.
     pub value: f64,
-    /// The orbit there.
+    /// Orbit at this value.
     pub orbit: Orbit,
 }
 
 /// A branch.
 #[derive(Debug, Clone)]
 pub struct Branch {
-    /// Its points in the order of the arc. Two in a row at the same end of the range are joined by
-    /// the curve outside of it, or belong to two curves.
+    /// Points in order of arc length. Two consecutive points at the same end of the range are
+    /// connected outside of it, or belong to two curves.
     pub points: Vec<TracePoint>,
     /// Refined maxima of the quantity: (parameter, value).
     pub peaks: Vec<(f64, f64)>,
-    /// Indices of the points next to turning points of the parameter.
+    /// Indices of the points at turning points of the parameter.
     pub turns: Vec<usize>,
-    /// Why it ends.
+    /// Why the branch ends.
     pub end: End,
 }
 
 impl Branch {
-    /// Whether it has a point at this value.
+    /// Tells whether the branch has a point at this value.
     pub fn reaches(&self, value: f64) -> bool {
         self.points.iter().any(|point| point.value == value)
     }
@@ -70,37 +71,39 @@ impl Branch {
     }
 }
 
-/// No branch at all.
+/// Why no branch was computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TraceError {
-    /// The method cannot take the system.
+    /// The method does not support the system.
     #[error(transparent)]
     Method(#[from] MethodError),
-    /// There is no orbit to start from.
+    /// No orbit was found at the start.
     #[error(transparent)]
     Start(#[from] OrbitError),
 }
 
-/// Maxima below this share of the largest are those of rounding, where a joint holds all motion.
+/// Maxima below this fraction of the largest one are rounding, in a motion that a joint blocks.
 const ROUNDING: f64 = 1e-9;
-/// Relative width at which the search for a peak ends: the height of a smooth one is then right to rounding, of a kink to about this share.
+/// Relative width at which the search for a peak ends. The height of a smooth peak is then
+/// accurate to rounding, that of a kink to about this fraction.
 const LOCATED: f64 = 1e-9;
-/// Points at one value of the parameter are one whose unknowns differ by less than this share.
+/// Two points at the same parameter are equal if their unknowns differ by less than this
+/// fraction.
 const SAME: f64 = 1e-6;
 
-/// A point with the unknowns that tell it, and its parameter.
+/// A point, with its unknowns and its parameter.
 type Passed = (TracePoint, (Vec<f64>, f64));
 
-/// What was followed of a curve, in the order of the arc.
+/// The computed part of a curve, in order of arc length.
 #[derive(Default)]
 struct Way {
     points: Vec<Passed>,
-    /// Whether there is one orbit at every value, so that the curve does not come back.
+    /// True if there is one orbit at every value, so that the curve does not return.
     single: bool,
 }
 
 impl Way {
-    /// Follows the curve from a point, also outside of the range where it comes back from there.
+    /// Follows the curve from a point, also outside of the range if it returns from there.
     fn follow(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) -> End {
         let mut from = (from, steps);
         loop {
@@ -120,15 +123,15 @@ impl Way {
         }
     }
 
-    /// Leaves the range from a point at its border, and follows the curve if it comes back.
+    /// Leaves the range from a point at its border, and follows the curve if it returns.
     fn outside(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) {
         if let Some((back, steps)) = Way::excursion(equations, from, steps) {
             self.follow(equations, back, steps);
         }
     }
 
-    /// From a point at a border of the range out of it: where the curve comes back, and the steps
-    /// from there.
+    /// Follows the curve out of the range from a point at its border. Returns the point at which
+    /// it comes back, and the steps from there.
     fn excursion(
         equations: &mut BranchEquations<'_>,
         (x, border): (Vec<f64>, f64),
@@ -147,7 +150,7 @@ impl Way {
         Some((back, Steps { direction: -direction, ..steps }))
     }
 
-    /// Whether it passed a point at a border of the range.
+    /// Tells whether the curve contains a point at a border of the range.
     fn has(&self, (x, value): &(Vec<f64>, f64)) -> bool {
         let distance = |other: &[f64]| x.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
         let size = x.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -156,10 +159,12 @@ impl Way {
 }
 
 impl Trace<'_> {
-    /// Follows the branch from the start of the range until it leaves it for good.
+    /// Follows the branch from the start of the range until it leaves the range and does not
+    /// return.
     ///
     /// # Errors
-    /// The method cannot take the system, or there is no orbit at the start. A branch that is lost later is returned as far as it got.
+    /// The method does not support the system, or no orbit is found at the start. A branch that
+    /// fails later is returned up to this point.
     ///
     /// # Example
     /// ```
@@ -185,7 +190,7 @@ impl Trace<'_> {
         let mut way = Way { single, ..Way::default() };
         let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
         if !single && end == End::Border {
-            // the same curve the other way, which may come back into the range
+            // In the opposite direction, the same curve may return into the range.
             let mut before = Way::default();
             let out = Steps { direction: -steps.direction, ..steps };
             before.outside(&mut equations, (start, self.range.0), out);
@@ -204,7 +209,7 @@ impl Trace<'_> {
         Ok(branch)
     }
 
-    /// Peaks and turns of what was followed.
+    /// Computes peaks and turning points of the curve.
     fn told(&self, equations: &mut BranchEquations<'_>, way: Way, end: End) -> Branch {
         let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = way.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
@@ -216,7 +221,7 @@ impl Trace<'_> {
             if (b - a) * (c - b) < 0.0 {
                 turns.push(i);
             }
-            // at an end of the range the curve goes on outside
+            // at an end of the range the curve continues outside
             let inside = a != b && b != c;
             if inside && heights[i] > rounding && heights[i] >= heights[i - 1] && heights[i] > heights[i + 1] {
                 peaks.push(self.refine(equations, &arc[i - 1..=i + 1], (b, heights[i])));
@@ -225,7 +230,7 @@ impl Trace<'_> {
         Branch { points, peaks, turns, end }
     }
 
-    /// The highest place between three neighbours where the parameter is monotonic.
+    /// Returns the highest point between three neighbours, if the parameter is monotonic there.
     fn refine(&self, equations: &mut BranchEquations<'_>, arc: &[(Vec<f64>, f64)], best: (f64, f64)) -> (f64, f64) {
         let (a, b) = (arc[0].1, arc[2].1);
         if (arc[1].1 - a) * (b - arc[1].1) <= 0.0 {

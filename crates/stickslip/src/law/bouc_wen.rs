@@ -1,10 +1,13 @@
-//! Smooth hysteresis of Bouc and Wen.
+//! Bouc-Wen smooth hysteresis.
 //!
-//! `f = k z`, `z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n`. In long motion to one side z tends to `(beta + gamma)^(-1/n)`, with the sharper
-//! a knee the larger n; beta alone makes the loop (with `beta = 0` it is a spring), gamma shapes it. It is the same at every speed.
+//! `f = k z`, `z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n`. Under monotonic loading z
+//! tends to `(beta + gamma)^(-1/n)`; a larger n makes the knee sharper. `beta` creates the
+//! hysteresis loop (with `beta = 0` the law is a spring), `gamma` changes its shape. The law is
+//! rate-independent.
 //! Source: Bouc (1967); Wen, "Method for random vibration of hysteretic systems" (1976).
 //!
-//! It gives no energy in a closed motion for any `beta >= 0`: at the same z, loading has a slope not above that of unloading.
+//! The law gives no energy in a closed motion for any `beta >= 0`: at the same z, the slope in
+//! loading does not exceed that in unloading.
 
 use super::kink::{power, size};
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
@@ -12,14 +15,15 @@ use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The key of the exponent, to which the dimensions of beta and gamma are raised.
+/// Key of the exponent, to which the dimensions of beta and gamma are raised.
 const EXPONENT: &str = "exponent";
 
-/// The highest exponent: units are written up to the 9th power. At the corner of the bilinear loop that higher ones tend to, the force is then
-/// 0.930 of its bound; for a sharper knee there is `jenkins`.
+/// The highest exponent, because units are written up to the 9th power. At the corner of the
+/// bilinear loop (the limit of high exponents) the force is then 0.930 of its bound. For a
+/// sharper knee, use `jenkins`.
 const SHARPEST: f64 = 9.0;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "bouc-wen",
     summary: "smooth hysteresis, f = stiffness z, z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n with n = exponent",
@@ -39,29 +43,30 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(BoucWen { stiffness: values[0], beta: values[1], gamma: values[2], exponent: values[3] }),
 };
 
-/// Smooth hysteresis. The internal state is z over the value that it tends to, a pure number between -1 and 1.
+/// Smooth hysteresis. The internal state is z divided by its limit, dimensionless, between -1
+/// and 1.
 ///
 /// # Example
 /// ```
 /// use stickslip::law::{BoucWen, Law};
 /// let law = BoucWen { stiffness: 1e4, beta: 3e3, gamma: 2e3, exponent: 1.0 };
 /// assert_eq!(law.scale(), 2.0); // stiffness / (beta + gamma)
-/// assert!(BoucWen { gamma: -4e3, ..law }.consistent().is_err()); // nothing would bound it
+/// assert!(BoucWen { gamma: -4e3, ..law }.consistent().is_err()); // the force would be unbounded
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWen {
-    /// Stiffness at rest, N/m.
+    /// Initial stiffness, N/m.
     pub stiffness: f64,
-    /// What makes the loop, 1/m to the power `exponent`.
+    /// Parameter that creates the loop, 1/m to the power `exponent`.
     pub beta: f64,
-    /// What shapes the loop, 1/m to the power `exponent`.
+    /// Parameter that shapes the loop, 1/m to the power `exponent`.
     pub gamma: f64,
     /// Sharpness of the knee, 1 or more.
     pub exponent: f64,
 }
 
 impl BoucWen {
-    /// The value that z tends to, m.
+    /// Returns the limit of z, m.
     fn bound(&self) -> f64 {
         (self.beta + self.gamma).powf(-1.0 / self.exponent)
     }

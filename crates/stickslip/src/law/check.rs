@@ -1,4 +1,4 @@
-//! Whether a law can be what its values and its author say.
+//! Checks of a law: parameter ranges, consistency, and the claims of its implementation.
 
 use super::{BuildError, Law, LawError, LawInfo, Parameter, SharedLaw, mirror};
 use crate::dimension::Dimension;
@@ -8,7 +8,8 @@ impl LawInfo {
     /// Builds the law from values by key (SI).
     ///
     /// # Errors
-    /// The keys that are missing, or a value that is not finite or out of its range.
+    /// Parameters are missing, or a value is not finite or out of its range, or
+    /// [`Law::consistent`] fails.
     ///
     /// # Example
     /// ```
@@ -24,7 +25,7 @@ impl LawInfo {
             return Err(BuildError::Missing { law: self.name, keys: missing });
         }
         let ordered: Vec<f64> = self.parameters.iter().filter_map(value).collect();
-        // numbers out of range could not be built from
+        // The constructor accepts only values within their ranges.
         in_range(self, &ordered)?;
         let law = (self.build)(&ordered);
         law.check()?;
@@ -33,13 +34,15 @@ impl LawInfo {
 }
 
 impl dyn Law + '_ {
-    /// Checks that every parameter is finite and in its range, that they fit each other, that internal states have a size, and that an odd law is one.
+    /// Checks that every parameter is finite and in its range, and that the parameters are
+    /// consistent. Also checks that the scale of internal states is positive and that an odd law
+    /// is odd.
     ///
     /// # Errors
-    /// [`LawError`] names the first parameter that is not.
+    /// [`LawError`] names the first parameter that is invalid, or describes the inconsistency.
     pub fn check(&self) -> Result<(), LawError> {
         in_range(self.info(), &self.values())?;
-        // what is compared with a size of nothing is no number
+        // Errors of states are relative to this scale; zero would give NaN.
         let sizes = [
             self.step().filter(|step| step.states() > 0).map(|step| step.state_scale()),
             self.rate().filter(|rate| rate.states() > 0).map(|rate| rate.state_scale()),
@@ -58,7 +61,7 @@ impl dyn Law + '_ {
     }
 }
 
-/// Whether every value is in its range.
+/// Checks that every value is in its range.
 fn in_range(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
     for (parameter, &value) in info.parameters.iter().zip(values) {
         if !parameter.range.has(value) {

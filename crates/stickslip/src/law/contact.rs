@@ -1,31 +1,32 @@
-//! Whether faces rest on each other, slide, or are apart.
+//! Contact states: stick, slip, separation.
 
 use serde::{Deserialize, Serialize};
 
-/// What the faces of a joint do.
+/// State of the faces of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Contact {
-    /// They rest on each other.
+    /// The faces stick.
     Stick,
-    /// They slide with `u' > 0`.
+    /// The faces slip with `u' > 0`.
     SlipForward,
-    /// They slide with `u' < 0`.
+    /// The faces slip with `u' < 0`.
     SlipBackward,
-    /// They slide in a plane.
+    /// The faces slip in a plane.
     Slip,
-    /// They touch, and the law does not tell whether they slide: a stop.
+    /// The faces touch, and the law does not distinguish stick and slip (a stop).
     Touch,
-    /// They do not touch.
+    /// The faces are separated.
     Open,
 }
 
-/// A smooth law never quite sticks: it counts as slipping while its force is above this fraction of its limit.
+/// A smooth law never sticks completely. It counts as slipping while its force exceeds this
+/// fraction of its limit.
 pub(crate) const SLIPS_ABOVE: f64 = 0.95;
-/// Any other is at its limit while it slips, but for the rounding of what it has summed up to there.
+/// A law with stick carries its limit during slip, up to accumulated rounding.
 const AT: f64 = 1.0 - 1e-9;
 
 impl Contact {
-    /// The slip direction along one direction: +1, -1, or 0.
+    /// Returns the sign of the slip velocity in one direction: +1, -1, or 0.
     pub fn sign(self) -> f64 {
         match self {
             Contact::SlipForward => 1.0,
@@ -34,12 +35,12 @@ impl Contact {
         }
     }
 
-    /// Whether the faces slide.
+    /// Tells whether the faces slip.
     pub fn slips(self) -> bool {
         matches!(self, Contact::SlipForward | Contact::SlipBackward | Contact::Slip)
     }
 
-    /// The same contact in the mirrored motion.
+    /// Returns the state in the mirrored motion.
     pub fn mirrored(self) -> Self {
         match self {
             Contact::SlipForward => Contact::SlipBackward,
@@ -52,12 +53,13 @@ impl Contact {
         if sign > 0.0 { Contact::SlipForward } else { Contact::SlipBackward }
     }
 
-    /// By the force of a smooth law against its limit, along all directions. A limit of zero holds nothing: the faces slide as they move.
+    /// Returns the state of a smooth law from its force relative to its limit, over all
+    /// directions. With a limit of zero the faces slip in the direction of the velocity.
     pub fn by_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
         Contact::above(SLIPS_ABOVE, limit, velocity, force)
     }
 
-    /// The same of a law that sticks below its limit.
+    /// Returns the state of a law that sticks below its limit.
     pub fn at_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
         Contact::above(AT, limit, velocity, force)
     }

@@ -1,14 +1,16 @@
 //! Dry friction of two rigid faces: Coulomb's set-valued law.
 //!
-//! `f = limit · Sgn(u')`: any force in `[-limit, limit]` while the faces stick, `±limit` while they slip.
-//! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau (1988).
+//! `f = limit · Sgn(u')`: any force in `[-limit, limit]` while the faces stick, `±limit` while
+//! they slip.
+//! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau
+//! (1988).
 
 use super::{CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, SharedLaw, Sliding};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb",
     summary: "rigid dry friction, f = limit Sgn(u'), exact",
@@ -57,11 +59,11 @@ impl Law for Coulomb {
         Some(Arc::new(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // the force is a monotone function of velocity, if a set-valued one
+        true // the force is a monotone set-valued function of velocity
     }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
         if self.limit == 0.0 {
-            return Complex64::new(0.0, 0.0); // also without motion
+            return Complex64::new(0.0, 0.0); // also at zero amplitude
         }
         Complex64::new(0.0, 4.0 * self.limit / (PI * amplitude))
     }
@@ -74,7 +76,7 @@ impl Sliding for Coulomb {
 }
 
 impl Prox for Coulomb {
-    /// The projection onto `[-limit, limit]`.
+    /// Projects onto `[-limit, limit]`.
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         force[0] = y[0].clamp(-self.limit, self.limit);
         slope[0] = if y[0].abs() < self.limit { 1.0 } else { 0.0 };

@@ -1,6 +1,6 @@
 //! Dry friction of two rigid faces that slide in a plane.
 //!
-//! `|f| <= limit` in stick, `f = limit u'/|u'|` in slip: the friction disk, the same in all directions.
+//! `|f| <= limit` in stick, `f = limit u'/|u'|` in slip: the isotropic friction disk.
 //! Source: Coulomb (1785); as a set-valued law Moreau (1988).
 
 use super::plane::radial;
@@ -8,7 +8,7 @@ use super::{Coulomb, Coulomb2dArctan, Law, LawInfo, Parameter, Prox, SharedLaw};
 use num_complex::Complex64;
 use std::sync::Arc;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb-2d",
     summary: "rigid dry friction in a plane, |f| <= limit, f = limit u'/|u'| in slip",
@@ -17,7 +17,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Coulomb2d { limit: values[0] }),
 };
 
-/// Rigid dry friction along two directions.
+/// Rigid dry friction in two directions.
 ///
 /// # Example
 /// ```
@@ -58,14 +58,14 @@ impl Law for Coulomb2d {
     fn is_incrementally_passive(&self) -> bool {
         true // the force is the subgradient of limit |u'|, which is convex
     }
-    /// Motion along one direction is that of Coulomb's law.
+    /// Motion in one direction gives Coulomb's law.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         Coulomb { limit: self.limit }.linearised(amplitude, omega)
     }
 }
 
 impl Prox for Coulomb2d {
-    /// The projection onto the disk.
+    /// Projects onto the disk.
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let size = y[0].hypot(y[1]);
         let inside = size <= self.limit;

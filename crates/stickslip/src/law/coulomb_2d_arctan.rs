@@ -1,7 +1,8 @@
 //! Dry friction in a plane, smoothed over velocity.
 //!
-//! `f = limit (2/π) arctan(alpha |u'|) u'/|u'|`; along one direction it is the law `coulomb-arctan`.
-//! Source: Pust, Pesek, Radolfova (2015), Eq. (2), turned around the axis.
+//! `f = limit (2/π) arctan(alpha |u'|) u'/|u'|`. In one direction this is the law
+//! `coulomb-arctan`.
+//! Source: Pust, Pesek, Radolfova (2015), Eq. (2), made isotropic in a plane.
 
 use super::plane::dot;
 use super::plane::radial;
@@ -12,7 +13,7 @@ use std::f64::consts::FRAC_2_PI;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb-2d-arctan",
     summary: "smoothed dry friction in a plane, f = limit (2/pi) arctan(alpha |u'|) u'/|u'|",
@@ -24,7 +25,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Coulomb2dArctan { limit: values[0], alpha: values[1] }),
 };
 
-/// Smoothed dry friction along two directions.
+/// Smoothed dry friction in two directions.
 ///
 /// # Example
 /// ```
@@ -36,14 +37,14 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coulomb2dArctan {
-    /// Size of the force that the law tends to at high velocity, N.
+    /// Limit of the force magnitude at high velocity, N.
     pub limit: f64,
-    /// Steepness at rest, s/m.
+    /// Steepness at zero velocity, s/m.
     pub alpha: f64,
 }
 
 impl Coulomb2dArctan {
-    /// The same along one direction.
+    /// Returns the one-dimensional law.
     fn along(&self) -> CoulombArctan {
         CoulombArctan { limit: self.limit, alpha: self.alpha }
     }
@@ -79,7 +80,8 @@ impl Law for Coulomb2dArctan {
     }
 }
 
-/// Squares below which `arctan x / x` is a series; its sixth term is then below rounding.
+/// Below this squared argument, `arctan x / x` is evaluated as a series. The sixth term is then
+/// below rounding.
 const SMALL: f64 = 1e-3;
 
 impl RateLaw for Coulomb2dArctan {

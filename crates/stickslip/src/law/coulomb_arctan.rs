@@ -1,8 +1,9 @@
-//! Dry friction smoothed over velocity: the paper's arctangent.
+//! Dry friction smoothed over velocity by an arctangent.
 //!
-//! `f = limit · (2/π) · arctan(alpha u')`.   Eq. (2)
+//! `f = limit · (2/π) · arctan(alpha u')`. Eq. (2)
 //! It never sticks: at `|f| < limit` it creeps with `u' = tan(π f / (2 limit)) / alpha`.
-//! Source: Pust, Pesek, Radolfova (2015), Eq. (2). The paper's alpha = 25 s/mm is 25 000 s/m in SI.
+//! Source: Pust, Pesek, Radolfova (2015), Eq. (2). The paper's alpha = 25 s/mm is 25 000 s/m in
+//! SI.
 
 use super::{Law, LawInfo, Mean, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
@@ -11,7 +12,7 @@ use std::f64::consts::{FRAC_2_PI, PI};
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb-arctan",
     summary: "smoothed dry friction, f = limit (2/pi) arctan(alpha u'), paper Eq. (2)",
@@ -34,9 +35,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoulombArctan {
-    /// Force that the law tends to at high velocity, N.
+    /// Limit of the force at high velocity, N.
     pub limit: f64,
-    /// Steepness at rest, s/m.
+    /// Steepness at zero velocity, s/m.
     pub alpha: f64,
 }
 
@@ -64,9 +65,10 @@ impl Law for CoulombArctan {
     }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         if self.limit == 0.0 {
-            return Complex64::new(0.0, 0.0); // also without motion
+            return Complex64::new(0.0, 0.0); // also at zero amplitude
         }
-        // first harmonic of arctan(z cos θ), z the scaled velocity; written without cancellation for small z
+        // First harmonic of arctan(z cos θ) with the scaled velocity z. This form has no
+        // cancellation at small z.
         let z = self.alpha * amplitude * omega;
         let first = self.limit * 4.0 / PI * z / ((1.0 + z * z).sqrt() + 1.0);
         Complex64::new(0.0, first / amplitude)
@@ -107,11 +109,12 @@ impl Prox for CoulombArctan {
     }
 }
 
-/// Change of the argument over a sample, relative to the length over which the arctangent changes, up to which the quadrature of [`Mean::of`]
-/// is exact to rounding.
+/// Largest half-width of a sample, relative to the scale `1 + |y|` of the arctangent, at which
+/// the quadrature of [`Mean::of`] is exact to rounding.
 const GENTLE: f64 = 0.2;
 
-/// Means of `arctan(y + eξ)` over `-1 < ξ < 1`: in closed form, or by quadrature where that cancels.
+/// Returns means of `arctan(y + eξ)` over `-1 < ξ < 1`, in closed form, or by quadrature if the
+/// closed form would lose digits to cancellation.
 fn mean_of_arctangent(y: f64, e: f64) -> Mean {
     let reach = e.abs();
     if reach < GENTLE * (1.0 + y.abs()) {
@@ -136,17 +139,18 @@ fn mean_of_arctangent(y: f64, e: f64) -> Mean {
     }
 }
 
-/// `λ` and `dλ/dy` of `λ + w = y`, `λ = (2/π) atan(s w)`.
+/// Returns `λ` and `dλ/dy` of `λ + w = y`, `λ = (2/π) atan(s w)`.
 fn resolve(y: f64, s: f64) -> (f64, f64) {
     let target = y.abs();
-    // the left side rises with a falling slope in w: Newton's method from a w that is too small never passes the root
+    // The left side is increasing and concave in w, so Newton's method from below converges
+    // monotonically.
     let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
     for _ in 0..RESOLVED {
         let left = w + FRAC_2_PI * (s * w).atan() - target;
         let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
         let step = left / slope;
         w -= step;
-        // the left side is rounded to this; what is no number ends too
+        // rounding of the left side; NaN also ends the loop
         if step.abs() <= 4.0 * f64::EPSILON * target || step.is_nan() {
             break;
         }
@@ -155,5 +159,5 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
     ((target - w).copysign(y), slope / (1.0 + slope))
 }
 
-/// Iterations of [`resolve`], which doubles its digits.
+/// Upper bound on the iterations of [`resolve`]; they converge quadratically.
 const RESOLVED: usize = 60;

@@ -1,6 +1,8 @@
-//! A spring that has no stiffness at rest and stiffens with the cube of its stretch.
+//! Cubic spring: zero stiffness at zero displacement, stiffening with the cube of the
+//! elongation.
 //!
-//! `f = k u³`. With a linear spring beside it, it is the restoring force of Duffing's oscillator.
+//! `f = k u³`. In parallel with a linear spring, it is the restoring force of the Duffing
+//! oscillator.
 //! Source: Duffing (1918).
 
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
@@ -9,7 +11,7 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "cubic",
     summary: "cubic spring, f = stiffness u^3",
@@ -33,7 +35,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cubic {
-    /// Force per cube of the stretch, N/m³.
+    /// Force per cube of the elongation, N/m³.
     pub stiffness: f64,
 }
 

@@ -1,7 +1,8 @@
-//! Presliding friction of Dahl: a spring that gives way the more the nearer its force is to the slip limit.
+//! Dahl's presliding friction: a spring whose tangent stiffness falls as its force approaches
+//! the slip limit.
 //!
-//! `f' = k u' (1 - (f / limit) sgn u')`. It is the same at every speed, creeps to the limit without reaching it, and is Bouc and Wen's
-//! law with `n = 1`, `gamma = 0`, `beta = k / limit`.
+//! `f' = k u' (1 - (f / limit) sgn u')`. The law is rate-independent and approaches the limit
+//! without reaching it. It is the Bouc-Wen law with `n = 1`, `gamma = 0`, `beta = k / limit`.
 //! Source: Dahl, "A solid friction model" (1968), exponent 1.
 
 use super::kink::size;
@@ -10,7 +11,7 @@ use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "dahl",
     summary: "presliding friction, f' = stiffness u' (1 - (f/limit) sgn u')",
@@ -22,7 +23,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Dahl { stiffness: values[0], limit: values[1] }),
 };
 
-/// Presliding friction. The internal state is the force over its limit.
+/// Presliding friction. The internal state is the force divided by the limit.
 ///
 /// # Example
 /// ```
@@ -34,7 +35,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dahl {
-    /// Stiffness at rest, N/m.
+    /// Initial stiffness, N/m.
     pub stiffness: f64,
     /// Slip limit, N.
     pub limit: f64,
@@ -60,7 +61,7 @@ impl Law for Dahl {
 
 impl RateLaw for Dahl {
     fn states(&self) -> usize {
-        usize::from(self.limit > 0.0) // what holds nothing carries no force
+        usize::from(self.limit > 0.0) // without a limit, the law carries no force
     }
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         z.fill((force[0] / self.limit).clamp(-1.0, 1.0));

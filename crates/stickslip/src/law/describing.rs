@@ -1,4 +1,5 @@
-//! The describing function of any law, by its views: the first harmonic of its force under a harmonic motion, once it repeats.
+//! The describing function of a law: the first harmonic of its periodic force under a harmonic
+//! motion.
 
 use super::{MOST_DIRECTIONS, Piece, Prox, Rate, RatePoint, Relative, Slider, Step};
 use nalgebra::{DMatrix, DVector};
@@ -7,16 +8,19 @@ use std::f64::consts::{PI, TAU};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Samples of a cycle: searches only begin here, and a hundredth is near enough.
+/// Samples per cycle. The result serves as an initial guess, so an error of 1 % is acceptable.
 const SAMPLES: usize = 128;
-/// Cycles until hysteresis repeats; states that relax slowly are then not far from it.
+/// Simulated cycles. Hysteresis is periodic by then, and states with slow relaxation are close
+/// to it.
 const CYCLES: usize = 3;
-/// Newton iterations for the states after a sample.
+/// Newton iterations for the states at a sample.
 const ITERATIONS: usize = 8;
-/// The penalty at which a resolvent is the law itself but for a millionth of its force.
+/// Penalty times velocity amplitude. The resolvent then evaluates the law at a velocity that
+/// differs by `λ / STEEP` of the velocity amplitude.
 const STEEP: f64 = 1e6;
 
-/// Complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s), by the first view that there is.
+/// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
+/// first available view, in the order of the arguments.
 pub(super) fn stiffness(
     pieces: Option<Vec<Piece>>,
     rate: Option<&dyn Rate>,
@@ -24,7 +28,8 @@ pub(super) fn stiffness(
     (prox, directions): (Option<&dyn Prox>, usize),
     (amplitude, omega): (f64, f64),
 ) -> Complex64 {
-    // without motion: that of a motion so small that it changes nothing would need a law's own scale of length
+    // At zero amplitude, use a tiny amplitude. The limit of small motion would need a length
+    // scale of the law.
     let a = if amplitude > 0.0 { amplitude } else { f64::MIN_POSITIVE.sqrt() };
     if let Some(pieces) = pieces {
         return pieces.iter().map(|piece| of_piece(piece, amplitude)).sum();
@@ -50,11 +55,11 @@ pub(super) fn stiffness(
         prox.resolve(&[y, 0.0, 0.0][..directions], penalty, &mut force, &mut slope);
         force[0]
     });
-    // a spring in series
+    // add the spring in series
     if prox.compliance() > 0.0 { rigid / (1.0 + rigid * prox.compliance()) } else { rigid }
 }
 
-/// Closed forms.
+/// Returns the complex stiffness of one ideal part in closed form.
 pub(super) fn of_piece(piece: &Piece, amplitude: f64) -> Complex64 {
     match *piece {
         Piece::Slider(Slider { limit: 0.0, .. }) => ZERO,
@@ -68,7 +73,7 @@ pub(super) fn of_piece(piece: &Piece, amplitude: f64) -> Complex64 {
             let (sin, cos) = slip.sin_cos();
             Complex64::new(slip - sin * cos, sin * sin) * (stiffness / PI)
         }
-        // in contact while cos θ > gap / amplitude
+        // closed while cos θ > gap / amplitude
         Piece::Stop { gap, stiffness } => {
             let share = if amplitude > 0.0 { gap / amplitude } else { f64::INFINITY.copysign(gap) };
             let closed = share.clamp(-1.0, 1.0).acos();
@@ -78,7 +83,8 @@ pub(super) fn of_piece(piece: &Piece, amplitude: f64) -> Complex64 {
     }
 }
 
-/// First harmonic of the force over the motion's amplitude in the last of the cycles.
+/// Returns the first harmonic of the force in the last cycle, divided by the amplitude of the
+/// motion.
 fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex64 {
     let mut sum = ZERO;
     for i in 0..=CYCLES * SAMPLES {
@@ -91,7 +97,7 @@ fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex6
     sum * (2.0 / (SAMPLES as f64 * amplitude))
 }
 
-/// The states by implicit Euler steps, which no stiffness breaks.
+/// Integrates the states by the implicit Euler method, which is stable for any stiffness.
 fn of_rate(rate: &dyn Rate, amplitude: f64, omega: f64) -> Complex64 {
     let states = rate.states();
     let length = TAU / (omega * SAMPLES as f64);

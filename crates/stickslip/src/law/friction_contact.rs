@@ -1,14 +1,20 @@
-//! A contact that presses, sticks, slips and separates: an elastic normal, and elastic friction along one or two tangents.
+//! A frictional contact with separation: an elastic normal direction, and elastic friction in
+//! one or two tangential directions.
 //!
-//! Normal: `N = max(preload + kn un, 0)` with `un > 0` closing. Tangents: `T = kt (u - s)`, `|T| <= mu N`, slip along T; two tangents are coupled by the
-//! friction disk. Where N is zero the faces are apart, and T is zero; faces that meet again begin without T.
-//! All of `T` and `N` acts on the structure, the preload too: it pushes the places apart, and the springs of the structure carry it.
-//! Source: Yang, Chu, Menq, "Stick-slip-separation analysis and non-linear stiffness and damping characterization of friction contacts having variable
-//! normal load" (1998), and for three directions Yang and Menq (1998).
+//! Normal: `N = max(preload + kn un, 0)` with `un > 0` closing. Tangential: `T = kt (u - s)`,
+//! `|T| <= mu N`, slip in the direction of T; the friction disk couples two tangential
+//! directions. At zero N the faces are separated, and T is zero. Faces that close again start
+//! with zero T.
+//! All of `T` and `N`, including the preload, acts on the structure: the preload pushes the
+//! places apart, and the springs of the structure carry it.
+//! Source: Yang, Chu, Menq, "Stick-slip-separation analysis and non-linear stiffness and damping
+//! characterization of friction contacts having variable normal load" (1998), and for three
+//! directions Yang and Menq (1998).
 //!
-//! A step is exact where its way is straight: the normal load then changes linearly along it, the step in which contact closes counts only
-//! its closed part, and slip in a plane is integrated in closed form. No smooth neighbour is offered: a tangential spring
-//! with an arctangent slider has no limit for its rate as the load goes to zero.
+//! A step with a straight path is exact. The normal load changes linearly along it. A step that
+//! closes the contact counts only its closed part. Slip in a plane is integrated in closed form.
+//! The law has no regularized version: the state rate of a tangential spring with an arctangent
+//! slider is unbounded as the load goes to zero.
 
 use super::plane;
 use super::{
@@ -18,7 +24,7 @@ use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "friction-contact",
     summary: "contact with separation, N = max(preload + kn un, 0), elastic friction |T| <= friction N along one or two tangents",
@@ -53,17 +59,17 @@ pub(super) static INFO: LawInfo = LawInfo {
     },
 };
 
-/// A contact that presses, sticks, slips and separates. Its directions are the tangents and, last, the normal; the internal states are the
-/// tangential force, N.
+/// A frictional contact with separation. Its directions are the tangential ones, then the
+/// normal. The internal states are the tangential force components, N.
 ///
 /// # Example
 /// ```
 /// use stickslip::law::{FrictionContact, StepLaw};
 /// let law = FrictionContact { tangential: 1.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 1 };
 /// let mut z = [0.0];
-/// // pressed with 4 N + 2 N/m · 1 m, slipping with half of that
+/// // normal load 4 N + 2 N/m · 1 m, slip at half of it
 /// assert_eq!(law.advance(&[0.0; 3], &[9.0, 1.0, 0.0], &mut z)[..2], [3.0, 6.0]);
-/// // apart
+/// // separated
 /// assert_eq!(law.advance(&[9.0, 1.0, 0.0], &[9.0, -2.0, 0.0], &mut z)[..2], [0.0, 0.0]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,9 +80,9 @@ pub struct FrictionContact {
     pub normal: f64,
     /// Coefficient of friction `mu`.
     pub friction: f64,
-    /// Normal load at rest, N; negative if the faces are apart.
+    /// Normal load at zero displacement, N; negative if there is a gap.
     pub preload: f64,
-    /// Tangential directions, 1 or 2.
+    /// Number of tangential directions, 1 or 2.
     pub tangents: usize,
 }
 
@@ -99,7 +105,7 @@ impl Law for FrictionContact {
     fn closed(&self) -> Option<Vec<f64>> {
         Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())
     }
-    /// The slip limit at rest; infinite if there is none.
+    /// The slip limit at zero displacement; infinite without a preload or friction.
     fn scale(&self) -> f64 {
         let limit = self.friction * self.preload;
         if limit > 0.0 { limit } else { f64::INFINITY }
@@ -142,7 +148,7 @@ impl StepLaw for FrictionContact {
             z.fill(zero);
             return out;
         }
-        // the part of the way on which the faces touch
+        // the fraction of the path on which the faces touch
         let (first, closed) = if before.re() < 0.0 {
             z.fill(zero);
             (zero, after / (after - before))
@@ -152,7 +158,8 @@ impl StepLaw for FrictionContact {
         let last = after * self.friction;
         match z {
             [force] => {
-                // along a line both ends of the disk move linearly: where the step ends decides
+                // In one direction, both bounds of the force change linearly, so the limit at
+                // the end of the step decides.
                 let trial = *force + (to[0] - from[0]) * closed * self.tangential;
                 *force = if trial.re() > last.re() {
                     last
@@ -190,7 +197,8 @@ impl StepLaw for FrictionContact {
             return Some(out);
         }
         let closes = before < 0.0;
-        // the closed part of the way, and its derivatives by the normal motion before and after
+        // the closed fraction of the path, and its derivatives with respect to the normal
+        // displacement before and after
         let (closed, by_normal) = if closes {
             z.fill(0.0);
             let whole = after - before;
@@ -236,12 +244,13 @@ impl StepLaw for FrictionContact {
         let length = |squares: f64| squares.sqrt();
         let pull =
             length(at_mean.map(|f| f * f).sum()) + self.tangential * length(reach[..t].iter().map(|u| u * u).sum());
-        // the straight way to the mean lies between two states within the friction cone
+        // A straight path between two states inside the friction cone stays inside it.
         closed > 0.0 && least > 0.0 && pull < self.friction * least
     }
 }
 
-/// As [`plane::step_with_slopes`], along the first direction alone: the limit where the step ends decides.
+/// Computes [`plane::step_with_slopes`] for a single direction, where the limit at the end of
+/// the step decides.
 fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, plane::Slopes) {
     let trial = force + way * stiffness;
     let mut slopes = plane::Slopes::NONE;
@@ -257,7 +266,8 @@ fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, plane
 mod tests {
     use super::*;
 
-    /// A step that closes the contact counts its closed part only: in two steps, with the instant of closing between, it is the same.
+    /// A step that closes the contact counts only its closed part. It equals two steps that are
+    /// separated at the instant of closing.
     #[test]
     fn a_step_that_closes_is_two_steps_with_the_closing_between() {
         for tangents in [1, 2] {
@@ -295,7 +305,7 @@ mod tests {
         }
     }
 
-    /// The same law without its derivatives by hand.
+    /// The law without its hand-written derivatives.
     #[derive(Debug)]
     struct ByDuals(FrictionContact);
 
@@ -313,7 +323,8 @@ mod tests {
         }
     }
 
-    /// Derivatives by hand are those of dual numbers: sticking, slipping, closing, opening, apart.
+    /// Hand-written derivatives agree with those of dual numbers: sticking, slipping, closing,
+    /// opening, separated.
     #[test]
     fn derivatives_by_hand_are_those_of_dual_numbers() {
         use crate::law::StepPoint;
@@ -327,7 +338,7 @@ mod tests {
             for a in 0..=tangents {
                 (start[a], from[a], to[a]) = (noise(a), noise(a + 3), noise(a + 6));
             }
-            // within the limit that the contact has before the step
+            // within the limit before the step
             let mut z = vec![0.0; tangents];
             law.advance(&start, &from, &mut z);
             z.iter_mut().for_each(|z| *z *= 0.99);
@@ -350,7 +361,8 @@ mod tests {
         assert!(met.iter().all(|count| *count > 100), "{met:?}");
     }
 
-    /// A contact that separates forgets where it began: the rest of the period is what it was, and is not followed again.
+    /// A contact that separates loses its history. A second cycle on the same path therefore
+    /// ends early, at the first point with the states of the first cycle.
     #[test]
     fn a_way_that_meets_its_trail_is_followed_no_farther() {
         let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 2 };

@@ -1,15 +1,17 @@
-//! A stop behind a gap: a spring that acts only beyond it.
+//! An elastic stop with a gap: a spring that acts only beyond the gap.
 //!
-//! `f = k max(u - gap, 0)`. A negative gap is a spring that is compressed at rest: it presses with `-k gap` and lets go at `u = gap`.
-//! The force has a kink where the faces meet, and no more than one value anywhere: no impact law is needed.
-//! Source: den Hartog, "Mechanical Vibrations" (1956), Sec. 8.11; Shaw and Holmes, "A periodically forced piecewise linear oscillator" (1983).
+//! `f = k max(u - gap, 0)`. A negative gap is a spring that is compressed at `u = 0`: it presses
+//! with `-k gap` and loses contact at `u = gap`. The force is single-valued with a kink at
+//! contact, so no impact law is needed.
+//! Source: den Hartog, "Mechanical Vibrations" (1956), Sec. 8.11; Shaw and Holmes, "A
+//! periodically forced piecewise linear oscillator" (1983).
 
 use super::{Contact, Law, LawInfo, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "gap",
     summary: "elastic stop behind a gap, f = stiffness max(u - gap, 0), exact",
@@ -26,13 +28,13 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Gap { gap: values[0], stiffness: values[1] }),
 };
 
-/// An elastic stop behind a gap.
+/// An elastic stop with a gap.
 ///
 /// # Example
 /// ```
 /// use stickslip::law::{Gap, Law};
 /// let law = Gap { gap: 0.0, stiffness: 1e4 };
-/// // in touch for half of the time: half the stiffness
+/// // closed for half of the period: half the stiffness
 /// assert!((law.linearised(1e-3, 1.0).re - 5e3).abs() < 1e-9);
 /// assert!(!law.is_odd());
 /// ```

@@ -1,17 +1,24 @@
-//! Iwan's parallel sliders with Segalman's distribution of four parameters: micro-slip with a power law of loss.
+//! Iwan model with Segalman's four-parameter distribution: micro-slip with power-law
+//! dissipation.
 //!
-//! Sliders behind springs, side by side; those that slip at a displacement between φ and φ + dφ have the stiffness ρ(φ) dφ:
-//! `ρ = R φ^χ` up to `φmax`, and a spring S more at φmax. With the stiffness at rest `KT` and the slip limit `FS`, the rest is
-//! `φmax = FS (1 + β) / (KT (β + (χ+1)/(χ+2)))`, `R = FS (χ+1) / (φmax^(χ+2) (β + (χ+1)/(χ+2)))`, `S = (FS/φmax) β / (β + (χ+1)/(χ+2))`.
-//! A cycle of amplitude u below φmax loses `4 R u^(χ+3) / ((χ+2) (χ+3))`.
+//! The model consists of parallel Jenkins elements. The elements that begin to slip at
+//! displacements between φ and φ + dφ have the stiffness ρ(φ) dφ. The density is `ρ = R φ^χ` up
+//! to `φmax`, plus a spring S that slips at φmax. With the initial stiffness `KT` and the slip
+//! limit `FS`:
+//! `φmax = FS (1 + β) / (KT (β + (χ+1)/(χ+2)))`,
+//! `R = FS (χ+1) / (φmax^(χ+2) (β + (χ+1)/(χ+2)))`,
+//! `S = (FS/φmax) β / (β + (χ+1)/(χ+2))`.
+//! A cycle of amplitude u below φmax dissipates `4 R u^(χ+3) / ((χ+2) (χ+3))`.
 //!
-//! The force of first loading is `B(u) = KT (u - φmax x^(χ+2) / ((1+β) (χ+2)))` with `x = u/φmax` up to 1, and FS beyond. Every
-//! other branch follows from it by Masing's rules (see `masing.rs`), exactly: no slider is counted.
+//! The force of first loading is `B(u) = KT (u - φmax x^(χ+2) / ((1+β) (χ+2)))` with
+//! `x = u/φmax` up to 1, and FS beyond. All other branches follow from it exactly by Masing's
+//! rules (see `masing.rs`), without discrete sliders.
 //! Source: Segalman, "A four-parameter Iwan model for lap-type joints" (2005); Iwan (1966).
 //!
-//! With a number of `elements` the distribution is cut into bins, graded geometrically, and each bin is one slider with the
-//! bin's stiffness and limit: for methods that follow sliders one by one. The force of first loading is then exact at the
-//! bins' edges and above it between them.
+//! With a positive number of `elements`, the distribution is divided into bins with geometric
+//! grading. Each bin becomes one slider with the bin's stiffness and limit, for methods that
+//! need discrete sliders. The force of first loading is then exact at the edges of the bins and
+//! too large between them.
 
 use super::describing;
 use super::masing::{LEGS, Masing, advance, counted, first_that_goes_on, share, stiffness};
@@ -22,13 +29,14 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The most sliders: what is more is no law of a joint but a model.
+/// Largest number of sliders.
 const MOST: u32 = 1000;
 
-/// Bins are graded by `exp(GRADING / √elements)`: with more elements both the bins and the first one get smaller.
+/// Ratio of successive bin edges is `exp(GRADING / √elements)`. More elements make both the bins
+/// and the first bin smaller.
 const GRADING: f64 = 1.5;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "iwan",
     summary: "parallel spring-sliders with the four-parameter distribution of Segalman, exact",
@@ -67,29 +75,29 @@ pub(super) static INFO: LawInfo = LawInfo {
     },
 };
 
-/// Parallel sliders with a distribution of four parameters.
+/// Parallel sliders with a four-parameter distribution.
 ///
 /// # Example
 /// ```
 /// use stickslip::law::{Iwan, Law};
 /// let law = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
-/// // the force of first loading, up to where all of it slips
+/// // the force of first loading at macro-slip
 /// let far = law.slips_at();
 /// assert!((law.masing().unwrap().backbone(far).0 - 2.0).abs() < 1e-14);
-/// // by 32 sliders and the spring that slips last
+/// // 32 sliders and the spring that slips last
 /// assert_eq!(Iwan { elements: 32, ..law }.pieces().unwrap().len(), 33);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Iwan {
-    /// Stiffness at rest `KT`, N/m.
+    /// Initial stiffness `KT`, N/m.
     pub stiffness: f64,
     /// Slip limit `FS`, N.
     pub limit: f64,
-    /// Exponent of the distribution `χ`, above -1, at most 0.
+    /// Exponent `χ` of the distribution, above -1, at most 0.
     pub chi: f64,
-    /// `β`: the stiffness that slips last, at φmax, over that of the distribution.
+    /// Ratio `β` of the stiffness that slips last, at φmax, to that of the distribution.
     pub beta: f64,
-    /// Sliders that stand for the distribution; 0: the distribution itself.
+    /// Number of sliders that approximate the distribution; 0: the exact distribution.
     pub elements: u32,
 }
 
@@ -99,13 +107,14 @@ impl Iwan {
         self.beta + (self.chi + 1.0) / (self.chi + 2.0)
     }
 
-    /// Displacement `φmax` at which all of it slips, m.
+    /// Returns the displacement `φmax` of macro-slip, m.
     pub fn slips_at(&self) -> f64 {
         self.limit * (1.0 + self.beta) / (self.stiffness * self.denominator())
     }
 
-    /// Force of first loading at a displacement that is not negative, N. A limit that nothing reaches leaves the spring `KT`,
-    /// whatever the distribution: near χ = -1 a share of it slips at any displacement.
+    /// Returns the force of first loading (N) at a non-negative displacement. With a limit of
+    /// `STUCK` or more, the law is the linear spring `KT`. Without this special case, a
+    /// distribution with χ near -1 would slip in part at any displacement.
     fn first_loading<S: Real>(&self, u: S) -> S {
         let far = self.slips_at();
         if self.limit >= STUCK {
@@ -139,7 +148,7 @@ impl Law for Iwan {
     fn macro_slip(&self) -> Option<f64> {
         (self.limit > 0.0).then(|| self.slips_at())
     }
-    /// With a number of elements.
+    /// Available with a positive number of elements. A slip limit of zero gives no parts.
     fn pieces(&self) -> Option<Vec<Piece>> {
         if self.limit == 0.0 {
             return Some(Vec::new());
@@ -148,7 +157,8 @@ impl Law for Iwan {
             return None;
         }
         let (far, chi, count) = (self.slips_at(), self.chi, self.elements);
-        // in units of φmax and FS: stiffness and limit of all sliders up to x are these powers of x
+        // In units of φmax and FS, the stiffness of all sliders up to x is proportional to
+        // x^(χ+1), their limit to x^(χ+2).
         let stiffness = 1.0 / self.denominator();
         let limit = stiffness * (chi + 1.0) / (chi + 2.0);
         let edge = |bin: u32| match bin {
@@ -183,7 +193,7 @@ impl Law for Iwan {
         }
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // each slider is, behind its spring
+        true // each spring-slider is passive
     }
     fn consistent(&self) -> Result<(), String> {
         if self.chi > -1.0 {
@@ -210,7 +220,7 @@ impl Masing for Iwan {
 }
 
 impl StepLaw for Iwan {
-    /// The legs of its history.
+    /// The legs of the history.
     fn states(&self) -> usize {
         LEGS
     }
@@ -226,11 +236,12 @@ impl StepLaw for Iwan {
         advance(z, to[0] - from[0], self.slips_at(), |k, leg| share(k, leg, |u| self.first_loading(u)));
         let legs = z.iter().take_while(|leg| leg.re() != 0.0).enumerate();
         let force: S = legs.map(|(k, leg)| share(k, *leg, |u| self.first_loading(u))).sum();
-        // a leg without a length still has a slope
+        // a leg of zero length still has a slope
         let force = if z[0].re() == 0.0 { force + z[0] * self.stiffness } else { force };
         [force, S::from(0.0), S::from(0.0)]
     }
-    /// All legs but the last stay as they were, and the last is made of those that it continues and the step.
+    /// All legs but the last are unchanged. The last leg is the sum of the step and the legs
+    /// that it merges with.
     fn tangent(
         &self,
         from: &[f64; MOST_DIRECTIONS],
@@ -239,7 +250,7 @@ impl StepLaw for Iwan {
         slopes: StepSlopes<'_>,
     ) -> Option<[f64; MOST_DIRECTIONS]> {
         let before = counted(z);
-        // one of them may be left out, or joined to another
+        // The step may drop or merge legs.
         if before == z.len() || first_that_goes_on(&z[..before]).is_some() {
             return None;
         }
@@ -267,7 +278,7 @@ impl StepLaw for Iwan {
 mod tests {
     use super::*;
 
-    /// Force of first loading and loss per cycle of sliders.
+    /// Returns the force of first loading and the energy dissipated per cycle of the sliders.
     fn of_pieces(pieces: &[Piece], u: f64) -> (f64, f64) {
         pieces.iter().fold((0.0, 0.0), |(force, loss), piece| {
             let Piece::Slider(slider) = piece else { panic!("{piece:?}") };
@@ -276,7 +287,7 @@ mod tests {
         })
     }
 
-    /// The same by the formulas of the heading.
+    /// Returns the exact values, by the formulas in the module documentation.
     fn exact(law: &Iwan, u: f64) -> (f64, f64) {
         let (chi, far, d) = (law.chi, law.slips_at(), law.denominator());
         let r = law.limit * (chi + 1.0) / (far.powf(chi + 2.0) * d);
@@ -286,7 +297,8 @@ mod tests {
         (force, 4.0 * r * u.powf(chi + 3.0) / ((chi + 2.0) * (chi + 3.0)))
     }
 
-    /// Derivatives by hand against those of dual numbers, through loops that open, close and are forgotten in full slip.
+    /// Hand-written derivatives agree with those of dual numbers, in loops that open, close and
+    /// are erased by macro-slip.
     #[test]
     fn slopes_are_those_of_dual_numbers() {
         use stickslip_numerics::dual::{Dual, partials, variable};

@@ -1,14 +1,16 @@
 //! Elastic dry friction: a spring in series with an ideal slider (Jenkins element).
 //!
-//! `f = kt (u - s)`; the slider rests (`s' = 0`) while `|f| < limit`, and moves with `|f| = limit`.   Eq. (1)
-//! The paper prints Eq. (1) with the sign of the spring force reversed; the form here is the consistent one.
+//! `f = kt (u - s)`; the slider sticks (`s' = 0`) while `|f| < limit` and slips with
+//! `|f| = limit`. Eq. (1)
+//! The paper prints Eq. (1) with the sign of the spring force reversed; the form here is the
+//! consistent one.
 //! Source: Jenkins (1962); Pust, Pesek, Radolfova (2015), Fig. 1a and Eq. (1).
 
 use super::{JenkinsArctan, Law, LawInfo, Parameter, Piece, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "jenkins",
     summary: "spring and slider in series, f = kt (u - s), |f| <= limit, exact, paper Eq. (1)",
@@ -20,7 +22,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Jenkins { stiffness: values[0], limit: values[1] }),
 };
 
-/// Spring and ideal slider in series, without mass.
+/// Massless spring and ideal slider in series.
 ///
 /// # Example
 /// ```
@@ -57,6 +59,6 @@ impl Law for Jenkins {
         Some(Arc::new(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // the spring keeps δf²/(2 kt), and the slider is Coulomb's
+        true // the spring stores δf²/(2 kt), and the Coulomb slider is passive
     }
 }

@@ -1,8 +1,11 @@
-//! Elastic dry friction in a plane: a spring in series with a slider, the same in all directions, coupled by the friction disk.
+//! Elastic dry friction in a plane: a spring in series with a slider, isotropic, with the
+//! friction disk as limit.
 //!
-//! `f = k (u - s)`; the slider rests while `|f| < limit` and moves along f with `|f| = limit`.
-//! Source: Menq and Yang, "Non-linear spring resistance and friction damping of frictional constraint having two-dimensional motion" (1998);
-//! step by Krieg and Key (1977), exact for straight steps.
+//! `f = k (u - s)`; the slider sticks while `|f| < limit` and slips in the direction of f with
+//! `|f| = limit`.
+//! Source: Menq and Yang, "Non-linear spring resistance and friction damping of frictional
+//! constraint having two-dimensional motion" (1998); step by Krieg and Key (1977), exact for
+//! straight steps.
 
 use super::plane;
 use super::{
@@ -13,7 +16,7 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "jenkins-2d",
     summary: "spring and slider in series in a plane, f = kt (u - s), |f| <= limit",
@@ -25,7 +28,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Jenkins2d { stiffness: values[0], limit: values[1] }),
 };
 
-/// Spring and slider along two directions. The internal states are the force, N.
+/// Spring and slider in two directions. The internal states are the force components, N.
 ///
 /// # Example
 /// ```
@@ -67,9 +70,10 @@ impl Law for Jenkins2d {
         Some(Arc::new(Jenkins2dArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // the spring keeps |δf|²/(2 kt), and the slider moves along the normal of a convex disk
+        // the spring stores |δf|²/(2 kt), and the slider moves along the normal of a convex disk
+        true
     }
-    /// Motion along one direction is that of the Jenkins element.
+    /// Motion in one direction gives the Jenkins element.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
     }

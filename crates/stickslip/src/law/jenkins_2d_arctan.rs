@@ -1,7 +1,9 @@
-//! Elastic dry friction in a plane, smoothed over velocity: a spring in series with an arctangent slider, without mass.
+//! Elastic dry friction in a plane, smoothed over velocity: a massless spring in series with an
+//! arctangent slider.
 //!
-//! `f = kt (u - s)`, `s' = (tan(π |f| / (2 limit)) / alpha) f/|f|`; along one direction it is the law `jenkins-arctan`.
-//! Source: Pust, Pesek, Radolfova (2015), Sec. 3, turned around the axis.
+//! `f = kt (u - s)`, `s' = (tan(π |f| / (2 limit)) / alpha) f/|f|`. In one direction this is the
+//! law `jenkins-arctan`.
+//! Source: Pust, Pesek, Radolfova (2015), Sec. 3, made isotropic in a plane.
 
 use super::plane::dot;
 use super::{Coulomb2dArctan, Jenkins, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
@@ -11,7 +13,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "jenkins-2d-arctan",
     summary: "spring and smoothed slider in series in a plane, f' = kt (u' - tan(pi |f|/(2 limit))/alpha f/|f|)",
@@ -24,9 +26,10 @@ pub(super) static INFO: LawInfo = LawInfo {
     build: |values| Arc::new(Jenkins2dArctan { stiffness: values[0], limit: values[1], alpha: values[2] }),
 };
 
-/// Spring and smooth slider along two directions.
+/// Spring and smooth slider in two directions.
 ///
-/// The internal states are a vector z along the force with `|z| = asinh(alpha |s'|)`, for the reasons of [`super::JenkinsArctan`]:
+/// The internal states are a vector z in the direction of the force with
+/// `|z| = asinh(alpha |s'|)`, for the reasons of [`super::JenkinsArctan`]:
 /// `f = limit (2/π) arctan(sinh |z|) z/|z|`.
 ///
 /// # Example
@@ -42,9 +45,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 pub struct Jenkins2dArctan {
     /// Stiffness of the spring `kt`, N/m.
     pub stiffness: f64,
-    /// Size of the force that the slider tends to at high velocity, N.
+    /// Limit of the slider force magnitude at high velocity, N.
     pub limit: f64,
-    /// Steepness of the slider's arctangent at rest, s/m.
+    /// Steepness of the slider's arctangent at zero velocity, s/m.
     pub alpha: f64,
 }
 
@@ -67,26 +70,30 @@ impl Law for Jenkins2dArctan {
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
     }
-    /// The slider without its spring.
+    /// Resolvent of the slider without its spring.
     fn prox(&self) -> Option<&dyn Prox> {
         if self.limit > 0.0 { Some(self) } else { None }
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // the spring keeps |δf|²/(2 kt), and the slider's velocity is the gradient of a convex function of the force
+        // the spring stores |δf|²/(2 kt); the slider velocity is the gradient of a convex
+        // function of the force
+        true
     }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
-        // a search begins at the exact law; the smooth one is near it wherever it is used
+        // The exact law is a sufficient initial guess for the smooth one.
         Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
     }
 }
 
-/// The share of the limit that a force can have, but for rounding.
+/// Largest force that determines a state, relative to the limit.
 const BELOW: f64 = 1.0 - 1e-12;
 
-/// Squares of `|z|` below which functions of it are series; their next terms are then below rounding.
+/// Below this value of `|z|²`, functions of it are evaluated as series. Their next terms are
+/// then below rounding.
 const SMALL: f64 = 1e-3;
 
-/// Functions of ρ that are even, and so smooth at zero, from `ρ²`: `arctan(sinh ρ) / ρ = G`, `sinh ρ / ρ`, and `(cosh ρ - 1/G) / ρ²`.
+/// Even functions of ρ, smooth at zero, from `ρ²`: `arctan(sinh ρ) / ρ = G`, `sinh ρ / ρ`, and
+/// `(cosh ρ - 1/G) / ρ²`.
 fn even<S: Real>(square: S) -> [S; 3] {
     if square.re() < SMALL {
         let gudermann =
@@ -115,11 +122,11 @@ impl Prox for Jenkins2dArctan {
 impl RateLaw for Jenkins2dArctan {
     #[inline]
     fn states(&self) -> usize {
-        if self.limit > 0.0 { 2 } else { 0 } // a slider that holds nothing leaves its spring without force
+        if self.limit > 0.0 { 2 } else { 0 } // without a limit, the spring carries no force
     }
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         let size = force[0].hypot(force[1]);
-        // forces beyond the limit count as just below it
+        // Forces beyond the limit are replaced by values just below it.
         let rho = ((size / self.limit).min(BELOW) / FRAC_2_PI).tan().asinh();
         let share = if size > 0.0 { rho / size } else { 0.0 };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force * share);
@@ -131,9 +138,9 @@ impl RateLaw for Jenkins2dArctan {
         let &[x, y] = z else { return [zero; 3] };
         let z = [x, y];
         let [gudermann, sinh, difference] = even(dot(z, z));
-        // creep of the spring's end: u' - s'
+        // rate of the spring's elongation: u' - s'
         let creep = [0, 1].map(|a| motion.velocity[a] - z[a] * sinh * (1.0 / self.alpha));
-        // along z the force rises by limit (2/π) / cosh, across it turns as limit (2/π) G z does
+        // Radially, df = limit (2/π) / cosh |z| d|z|; tangentially, df = limit (2/π) G dz.
         let speed = self.stiffness * FRAC_PI_2 / self.limit;
         let along = dot(z, creep) * difference;
         for a in 0..2 {
@@ -167,7 +174,8 @@ mod tests {
             let gudermann = rho.sinh().atan() / rho;
             let expected = [gudermann, rho.sinh() / rho, (rho.cosh() - 1.0 / gudermann) / square];
             for (found, expected) in even(square).into_iter().zip(expected) {
-                assert!((found - expected).abs() < 1e-12, "{found} {expected}"); // the last one cancels
+                // the last function loses digits to cancellation
+                assert!((found - expected).abs() < 1e-12, "{found} {expected}");
             }
         }
     }

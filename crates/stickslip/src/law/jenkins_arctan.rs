@@ -1,6 +1,7 @@
-//! Elastic dry friction smoothed over velocity: a spring in series with an arctangent slider, without mass.
+//! Elastic dry friction smoothed over velocity: a massless spring in series with an arctangent
+//! slider.
 //!
-//! From `kt (s - u) + limit (2/π) arctan(alpha s') = 0` follows `f = kt (u - s)` and
+//! The balance `kt (s - u) + limit (2/π) arctan(alpha s') = 0` gives `f = kt (u - s)` and
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
@@ -12,7 +13,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "jenkins-arctan",
     summary: "spring and smoothed slider in series, f' = kt (u' - tan(pi f/(2 limit))/alpha)",
@@ -27,9 +28,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 
 /// Spring and smooth slider in series.
 ///
-/// The internal state is `z = asinh(alpha s')`, with the slider's velocity `s'`, a pure number: it is unbounded, so that no
-/// solver can step out of `|f| < limit`, it resolves the creep of the stuck contact (`z` near 0), and it grows only
-/// logarithmically in slip.
+/// The internal state is `z = asinh(alpha s')` with the slider velocity `s'`, dimensionless. The
+/// state is unbounded, so no solver step can violate `|f| < limit`. It resolves the creep of the
+/// stuck contact (`z` near 0) and grows only logarithmically in slip.
 /// `f = limit (2/π) arctan(sinh z)`, `z' = kt (π / (2 limit)) cosh z (u' - sinh(z) / alpha)`.
 ///
 /// # Example
@@ -45,9 +46,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 pub struct JenkinsArctan {
     /// Stiffness of the spring `kt`, N/m.
     pub stiffness: f64,
-    /// Force that the slider tends to at high velocity, N.
+    /// Limit of the slider force at high velocity, N.
     pub limit: f64,
-    /// Steepness of the slider's arctangent at rest, s/m.
+    /// Steepness of the slider's arctangent at zero velocity, s/m.
     pub alpha: f64,
 }
 
@@ -71,19 +72,19 @@ impl Law for JenkinsArctan {
         Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // the spring keeps δf²/(2 kt), and the slider's velocity grows with the force
+        true // the spring stores δf²/(2 kt), and the slider velocity grows with the force
     }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
-        // a search begins at the exact law; the smooth one is near it wherever it is used
+        // The exact law is a sufficient initial guess for the smooth one.
         describing::of_piece(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
     }
 }
 
-/// The share of the limit that a force can have, but for rounding.
+/// Largest force that determines a state, relative to the limit.
 const BELOW: f64 = 1.0 - 1e-12;
 
 impl JenkinsArctan {
-    /// The slider without its spring.
+    /// Returns the slider without its spring.
     fn slider(&self) -> CoulombArctan {
         CoulombArctan { limit: self.limit, alpha: self.alpha }
     }
@@ -107,10 +108,10 @@ impl Prox for JenkinsArctan {
 impl RateLaw for JenkinsArctan {
     #[inline]
     fn states(&self) -> usize {
-        usize::from(self.limit > 0.0) // a slider that holds nothing leaves its spring without force
+        usize::from(self.limit > 0.0) // without a limit, the spring carries no force
     }
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
-        // forces beyond the limit count as just below it
+        // Forces beyond the limit are replaced by values just below it.
         let share = (force[0] / self.limit).clamp(-BELOW, BELOW);
         z.fill((share / FRAC_2_PI).tan().asinh());
         true

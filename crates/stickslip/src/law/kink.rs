@@ -1,12 +1,13 @@
-//! Functions with a kink, and how they are differentiated there.
+//! Functions with a kink, and their derivatives at the kink.
 //!
-//! Laws of hysteresis speak of `|u'|` and `sgn u'`. These stay exact, without smoothing: at the kink itself, which a motion passes at single
-//! instants, the derivative is the mean of those on its sides, so that it is odd where the function is even. What integrates such a law sees a
-//! jump of a derivative when the velocity changes its sign, and shortens its steps there.
+//! Hysteresis laws contain `|u'|` and `sgn u'`. These functions stay exact, without smoothing. A
+//! motion passes the kink at isolated instants. There, the derivative is the mean of the
+//! one-sided derivatives, so it is odd if the function is even. Time integration sees a jump of
+//! a derivative at a velocity reversal and shortens its steps there.
 
 use stickslip_numerics::dual::Real;
 
-/// The sign of a number; zero of zero.
+/// Returns the sign of a number; zero for zero.
 pub(super) fn sign(x: f64) -> f64 {
     if x > 0.0 {
         1.0
@@ -17,16 +18,16 @@ pub(super) fn sign(x: f64) -> f64 {
     }
 }
 
-/// `|x|`; its derivative is the sign, zero at zero.
+/// Returns `|x|`. Its derivative is the sign, zero at zero.
 pub(super) fn size<S: Real>(x: S) -> S {
     x * sign(x.re())
 }
 
-/// Numbers below this count as zero in [`power`]: their powers above the first vanish, and their negative powers, of which derivatives are made,
-/// do not overflow.
+/// [`power`] treats numbers below this as zero. Their powers above the first are negligible, and
+/// the negative powers in the derivatives would overflow.
 const TINY: f64 = 1e-60;
 
-/// `|x|` to a power of one or more.
+/// Returns `|x|` raised to a power of one or more.
 pub(super) fn power<S: Real>(x: S, exponent: f64) -> S {
     let size = size(x);
     if exponent == 1.0 {

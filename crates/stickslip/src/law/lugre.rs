@@ -1,11 +1,16 @@
-//! Friction of bristles that bend and slip (LuGre): presliding, a static limit, friction that falls with velocity, and lag.
+//! LuGre friction: bristles with presliding, a static limit, friction that falls with velocity,
+//! and frictional lag.
 //!
-//! `z' = v - s0 |v| z / g(v)`, `f = s0 z + s1 z' + s2 v`, `g(v) = Fc + (Fs - Fc) exp(-(v/vs)²)`, with the bristles' deflection z and `v = u'`.
-//! Steady sliding: `f = g(v) sgn v + s2 v`. Without s1 and s2 and with `Fs = Fc` it is Dahl's law.
-//! Source: Canudas de Wit, Olsson, Åström, Lischinsky, "A new model for control of systems with friction" (1995).
+//! `z' = v - s0 |v| z / g(v)`, `f = s0 z + s1 z' + s2 v`, `g(v) = Fc + (Fs - Fc) exp(-(v/vs)²)`,
+//! with the bristle deflection z and `v = u'`.
+//! Steady sliding: `f = g(v) sgn v + s2 v`. Without s1 and s2 and with `Fs = Fc` it is Dahl's
+//! law.
+//! Source: Canudas de Wit, Olsson, Åström, Lischinsky, "A new model for control of systems with
+//! friction" (1995).
 //!
-//! It gives no energy in a closed motion while `s1 |v| <= 4 g(v)`: the power beyond the bristles' energy is
-//! `|v| (g q² + s1 |v| (1 - q)) + s2 v²` with `q = s0 z sgn(v) / g`, and that bracket is never negative then.
+//! The law is passive (gives no energy in a closed motion) while `s1 |v| <= 4 g(v)`. The power
+//! that does not go into the bristles' elastic energy is `|v| (g q² + s1 |v| (1 - q)) + s2 v²`
+//! with `q = s0 z sgn(v) / g`. Under this condition the bracket is never negative.
 
 use super::kink::size;
 use super::parameter::STATIC_LIMIT;
@@ -15,7 +20,7 @@ use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "lugre",
     summary: "bristle friction, f = stiffness z + damping z' + viscous u', z' = u' - stiffness |u'| z/g(u')",
@@ -45,13 +50,14 @@ pub(super) static INFO: LawInfo = LawInfo {
     },
 };
 
-/// Friction of bristles. The internal state is the force of their bending over the static limit, a pure number between -1 and 1.
+/// Bristle friction. The internal state is the bristles' elastic force divided by the static
+/// limit, dimensionless, between -1 and 1.
 ///
 /// # Example
 /// ```
 /// use stickslip::law::{LuGre, RateLaw, Relative};
 /// let law = LuGre { stiffness: 1e4, damping: 10.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
-/// // steady sliding at 1 m/s: the bristles carry `limit`, and there is viscous friction beside it
+/// // steady sliding at 1 m/s: the bristles carry `limit`, plus viscous friction
 /// let mut rate = [0.0_f64];
 /// let force = law.evaluate(&Relative::along(0.0, 1.0), &[2.0 / 2.5], &mut rate);
 /// assert!((force[0] - 2.4).abs() < 1e-12 && rate[0].abs() < 1e-9);
@@ -73,7 +79,7 @@ pub struct LuGre {
 }
 
 impl LuGre {
-    /// Force of steady sliding without viscous friction, N.
+    /// Returns the force of steady sliding without viscous friction, N.
     fn steady<S: Real>(&self, velocity: S) -> S {
         falling(velocity, self.limit, self.static_limit, self.velocity)
     }
@@ -89,7 +95,7 @@ impl Law for LuGre {
     fn is_odd(&self) -> bool {
         true
     }
-    /// The static limit; without any limit, viscous friction alone is bounded by nothing.
+    /// The static limit. With both limits zero, viscous friction alone is unbounded.
     fn scale(&self) -> f64 {
         if self.static_limit == 0.0 && self.viscous > 0.0 { f64::INFINITY } else { self.static_limit }
     }
@@ -113,7 +119,7 @@ impl Law for LuGre {
 
 impl RateLaw for LuGre {
     fn states(&self) -> usize {
-        usize::from(self.static_limit > 0.0) // bristles that hold nothing are none
+        usize::from(self.static_limit > 0.0) // without a limit there are no bristles
     }
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         z.fill((force[0] / self.static_limit).clamp(-1.0, 1.0));

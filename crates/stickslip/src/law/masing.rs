@@ -1,15 +1,18 @@
-//! Hysteresis by Masing's rules with memory: a curve of first loading and the return points of the motion.
+//! Hysteresis by Masing's rules with memory: a curve of first loading and the return points of
+//! the motion.
 //!
-//! The force of first loading is `B(u)`, odd in the displacement u. From a return point `(u_r, f_r)` on the force follows
-//! `f_r + 2 B((u - u_r)/2)`, until the motion passes the return point before it: that loop closes, both points are
-//! forgotten, and the motion goes on along the branch that the loop interrupted. A law of ideal sliders side by side, with
-//! any distribution of springs and limits, behaves so exactly.
+//! The force of first loading is `B(u)`, odd in the displacement u. After a return point
+//! `(u_r, f_r)` the force follows `f_r + 2 B((u - u_r)/2)` until the motion passes the previous
+//! return point. That closes a loop: both points are deleted, and the motion continues on the
+//! branch that the loop interrupted. Any parallel connection of ideal sliders, with any springs
+//! and limits, obeys these rules exactly.
 //!
-//! A history is told by its legs, the displacements between return points: `z₁` from rest, then `z₂, z₃, …` of alternating
-//! signs, each nested in the one before (`|z₂| ≤ 2 |z₁|`, `|z₃| ≤ |z₂|`, …). The last leg ends at the present displacement,
-//! so that the force is a function of the legs alone: `f = B(z₁) + Σ 2 B(z_k/2)`.
-//! Source: Masing (1926); Jennings (1964) for the rules of closed loops; Brokate and Sprekels, "Hysteresis and Phase
-//! Transitions" (1996), Ch. 2, for the equivalence with sliders.
+//! A history is stored as legs, the displacements between return points. The first leg `z₁`
+//! begins at zero; `z₂, z₃, …` have alternating signs. Each leg is nested in the one before it
+//! (`|z₂| ≤ 2 |z₁|`, `|z₃| ≤ |z₂|`, …). The last leg ends at the present displacement. Therefore
+//! the force is a function of the legs alone: `f = B(z₁) + Σ 2 B(z_k/2)`.
+//! Source: Masing (1926); Jennings (1964) for the rules of closed loops; Brokate and Sprekels,
+//! "Hysteresis and Phase Transitions" (1996), Ch. 2, for the equivalence with sliders.
 
 use num_complex::Complex64;
 use std::f64::consts::PI;
@@ -19,26 +22,30 @@ use stickslip_numerics::quadrature;
 
 /// The Masing view: the curve of first loading.
 pub trait Masing: Debug + Send + Sync {
-    /// Force of first loading (N) at a displacement that is not negative (m), and its slope (N/m).
+    /// Returns the force of first loading (N) at a non-negative displacement (m), and its slope
+    /// (N/m).
     fn backbone(&self, displacement: f64) -> (f64, f64);
-    /// The displacement at which all of it slips, m: beyond it the force is constant, and a motion so far forgets everything.
+    /// Returns the displacement of macro-slip, m. Beyond it the force is constant, and the
+    /// history is erased.
     fn slips_at(&self) -> f64;
 }
 
-/// Legs that a state keeps. Of a motion with more return points within each other, such as a long decay, it keeps fewer that
-/// carry the same force.
+/// Number of legs in a state. A motion with more nested return points, such as a long decay, is
+/// stored with fewer legs that carry the same force.
 pub(super) const LEGS: usize = 16;
 
-/// The share of a leg that the next one goes back when their loop closes: all of it but for rounding. A periodic motion comes
-/// back to its return points by rounding, and must forget them as the first time.
+/// A loop closes when a leg reaches this fraction of the previous leg. The margin to 1 covers
+/// rounding: a periodic motion repeats its return points only up to rounding, and must close its
+/// loops each time.
 const CLOSES: f64 = 1.0 - 1e-9;
 
-/// Adds a displacement `way` to the legs of a history whose law slips at `slips_at`; `force` is the share of a leg by its
-/// place and length, see [`share`].
+/// Adds a displacement `way` to the legs of a history of a law that slips at `slips_at`. `force`
+/// returns the contribution of a leg from its index and length, see [`share`].
 pub(super) fn advance<S: Real>(legs: &mut [S], way: S, slips_at: f64, force: impl Fn(usize, f64) -> f64) {
     let mut count = counted(legs);
     while let Some(k) = first_that_goes_on(&legs[..count]) {
-        // what an extrapolation between two lengths of steps leaves
+        // Two consecutive legs may have the same sign after an extrapolation between two step
+        // sizes.
         let joined = legs[k];
         legs[k - 1] += joined;
         legs[k..count].rotate_left(1);
@@ -63,7 +70,7 @@ pub(super) fn advance<S: Real>(legs: &mut [S], way: S, slips_at: f64, force: imp
             (legs[count - 2], legs[count - 1]) = (S::from(0.0), S::from(0.0));
             count -= 2;
         } else if count == 2 && length(1) >= CLOSES * 2.0 * length(0) {
-            // first loading to the other side
+            // the motion exceeds the first leg on the opposite side: first loading again
             let end = legs[0] + legs[1];
             (legs[0], legs[1]) = (end, S::from(0.0));
             count = 1;
@@ -77,25 +84,28 @@ pub(super) fn advance<S: Real>(legs: &mut [S], way: S, slips_at: f64, force: imp
     }
 }
 
-/// Legs that there are: the others are zero.
+/// Counts the legs in use; the others are zero.
 pub(super) fn counted<S: Real>(legs: &[S]) -> usize {
     legs.iter().position(|leg| leg.re() == 0.0).unwrap_or(legs.len())
 }
 
-/// The first leg that goes on where the one before it ends, and does not turn.
+/// Returns the index of the first leg that has the same sign as the leg before it.
 pub(super) fn first_that_goes_on<S: Real>(legs: &[S]) -> Option<usize> {
     (1..legs.len()).find(|&k| legs[k].re() * legs[k - 1].re() > 0.0)
 }
 
-/// Makes two legs of four, of those that differ least: they have the same displacement and the same force together, so that
-/// nothing jumps, and lie between those that they replace. `force` is the share of a leg by its place and length.
+/// Replaces four consecutive legs by two, at the position at which legs of the same sign differ
+/// least in length. The two legs have the same total displacement and the same total force as
+/// the four, so the force does not jump. Their lengths lie between those that they replace.
+/// `force` returns the contribution of a leg from its index and length.
 fn forget<S: Real>(legs: &mut [S], force: impl Fn(usize, f64) -> f64) {
     let apart = |k: usize| 1.0 - (legs[k + 2].re() / legs[k].re()).abs();
     let Some(first) = (1..legs.len() - 3).min_by(|a, b| apart(*a).total_cmp(&apart(*b))) else { return };
     let four = [0, 1, 2, 3].map(|k| legs[first + k].re());
     let (sign, sum) = (four[0].signum(), legs[first] + legs[first + 1] + legs[first + 2] + legs[first + 3]);
     let carried: f64 = four.iter().map(|leg| force(1, *leg)).sum();
-    // the slope falls with the length, so that of two legs of the same difference shorter ones carry more
+    // The slope of the force falls with the length. Of two pairs of legs with the same sum, the
+    // pair of shorter legs carries more force.
     let (mut low, mut high) = (four[0].abs() - four[1].abs() + four[2].abs(), four[0].abs());
     while high - low > f64::EPSILON * high {
         let middle = 0.5 * (low + high);
@@ -112,18 +122,20 @@ fn forget<S: Real>(legs: &mut [S], force: impl Fn(usize, f64) -> f64) {
     legs[end..].fill(S::from(0.0));
 }
 
-/// What a leg adds to the force, by its place among the legs: the first one is first loading, the others are branches.
+/// Returns the contribution of a leg to the force. The leg at place 0 is first loading; the
+/// others are branches.
 pub(super) fn share<S: Real>(place: usize, leg: S, backbone: impl Fn(S) -> S) -> S {
     let scale = if place == 0 { 1.0 } else { 2.0 };
     let force = backbone(leg.abs() / scale) * scale;
     if leg.re() < 0.0 { -force } else { force }
 }
 
-/// Panels of the half period in [`stiffness`].
+/// Number of quadrature panels over the half period in [`stiffness`].
 const PANELS: u32 = 8;
 
-/// Complex stiffness of the first harmonic of a law under `u = amplitude cos θ`, once it repeats, N/m: over the half period
-/// downwards the force is `B(a) - 2 B((a - u)/2)`, and the other half mirrors it.
+/// Returns the complex stiffness (N/m) of the first harmonic of the periodic force under
+/// `u = amplitude cos θ`. In the half period of decreasing u the force is
+/// `B(a) - 2 B((a - u)/2)`; the other half mirrors it.
 pub(super) fn stiffness(law: &dyn Masing, amplitude: f64) -> Complex64 {
     let top = law.backbone(amplitude).0;
     let mut sum = Complex64::ZERO;
@@ -142,7 +154,7 @@ pub(super) fn stiffness(law: &dyn Masing, amplitude: f64) -> Complex64 {
 mod tests {
     use super::*;
 
-    /// Jenkins's element: a backbone with a corner.
+    /// Jenkins element: a backbone with a corner.
     fn jenkins(u: f64) -> f64 {
         u.min(1.0)
     }
@@ -160,7 +172,8 @@ mod tests {
         ((k * 7919 + 13) as f64).sin()
     }
 
-    /// Any history of sliders side by side is that of their backbone: here four of them, of different springs and limits.
+    /// Four parallel sliders with different springs and limits have the force history of their
+    /// backbone.
     #[test]
     fn sliders_side_by_side_are_their_backbone() {
         const SLIDERS: [(f64, f64); 4] = [(1.0, 0.3), (2.0, 0.7), (0.5, 1.1), (0.8, 1.6)];
@@ -169,7 +182,7 @@ mod tests {
         }
         let (mut legs, mut held) = ([0.0; LEGS], [0.0; 4]);
         for k in 0..5000 {
-            // slow changes of size, so that loops are nested deep
+            // The amplitude changes slowly, so that loops are nested deeply.
             let way = 1.5 * noise(k) * (0.6 + 0.5 * (0.037 * k as f64).sin());
             let found = run(&mut legs, way, backbone, 1.6);
             for (f, (k, reach)) in held.iter_mut().zip(SLIDERS) {
@@ -180,7 +193,7 @@ mod tests {
         }
     }
 
-    /// A closed inner loop leaves no trace, and a long way to one side forgets all.
+    /// A closed inner loop is deleted, and macro-slip erases the history.
     #[test]
     fn loops_close_and_are_forgotten() {
         let mut legs = [0.0; LEGS];
@@ -192,8 +205,9 @@ mod tests {
         assert_eq!(legs[..2], [-1.0, 0.0]);
     }
 
-    /// A decay has a return point every half cycle, more than are kept: the force is the same all the time, and where the
-    /// motion grows again it is so once the loops that were joined are closed.
+    /// A decay has one return point per half cycle, more than are stored. The force stays the
+    /// same during the decay. It agrees again in a growing motion after the merged loops are
+    /// closed.
     #[test]
     fn a_long_decay_keeps_its_force() {
         fn smooth(u: f64) -> f64 {
@@ -218,7 +232,7 @@ mod tests {
         assert!(last < 1e-12 && worst < 0.02, "{last:e} {worst:e}");
     }
 
-    /// The derivative of a history by every step of it, against differences.
+    /// The derivatives with respect to each step of a history agree with finite differences.
     #[test]
     fn derivatives_follow_the_legs() {
         use stickslip_numerics::dual::{Dual, partials, variable};

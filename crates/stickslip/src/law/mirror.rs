@@ -1,27 +1,29 @@
-//! Whether a law answers the mirror image of a motion by the mirror image of its force, as one must that says it is odd.
+//! Test of an odd law: the mirrored motion must produce the mirrored force.
 //!
-//! Methods halve the period of odd systems and leave out their even harmonics: the claim of a law that is wrong makes a motion that looks like
-//! an orbit and is none. It is tried along a few histories of every size; a law that is odd gives the same bits, since signs cost no rounding.
+//! Methods halve the period of odd systems and omit their even harmonics. A law that is wrongly
+//! declared odd would give a result that looks like an orbit but is not one. The test evaluates
+//! a few histories of every size. An odd law gives identical bits, because a change of sign
+//! causes no rounding.
 
 use super::{Law, MOST_DIRECTIONS, Piece, Prox, Rate, Relative, Step};
 
-/// Displacements of the histories, decades of a metre.
+/// Magnitudes of the displacements, as powers of ten in metres.
 const DECADES: std::ops::RangeInclusive<i32> = -9..=0;
-/// Velocities relative to displacements, 1/s.
+/// Ratio of velocities to displacements, 1/s.
 const PACE: f64 = 1e3;
-/// Forces before which a law of velocity is asked, relative to its size.
+/// Arguments of the resolvent, relative to the law's force scale.
 const FORCES: [f64; 4] = [0.3, 0.9, 1.5, 10.0];
-/// Difference relative to the largest force that is no rounding.
+/// Difference relative to the largest force that is larger than rounding.
 const APART: f64 = 1e-9;
-/// One history along every direction, relative to its size: there and back, beyond and around.
+/// One history in every direction, in relative units, with reversals and varying amplitude.
 const WAY: [[f64; MOST_DIRECTIONS]; 6] =
     [[0.3, 0.2, -0.1], [1.0, -0.4, 0.6], [0.4, -1.0, 1.0], [-0.2, -0.7, 0.3], [-0.9, 0.5, -0.8], [-0.1, 0.8, -0.3]];
 
 type Force = [f64; MOST_DIRECTIONS];
 
-/// Whether the force of a view differs from the mirrored one under the mirrored motion.
+/// Tells whether any view of the law violates the symmetry.
 pub(super) fn is_broken(law: &dyn Law) -> bool {
-    // what opens and closes, and what stops on one side, are not odd by what they are
+    // Contacts and one-sided stops are not odd by construction.
     let one_sided = |pieces: Vec<Piece>| pieces.iter().any(|piece| matches!(piece, Piece::Stop { .. }));
     let directions = law.directions();
     law.normal().is_some()
@@ -35,12 +37,12 @@ fn size(decade: i32) -> f64 {
     10f64.powi(decade)
 }
 
-/// The size of a law's forces, N.
+/// Returns the force scale of a law, N; 1 N if it is unbounded.
 fn newton(law: &dyn Law) -> f64 {
     Some(law.scale()).filter(|scale| scale.is_finite()).unwrap_or(1.0)
 }
 
-/// What is no number says nothing: searches end at it by themselves.
+/// NaN counts as no difference; solvers stop at NaN.
 fn differ(forces: impl Fn(f64) -> Vec<Force>) -> bool {
     let (there, back) = (forces(1.0), forces(-1.0));
     let all = || there.iter().flatten();
@@ -90,7 +92,7 @@ mod tests {
     use super::*;
     use crate::law::TABLE;
 
-    /// The trial finds those that say they are not odd, and none else.
+    /// The test finds exactly the laws that declare themselves not odd.
     #[test]
     fn laws_are_odd_or_say_that_they_are_not() {
         for row in TABLE {

@@ -1,24 +1,31 @@
-//! Laws: what happens where two places rub or touch.
+//! Laws: force laws of joints, for friction, contact and nonlinear springs.
 //!
-//! A law is an object behind [`Law`], with its data in one file. It offers the *views* that are honest for it, and a method asks for the view
-//! that it can work with:
+//! A law is an object behind [`Law`]; each law has its own file. A law offers one or more
+//! *views*. A method uses the view that it can work with:
 //!
-//! | view | what it is | who asks |
-//! | --- | --- | --- |
-//! | [`Law::pieces`] | ideal sliders, springs and stops side by side | event-driven, harmonic balance |
-//! | [`Law::rate`] | `f = h(u, u', z)`, `z' = g(u, u', z)`, smooth | transient, shooting, harmonic balance |
-//! | [`Law::step`] | the force at the end of a step of `u`, from the state before it | harmonic balance, motion in small steps |
-//! | [`Law::masing`] | the force of first loading of a law that follows Masing's rules | harmonic balance |
-//! | [`Law::sliding`] | set-valued friction that is a smooth curve of the velocity in slip | shooting, transient |
-//! | [`Law::prox`] | the resolvent of a law of velocity, rigid or steep | harmonic balance |
+//! - [`Law::pieces`]: ideal sliders, springs and stops in parallel. Used by event-driven
+//!   integration, harmonic balance and average acceleration.
+//! - [`Law::rate`]: `f = h(u, u', z)`, `z' = g(u, u', z)`, smooth. Used by transient, shooting
+//!   and harmonic balance.
+//! - [`Law::step`]: the force at the end of a step of `u`, from the state before it. Used by
+//!   harmonic balance and average acceleration.
+//! - [`Law::masing`]: the force of first loading of a law that follows Masing's rules. Used by
+//!   harmonic balance.
+//! - [`Law::sliding`]: set-valued friction that is a smooth function of velocity during slip.
+//!   Used by shooting and transient.
+//! - [`Law::prox`]: the resolvent of a velocity-dependent law, rigid or steep. Used by harmonic
+//!   balance.
 //!
-//! A law that offers one view works in every method that asks for this view, and a method that finds none says which it misses.
+//! A law that offers a view works in every method that uses this view. A method that finds no
+//! suitable view reports the missing one.
 //!
-//! A joint acts along one to three directions. Along each of them `u` is the motion of its first place relative to its second, and the law's
-//! force `f` acts on the first place as `-f`. A law that knows a normal has it as its last direction.
+//! A joint acts along one to three directions. In each direction, `u` is the displacement of the
+//! joint's first place relative to its second place. The law's force `f` acts on the first place
+//! as `-f`. A law with a normal direction has it as its last direction.
 //!
-//! To add a law: write its file, with its [`LawInfo`], name it beside the others (`mod`), then add one line to [`TABLE`]. A law from another crate, or one that only a test needs,
-//! is put into a [`crate::model::Joint`] without any line.
+//! To add a law, write its file with its [`LawInfo`], declare the module here, and add one line
+//! to [`TABLE`]. A law from another crate or from a test needs no entry in the table: a
+//! [`crate::model::Joint`] takes any object that implements [`Law`].
 
 mod bouc_wen;
 mod check;
@@ -88,7 +95,7 @@ pub use stribeck_arctan::StribeckArctan;
 pub use traits::{Law, LawInfo, SharedLaw};
 pub use valanis::Valanis;
 
-/// Every law there is, in the order in which lists show them.
+/// All laws, in the order of printed lists.
 pub const TABLE: &[&LawInfo] = &[
     &coulomb::INFO,
     &coulomb_arctan::INFO,
@@ -110,7 +117,7 @@ pub const TABLE: &[&LawInfo] = &[
     &cubic::INFO,
 ];
 
-/// The row of [`TABLE`] with this name.
+/// Returns the entry of [`TABLE`] with this name.
 pub fn find(name: &str) -> Option<&'static LawInfo> {
     TABLE.iter().copied().find(|row| row.name == name)
 }

@@ -1,16 +1,16 @@
-//! The parameters of a law, and what is wrong with their values.
+//! The parameters of a law, and the errors of their values.
 
 use crate::dimension::Dimension;
 use std::fmt;
 
-/// The key of a slip limit.
+/// Key of the slip limit.
 pub(super) const LIMIT: &str = "limit";
-/// The key of the force up to which faces hold once they rest.
+/// Key of the static slip limit.
 pub(super) const STATIC_LIMIT: &str = "static_limit";
-/// The key of the number of tangential directions, of laws that leave it open.
+/// Key of the number of tangential directions, for laws that support one or two.
 pub const TANGENTS: &str = "tangents";
 
-/// The values that a parameter may have; all are finite.
+/// The range of a parameter. All values must be finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
     /// More than zero.
@@ -19,16 +19,16 @@ pub enum Range {
     ZeroOrMore,
     /// Any number.
     Any,
-    /// From the first number on, up to the second.
+    /// From the first number to the second, both included.
     Within(f64, f64),
-    /// A whole number from 1 up to this.
+    /// An integer from 1 to this number.
     Count(u32),
-    /// A whole number from 0 up to this.
+    /// An integer from 0 to this number.
     UpTo(u32),
 }
 
 impl Range {
-    /// Whether `value` lies in it.
+    /// Tells whether `value` lies in the range.
     pub fn has(self, value: f64) -> bool {
         value.is_finite()
             && match self {
@@ -55,46 +55,48 @@ impl fmt::Display for Range {
     }
 }
 
-/// One parameter of a law: its key in a study file, its dimension, what it means.
+/// One parameter of a law: key in a study file, dimension, meaning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
     /// Key in `law = { kind = …, KEY = … }`.
     pub key: &'static str,
-    /// Physical dimension, for units and for error messages.
+    /// Physical dimension, for units and error messages.
     pub dimension: Dimension,
-    /// The parameter to whose value the dimension is raised, see [`Parameter::dimension_under`].
+    /// Key of another parameter; its value is the exponent to which the dimension is raised. See
+    /// [`Parameter::dimension_under`].
     pub power: Option<&'static str>,
-    /// What it may be.
+    /// Permitted values.
     pub range: Range,
-    /// Its value when the key is absent, SI; `None` if it must be given.
+    /// Value if the key is absent, SI; `None` if the key is required.
     pub default: Option<f64>,
     /// One line for the documentation and for editors.
     pub doc: &'static str,
 }
 
 impl Parameter {
-    /// A parameter within a range.
+    /// Creates a parameter with a range.
     pub const fn new(key: &'static str, dimension: Dimension, range: Range, doc: &'static str) -> Self {
         Parameter { key, dimension, power: None, range, default: None, doc }
     }
 
-    /// A parameter that is more than zero.
+    /// Creates a parameter that is more than zero.
     pub const fn positive(key: &'static str, dimension: Dimension, doc: &'static str) -> Self {
         Parameter::new(key, dimension, Range::Positive, doc)
     }
 
-    /// The slip limit, N; zero is a joint that carries no force: the free reference of a damper.
+    /// Creates the slip limit, N. At zero the joint carries no force, which is the frictionless
+    /// reference of a damper.
     pub const fn limit(doc: &'static str) -> Self {
         Parameter::new(LIMIT, Dimension::FORCE, Range::ZeroOrMore, doc)
     }
 
-    /// The same parameter with its dimension raised to the value of another one.
+    /// Returns the parameter with its dimension raised to the value of another parameter.
     pub const fn to_the(self, power: &'static str) -> Self {
         Parameter { power: Some(power), ..self }
     }
 
-    /// Its dimension where `value` gives the values of the other parameters: the power's value is what it is raised to. `None` if that is
-    /// no whole number; then it is stated by a plain number in SI, which no unit could be asked of.
+    /// Returns the dimension for given values of the other parameters. `None` if the exponent is
+    /// not an integer. The parameter is then a plain number in SI, without a unit.
     pub fn dimension_under(&self, value: impl Fn(&str) -> Option<f64>) -> Option<Dimension> {
         match self.power {
             None => Some(self.dimension),
@@ -102,7 +104,7 @@ impl Parameter {
         }
     }
 
-    /// What it takes, in words: dimension, range, and what holds without it.
+    /// Describes the permitted values in words: dimension, range and default.
     ///
     /// # Example
     /// ```
@@ -124,46 +126,46 @@ impl Parameter {
         what + &self.default.map(|value| format!("; {value} if absent")).unwrap_or_default()
     }
 
-    /// The same parameter with a value for when its key is absent, SI.
+    /// Returns the parameter with a default value, SI.
     pub const fn or(self, default: f64) -> Self {
         Parameter { default: Some(default), ..self }
     }
 }
 
-/// A dimension in words; what has none is a number.
+/// Returns the dimension in words; "number" if it is dimensionless.
 fn measured(dimension: Dimension) -> String {
     if dimension == Dimension::NONE { "number".to_owned() } else { dimension.to_string() }
 }
 
-/// Why a law's parameters are refused.
+/// Why the parameters of a law are rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LawError {
-    /// A value is out of its range.
+    /// A value is out of range.
     #[error("{law}: `{key}` must be a finite {}, {range}, found {value}", measured(*.dimension))]
     Value {
         /// Name of the law.
         law: &'static str,
         /// Key of the parameter.
         key: &'static str,
-        /// What is measured by it.
+        /// Dimension of the parameter.
         dimension: Dimension,
-        /// What it may be.
+        /// Permitted values.
         range: Range,
-        /// The value that was given, SI.
+        /// The given value, SI.
         value: f64,
     },
-    /// The values do not fit each other.
+    /// The values are not consistent with each other.
     #[error("{law}: {message}")]
     Inconsistent {
         /// Name of the law.
         law: &'static str,
-        /// What is wrong.
+        /// Description of the inconsistency.
         message: String,
     },
 }
 
 impl LawError {
-    /// The key of the parameter that is wrong, if one alone is.
+    /// Returns the key of the invalid parameter, if the error concerns a single one.
     pub fn key(&self) -> Option<&'static str> {
         match self {
             LawError::Value { key, .. } => Some(key),
@@ -172,7 +174,7 @@ impl LawError {
     }
 }
 
-/// Why a law could not be built.
+/// Why a law cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildError {
     /// Parameters are missing.
@@ -180,10 +182,10 @@ pub enum BuildError {
     Missing {
         /// Name of the law.
         law: &'static str,
-        /// The keys that are missing.
+        /// Keys of the missing parameters.
         keys: Vec<&'static str>,
     },
-    /// A value is refused.
+    /// A value is rejected.
     #[error(transparent)]
     Value(#[from] LawError),
 }

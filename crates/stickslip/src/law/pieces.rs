@@ -1,13 +1,14 @@
-//! The pieces view: ideal sliders and stops side by side.
+//! The pieces view: ideal sliders and stops in parallel.
 
-/// One of the ideal parts of a law; parts of one law stand side by side and move alike.
+/// An ideal part of a law. The parts of one law act in parallel and have the same displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
-    /// Holds while its force is below its limit, and moves with the force at its limit.
+    /// Sticks while its force is below its limit, and slips with the force at its limit.
     Slider(Slider),
     /// A spring that acts only beyond a gap: `f = stiffness max(u - gap, 0)`.
     Stop {
-        /// Displacement at which it begins to act, m; negative if it is compressed at rest.
+        /// Displacement at which the stop begins to act, m; negative if it is compressed at
+        /// `u = 0`.
         gap: f64,
         /// Stiffness beyond the gap, N/m.
         stiffness: f64,
@@ -17,26 +18,26 @@ pub enum Piece {
 /// An ideal slider, rigid or in series with a spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slider {
-    /// Stiffness of the spring in front of it, N/m; `None` if it is rigid.
+    /// Stiffness of the spring in series, N/m; `None` if the slider is rigid.
     pub stiffness: Option<f64>,
-    /// Force while it moves, N.
+    /// Force during slip, N.
     pub limit: f64,
-    /// Force up to which it holds once it rests, N; not below `limit`.
+    /// Largest force during stick, N; not below `limit`.
     pub static_limit: f64,
 }
 
 impl Piece {
-    /// A slider that holds up to the force with which it moves.
+    /// Returns a slider with equal static and dynamic limits.
     pub fn slider(stiffness: Option<f64>, limit: f64) -> Self {
         Piece::Slider(Slider { stiffness, limit, static_limit: limit })
     }
 
-    /// Whether it is a slider that holds more than it carries in slip.
+    /// Tells whether this is a slider whose static limit exceeds its dynamic limit.
     pub fn drops(&self) -> bool {
         matches!(self, Piece::Slider(slider) if slider.static_limit > slider.limit)
     }
 
-    /// Whether it never carries a force.
+    /// Tells whether the part never carries a force.
     pub(crate) fn is_nothing(&self) -> bool {
         match self {
             Piece::Slider(slider) => slider.static_limit == 0.0,
@@ -45,5 +46,5 @@ impl Piece {
     }
 }
 
-/// A slip limit that nothing reaches, N; the weight of a mountain.
+/// A slip limit that no force reaches, N.
 pub(super) const STUCK: f64 = 1e15;

@@ -1,11 +1,15 @@
-//! Slip in a plane: the force of a spring and slider at the end of a straight step, while the slip limit changes linearly along it.
+//! Slip in a plane: the force of a spring-slider at the end of a straight step, with a slip
+//! limit that changes linearly along the step.
 //!
-//! While it slips, the force `T = R n` of the size of the limit R turns towards the motion: with the angle ψ between both and the way s,
-//! `ψ' = -(k / R) sin ψ`, so that `tan(ψ/2)` falls by the factor `exp(-k ∫ ds / R)`. At a constant limit that is the closed form of Krieg and Key; at
-//! one that changes linearly the integral is a logarithm. Slip once begun lasts to the end of the step, since ψ only falls; where it begins is the
-//! root of a quadratic. So the step is exact, as long as the way is straight and the limit linear.
-//! Source: Krieg and Key, "Implementation of a time-independent plasticity theory into structural computer programs" (1977); with a limit that
-//! changes derived here.
+//! During slip the force `T = R n` has the magnitude of the limit R and turns towards the
+//! motion. Let ψ be the angle between force and motion and s the path length. Then
+//! `ψ' = -(k / R) sin ψ`, so `tan(ψ/2)` decreases by the factor `exp(-k ∫ ds / R)`. At a
+//! constant limit this is the closed form of Krieg and Key. At a linearly changing limit the
+//! integral is a logarithm.
+//! Slip lasts until the end of the step, because ψ only decreases. Its beginning is the root of
+//! a quadratic equation. The step is therefore exact for a straight path and a linear limit.
+//! Source: Krieg and Key, "Implementation of a time-independent plasticity theory into
+//! structural computer programs" (1977). The changing limit is derived here.
 
 use stickslip_numerics::dual::Real;
 
@@ -19,30 +23,34 @@ fn beyond<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
     [a[0] + b[0] * s, a[1] + b[1] * s]
 }
 
-/// Distance of the squared force from the squared limit, relative, up to which it is the limit: the rounding of the step before.
+/// Relative tolerance between the squared force and the squared limit at which the force counts
+/// as being at the limit. It covers the rounding of the previous step.
 const ROUNDED: f64 = 1e-14;
 
-/// The direction of a force that slipped in the step before and goes on, `b` being its growth along the way and `c` its distance from the limit, see [`step`].
-/// It is scaled to one by the limit, so that nothing but the direction waits
-/// for the force: two roots and the exponential are known before the last step is.
+/// Returns the direction of a force that slipped in the previous step and continues to slip. `b`
+/// is the growth of the force along the path, `c` its distance from the limit, see [`step`].
+/// The force is normalized by the limit instead of its length. The square roots and the
+/// exponential of a step then do not wait for the result of the previous step.
 #[inline]
 fn slips_on<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Option<[S; 2]> {
     let square = first.re() * first.re();
     let on = b.re() > 0.0 && square >= f64::MIN_POSITIVE && c.re().abs() <= ROUNDED * square;
     on.then(|| {
         let inverse = first.recip();
-        // one over the size to first order of the rounding
+        // 1 / |force| to first order in the rounding error
         let scale = inverse * (-dot(force, force) * (inverse * inverse) * 0.5 + 1.5);
         [force[0] * scale, force[1] * scale]
     })
 }
 
-/// Difference of the limits relative to their sum below which the logarithm is a series; its ninth term is then below rounding.
+/// Below this difference of the limits, relative to their sum, the logarithm is replaced by its
+/// series. The ninth term is then below rounding.
 const FLAT: f64 = 0.1;
-/// Relative change of the limit below which the derivative of that is one; its fifth term is then below rounding.
+/// Below this relative change of the limit, the derivative is replaced by its series. The fifth
+/// term is then below rounding.
 const FLATTER: f64 = 1e-3;
 
-/// `ln(to / from) / (to - from)`: one over the logarithmic mean.
+/// `ln(to / from) / (to - from)`: the reciprocal of the logarithmic mean.
 #[inline]
 fn inverse_mean<S: Real>(from: S, to: S) -> S {
     let sum = to + from;
@@ -57,8 +65,9 @@ fn inverse_mean<S: Real>(from: S, to: S) -> S {
     (to / from).ln() / (to - from)
 }
 
-/// The force (N) of a spring and slider after a straight `way` (m), from the `force` before it. The slip limit goes from the first to the second of
-/// `limits` (N, not negative) meanwhile; the force before is not above the first.
+/// Returns the force (N) of a spring-slider after a straight path `way` (m), from the `force`
+/// before it. Meanwhile the slip limit changes linearly from the first to the second of `limits`
+/// (N, not negative). The initial force does not exceed the first limit.
 #[inline]
 pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: [S; 2]) -> [S; 2] {
     let [first, last] = limits;
@@ -72,25 +81,26 @@ pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: 
         return trial;
     }
     if dot(way, way).re() == 0.0 {
-        // the limit has fallen below a force that rests
+        // the limit falls below the force of a joint that does not move
         let size = dot(trial, trial).sqrt();
         return [trial[0] * last / size, trial[1] * last / size];
     }
-    // |force + stiffness s way| meets the limit at the share s of the way: a s² + b s + c = 0, c <= 0, more than zero at s = 1
+    // |force + stiffness s way| reaches the limit at the fraction s of the path. It solves a s²
+    // + b s + c = 0 with c <= 0 and a + b + c > 0.
     let change = last - first;
     let a = dot(way, way) * (stiffness * stiffness) - change * change;
     let b = (dot(force, way) * stiffness - first * change) * 2.0;
     let c = dot(force, force) - first * first;
     let length = dot(way, way).sqrt();
     let ahead = [way[0] / length, way[1] / length];
-    // derivatives see where slip begins also where that is at once
+    // A pass with derivatives always solves for the beginning of slip.
     let on = if S::NDERIV == 0 { slips_on(force, first, b, c) } else { None };
     let (share, size, direction) = match on {
         Some(direction) => (zero, first, direction),
         None => {
             let discriminant = b * b - a * c * 4.0;
             let share = if discriminant.re() <= 0.0 {
-                zero // it slips at once, across its force
+                zero // it slips at once, with the motion across the force
             } else if b.re() > 0.0 {
                 c * -2.0 / (b + discriminant.sqrt())
             } else {
@@ -108,12 +118,13 @@ pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: 
     let exponent = length * (S::from(1.0) - share) * stiffness * inverse_mean(size, last);
     let factor = (-exponent).exp();
     let cosine = dot(direction, ahead);
-    // cos ψ = (1 - tan²) / (1 + tan²) of half the angle; rounding may put the cosine out of -1 to 1
+    // cos ψ = (1 - tan²) / (1 + tan²) of ψ/2; rounding may move the cosine out of -1 to 1
     let above = |x: S| if x.re() > 0.0 { x } else { zero };
     let (plus, minus) = (above(cosine + 1.0), above(-cosine + 1.0));
     let denominator = plus + minus * factor * factor;
     if denominator.re() <= 0.0 {
-        return [direction[0] * last, direction[1] * last]; // exactly against the motion, and it stays so
+        // the force is exactly opposite to the motion and stays there
+        return [direction[0] * last, direction[1] * last];
     }
     let along = (plus - minus * factor * factor) / denominator;
     let turned = factor * 2.0 / denominator;
@@ -122,7 +133,8 @@ pub(super) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: 
     [out[0] * last, out[1] * last]
 }
 
-/// Derivatives of the force after a step, [component][by component], and by the limits before and after it.
+/// Derivatives of the force after a step, `[component][by component]`, with respect to the force
+/// before, the path, and the two limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Slopes {
     pub(super) by_force: [[f64; 2]; 2],
@@ -134,7 +146,8 @@ impl Slopes {
     pub(super) const NONE: Slopes = Slopes { by_force: [[0.0; 2]; 2], by_way: [[0.0; 2]; 2], by_limits: [[0.0; 2]; 2] };
 }
 
-/// Derivatives of a scalar by the components of the force, those of the way, and the limits.
+/// Derivatives of a scalar with respect to the components of the force, those of the path, and
+/// the limits.
 #[derive(Debug, Clone, Copy)]
 struct Gradient {
     force: [f64; 2],
@@ -156,7 +169,7 @@ impl Gradient {
     }
 }
 
-/// `radial δsize + size across δangle`, of a force `size radial`.
+/// `radial δsize + size across δangle`, for a force `size radial`.
 #[inline]
 fn turning(radial: [f64; 2], last: f64, angle: Gradient) -> Slopes {
     let across = [-radial[1] * last, radial[0] * last];
@@ -168,8 +181,9 @@ fn turning(radial: [f64; 2], last: f64, angle: Gradient) -> Slopes {
     slopes
 }
 
-/// [`step`] with its derivatives. While it slips the force is `R (cos α, sin α)` at its end: with the angle `ψ₁` where slip begins,
-/// `tan(ψ₂/2) = e⁻ᴱ tan(ψ₁/2)` has `δψ₂ = t δψ₁ - sin ψ₂ δE`, `t = sin ψ₂ / sin ψ₁`.
+/// Computes [`step`] with its derivatives. At the end of slip the force is `R (cos α, sin α)`.
+/// Let `ψ₁` be the angle at which slip begins. Then `tan(ψ₂/2) = e⁻ᴱ tan(ψ₁/2)` gives
+/// `δψ₂ = t δψ₁ - sin ψ₂ δE` with `t = sin ψ₂ / sin ψ₁`.
 #[inline]
 pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, limits: [f64; 2]) -> ([f64; 2], Slopes) {
     let [first, last] = limits;
@@ -191,7 +205,7 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
     }
     let ahead = [way[0] / length, way[1] / length];
     let heading = Gradient { way: [-ahead[1] / length, ahead[0] / length], ..Gradient::NONE };
-    // where slip begins
+    // beginning of slip
     let change = last - first;
     let a = length * length * (stiffness * stiffness) - change * change;
     let b = (dot(force, way) * stiffness - first * change) * 2.0;
@@ -215,7 +229,7 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
             (share, root, held, size, [held[0] / size, held[1] / size])
         }
     };
-    // |held| = first + share change, by its derivative
+    // derivatives of the fraction s, from |held| = first + s · change
     let begins = if root > 0.0 {
         let by = -2.0 / root;
         Gradient {
@@ -226,7 +240,7 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
     } else {
         Gradient::NONE
     };
-    // what a vector has of the change of `held`
+    // derivatives of a component of `held`
     let of_held = |along: [f64; 2]| {
         let own = Gradient { force: along, way: along.map(|x| share * stiffness * x), ..Gradient::NONE };
         own.combined(1.0, begins, stiffness * dot(way, along))
@@ -246,7 +260,7 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
     let turned = factor * 2.0 / denominator;
     let across = beyond(direction, -cosine, ahead);
     let out = beyond([ahead[0] * along, ahead[1] * along], turned, across);
-    // the sine of the angle from the way to the force, signed
+    // signed sine of the angle from the motion to the force
     let sine = ahead[0] * out[1] - ahead[1] * out[0];
     let of_rest = Gradient {
         way: ahead.map(|x| (1.0 - share) * stiffness * mean * x),
@@ -259,7 +273,8 @@ pub(super) fn step_with_slopes(force: [f64; 2], way: [f64; 2], stiffness: f64, l
     ([out[0] * last, out[1] * last], turning(out, last, angle))
 }
 
-/// [`inverse_mean`] with its derivative by the second; that by the first follows, since it is of the order -1 in both.
+/// Returns [`inverse_mean`] and its derivative with respect to `to`. The derivative with respect
+/// to `from` follows because the function is homogeneous of degree -1.
 #[inline]
 fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     let change = to / from - 1.0;
@@ -272,9 +287,10 @@ fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     (mean, slope)
 }
 
-/// A force along `y` whose size and derivative by the size of y are given, and its derivative by y.
+/// Writes a force along `y` and its derivative with respect to y. Given are the magnitude of the
+/// force and its derivative with respect to the magnitude of y.
 pub(super) fn radial(y: &[f64], size: f64, (value, rise): (f64, f64), force: &mut [f64], slope: &mut [f64]) {
-    // across y the direction turns
+    // perpendicular to y, only the direction changes
     let across = if size > 0.0 { value / size } else { rise };
     for i in 0..2 {
         force[i] = across * y[i];
@@ -291,7 +307,7 @@ mod tests {
     use super::*;
     use stickslip_numerics::dual::{Dual, partials, variable};
 
-    /// Derivatives by hand against those of dual numbers, on every way through the step.
+    /// Hand-written derivatives agree with those of dual numbers, in every branch of the step.
     #[test]
     fn slopes_are_those_of_dual_numbers() {
         let mut slid = 0;
@@ -329,9 +345,10 @@ mod tests {
                 let by_hand = [slopes.by_force[a], slopes.by_way[a], slopes.by_limits[a]].concat();
                 let exact = partials(&dual[a]);
                 if exact.iter().any(|x| !x.is_finite()) {
-                    continue; // where a square root of zero has no derivative
+                    continue; // the square root of zero has no derivative
                 }
-                // where slip begins along a tangent of the disk derivatives grow, and their rounding with them
+                // Derivatives grow if the path is nearly tangent to the limit circle, and their
+                // rounding errors grow with them.
                 let size = exact.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
                 for (hand, exact) in by_hand.iter().zip(exact) {
                     assert!((hand - exact).abs() <= 1e-10 * size * size, "{k}: {by_hand:?} {:?}", partials(&dual[a]));
@@ -341,7 +358,7 @@ mod tests {
         assert!(slid > 1000, "{slid}");
     }
 
-    /// Radial return in many small steps, which is of first order.
+    /// Radial return in many small steps, a first-order method.
     fn in_small_steps(mut force: [f64; 2], way: [f64; 2], stiffness: f64, limits: [f64; 2], steps: u32) -> [f64; 2] {
         for k in 1..=steps {
             let limit = limits[0] + (limits[1] - limits[0]) * f64::from(k) / f64::from(steps);

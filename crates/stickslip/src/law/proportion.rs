@@ -1,15 +1,17 @@
-//! Laws that differ in nothing but the size of their forces.
+//! Proportional laws: two laws whose forces differ by a constant factor.
 //!
-//! Units of force, length and time are free: multiply the parameters in Nᵖ by κᵖ, and the forces are κ times as large in every motion. What holds
-//! p newtons holds as many kilograms.
+//! If each parameter with the force dimension Nᵖ is multiplied by κᵖ, all forces are multiplied
+//! by κ. The exponent p equals the kilogram exponent of the parameter's dimension.
 
 use super::Law;
 
-/// Factors of the parameters of one law differ by no more than this share: what the roundings of a few products and a root leave.
+/// Tolerance between the factors of different parameters: the rounding of a few products and a
+/// root.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 impl dyn Law + '_ {
-    /// How many times the forces of `other` this law has in every motion; `None` if that depends on the motion.
+    /// Returns the factor between the forces of this law and those of `other`, equal in every
+    /// motion. `None` if the laws are not proportional.
     pub(crate) fn times(&self, other: &dyn Law) -> Option<f64> {
         if !std::ptr::eq(self.info(), other.info()) {
             return None;
@@ -62,7 +64,7 @@ mod tests {
         assert_eq!(times(&Coulomb2d { limit: 1.0 }, &smooth(1.0, 1.0)), None);
     }
 
-    /// Every law is once itself.
+    /// Each law has the factor 1 to itself.
     #[test]
     fn every_law_is_itself() {
         for row in TABLE {

@@ -1,30 +1,35 @@
-//! The prox view: the resolvent of a law that the velocity decides, rigid (set-valued at rest) or steep.
+//! The prox view: the resolvent of a velocity-dependent law, rigid (set-valued at rest) or
+//! steep.
 //!
-//! For any penalty `ε > 0` (N s/m), `λ = φ(v)` says the same as `λ = J(λ + ε v)` with the resolvent `J = (1 + ε φ⁻¹)⁻¹`. For rigid friction
-//! that is the projection onto `|λ| ≤ limit`. `J` never rises faster than its argument, however steep φ is.
+//! For any penalty `ε > 0` (N s/m), `λ = φ(v)` is equivalent to `λ = J(λ + ε v)` with the
+//! resolvent `J = (1 + ε φ⁻¹)⁻¹`. For rigid friction, `J` is the projection onto `|λ| ≤ limit`.
+//! If φ does not fall with velocity, `J` is nonexpansive, however steep φ is.
 //! Source: Alart and Curnier (1991); Parikh and Boyd, "Proximal Algorithms" (2014).
 
 use std::fmt::Debug;
 use stickslip_numerics::quadrature;
 
-/// A law of velocity by its resolvent.
+/// A velocity-dependent law, given by its resolvent.
 pub trait Prox: Debug + Send + Sync {
-    /// The force `λ` (N) of `λ + ε φ⁻¹(λ) ∋ y` along all directions, and its derivative by `y` (row-major, directions squared), into `force`
-    /// and `slope`. `y` is in N, the `penalty` ε in N s/m.
+    /// Solves `λ + ε φ⁻¹(λ) ∋ y` for the force `λ` (N) in all directions. Writes it into `force`
+    /// and its derivative with respect to `y` into `slope` (row-major, directions squared). `y`
+    /// is in N, the `penalty` ε in N s/m.
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]);
-    /// The force at a velocity along one direction (m/s) and its derivative, N and N s/m; `None` if a velocity of zero leaves it open.
+    /// Returns the force (N) at a velocity (m/s) in one direction and its derivative (N s/m).
+    /// `None` if the law is set-valued at zero velocity.
     fn at_velocity(&self, _velocity: f64) -> Option<(f64, f64)> {
         None
     }
-    /// Compliance of a spring in series with it, m/N; zero if there is none.
+    /// Returns the compliance of a spring in series, m/N; zero if there is no spring.
     fn compliance(&self) -> f64 {
         0.0
     }
-    /// The penalty above which the resolvent is single-valued, N s/m: zero unless friction falls with velocity.
+    /// Returns the penalty above which the resolvent is single-valued, N s/m. It is zero unless
+    /// friction falls with velocity.
     fn least_penalty(&self) -> f64 {
         0.0
     }
-    /// Means of `J(y + e ξ)` over a sample, `-1 < ξ < 1`, along one direction.
+    /// Returns means of `J(y + e ξ)` over a sample, `-1 < ξ < 1`, in one direction.
     fn mean(&self, y: f64, e: f64, penalty: f64) -> Mean {
         Mean::of(y, e, |y| {
             let (mut force, mut slope) = ([0.0], [0.0]);
@@ -32,30 +37,31 @@ pub trait Prox: Debug + Send + Sync {
             (force[0], slope[0])
         })
     }
-    /// The same of the force at the velocity `velocity + e ξ`, m/s; `None` where [`Prox::at_velocity`] is.
+    /// Returns means of the force at the velocity `velocity + e ξ`, m/s. `None` if
+    /// [`Prox::at_velocity`] returns `None`.
     fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
         self.at_velocity(velocity)?;
         Some(Mean::of(velocity, e, |v| self.at_velocity(v).unwrap_or_default()))
     }
 }
 
-/// Means over a sample of a map `g(y + e ξ)`, `-1 < ξ < 1`, in its own units.
+/// Means of a function `g(y + e ξ)` over a sample, `-1 < ξ < 1`, in the units of `g`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Mean {
-    /// Of g.
+    /// Mean of g.
     pub zeroth: f64,
-    /// Of ξ g.
+    /// Mean of ξ g.
     pub first: f64,
-    /// Of g'.
+    /// Mean of g'.
     pub slope: f64,
-    /// Of ξ g'.
+    /// Mean of ξ g'.
     pub slope_first: f64,
-    /// Of ξ² g'.
+    /// Mean of ξ² g'.
     pub slope_second: f64,
 }
 
 impl Mean {
-    /// By quadrature of g and g', which `g` gives.
+    /// Computes the means by quadrature. `g` returns the function's value and its derivative.
     #[inline]
     pub fn of(y: f64, e: f64, g: impl Fn(f64) -> (f64, f64)) -> Self {
         if e == 0.0 {

@@ -1,71 +1,77 @@
-//! The rate view: force and rates of internal states, smooth in the motion.
+//! The rate view: force and rates of the internal states, as smooth functions of the motion.
 
 use super::relative::{MOST_DIRECTIONS, Relative};
 use super::slopes::{FEW, Slopes, WIDTH, seeded};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
 
-/// What the author of a law of rate form writes, once for numbers and for dual numbers: `f = h(u, u', z)`, `z' = g(u, u', z)`, both continuous, and
-/// smooth but for kinks, such as `|u'|` where the motion turns: integration shortens its steps there.
+/// A law in rate form, written once for numbers and for dual numbers: `f = h(u, u', z)`,
+/// `z' = g(u, u', z)`. Both functions are continuous. They are smooth except at kinks, such as
+/// `|u'|` at a velocity reversal, where time integration shortens its steps.
 pub trait RateLaw {
-    /// Number of internal states `z`.
+    /// Returns the number of internal states `z`.
     fn states(&self) -> usize {
         0
     }
-    /// The size that internal states have in motion, in their own unit: what errors in them are compared with.
+    /// Returns the typical magnitude of the internal states, in their own unit. Error estimates
+    /// of the states are relative to it.
     fn state_scale(&self) -> f64 {
         1.0
     }
-    /// The states with which it carries a `force` (N) along its directions, into `z`; false if a force does not decide them.
+    /// Writes into `z` the states at which the law carries a `force` (N) in its directions.
+    /// Returns `false` if the force does not determine the states.
     fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
         false
     }
-    /// Force (N) and rates at one instant. `z` and `rate` have length [`RateLaw::states`]; units belong to the law.
+    /// Returns the force (N) and writes the rates at one instant. `z` and `rate` have length
+    /// [`RateLaw::states`]; the law defines their units.
     fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; MOST_DIRECTIONS];
 }
 
-/// The rate view as methods see it; every [`RateLaw`] has it.
+/// The rate view as methods use it; every [`RateLaw`] implements it.
 pub trait Rate: Debug + Send + Sync {
-    /// Number of internal states.
+    /// Returns the number of internal states.
     fn states(&self) -> usize;
-    /// Their size in motion, see [`RateLaw::state_scale`].
+    /// Returns the typical magnitude of the states, see [`RateLaw::state_scale`].
     fn state_scale(&self) -> f64;
-    /// The states with which it carries a force, see [`RateLaw::state_under`].
+    /// Writes the states at which the law carries a force, see [`RateLaw::state_under`].
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool;
-    /// Force (N) and rates at one instant.
+    /// Returns the force (N) and writes the rates at one instant.
     fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS];
-    /// The same with exact derivatives, along the first `directions`.
+    /// Evaluates force and rates with exact derivatives, in the first `directions`.
     fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint);
 }
 
-/// Force and rates of a law at one instant, with derivatives by its arguments: `u` along all directions, `u'` along all directions, `z`.
+/// Force and rates of a law at one instant, with derivatives. The arguments are `u` in all
+/// directions, `u'` in all directions, then `z`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RatePoint {
-    /// Force along the directions, N.
+    /// Force in each direction, N.
     pub force: [f64; MOST_DIRECTIONS],
     /// Rates of the internal states.
     pub rate: Vec<f64>,
-    /// Derivatives, one row of arguments for each force, then for each rate.
+    /// Derivatives: one row per force, then one row per rate; one column per argument.
     slopes: Slopes,
 }
 
 impl RatePoint {
-    /// For a law with so many directions and internal states.
+    /// Allocates a point for a law with these numbers of directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
         RatePoint { force: [0.0; MOST_DIRECTIONS], rate: vec![0.0; states], slopes: Slopes::new(directions, states) }
     }
 
-    /// Derivatives of force `a` by all arguments.
+    /// Returns the derivatives of force `a` with respect to all arguments.
     pub fn force_slope(&self, a: usize) -> &[f64] {
         self.slopes.force(a)
     }
 
-    /// Derivatives of the rate of state `s` by all arguments.
+    /// Returns the derivatives of the rate of state `s` with respect to all arguments.
     pub fn rate_slope(&self, s: usize) -> &[f64] {
         self.slopes.state(s)
     }
 
-    /// All derivatives, for a law that computes them by itself: one row of arguments for each force, then for each rate.
+    /// Returns all derivatives for writing, for a law that computes them without dual numbers.
+    /// One row per force, then one row per rate.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         self.slopes.all_mut()
     }
@@ -100,7 +106,7 @@ impl<L: RateLaw + Debug + Send + Sync> Rate for L {
     }
 }
 
-/// Derivatives by the arguments from `first` on, as many as the dual number has.
+/// Computes the derivatives with respect to `N` arguments, starting at argument `first`.
 #[inline]
 fn pass<const N: usize, L: RateLaw>(
     law: &L,

@@ -1,28 +1,30 @@
-//! The linear references of a law: the same joint free of friction, and stuck.
+//! The linear references of a law: the joint without friction, and the stuck joint.
 
 use super::parameter::{LIMIT, STATIC_LIMIT};
 use super::pieces::STUCK;
 use super::springs::Springs;
 use super::{Law, SharedLaw};
 
-/// Index of the stiffnesses of [`Law::springs`].
+/// Indices into the stiffnesses of [`Law::springs`].
 const FREE: usize = 0;
 const HELD: usize = 1;
 
 impl dyn Law + '_ {
-    /// The same law with another slip limit, N, static or not; `None` if it has none.
+    /// Returns the law with another slip limit (N), dynamic and static; `None` if it has no slip
+    /// limit.
     fn limited(&self, limit: f64) -> Option<SharedLaw> {
         let law = self.with(LIMIT, limit)?;
         Some(law.with(STATIC_LIMIT, limit).unwrap_or(law))
     }
 
-    /// The same joint as linear springs, if the law says which.
+    /// Returns the joint as linear springs, if the law defines them. `which` is `FREE` or
+    /// `HELD`.
     fn as_springs(&self, which: usize) -> Option<SharedLaw> {
         self.springs().map(|springs| Springs::shared(&springs[which]))
     }
 
-    /// The same joint free of friction, a linear reference: its slip limit is zero, or its faces stay apart. `None` if the law has neither a
-    /// limit nor faces that part.
+    /// Returns the linear reference without friction: the slip limit is zero, or the faces stay
+    /// apart. `None` if the law has neither a slip limit nor faces that separate.
     pub fn free(&self) -> Option<SharedLaw> {
         match self.closed() {
             Some(along) => Some(Springs::shared(&vec![0.0; along.len()])),
@@ -30,7 +32,9 @@ impl dyn Law + '_ {
         }
     }
 
-    /// The same joint stuck, a linear reference: no force reaches its slip limit, and its faces stay closed. `None` as for the free reference.
+    /// Returns the linear reference that is permanently stuck: no force reaches the slip limit,
+    /// and the faces stay closed. `None` if the law has neither a slip limit nor faces that
+    /// separate.
     pub fn stuck(&self) -> Option<SharedLaw> {
         match self.closed() {
             Some(along) => Some(Springs::shared(&along)),

@@ -2,10 +2,11 @@
 
 use stickslip_numerics::dual::Real;
 
-/// The most directions that a joint can have.
+/// Largest number of directions of a joint.
 pub const MOST_DIRECTIONS: usize = 3;
 
-/// The relative motion at a joint, along up to three directions; the first ones count, as many as the law has.
+/// Relative motion at a joint in up to three directions. Only the law's first directions are
+/// used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relative<S> {
     /// Relative displacement `u`, m.
@@ -15,7 +16,7 @@ pub struct Relative<S> {
 }
 
 impl<S: Real> Relative<S> {
-    /// Motion along one direction.
+    /// Returns a motion in one direction.
     pub fn along(displacement: S, velocity: S) -> Self {
         let zero = S::from(0.0);
         Relative { displacement: [displacement, zero, zero], velocity: [velocity, zero, zero] }

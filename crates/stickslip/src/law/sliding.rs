@@ -1,13 +1,16 @@
-//! The sliding view: set-valued friction along one direction whose force in slip is a smooth curve.
+//! The sliding view: set-valued friction in one direction whose force during slip is a smooth
+//! function of velocity.
 //!
-//! `|f| ≤ g(0)` at rest, `f = sgn(u') g(u')` in slip. While the faces keep one direction of slip, or rest, the motion is
-//! smooth; methods that locate the switches between these need no smoothing.
+//! `|f| ≤ g(0)` at rest, `f = sgn(u') g(u')` during slip. The motion is smooth while the joint
+//! sticks or keeps its direction of slip. Methods that locate the transitions therefore need no
+//! regularization.
 
 use std::fmt::Debug;
 
-/// The curve of a friction force over the velocity.
+/// The friction force as a function of velocity.
 pub trait Sliding: Debug + Send + Sync {
-    /// Friction `g` at a velocity (m/s), N, and its derivative, N s/m. It is even in the velocity, and the branch of one
-    /// direction goes on smoothly beyond zero: iterations may look there.
+    /// Returns the friction force `g` (N) at a velocity (m/s) and its derivative (N s/m). `g` is
+    /// even in the velocity. The branch of one direction is continued smoothly beyond zero
+    /// velocity, because iterations may evaluate it there.
     fn slip_force(&self, velocity: f64) -> (f64, f64);
 }

@@ -1,13 +1,15 @@
-//! Derivatives of a law's forces and states by its arguments, filled in passes of dual numbers: what the rate and the step view share.
+//! Derivatives of a law's forces and states with respect to its arguments, shared by the rate
+//! view and the step view. Each pass of dual numbers fills some columns.
 
 use stickslip_numerics::dual::{Dual, partials, variable};
 
-/// Derivatives that are computed in one pass, where there are more than fit a smaller number.
+/// Number of derivatives per pass for laws with many arguments.
 pub(super) const WIDTH: usize = 8;
-/// Internal states that are kept on the stack.
+/// Largest number of internal states that are stored on the stack.
 pub(super) const FEW: usize = 8;
 
-/// One row of arguments for each force, then for each state (or its rate). Arguments are two motions along all directions, then the states.
+/// One row per force, then one row per state (or per state rate). The columns are two vectors in
+/// all directions, then the states.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Slopes {
     values: Vec<f64>,
@@ -21,41 +23,43 @@ impl Slopes {
         Slopes { values: vec![0.0; (directions + states) * arguments], directions, arguments }
     }
 
-    /// Of force `a`.
+    /// Returns the row of force `a`.
     #[inline]
     pub fn force(&self, a: usize) -> &[f64] {
         &self.values[a * self.arguments..(a + 1) * self.arguments]
     }
 
-    /// Of state `s`, or of its rate.
+    /// Returns the row of state `s`, or of its rate.
     #[inline]
     pub fn state(&self, s: usize) -> &[f64] {
         self.force(self.directions + s)
     }
 
-    /// All of them, row by row.
+    /// Returns all rows.
     pub fn all_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
-    /// Those of the forces, and those of the states, row by row.
+    /// Returns the rows of the forces and the rows of the states.
     pub fn parts_mut(&mut self) -> (&mut [f64], &mut [f64]) {
         self.values.split_at_mut(self.directions * self.arguments)
     }
 
-    /// Keeps what a pass found by the arguments from `first` on, for a force or, behind the forces, a state.
+    /// Stores the derivatives of one pass, from argument `first` on, in a row. The rows of the
+    /// states follow those of the forces.
     #[inline]
     pub fn keep<const N: usize>(&mut self, row: usize, first: usize, value: &Dual<N>) {
         let width = N.min(self.arguments - first);
         let kept = &mut self.values[row * self.arguments + first..];
         match kept.first_chunk_mut::<N>() {
-            Some(kept) if width == N => *kept = partials(value), // a length that the compiler knows
+            Some(kept) if width == N => *kept = partials(value), // the compiler knows this length
             _ => kept[..width].copy_from_slice(&partials(value)[..width]),
         }
     }
 }
 
-/// The argument of a number as a dual number of the pass by the arguments from `first` on.
+/// Returns an argument as a dual number. It carries a derivative if the pass that starts at
+/// `first` contains it.
 #[inline]
 pub(super) fn seeded<const N: usize>(value: f64, argument: usize, first: usize) -> Dual<N> {
     match argument.checked_sub(first) {

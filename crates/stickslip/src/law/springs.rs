@@ -1,6 +1,8 @@
-//! Linear springs along the directions of a joint, `f = k u`: what a contact is whose faces stay together, or apart for good.
+//! Linear springs in the directions of a joint, `f = k u`: a contact whose faces stay closed, or
+//! stay apart.
 //!
-//! No row of the table: it stands for other laws in the linear references, see [`super::Law::closed`].
+//! This law is not in the table. It replaces other laws in the linear references, see
+//! [`super::Law::closed`].
 
 use super::pieces::STUCK;
 use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
@@ -25,16 +27,16 @@ static INFO: LawInfo = LawInfo {
     build: |values| Springs::shared(&values[..(values[3] as usize).clamp(1, MOST_DIRECTIONS)]),
 };
 
-/// Linear springs along one to three directions.
+/// Linear springs in one to three directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Springs {
-    /// N/m; zero beyond the directions.
+    /// Stiffness, N/m; zero beyond `directions`.
     stiffness: [f64; MOST_DIRECTIONS],
     directions: usize,
 }
 
 impl Springs {
-    /// With these stiffnesses, N/m, one for every direction.
+    /// Returns a shared law with these stiffnesses, N/m, one per direction.
     pub fn shared(along: &[f64]) -> SharedLaw {
         let stiffness = std::array::from_fn(|a| along.get(a).copied().unwrap_or(0.0));
         Arc::new(Springs { stiffness, directions: along.len() })
@@ -57,7 +59,8 @@ impl Law for Springs {
     fn scale(&self) -> f64 {
         if self.stiffness.iter().all(|k| *k == 0.0) { 0.0 } else { f64::INFINITY }
     }
-    /// Along one direction exact methods take it: as a slider that nothing moves, or as nothing.
+    /// In one direction, exact methods take the spring as a slider that never slips, or as
+    /// nothing.
     fn pieces(&self) -> Option<Vec<Piece>> {
         match (self.directions, self.stiffness[0]) {
             (1, 0.0) => Some(Vec::new()),
@@ -69,7 +72,7 @@ impl Law for Springs {
         Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
-        true // springs keep what goes in
+        true // springs store the energy that they receive
     }
 }
 
@@ -91,7 +94,7 @@ mod tests {
         let (stuck, free) = (law.stuck().unwrap(), law.free().unwrap());
         let at = Relative { displacement: [2.0, -1.0, 0.0], velocity: [1.0; 3] };
         let force = |law: &SharedLaw| law.rate().unwrap().value(&at, &[], &mut []);
-        // also under tension: closed for good
+        // The stuck reference also carries tension.
         assert_eq!((force(&stuck), force(&free)), ([6.0, -5.0, 0.0], [0.0; 3]));
         assert!(free.is_free() && !stuck.is_free() && stuck.directions() == 2);
         assert!(stuck.check().is_ok() && *(INFO.build)(&stuck.values()) == *stuck);

@@ -1,28 +1,32 @@
-//! The step view: the force at the end of a step, from the motion over it and the state before it (return map).
+//! The step view (return map): the force at the end of a step, from the displacements at both
+//! ends and the state before it.
 
 use super::relative::MOST_DIRECTIONS;
 use super::slopes::{FEW, Slopes, WIDTH, seeded};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
 
-/// What the author of a law of step form writes, once for numbers and for dual numbers. Time does not occur in it: what happens depends on the
-/// way and not on the speed.
+/// A law in step form, written once for numbers and for dual numbers. It is rate-independent:
+/// the force depends on the path of the displacement and not on time.
 pub trait StepLaw {
-    /// Number of internal states `z`; all are zero in a contact that has not been moved.
+    /// Returns the number of internal states `z`. All states are zero before the first motion.
     fn states(&self) -> usize;
-    /// The size that internal states have in motion, in their own unit.
+    /// Returns the typical magnitude of the internal states, in their own unit.
     fn state_scale(&self) -> f64 {
         1.0
     }
-    /// Force (N) at the end of a straight step of the displacement `from` one point `to` the next (m); `z` is replaced by the states at its end.
+    /// Returns the force (N) at the end of a straight step of the displacement (m) from the
+    /// point `from` to the point `to`. Replaces `z` by the states at the end.
     fn advance<S: Real>(
         &self,
         from: &[S; MOST_DIRECTIONS],
         to: &[S; MOST_DIRECTIONS],
         z: &mut [S],
     ) -> [S; MOST_DIRECTIONS];
-    /// The same for numbers, with derivatives by hand, if the author has any: they cost a fifth of those by dual numbers. One row for each of the first
-    /// `directions` forces and one for each state, of derivatives by the displacement before along all directions, the one after, and the states before.
+    /// Advances numbers with hand-written derivatives, if the law has any; they cost a fifth of
+    /// those by dual numbers. `slopes` gets one row for each of the first `directions` forces
+    /// and one row for each state. The columns are the displacement before the step in all
+    /// directions, the displacement after it, and the states before it.
     fn tangent(
         &self,
         _from: &[f64; MOST_DIRECTIONS],
@@ -32,48 +36,48 @@ pub trait StepLaw {
     ) -> Option<[f64; MOST_DIRECTIONS]> {
         None
     }
-    /// Whether the joint sticks throughout a motion that leads straight from `from` (m), where the states are `z`, to
-    /// `mean` (m) and then stays within `reach` (m) of it: force and states are then linear in the motion. `false` is
-    /// always right.
+    /// Tells whether the joint sticks during a whole motion. The motion leads straight from
+    /// `from` (m), with states `z`, to `mean` (m), and then stays within `reach` (m) of `mean`.
+    /// Force and states are then linear in the motion. `false` is always a valid answer.
     fn holds(&self, _from: (&[f64; MOST_DIRECTIONS], &[f64]), _to: Reach<'_>) -> bool {
         false
     }
 }
 
-/// Displacements within `reach` of `mean` along each direction, m.
+/// Displacements within `reach` of `mean` in each direction, m.
 #[derive(Debug, Clone, Copy)]
 pub struct Reach<'a> {
     /// Centre of the motion, m.
     pub mean: &'a [f64; MOST_DIRECTIONS],
-    /// Largest distance from it, m.
+    /// Largest distance from the centre, m.
     pub reach: &'a [f64; MOST_DIRECTIONS],
 }
 
-/// Where the derivatives of a step go: rows of the forces, and rows of the states.
+/// Output memory for the derivatives of a step: rows of the forces, and rows of the states.
 #[derive(Debug)]
 pub struct StepSlopes<'a> {
-    /// Directions of the joint.
+    /// Number of directions of the joint.
     pub directions: usize,
-    /// Row after row, one for each direction.
+    /// Derivatives of the forces, row by row, one row per direction.
     pub force: &'a mut [f64],
-    /// Row after row, one for each state.
+    /// Derivatives of the states, row by row, one row per state.
     pub state: &'a mut [f64],
 }
 
-/// The step view as methods see it; every [`StepLaw`] has it.
+/// The step view as methods use it; every [`StepLaw`] implements it.
 pub trait Step: Debug + Send + Sync {
-    /// Number of internal states.
+    /// Returns the number of internal states.
     fn states(&self) -> usize;
-    /// Their size in motion, see [`StepLaw::state_scale`].
+    /// Returns the typical magnitude of the states, see [`StepLaw::state_scale`].
     fn state_scale(&self) -> f64;
-    /// Force (N) at the end of a step; `z` is replaced by the states there.
+    /// Returns the force (N) at the end of a step. Replaces `z` by the states there.
     fn value(
         &self,
         from: &[f64; MOST_DIRECTIONS],
         to: &[f64; MOST_DIRECTIONS],
         z: &mut [f64],
     ) -> [f64; MOST_DIRECTIONS];
-    /// The same with exact derivatives, along the first `directions`; `z` stays.
+    /// Advances a step with exact derivatives in the first `directions`, without changing `z`.
     fn linearise(
         &self,
         directions: usize,
@@ -82,10 +86,17 @@ pub trait Step: Debug + Send + Sync {
         z: &[f64],
         point: &mut StepPoint,
     );
-    /// Steps around a closed way, `[direction][point]`, from its first point to the next and in the end from the last to the first: forces at the points,
-    /// and with `rows` the derivatives of the step to every point along the first `directions`: rows of the states, then of the forces, as long as in
-    /// [`StepPoint`]. `states` are those at the first point, before and after, and those at all points, `[point][state]`, as the last time around
-    /// this way has left them, with the forces, or no numbers: from where both meet on the forces are there already.
+    /// Advances the law once around a closed path `[direction][point]`: from the first point to
+    /// the last and back to the first. Writes the forces at all points.
+    ///
+    /// `rows` gets the derivatives of the step to each point, in the first `directions`: the
+    /// rows of the states, then those of the forces, with the columns of [`StepPoint`].
+    ///
+    /// `states` holds two arrays. The first contains the states at the first point, before and
+    /// after the cycle. The second contains the states at all points, `[point][state]`, from the
+    /// previous cycle on this path, or NaN. Without `rows`, the cycle ends early when its states
+    /// equal those of the previous cycle: the remaining forces are then already correct. With
+    /// `rows`, the second array is set to NaN.
     fn around(
         &self,
         directions: usize,
@@ -94,34 +105,34 @@ pub trait Step: Debug + Send + Sync {
         force: &mut [Vec<f64>; MOST_DIRECTIONS],
         rows: Option<&mut [f64]>,
     );
-    /// See [`StepLaw::holds`].
+    /// Tells whether the joint sticks, see [`StepLaw::holds`].
     fn holds(&self, from: (&[f64; MOST_DIRECTIONS], &[f64]), to: Reach<'_>) -> bool;
 }
 
-/// Force and states at the end of a step, with derivatives by its arguments: the displacement before along all directions, the one after along
-/// all directions, the states before.
+/// Force and states at the end of a step, with derivatives. The arguments are the displacement
+/// before the step in all directions, the displacement after it, then the states before it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepPoint {
-    /// Force along the directions, N.
+    /// Force in each direction, N.
     pub force: [f64; MOST_DIRECTIONS],
-    /// States at the end.
+    /// States at the end of the step.
     pub state: Vec<f64>,
-    /// Derivatives, one row of arguments for each force, then for each state.
+    /// Derivatives: one row per force, then one row per state; one column per argument.
     slopes: Slopes,
 }
 
 impl StepPoint {
-    /// For a law with so many directions and internal states.
+    /// Allocates a point for a law with these numbers of directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
         StepPoint { force: [0.0; MOST_DIRECTIONS], state: vec![0.0; states], slopes: Slopes::new(directions, states) }
     }
 
-    /// Derivatives of force `a` by all arguments.
+    /// Returns the derivatives of force `a` with respect to all arguments.
     pub fn force_slope(&self, a: usize) -> &[f64] {
         self.slopes.force(a)
     }
 
-    /// Derivatives of state `s` at the end by all arguments.
+    /// Returns the derivatives of state `s` at the end with respect to all arguments.
     pub fn state_slope(&self, s: usize) -> &[f64] {
         self.slopes.state(s)
     }
@@ -230,7 +241,8 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
     }
 }
 
-/// The steps of [`Step::around`] without derivatives, of a law with so many states: most have one or two.
+/// Performs the steps of [`Step::around`] without derivatives, for a fixed number of states.
+/// Most laws have one or two.
 fn values<const STATES: usize, L: StepLaw>(
     law: &L,
     (n, at): (usize, impl Fn(usize) -> [f64; MOST_DIRECTIONS]),
@@ -254,7 +266,7 @@ fn values<const STATES: usize, L: StepLaw>(
     z.copy_from_slice(&now);
 }
 
-/// Derivatives by the arguments from `first` on, as many as the dual number has.
+/// Computes the derivatives with respect to `N` arguments, starting at argument `first`.
 fn pass<const N: usize, L: StepLaw>(
     law: &L,
     directions: usize,

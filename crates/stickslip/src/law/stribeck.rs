@@ -1,9 +1,10 @@
-//! Rigid dry friction that falls with velocity: Stribeck's curve, or a static and a dynamic limit.
+//! Rigid dry friction that falls with velocity: a Stribeck curve, or a static and a dynamic
+//! limit.
 //!
-//! `|f| <= Fs` at rest, `f = sgn(u') g(u')`, `g(v) = Fc + (Fs - Fc) exp(-(v/vs)²)` in slip. With `vs = 0` the force drops from Fs to Fc as soon
-//! as the faces slide.
-//! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its influence on the critical velocity of
-//! stick-slip motion" (1982).
+//! `|f| <= Fs` at rest, `f = sgn(u') g(u')`, `g(v) = Fc + (Fs - Fc) exp(-(v/vs)²)` in slip. With
+//! `vs = 0` the force drops from Fs to Fc as soon as the faces slip.
+//! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its
+//! influence on the critical velocity of stick-slip motion" (1982).
 
 use super::parameter::STATIC_LIMIT;
 use super::stribeck_curve::limits_fit;
@@ -14,7 +15,7 @@ use crate::dimension::Dimension;
 use std::f64::consts::E;
 use std::sync::Arc;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "stribeck",
     summary: "rigid friction that falls with velocity, |f| <= Fs at rest, f = sgn(u') (Fc + (Fs - Fc) exp(-(u'/vs)^2)) in slip",
@@ -46,9 +47,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// let law = Stribeck { limit: 2.0, static_limit: 2.5, velocity: 0.01 };
 /// let (mut force, mut slope) = ([0.0], [0.0]);
 /// law.resolve(&[2.4], 1e3, &mut force, &mut slope);
-/// assert_eq!((force[0], slope[0]), (2.4, 1.0)); // it holds
+/// assert_eq!((force[0], slope[0]), (2.4, 1.0)); // it sticks
 /// law.resolve(&[1002.0], 1e3, &mut force, &mut slope);
-/// assert_eq!(force[0], 2.0); // it slides at 1 m/s
+/// assert_eq!(force[0], 2.0); // it slips at 1 m/s
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stribeck {
@@ -61,12 +62,12 @@ pub struct Stribeck {
 }
 
 impl Stribeck {
-    /// Whether friction does not fall at all.
+    /// Tells whether the static and the dynamic limit are equal.
     fn is_constant(&self) -> bool {
         self.static_limit == self.limit
     }
 
-    /// Friction at a velocity that is not zero, and its derivative there, N and N s/m.
+    /// Returns the friction force (N) at a nonzero velocity and its derivative (N s/m).
     fn friction(&self, velocity: f64) -> (f64, f64) {
         if self.velocity == 0.0 || self.is_constant() {
             return (self.limit, 0.0);
@@ -90,20 +91,22 @@ impl Law for Stribeck {
     fn scale(&self) -> f64 {
         self.static_limit
     }
-    /// Without a velocity: a slider with two limits.
+    /// A slider with two limits. Available if `velocity` is zero or the limits are equal.
     fn pieces(&self) -> Option<Vec<Piece>> {
         let slider = Slider { stiffness: None, limit: self.limit, static_limit: self.static_limit };
         (self.velocity == 0.0 || self.is_constant()).then(|| vec![Piece::Slider(slider)])
     }
-    /// With a velocity: without one no penalty makes the resolvent single-valued.
+    /// Available if `velocity` is positive or the limits are equal. Otherwise no penalty makes
+    /// the resolvent single-valued.
     fn prox(&self) -> Option<&dyn Prox> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
-    /// With a velocity, as for the resolvent.
+    /// Available under the same condition as the resolvent.
     fn sliding(&self) -> Option<&dyn Sliding> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
-    /// With a velocity: no smooth law of one width has both a static and a dynamic limit.
+    /// Available if `velocity` is positive or the limits are equal. Otherwise no smooth law with
+    /// a single width has both limits.
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
         let Stribeck { limit, static_limit, velocity } = *self;
         if self.is_constant() {
@@ -114,7 +117,7 @@ impl Law for Stribeck {
             None
         }
     }
-    /// Where friction does not fall it is Coulomb's, a monotone function of velocity.
+    /// With equal limits, this is Coulomb's law, a monotone function of velocity.
     fn is_incrementally_passive(&self) -> bool {
         self.is_constant()
     }
@@ -133,7 +136,8 @@ impl Sliding for Stribeck {
     }
 }
 
-/// Iterations of the search for the velocity; bisection alone needs as many as a number has bits.
+/// Upper bound on the iterations for the velocity. Bisection alone needs one per bit of the
+/// result.
 const SEARCHED: usize = 100;
 
 impl Prox for Stribeck {
@@ -143,9 +147,10 @@ impl Prox for Stribeck {
             (force[0], slope[0]) = (y[0], 1.0);
             return;
         }
-        // the velocity v with g(v) + penalty v = target, by Newton's method within a bracket
+        // Solve g(v) + penalty v = target for the velocity v, by Newton's method within a
+        // bracket.
         let (mut low, mut high) = (0.0, (target - self.limit) / penalty);
-        // what the force that is sought loses to rounding
+        // rounding of the force, expressed as a velocity
         let rounding = f64::EPSILON * target / penalty;
         let mut v = high;
         for _ in 0..SEARCHED {
@@ -167,7 +172,7 @@ impl Prox for Stribeck {
         let (friction, fall) = self.friction(v);
         (force[0], slope[0]) = (friction.copysign(y[0]), fall / (fall + penalty));
     }
-    /// The steepest fall of friction, at `v = vs / √2`.
+    /// The steepest slope of the friction curve, at `v = vs / √2`.
     fn least_penalty(&self) -> f64 {
         if self.is_constant() {
             return 0.0;

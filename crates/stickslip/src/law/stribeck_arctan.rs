@@ -1,8 +1,10 @@
-//! Friction that falls with velocity, smoothed over velocity.
+//! Friction that falls with velocity, smoothed by an arctangent.
 //!
-//! `f = (2/π) arctan(alpha u') (Fc + (Fs - Fc) exp(-(u'/vs)²))`. It never sticks: it creeps. The smoothing takes from the static limit, the
-//! less the larger `alpha vs` is: at 1000 and `Fc = 0.8 Fs` the largest force is 0.8 % below Fs.
-//! Source: the arctangent of Pust, Pesek, Radolfova (2015), Eq. (2), around Stribeck's curve.
+//! `f = (2/π) arctan(alpha u') (Fc + (Fs - Fc) exp(-(u'/vs)²))`. It never sticks: it creeps. The
+//! smoothing reduces the largest force below the static limit, less so for larger `alpha vs`. At
+//! `alpha vs = 1000` and `Fc = 0.8 Fs` the largest force is 0.8 % below Fs.
+//! Source: the arctangent of Pust, Pesek, Radolfova (2015), Eq. (2), multiplied by the Stribeck
+//! curve.
 
 use super::parameter::STATIC_LIMIT;
 use super::stribeck_curve::{falling, limits_fit};
@@ -12,7 +14,7 @@ use std::f64::consts::FRAC_2_PI;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "stribeck-arctan",
     summary: "smoothed friction that falls with velocity, f = (2/pi) arctan(alpha u') (Fc + (Fs - Fc) exp(-(u'/vs)^2))",
@@ -50,7 +52,7 @@ pub struct StribeckArctan {
     pub static_limit: f64,
     /// Velocity `vs` over which friction falls, m/s.
     pub velocity: f64,
-    /// Steepness at rest, s/m.
+    /// Steepness at zero velocity, s/m.
     pub alpha: f64,
 }
 

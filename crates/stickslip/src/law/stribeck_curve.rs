@@ -1,4 +1,4 @@
-//! Stribeck's curve, friction that falls with the velocity, as laws share it.
+//! The Stribeck curve: friction that falls with velocity, shared by several laws.
 //!
 //! Source: Stribeck (1902); in this form Bo and Pavelescu (1982).
 
@@ -10,7 +10,7 @@ pub(super) fn falling<S: Real>(v: S, limit: f64, static_limit: f64, velocity: f6
     (-(share * share)).exp() * (static_limit - limit) + limit
 }
 
-/// Whether the static limit is not below the dynamic one.
+/// Checks that the static limit is not below the dynamic limit.
 pub(super) fn limits_fit(limit: f64, static_limit: f64) -> Result<(), String> {
     if static_limit >= limit {
         return Ok(());

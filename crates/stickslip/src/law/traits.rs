@@ -1,4 +1,4 @@
-//! What every law answers, and the row by which it is known.
+//! The trait of all laws, and the description of a law in the table.
 
 use super::pieces::{Piece, Slider};
 use super::{Contact, Masing, Parameter, Prox, Rate, Sliding, Step, describing};
@@ -7,13 +7,13 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// A law that many joints, cases and threads share.
+/// A law that several joints, cases and threads share.
 pub type SharedLaw = Arc<dyn Law>;
 
-/// What every law answers. It offers at least one view.
+/// A force law of a joint. It offers at least one view.
 ///
 /// # Example
-/// A law from outside: a spring that stiffens, `f = k (u + b u³)`.
+/// A law defined outside this crate: a stiffening spring, `f = k (u + b u³)`.
 /// ```
 /// use std::sync::Arc;
 /// use stickslip::dimension::Dimension;
@@ -54,93 +54,108 @@ pub type SharedLaw = Arc<dyn Law>;
 /// assert!((law.linearised(1e-3, 1.0).re - 1.75e4).abs() < 1e-6);
 /// ```
 pub trait Law: Debug + Send + Sync {
-    /// Its row: name, summary, parameters.
+    /// Returns the table entry: name, summary, parameters.
     fn info(&self) -> &'static LawInfo;
-    /// The parameters' values in SI, in the order of its row. Two laws of one row with the same values are taken for the same law: what else tells them
-    /// apart has to be among them.
+    /// Returns the parameter values in SI, in the order of the table entry. Two laws with the
+    /// same entry and the same values compare equal, so the values must contain everything that
+    /// distinguishes two instances.
     fn values(&self) -> Vec<f64>;
-    /// Directions of relative motion, 1 to [`MOST_DIRECTIONS`](super::MOST_DIRECTIONS).
+    /// Returns the number of directions of relative motion, 1 to
+    /// [`MOST_DIRECTIONS`](super::MOST_DIRECTIONS).
     fn directions(&self) -> usize {
         1
     }
-    /// The direction along which its faces press on each other, if it knows one: that opens and closes, where the others slip.
+    /// Returns the index of the normal direction, if the law has one. The faces press on each
+    /// other, open and close in this direction; they slip in the others.
     fn normal(&self) -> Option<usize> {
         None
     }
-    /// The same law with its faces pressed on each other by `force` (N) where it has not moved: what it is in small motion
-    /// where a constant load presses faces that have no preload. `None` of a law without faces, and where it has a preload.
+    /// Returns this law with its faces pressed together by `force` (N) at zero displacement. It
+    /// describes small motions of a contact without preload that a constant load presses
+    /// together. `None` if the law has no faces or already has a preload.
     fn pressed_by(&self, _force: f64) -> Option<SharedLaw> {
         None
     }
-    /// The stiffness (N/m) along every direction while its faces stay closed and stick, of a law whose faces can part.
+    /// Returns the stiffness (N/m) in each direction while the faces are closed and stick.
+    /// `None` if the faces cannot separate.
     fn closed(&self) -> Option<Vec<f64>> {
         None
     }
-    /// The springs (N/m) that the joint is in its linear references, free of friction and stuck, one stiffness for every direction, of a law that
-    /// slips and has no parameter `limit`.
+    /// Returns the springs (N/m) of the two linear references: free of friction, and stuck. Each
+    /// reference has one stiffness per direction. Laws that slip but have no parameter `limit`
+    /// implement this.
     fn springs(&self) -> Option<[Vec<f64>; 2]> {
         None
     }
-    /// The relative displacement (m) at which all of it slips, of a law that slips little by little before (micro-slip, macro-slip).
+    /// Returns the relative displacement (m) at which the whole joint slips (macro-slip). Laws
+    /// with gradual slip before it (micro-slip) implement this.
     fn macro_slip(&self) -> Option<f64> {
         None
     }
-    /// The size of its forces, N, for tolerances and guesses: a slip limit, or infinity if nothing bounds them.
+    /// Returns the magnitude of the law's forces, N, for tolerances and initial guesses: the
+    /// slip limit, or infinity if the force is unbounded.
     fn scale(&self) -> f64 {
         f64::INFINITY
     }
-    /// Ideal sliders, springs and stops side by side; exact.
+    /// Returns ideal sliders, springs and stops in parallel, if they represent the law exactly.
     fn pieces(&self) -> Option<Vec<Piece>> {
         None
     }
-    /// Smooth force and rates of internal states.
+    /// Returns the rate view: a smooth force and the rates of the internal states.
     fn rate(&self) -> Option<&dyn Rate> {
         None
     }
-    /// The force after a step.
+    /// Returns the step view: the force at the end of a step.
     fn step(&self) -> Option<&dyn Step> {
         None
     }
-    /// The force of first loading, of a law along one direction that follows Masing's rules with memory.
+    /// Returns the Masing view: the force of first loading of a one-dimensional law that follows
+    /// Masing's rules with memory.
     fn masing(&self) -> Option<&dyn Masing> {
         None
     }
-    /// The resolvent of a law of velocity.
+    /// Returns the prox view: the resolvent of a velocity-dependent law.
     fn prox(&self) -> Option<&dyn Prox> {
         None
     }
-    /// The friction curve of a law that is set-valued at rest, and continuous there: it holds up to the force with which it
-    /// begins to slide.
+    /// Returns the sliding view: the friction curve of a law that is set-valued at rest. The
+    /// curve is continuous at rest: slip begins at the force that the joint carries when it
+    /// starts to slide.
     fn sliding(&self) -> Option<&dyn Sliding> {
         None
     }
-    /// Whether the force changes its sign with the motion: `f(-u) = -f(u)` for whole histories. Methods halve the period of systems that are odd,
-    /// so that a law that says so is tried when its system is built.
+    /// Tells whether the force is odd: `f(-u) = -f(u)` for whole histories. Methods halve the
+    /// period of odd systems, so the check of a law tests this claim.
     fn is_odd(&self) -> bool;
-    /// Whether two contacts with this law that move differently never give energy to their difference: `∫ δf δu' dt` from equal states on is
-    /// never negative. Then what both keep of it elastically cannot exceed what went in, and motions do not separate
-    /// ([`crate::model::System::contracts`]). Friction that grows with velocity or does not depend on it is of this kind at constant slip limits;
-    /// friction that falls with velocity is not.
+    /// Tells whether the law is incrementally passive. For two motions of the contact from equal
+    /// states, `∫ δf δu' dt` is never negative: the contact gives no energy to their difference.
+    /// The stored elastic energy of the difference is then bounded, and two motions do not
+    /// diverge ([`crate::model::System::contracts`]). At a constant slip limit, friction that
+    /// grows with velocity or does not depend on it is passive; friction that falls with
+    /// velocity is not.
     fn is_incrementally_passive(&self) -> bool {
         false
     }
-    /// What the faces do at this velocity (m/s) under this force (N), along the law's directions.
+    /// Returns the contact state at this velocity (m/s) under this force (N), both given in the
+    /// law's directions.
     fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
         match self.rate() {
             Some(_) => Contact::by_limit(self.scale(), velocity, force),
             None => Contact::at_limit(self.scale(), velocity, force),
         }
     }
-    /// Complex stiffness of the first harmonic under `u = amplitude cos Ωt` along the first direction (N/m): where methods begin to search.
+    /// Returns the complex stiffness (N/m) of the first harmonic under `u = amplitude cos Ωt` in
+    /// the first direction. Methods build initial guesses from it.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         let directions = self.directions();
         describing::stiffness(self.pieces(), self.rate(), self.step(), (self.prox(), directions), (amplitude, omega))
     }
-    /// The smooth law that tends to this one as `width` (m/s, the velocity over which friction changes its sign) goes to zero.
+    /// Returns the smooth law that converges to this one as `width` (m/s) goes to zero. `width`
+    /// is the velocity over which friction changes its sign.
     fn regularised(&self, _width: f64) -> Option<SharedLaw> {
         None
     }
-    /// Whether the parameters fit each other; what is wrong and what was expected if they do not.
+    /// Checks that the parameters are consistent with each other.
     ///
     /// # Errors
     /// A sentence without the law's name, such as "`beta + gamma` must be more than zero".
@@ -149,35 +164,37 @@ pub trait Law: Debug + Send + Sync {
     }
 }
 
-/// What can be known of a law without an instance of it.
+/// Description of a law that needs no instance of it.
 #[derive(Debug)]
 pub struct LawInfo {
     /// Name in study files.
     pub name: &'static str,
-    /// One line of what it is, with its equation.
+    /// One line that describes the law, with its equation.
     pub summary: &'static str,
-    /// Its parameters.
+    /// Parameters of the law.
     pub parameters: &'static [Parameter],
-    /// Values of a typical instance in the order of `parameters`, SI: for examples and for tests that run over all laws.
+    /// Values of a typical instance in the order of `parameters`, SI. Examples and tests that
+    /// run over all laws use them.
     pub sample: &'static [f64],
-    /// Builds the law from values in the order of `parameters`, SI; no check is made here.
+    /// Builds the law from values in the order of `parameters`, SI, without checks.
     pub build: fn(&[f64]) -> SharedLaw,
 }
 
 impl LawInfo {
-    /// A typical instance.
+    /// Builds a typical instance.
     pub fn sample(&self) -> SharedLaw {
         (self.build)(self.sample)
     }
 }
 
 impl dyn Law + '_ {
-    /// Name in study files.
+    /// Returns the name in study files.
     pub fn name(&self) -> &'static str {
         self.info().name
     }
 
-    /// Its sliders, if sliders are all that it is; those that hold nothing are left out.
+    /// Returns the sliders if the law consists of sliders alone. Parts that carry no force are
+    /// left out.
     pub fn sliders(&self) -> Option<Vec<Slider>> {
         let slider = |piece: &Piece| match piece {
             Piece::Slider(slider) => Some(*slider),
@@ -186,13 +203,14 @@ impl dyn Law + '_ {
         self.pieces()?.iter().filter(|piece| !piece.is_nothing()).map(slider).collect()
     }
 
-    /// The value of a parameter, SI.
+    /// Returns the value of a parameter, SI.
     pub fn value(&self, key: &str) -> Option<f64> {
         let at = self.info().parameters.iter().position(|p| p.key == key)?;
         self.values().get(at).copied()
     }
 
-    /// The same law with another value of one parameter, SI, unchecked; `None` if it has no such parameter.
+    /// Returns the law with another value (SI) of one parameter, without checks. `None` if it
+    /// has no such parameter.
     ///
     /// # Example
     /// ```
@@ -207,7 +225,8 @@ impl dyn Law + '_ {
         Some((info.build)(&values))
     }
 
-    /// Whether its faces can slide or part: a spring has none, and its contact says nothing.
+    /// Tells whether the law has faces that can slide or separate. A spring has no faces, and
+    /// its contact state has no meaning.
     ///
     /// # Example
     /// ```
@@ -219,7 +238,7 @@ impl dyn Law + '_ {
         self.scale().is_finite() || self.closed().is_some()
     }
 
-    /// Whether the law can never carry a force: the size of its forces is zero.
+    /// Tells whether the law never carries a force: the magnitude of its forces is zero.
     pub fn is_free(&self) -> bool {
         self.scale() == 0.0
     }
@@ -232,7 +251,7 @@ impl PartialEq for dyn Law + '_ {
 }
 
 impl Serialize for dyn Law + '_ {
-    /// As in a study file, in SI: `{ kind = …, KEY = … }`.
+    /// Writes the law as in a study file, in SI: `{ kind = …, KEY = … }`.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let (info, values) = (self.info(), self.values());
         let mut map = serializer.serialize_map(Some(1 + values.len()))?;

@@ -1,11 +1,15 @@
-//! Hysteresis of Valanis's endochronic theory, as used for bolted joints: stiff at rest, softer in slip, with a knee between.
+//! Valanis hysteresis (endochronic theory), for bolted joints: stiff in stick, softer in slip,
+//! with a knee between them.
 //!
-//! `f' = E0 u' (1 + q) / (1 + kappa q)`, `q = (lambda / E0) sgn(u') (Et u - f)`. In long motion to one side f tends to a line of slope Et;
-//! kappa between 0 and 1 makes the knee sharper. It is the same at every speed.
-//! Source: Valanis (1971); for joints Gaul and Lenz, "Nonlinear dynamics of structures assembled by bolted joints" (1997); Gaul and Nitsche,
-//! "The role of friction in mechanical joints" (2001).
+//! `f' = E0 u' (1 + q) / (1 + kappa q)`, `q = (lambda / E0) sgn(u') (Et u - f)`. Under monotonic
+//! loading f tends to a line of slope Et. kappa between 0 and 1 makes the knee sharper. The law
+//! is rate-independent.
+//! Source: Valanis (1971); for joints Gaul and Lenz, "Nonlinear dynamics of structures assembled
+//! by bolted joints" (1997); Gaul and Nitsche, "The role of friction in mechanical joints"
+//! (2001).
 //!
-//! It gives no energy in a closed motion: beyond the spring Et, its slope at a given force in loading is never above that in unloading.
+//! The law gives no energy in a closed motion: apart from the spring Et, the slope at a given
+//! force is never larger in loading than in unloading.
 
 use super::kink::{sign, size};
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
@@ -13,7 +17,7 @@ use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// The row of this law in [`super::TABLE`].
+/// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "valanis",
     summary: "joint with stick and slip stiffness, f' = E0 u' (1 + q)/(1 + kappa q), q = (lambda/E0) sgn(u') (Et u - f)",
@@ -34,7 +38,8 @@ pub(super) static INFO: LawInfo = LawInfo {
     },
 };
 
-/// A joint with a stiffness in stick and another in slip. The internal state is `y = (lambda / E0) (f - Et u)`, a pure number between -1 and 1.
+/// A joint with different stiffnesses in stick and in slip. The internal state is
+/// `y = (lambda / E0) (f - Et u)`, dimensionless, between -1 and 1.
 ///
 /// # Example
 /// ```
@@ -47,11 +52,11 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Valanis {
-    /// Stiffness at rest `E0`, N/m.
+    /// Initial stiffness `E0`, N/m.
     pub stiffness: f64,
     /// Stiffness in slip `Et`, N/m.
     pub slip_stiffness: f64,
-    /// How soon it slips, 1/m.
+    /// Rate of the transition from stick to slip, 1/m.
     pub lambda: f64,
     /// Sharpness of the knee, from 0 to below 1.
     pub kappa: f64,
@@ -67,11 +72,11 @@ impl Law for Valanis {
     fn is_odd(&self) -> bool {
         true
     }
-    /// What the force beyond the spring Et tends to in slip.
+    /// The limit of the force beyond the spring Et in slip.
     fn scale(&self) -> f64 {
         self.stiffness / self.lambda * self.sliding()
     }
-    /// Free of friction the spring in slip is left.
+    /// Without friction, the slip stiffness remains.
     fn springs(&self) -> Option<[Vec<f64>; 2]> {
         Some([vec![self.slip_stiffness], vec![self.stiffness]])
     }
@@ -90,7 +95,7 @@ impl Law for Valanis {
 }
 
 impl Valanis {
-    /// The state that slip tends to and never passes.
+    /// Returns the limit of the state in slip.
     fn sliding(&self) -> f64 {
         let (stick, slip) = (self.stiffness, self.slip_stiffness);
         (stick - slip) / (stick - self.kappa * slip)
@@ -105,7 +110,8 @@ impl RateLaw for Valanis {
     fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let (u, v, y) = (motion.displacement[0], motion.velocity[0], z[0]);
         let mut knee = S::from(1.0) - y * (self.kappa * sign(v.re()));
-        // beyond slip no motion leads, but iterations do: there the pole at `|y| = 1/kappa` would have them find another solution
+        // No motion exceeds the limit of the state, but iterations may. The pole at
+        // `|y| = 1/kappa` would give them a spurious solution.
         let least = 1.0 - self.kappa * self.sliding();
         if knee.re() < least {
             knee = S::from(least);
@@ -126,7 +132,8 @@ mod tests {
             let y = law.lambda / law.stiffness * (force - law.slip_stiffness * u);
             let mut rate = [0.0];
             let found = law.evaluate(&Relative::along(u, v), &[y], &mut rate)[0];
-            let slope = law.slip_stiffness * v + rate[0] * law.stiffness / law.lambda; // f' by the state's rate
+            // f' from the rate of the state
+            let slope = law.slip_stiffness * v + rate[0] * law.stiffness / law.lambda;
             let q = law.lambda / law.stiffness * v.signum() * (law.slip_stiffness * u - force);
             let expected = law.stiffness * v * (1.0 + q) / (1.0 + law.kappa * q);
             assert!((found - force).abs() < 1e-14 && (slope - expected).abs() < 1e-12, "{u} {force} {v}");

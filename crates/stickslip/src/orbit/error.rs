@@ -1,26 +1,27 @@
-//! Why there is no orbit.
+//! Errors: why no orbit was found.
 
-/// Why a motion could not be followed.
+/// Why time integration of a motion failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Breakdown {
-    /// Too many switches.
+    /// Too many transitions.
     #[error("joint `{joint}` chatters at t = {time:.6e} s after {switches} switches")]
     Chatter {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
-        /// Switches until then.
+        /// Transitions up to this time.
         switches: usize,
         /// Name of the joint.
         joint: String,
     },
-    /// Rigid joints that form a loop stick together, and how they share the load is not unique.
+    /// Rigid joints in a loop stick simultaneously, and the distribution of their forces is not
+    /// unique.
     #[error(
         "joint `{joint}` and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
          give one of them a stiffness (law `jenkins`), or smooth them: method = {{ kind = \"shooting\", width = \"0.1 mm/s\" }}, the velocity over which \
          friction changes its sign; or use `harmonic-balance` with a `tolerance` that the series of rigid friction reaches, 0.02"
     )]
     Redundant {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
         /// Name of one of the joints.
         joint: String,
@@ -28,88 +29,91 @@ pub enum Breakdown {
     /// The contact problem has no solution.
     #[error("no stick-slip state is consistent at t = {time:.6e} s")]
     Undecidable {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
     },
-    /// The linear motion of a pattern has no full set of modes.
+    /// The linear motion of a contact pattern has no complete set of modes.
     #[error(
         "two modes fall together at {lambda:.6e} rad/s (critical damping) at t = {time:.6e} s; change a damper slightly"
     )]
     Defective {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
         /// Modulus of the exponent, rad/s.
         lambda: f64,
     },
-    /// The signals oscillate too fast for the period.
+    /// The signals oscillate too fast relative to the period.
     #[error("modes far faster than the drive: no switch could be excluded within the allowed steps, t = {time:.6e} s")]
     TooFast {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
     },
-    /// The step size of an integration became too small.
+    /// The step size of a time integration became too small.
     #[error("the integration stalls at t = {time:.6e} s (step {step:.1e} s)")]
     Stalled {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
-        /// The step, s.
+        /// Step size, s.
         step: f64,
     },
-    /// A law answers by what is no number.
+    /// A law returned NaN or infinity.
     #[error("the law `{law}` of joint `{joint}` gives no number at t = {time:.6e} s")]
     NoNumber {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
         /// Name of the joint.
         joint: String,
         /// Name of its law.
         law: &'static str,
     },
-    /// Equal steps, however short, do not reach the tolerance.
+    /// Integration with equal steps does not reach the tolerance, however short the steps.
     #[error(
         "{steps} steps leave an estimated error of {estimate:.1e} where {tolerance:.1e} is wanted; \
          raise the tolerance, or soften what is far stiffer than the rest"
     )]
     Unresolved {
-        /// Steps of the finest attempt.
+        /// Number of steps of the finest attempt.
         steps: usize,
-        /// Its error relative to the motion, estimated.
+        /// Its estimated error relative to the motion.
         estimate: f64,
-        /// The error that was allowed.
+        /// The permitted error.
         tolerance: f64,
     },
-    /// The vibration is lost in the digits of the displacement that it is about.
+    /// The vibration is too small relative to the static displacement to be resolved in floating
+    /// point.
     #[error(
         "the motion vibrates by only {share:.1e} of the displacement that it is about, too little for its digits; \
          take the constant force that displaces it away and let the structure be as it is under it, or use `harmonic-balance`"
     )]
     Offset {
-        /// Size of the vibration, in the energy norm, relative to that of the state.
+        /// Magnitude of the vibration relative to the state, both in the energy norm.
         share: f64,
     },
-    /// Numbers leave the range of floating point, or what they need to be solved with.
+    /// Numbers leave the range of floating point, or the range in which the equations can be
+    /// solved.
     #[error("masses, springs and dampers are too far apart to compute with at t = {time:.6e} s; check their units")]
     OutOfRange {
-        /// When, s.
+        /// Time of the failure, s.
         time: f64,
     },
-    /// The motion escapes to infinity, or a number is no longer finite.
+    /// The motion grows without bound, or a number is no longer finite.
     #[error("the motion{} grows without bound{}", .place.as_ref().map_or_else(String::new, |place| format!(" of `{place}`")), by(*.time))]
     Unbounded {
-        /// When, s; not finite where that is not known.
+        /// Time of the failure, s; not finite if it is unknown.
         time: f64,
-        /// The place that is farthest then, where that is known.
+        /// The place with the largest displacement at that time, if known.
         place: Option<String>,
     },
 }
 
-/// An estimate with as many digits as tell it from a tolerance of two.
+/// Formats an estimate with two digits, or with four if two do not distinguish it from the
+/// tolerance.
 fn told_apart(estimate: f64, tolerance: f64) -> String {
     let short = format!("{estimate:.1e}");
     if short == format!("{tolerance:.1e}") { format!("{estimate:.3e}") } else { short }
 }
 
-/// What to do about a series that is too short.
+/// Returns advice for a series that is too short.
 fn beyond(needed: Option<usize>) -> String {
     let raise = "raise `tolerance`";
     needed.map_or_else(
@@ -127,12 +131,12 @@ fn by(time: f64) -> String {
 }
 
 impl Breakdown {
-    /// When, s, if that is known.
+    /// Returns the time of the failure, s, if known.
     pub fn time(&self) -> Option<f64> {
         self.clone().instant().map(|time| *time).filter(|time| time.is_finite())
     }
 
-    /// The same of a motion that began later by `begin` (s).
+    /// Shifts the time of the failure by `begin` (s), for a motion that began later.
     pub(crate) fn later(mut self, begin: f64) -> Self {
         if let Some(time) = self.instant() {
             *time += begin;
@@ -166,17 +170,18 @@ pub enum OrbitError {
         if *spent { ", with all the work that one point may take" } else { "" }
     )]
     NotConverged {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// Iterations made.
+        /// Iterations performed.
         iterations: usize,
         /// Smallest residual reached.
         residual: f64,
-        /// Whether the search ended because it had taken all the work that one point may take.
+        /// True if the search exhausted the work limit of a point.
         spent: bool,
-        /// What may find it instead, as words behind a comma; empty where nobody has asked or nothing does.
+        /// Advice about other methods, as text that follows a comma; empty if no method was
+        /// asked or none applies.
         instead: String,
     },
     /// The motion does not settle.
@@ -185,155 +190,162 @@ pub enum OrbitError {
         unsettled(*.repeats, *.needed, .instead)
     )]
     Unsettled {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// Returns made: periods of the drive, or as many of these at a time as were asked for.
+        /// Number of returns. A return is one period of the excitation, or the requested number
+        /// of periods.
         returns: usize,
         /// Change over the last return, relative to the state.
         change: f64,
-        /// Returns after which it repeats, if it does after a few.
+        /// Number of returns after which the motion repeats, if it repeats after a few.
         repeats: Option<usize>,
-        /// Returns after which it would have settled, by its decay so far; `None` where it does not decay.
+        /// Predicted number of returns until the motion settles, from its decay; `None` if it
+        /// does not decay.
         needed: Option<f64>,
-        /// What finds orbits without waiting, as words behind a comma; empty where nobody has asked or nothing does.
+        /// Advice about methods that need no settling, as text that follows a comma; empty if no
+        /// method was asked or none applies.
         instead: String,
     },
-    /// The motion broke down.
+    /// The time integration of the motion failed.
     #[error("{method} broke down at Ω = {omega:.4} rad/s: {cause}")]
     Breakdown {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// The cause.
+        /// Cause of the failure.
         cause: Breakdown,
     },
     /// The evidence contradicts the orbit.
     #[error("{method} closed an orbit at Ω = {omega:.4} rad/s that fails its check: energy gap {energy_gap:.1e}")]
     Evidence {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// The gap.
+        /// Energy gap of the orbit.
         energy_gap: f64,
     },
-    /// The series that the method may take is too short for the tolerance.
+    /// The longest series that the method may use does not reach the tolerance.
     #[error(
         "{method} reaches an estimated error of {} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}{}{instead}",
         told_apart(*.estimate, *.tolerance), beyond(*.needed)
     )]
     Truncation {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
         /// Highest harmonic tried.
         harmonics: usize,
-        /// Of rigid friction, how many may be enough: more than one point may take.
+        /// For rigid friction: the number of harmonics that may suffice, which exceeds the work
+        /// limit of a point.
         needed: Option<usize>,
-        /// Error of the motion relative to its amplitude, estimated.
+        /// Estimated error of the motion relative to its amplitude.
         estimate: f64,
-        /// The error that was allowed.
+        /// The permitted error.
         tolerance: f64,
-        /// What finds it instead, as words behind a comma; empty where nobody has asked or nothing does.
+        /// Advice about other methods, as text that follows a comma; empty if no method was
+        /// asked or none applies.
         instead: String,
     },
-    /// Nothing holds the structure against the mean of the forces, or only friction does.
+    /// No stiffness, or friction alone, carries the mean of the forces.
     #[error(
         "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: friction or contacts alone hold some of the structure, and \
          its mean leaves them; press the contacts harder, or add the spring that holds it{}",
         if .instead.is_empty() { String::new() } else { format!("{instead}, which may find one that friction holds") }
     )]
     Drift {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// What follows such a motion, as words behind a comma; empty where nobody has asked or nothing does.
+        /// Advice about methods that can follow such a motion, as text that follows a comma;
+        /// empty if no method was asked or none applies.
         instead: String,
     },
-    /// No orbit was found, and a motion that was followed from static equilibrium shows what there is instead.
+    /// No orbit was found. A motion that was integrated from static equilibrium shows the actual
+    /// behaviour.
     #[error(
         "{method} finds no orbit at Ω = {omega:.4} rad/s; followed in time from static equilibrium, the motion {course}"
     )]
     NoOrbit {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// What it does.
+        /// Behaviour of the integrated motion.
         course: Course,
     },
-    /// Nothing bounds the motion of the structure without its joints.
+    /// The motion of the structure without its joints is unbounded.
     #[error(
         "{method} finds the structure without its joints {} at Ω = {omega:.4} rad/s: {}",
         if *resonance == 0.0 { "free to stand anywhere" } else { "in a resonance without damping" },
         unbounded(*resonance)
     )]
     Resonance {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// The harmonic of it that is the resonance, rad/s.
+        /// The harmonic of the excitation frequency that is the resonance, rad/s.
         resonance: f64,
     },
-    /// A path that a method gave is no periodic motion.
+    /// The path that a method returned is not a periodic motion.
     #[error("the motion of {method} at Ω = {omega:.4} rad/s {what}")]
     NotAnOrbit {
-        /// The method.
+        /// Name of the method.
         method: &'static str,
-        /// Drive frequency, rad/s.
+        /// Excitation frequency, rad/s.
         omega: f64,
-        /// What is wrong.
+        /// Description of the problem.
         what: &'static str,
     },
-    /// The drive frequency is no positive finite number.
+    /// The excitation frequency is not positive and finite.
     #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
     Frequency {
-        /// What was given, rad/s.
+        /// The given frequency, rad/s.
         omega: f64,
     },
 }
 
-/// What a motion does that is followed in time.
+/// Behaviour of a motion that was integrated in time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Course {
-    /// It comes to one that repeats with the drive.
+    /// It converges to a motion that repeats with the excitation.
     Settles,
-    /// It comes closer to such a one, and is not there yet.
+    /// It approaches a motion that repeats with the excitation, but has not reached it.
     Settling {
-        /// Periods for which it was followed.
+        /// Number of integrated periods.
         periods: usize,
     },
-    /// It comes to one that repeats after several periods of the drive.
+    /// It converges to a motion that repeats after several periods of the excitation.
     Repeats {
-        /// How many.
+        /// Number of these periods.
         periods: usize,
     },
-    /// A body leaves the place where it was, period by period.
+    /// A body drifts away, period by period.
     MovesOn {
-        /// The place that goes farthest.
+        /// The place with the largest drift.
         place: String,
-        /// How far, m.
+        /// Its drift, m.
         way: f64,
-        /// In how many periods.
+        /// Number of periods of this drift.
         periods: usize,
-        /// The joint that is apart for the largest share of the last period.
+        /// The joint that is separated for the largest fraction of the last period.
         joint: String,
-        /// That share; zero if no faces part.
+        /// This fraction; zero if no faces separate.
         share: f64,
     },
-    /// It neither repeats nor moves on.
+    /// It neither repeats nor drifts.
     Wanders {
-        /// Periods for which it was followed.
+        /// Number of integrated periods.
         periods: usize,
-        /// The joint that is apart for the largest share of the last of them.
+        /// The joint that is separated for the largest fraction of the last period.
         joint: String,
-        /// That share; zero if no faces part.
+        /// This fraction; zero if no faces separate.
         share: f64,
     },
 }
@@ -380,11 +392,11 @@ impl std::fmt::Display for Course {
     }
 }
 
-/// What a motion that does not settle does instead, and what to do about it.
+/// Describes a motion that does not settle, and gives advice.
 fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> String {
     let by_newton = if instead.is_empty() { String::new() } else { format!("{instead}, which does not wait") };
     match repeats {
-        // what does not change is settled: the first that can be is the second
+        // A motion that repeats after one return is settled, so `repeats` is at least 2.
         Some(repeats) => {
             format!(
                 "; it repeats after {repeats} of them: ask for it with {repeats} times the `period` (1 when absent)"
@@ -403,7 +415,8 @@ fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> Stri
     }
 }
 
-/// What is wrong with a structure that has a resonance without damping there, rad/s, and what to do; at zero it is a mean that nothing holds.
+/// Describes a structure with an undamped resonance at this frequency, rad/s, and gives advice.
+/// Zero means a mean force that no stiffness carries.
 fn unbounded(resonance: f64) -> String {
     if resonance == 0.0 {
         return "nothing holds some of its bodies; add a spring that does, or a constant force or preload that presses their contacts".to_owned();
@@ -412,12 +425,13 @@ fn unbounded(resonance: f64) -> String {
 }
 
 impl OrbitError {
-    /// The search of `method` at `omega` ended after so many iterations, with this least residual.
+    /// Returns the error of a search that stopped after a number of iterations, with its
+    /// smallest residual.
     pub(crate) fn not_converged(method: &'static str, omega: f64, iterations: usize, residual: f64) -> Self {
         OrbitError::NotConverged { method, omega, iterations, residual, spent: false, instead: String::new() }
     }
 
-    /// The same error, of a search after which `other` found nothing either.
+    /// Adds that the method `other` found no orbit either.
     pub(crate) fn after(mut self, other: &str) -> Self {
         match &mut self {
             OrbitError::NotConverged { instead, .. } | OrbitError::Truncation { instead, .. } => {
@@ -428,12 +442,12 @@ impl OrbitError {
         self
     }
 
-    /// No motion that `method` finds at `omega` stays where it is.
+    /// Returns the error of a motion that drifts.
     pub(crate) fn drift(method: &'static str, omega: f64) -> Self {
         OrbitError::Drift { method, omega, instead: String::new() }
     }
 
-    /// One word for tables.
+    /// Returns one word for tables.
     pub fn status(&self) -> &'static str {
         match self {
             OrbitError::NotConverged { .. } => "not-converged",

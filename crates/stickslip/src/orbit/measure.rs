@@ -1,7 +1,7 @@
-//! The numbers of a periodic motion: amplitudes, first harmonics, means, energies, slip; from any path whose signals can be integrated.
+//! Postprocessing of a periodic motion: amplitudes, first harmonics, means, energies, slip.
 //!
-//! A method says what its signals are ([`Signals`]): closed forms, values at the nodes of a quadrature, samples. What is asked of them is
-//! written once, here, and is independent of how the motion was found.
+//! A method supplies its signals ([`Signals`]) as closed forms, values at quadrature nodes, or
+//! samples. This file computes all results from them, independently of the method.
 
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
 use crate::law::Contact;
@@ -12,35 +12,35 @@ use stickslip_numerics::radau::quintic;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// The signals of a motion over one return: half a period or a whole one.
+/// The signals of a motion over one return: half a period or a full period.
 pub(crate) trait Signals {
     /// A function of time over the return.
     type Signal: Clone;
-    /// Why a number could not be had.
+    /// Why a result cannot be computed.
     type Error;
-    /// Displacement of a degree of freedom, m.
+    /// Returns the displacement of a degree of freedom, m.
     fn displacement(&self, row: usize) -> Self::Signal;
-    /// Velocity of a degree of freedom, m/s.
+    /// Returns the velocity of a degree of freedom, m/s.
     fn velocity(&self, row: usize) -> Self::Signal;
-    /// Relative velocity along an axis, m/s; axes count over all joints.
+    /// Returns the relative velocity along an axis, m/s. Axes are numbered over all joints.
     fn relative_velocity(&self, axis: usize) -> Self::Signal;
-    /// Force along an axis, N.
+    /// Returns the force along an axis, N.
     fn force(&self, axis: usize) -> Self::Signal;
-    /// `Re Σ a e^{jωt}` of (ω in rad/s, a).
+    /// Returns `Re Σ a e^{jωt}` of pairs (ω in rad/s, a).
     fn harmonics(&self, parts: &[(f64, Complex64)]) -> Self::Signal;
-    /// Adds a multiple.
+    /// Adds a multiple of a signal to another one.
     fn add(&self, to: &mut Self::Signal, signal: &Self::Signal, factor: f64);
-    /// Integral of a product over the return.
+    /// Returns the integral of a product over the return.
     fn product(&self, a: &Self::Signal, b: &Self::Signal) -> f64;
-    /// `∫ signal e^{-jωt} dt` over the return.
+    /// Returns `∫ signal e^{-jωt} dt` over the return.
     fn fourier(&self, signal: &Self::Signal, omega: f64) -> Complex64;
-    /// Least and largest displacement of a place, m.
+    /// Returns the smallest and the largest displacement of a place, m.
     fn range(&self, place: &Axis) -> Result<(f64, f64), Self::Error>;
-    /// Least and largest relative displacement along an axis, m.
+    /// Returns the smallest and the largest relative displacement along an axis, m.
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
-    /// What the faces of a joint do.
+    /// Returns the contact states of a joint.
     fn faces(&self, joint: usize) -> Faces;
-    /// Of signals of the degrees of freedom that of a place.
+    /// Combines signals of the degrees of freedom into the signal of a place.
     fn along(&self, place: &Axis, of: impl Fn(usize) -> Self::Signal) -> Self::Signal {
         match *place.rows() {
             [(row, 1.0)] => of(row),
@@ -51,30 +51,32 @@ pub(crate) trait Signals {
             }
         }
     }
-    /// Displacement of a place, m.
+    /// Returns the displacement of a place, m.
     fn seen(&self, place: &Axis) -> Self::Signal {
         self.along(place, |row| self.displacement(row))
     }
-    /// What the `force` along an axis takes from the motion in the return, J.
+    /// Returns the energy that the `force` along an axis dissipates in the return, J.
     fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
         self.product(force, &self.relative_velocity(axis))
     }
 }
 
-/// What the faces of a joint do in a return.
+/// Contact states of a joint over a return.
 pub(crate) struct Faces {
-    /// In which shares of it.
+    /// Fractions of the return in each state.
     pub shares: Shares,
-    /// How often that, or the direction of slip, changes.
+    /// Number of changes of the state or of the slip direction.
     pub switches: usize,
-    /// Whether it sticks all the time; one that is open all the time neither slips nor sticks.
+    /// True if the joint sticks during the whole return. A joint that stays open neither slips
+    /// nor sticks.
     pub rests: bool,
 }
 
-/// Samples in which a joint that sticks may slip: it comes up to its limit, at the edge of a continuum of orbits, and how far beyond is less than samples tell.
+/// Number of samples in which a stuck joint may slip. At the edge of a continuum of orbits the
+/// force reaches its limit, and samples cannot resolve the excess.
 const EDGE: usize = 1;
 
-/// Whether a joint that does this at the samples of a return sticks all the time.
+/// Tells whether a joint with these states at the samples sticks during the whole return.
 pub(crate) fn sticks(mut contact: impl Iterator<Item = Contact>) -> bool {
     let mut slips = 0;
     contact.all(|contact| {
@@ -83,7 +85,8 @@ pub(crate) fn sticks(mut contact: impl Iterator<Item = Contact>) -> bool {
     })
 }
 
-/// Shares of a return in which the faces of a joint rest on each other, slide, and are apart. What is missing to one is a stop that touches.
+/// Fractions of a return in which the faces stick, slip, and are separated. If a stop touches,
+/// the sum is less than one.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Shares {
     pub stick: f64,
@@ -92,7 +95,8 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// Of contacts, each as long as its weight. All sums run in one order, so that a joint that always slips has a share of exactly one.
+    /// Computes the fractions from contact states and their durations. All sums run in the same
+    /// order, so a joint that always slips has a fraction of exactly one.
     pub fn of(contacts: impl Iterator<Item = (Contact, f64)>) -> Shares {
         let (mut times, mut all) = (Shares::default(), 0.0);
         for (contact, weight) in contacts {
@@ -105,19 +109,21 @@ impl Shares {
     }
 }
 
-/// The numbers of a periodic motion.
+/// Results of a periodic motion.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Measured {
     pub places: Vec<PlaceMotion>,
     pub joints: Vec<JointMotion>,
     pub energy: Energy,
-    /// Force amplitudes times velocity amplitudes times period, J: the work that could be exchanged.
+    /// Force amplitudes times velocity amplitudes times period, J: an upper bound of the
+    /// exchanged work.
     pub possible: f64,
     /// Names of joints that stick for the whole period.
     pub stuck: Vec<String>,
 }
 
-/// Measures a motion under a drive of `omega` (rad/s) that repeats after `period` (s).
+/// Computes the results of a motion under an excitation of `omega` (rad/s) that repeats after
+/// `period` (s).
 pub(crate) fn measure<S: Signals>(
     system: &System,
     signals: &S,
@@ -151,7 +157,8 @@ pub(crate) fn measure<S: Signals>(
         let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
         let Faces { shares, switches, rests } = signals.faces(j);
-        // a law without a limit never slips, and a smooth one gives way however little: neither is stuck, and their orbits are none of many
+        // A law without a slip limit never slips, and a smooth law always creeps. Neither counts
+        // as stuck, because their orbits are unique.
         if rests && joint.law().scale().is_finite() && joint.law().rate().is_none() {
             stuck.push(joint.name().to_owned());
         }
@@ -171,7 +178,8 @@ pub(crate) fn measure<S: Signals>(
     Ok(Measured { places, joints, energy, possible: times * possible, stuck })
 }
 
-/// Work of the loads and of imposed motion, loss in dampers, and the work that could be exchanged, over the return.
+/// Returns the work of the loads and of imposed motion, the loss in dampers, and the bound of
+/// the exchanged work, over the return.
 fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Signal]) -> ((f64, f64), f64) {
     let n = system.dofs();
     let velocity: Vec<S::Signal> = (0..n).map(|row| signals.velocity(row)).collect();
@@ -180,13 +188,14 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
     for row in 0..n {
         let parts: Vec<(f64, Complex64)> = excitation
             .iter()
-            .filter(|(h, load)| *h > 0 && load[row] != ZERO) // a constant one does no work over a return
+            // a constant load does no work over a return
+            .filter(|(h, load)| *h > 0 && load[row] != ZERO)
             .map(|(h, load)| (f64::from(*h) * omega, load[row]))
             .collect();
         if !parts.is_empty() {
             let load = signals.harmonics(&parts);
             work += signals.product(&load, &velocity[row]);
-            // ∫|f v| is at most this, by Cauchy and Schwarz
+            // upper bound of ∫|f v|, by the Cauchy-Schwarz inequality
             possible += (signals.product(&load, &load) * signals.product(&velocity[row], &velocity[row])).sqrt();
         }
     }
@@ -220,7 +229,8 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
         .collect();
     for (m, place) in system.moved().iter().enumerate() {
         let [motion, speed, _] = &moved[m];
-        // the inertia that it shares with degrees of freedom is left out: what it takes here, ∫ m a ġ = -∫ m v g̈, it adds to their loads
+        // The inertia that the place shares with degrees of freedom is omitted. Its work here is
+        // ∫ m a ġ = -∫ m v g̈, and it is already part of their loads.
         let mut reaction = signals.harmonics(&[]);
         for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
             signals.add(&mut reaction, &moved[other][2], place.mass.1[other]);
@@ -235,14 +245,15 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
             }
             signals.add(&mut reaction, &signals.displacement(row), k);
             signals.add(&mut reaction, &velocity[row], c);
-            // the load on the masses contains what the moved place does to them: that is no work from outside
+            // The load on the masses includes the force of the moved place, which is not
+            // external work.
             work += k * signals.product(motion, &velocity[row]) + c * signals.product(speed, &velocity[row]);
             viscous += 2.0 * c * signals.product(speed, &velocity[row]);
         }
         work += signals.product(&reaction, speed);
         possible += (signals.product(&reaction, &reaction) * signals.product(speed, speed)).sqrt();
     }
-    // what joints take from imposed motion
+    // work of imposed motion on the joints
     for ((_, axis), force) in system.axes().zip(forces) {
         let parts: Vec<(f64, Complex64)> = axis
             .imposed()
@@ -258,10 +269,11 @@ fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Sig
     ((work, viscous), possible)
 }
 
-/// Turning points are refined until the step in time is below this fraction of the interval.
+/// Bisection of a turning point ends at this fraction of the interval.
 const REFINED: f64 = 1e-12;
 
-/// Least and largest value of a signal over intervals: their length, with value, slope and curvature at both ends, between which it is a quintic.
+/// Returns the smallest and the largest value of a signal over intervals. Each interval has its
+/// length, and value, slope and curvature at both ends; the signal is a quintic between them.
 pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (length, from, to) in spans {
@@ -281,11 +293,13 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
     (low, high)
 }
 
-/// Work below this fraction of what the loads could do is no yardstick for the energy gap: the motion is conservative.
+/// Work below this fraction of its bound is no reference for the energy gap, because the motion
+/// is nearly conservative.
 pub(crate) const NO_WORK: f64 = 1e-6;
 
 impl Measured {
-    /// `|work in - viscous - friction|` relative to the work, or to what is the least yardstick, J.
+    /// Returns `|work in - viscous - friction|` relative to the work. `least` is the smallest
+    /// reference energy, J.
     pub fn energy_gap(&self, least: f64) -> f64 {
         let balance = (self.energy.work_in - self.energy.viscous - self.energy.friction).abs();
         let reference =

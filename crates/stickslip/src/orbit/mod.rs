@@ -1,7 +1,8 @@
-//! A periodic motion, with the evidence for it.
+//! Orbits: periodic motions with their evidence.
 //!
-//! All methods return the same [`Orbit`]. Its numbers (amplitudes, energies, slip) are computed by the method that found it, in
-//! closed form where it can; [`Orbit::sample`] gives the motion at any time.
+//! All methods return the same [`Orbit`]. The method that found the orbit computes its results
+//! (amplitudes, energies, slip), in closed form if possible. [`Orbit::sample`] returns the
+//! motion at any time.
 
 mod error;
 mod evidence;
@@ -28,36 +29,39 @@ use std::sync::Arc;
 pub struct Orbit {
     /// Name of the method that found it.
     pub method: &'static str,
-    /// Drive frequency Ω, rad/s.
+    /// Excitation frequency Ω, rad/s.
     pub omega: f64,
-    /// Periods of the drive after which the motion repeats.
+    /// Number of excitation periods after which the motion repeats.
     pub periods: usize,
-    /// Whether the orbit was found as one with `x(t + T/2) = -x(t)` or over the full period.
+    /// The return that was closed: `x(t + T/2) = -x(t)`, or the full period.
     pub symmetry: Symmetry,
-    /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints. A start for neighbouring orbits.
+    /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints. It
+    /// serves as initial guess for neighbouring orbits.
     pub start: Vec<f64>,
-    /// One entry per degree of freedom.
+    /// One entry per place.
     pub places: Vec<PlaceMotion>,
     /// One entry per joint.
     pub joints: Vec<JointMotion>,
     /// Work and losses per period, J.
     pub energy: Energy,
-    /// Why the orbit may be trusted.
+    /// Evidence for the orbit.
     pub evidence: Evidence,
-    /// Derivative of the state after one return (half or full period by `symmetry`) with respect to the state at t = 0; 0 × 0 if the method
-    /// had no need of it ([`Orbit::multipliers`] makes it then).
+    /// Derivative of the state after one return (half or full period by `symmetry`) with respect
+    /// to the state at t = 0. It is 0 × 0 if the method did not need it; [`Orbit::multipliers`]
+    /// then computes it.
     pub return_map: DMatrix<f64>,
-    /// No two motions of the system separate: [`crate::model::System::contracts`].
+    /// No two motions of the system diverge: [`crate::model::System::contracts`].
     pub(crate) contracts: bool,
     pub(crate) path: Arc<dyn Path>,
 }
 
-/// The laws of a system's joints.
+/// Returns the laws of a system's joints.
 pub(crate) fn laws(system: &System) -> impl Iterator<Item = &SharedLaw> {
     system.joints().iter().map(|joint| joint.law())
 }
 
-/// Names of joints whose past an orbit keeps: see [`Evidence::history`]. The laws are those by which the orbit was found.
+/// Returns the names of joints whose history affects the orbit: see [`Evidence::history`]. The
+/// laws are those that the method used.
 pub(crate) fn history<'a>(
     laws: impl Iterator<Item = &'a SharedLaw>,
     joints: &[JointMotion],
@@ -81,50 +85,53 @@ pub(crate) fn history<'a>(
     kept.map(|(_, motion)| motion.name.clone()).collect()
 }
 
-/// What a method says of an orbit beside its path.
+/// Data that a method supplies with the path of an orbit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// Name of the method.
     pub method: &'static str,
-    /// Drive frequency Ω, rad/s.
+    /// Excitation frequency Ω, rad/s.
     pub omega: f64,
-    /// Periods of the drive after which the motion repeats.
+    /// Number of excitation periods after which the motion repeats.
     pub periods: usize,
-    /// Which return it was closed on.
+    /// The return that was closed.
     pub symmetry: Symmetry,
     /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints.
     pub start: Vec<f64>,
-    /// Residual of the method's equations, relative.
+    /// Relative residual of the method's equations.
     pub residual: f64,
     /// Iterations of the method.
     pub iterations: usize,
-    /// Estimated relative error of the amplitudes, if there is an estimate.
+    /// Estimated relative error of the amplitudes, if available.
     pub truncation: Option<f64>,
-    /// Whether that is as little as was asked for.
+    /// Comparison of that error with the tolerance.
     pub accuracy: Accuracy,
 }
 
-/// Difference of displacements, relative to their size, and of velocities, relative to it times Ω, by which the ends of a period, or the start and
-/// the path, may differ: a series of a few harmonics is no more accurate.
+/// Permitted difference between the ends of a period, and between `start` and the path.
+/// Displacements are relative to their size, velocities to their size times Ω. A series of a few
+/// harmonics is no more accurate.
 const CLOSES: f64 = 1e-3;
-/// Difference, relative to the largest amplitude (velocities to it times Ω), below which two states of a motion are the same, and instants of the
-/// period at which that is asked: methods in time close orbits to 1e-9, stiff contacts make of that 1e-7.
+/// Two states are equal below this difference relative to the largest amplitude (velocities:
+/// times Ω). Time integration closes orbits to 1e-9, which stiff contacts degrade to 1e-7. The
+/// second constant is the number of instants that are compared.
 const REPEATS: f64 = 1e-6;
 const REPEATED_AT: usize = 8;
-/// How far before the end of the period it is looked at, as a share of it.
+/// Distance from the end of the period at which the path is evaluated, relative to the period.
 const BEFORE: f64 = 1e-9;
-/// Energy gap above which a motion is no orbit of the system at all.
+/// Energy gap above which a motion is not an orbit of the system.
 const LARGEST_GAP: f64 = 0.1;
 
 impl Orbit {
-    /// Makes an orbit of a path. All its numbers are measured from samples of the path, so that they are evidence about it.
+    /// Creates an orbit from a path. All results are computed from samples of the path, so they
+    /// are independent evidence.
     ///
     /// # Errors
-    /// [`OrbitError::NotAnOrbit`] if the path does not fit the system, does not close, or does not begin at `start`;
-    /// [`OrbitError::Evidence`] if its energies are out of balance by a tenth.
+    /// [`OrbitError::NotAnOrbit`] if the path does not fit the system, does not close, or does
+    /// not begin at `start`; [`OrbitError::Evidence`] if its energy gap exceeds 0.1.
     ///
     /// # Example
-    /// An oscillator without joints, whose motion is known.
+    /// An oscillator without joints, with a known solution.
     /// ```
     /// use nalgebra::dmatrix;
     /// use num_complex::Complex64;
@@ -157,7 +164,7 @@ impl Orbit {
     /// let orbit = Orbit::new(&system, Arc::new(Harmonic { x, omega }), found(x)).unwrap();
     /// assert!((orbit.places[0].amplitude() - x.norm()).abs() < 1e-9);
     /// assert!(orbit.evidence.energy_gap < 1e-9);
-    /// // a motion that is none of the system
+    /// // a motion that does not belong to the system
     /// let wrong = Harmonic { x: 2.0 * x, omega };
     /// assert!(Orbit::new(&system, Arc::new(wrong), found(2.0 * x)).is_err());
     /// ```
@@ -230,13 +237,15 @@ impl Orbit {
         })
     }
 
-    /// Period of the motion: as many periods `2π/Ω` of the drive as [`Orbit::periods`] says, s.
+    /// Returns the period of the motion, s: [`Orbit::periods`] times the excitation period
+    /// `2π/Ω`.
     pub fn period(&self) -> f64 {
         self.periods as f64 * std::f64::consts::TAU / self.omega
     }
 
-    /// Periods of the drive after which the motion really repeats: a search for motions of several periods also finds those of fewer. Of motions
-    /// that differ by less than a millionth, it is one.
+    /// Returns the smallest number of excitation periods after which the motion repeats. A
+    /// search for motions of several periods also finds those of fewer. States that differ by
+    /// less than 1e-6 count as equal.
     pub fn repeats(&self) -> usize {
         let state = |time: f64| {
             let sample = self.sample(time);
@@ -258,27 +267,28 @@ impl Orbit {
             .unwrap_or(self.periods)
     }
 
-    /// The state at any time (s).
+    /// Returns the state at any time (s).
     pub fn sample(&self, time: f64) -> Sample {
         self.path.sample(time.rem_euclid(self.period()))
     }
 
-    /// Instants within `[0, T)` at which a joint switches, rising, s.
+    /// Returns the times in `[0, T)` at which a joint switches, in increasing order, s.
     pub fn switch_times(&self) -> Vec<f64> {
         self.path.switch_times()
     }
 
-    /// The motion of a place by its name.
+    /// Returns the motion of a place by name.
     pub fn place(&self, name: &str) -> Option<&PlaceMotion> {
         self.places.iter().find(|place| place.name == name)
     }
 
-    /// A joint by its name.
+    /// Returns the motion of a joint by name.
     pub fn joint(&self, name: &str) -> Option<&JointMotion> {
         self.joints.iter().find(|joint| joint.name == name)
     }
 
-    /// Whether a joint sticks for the whole period, so that the orbit is one of a continuum.
+    /// Tells whether a joint sticks for the whole period, so that the orbit belongs to a
+    /// continuum.
     pub fn is_one_of_many(&self) -> bool {
         !self.evidence.stuck.is_empty()
     }

@@ -1,9 +1,9 @@
-//! What an orbit tells of places and joints over a period.
+//! Results of an orbit for places and joints over a period.
 
 use crate::model::System;
 use num_complex::Complex64;
 
-/// Which return the orbit was closed on.
+/// The return over which the orbit was closed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Symmetry {
     /// `x(t + T/2) = -x(t)`.
@@ -13,7 +13,8 @@ pub enum Symmetry {
 }
 
 impl Symmetry {
-    /// Of orbits that repeat after so many periods of the drive: an odd number of them has a half after which an odd excitation is mirrored.
+    /// Returns the symmetry of orbits that repeat after `periods` excitation periods. An odd
+    /// excitation is mirrored after half of an odd number of periods.
     pub(crate) fn of(system: &System, periods: usize) -> Symmetry {
         if system.is_odd() && periods % 2 == 1 { Symmetry::HalfPeriod } else { Symmetry::FullPeriod }
     }
@@ -32,23 +33,27 @@ pub struct PlaceMotion {
     pub mean: f64,
     /// First harmonic `X` in `x = Re(X e^{jΩt}) + …`, m.
     pub first_harmonic: Complex64,
-    /// Of a rotation, whose values are rad instead of m: the radius (m) at which it counts beside displacements.
+    /// Only for a rotation, with values in rad instead of m: the radius (m) that converts it
+    /// into a displacement.
     pub radius: Option<f64>,
 }
 
-/// First harmonic, relative to the amplitude, that is rounding: under a drive that has none, orbits are closed to less.
+/// A first harmonic below this fraction of the amplitude is rounding. Orbits are more accurate
+/// than this.
 const NO_PHASE: f64 = 1e-9;
 
 impl PlaceMotion {
-    /// Half of peak to peak, m.
+    /// Returns half of the peak-to-peak value, m.
     pub fn amplitude(&self) -> f64 {
         0.5 * (self.maximum - self.minimum)
     }
-    /// The same as a length, m, where sizes of places are compared: of a rotation the arc at its radius.
+    /// Returns the amplitude as a length, m, for comparisons between places. For a rotation it
+    /// is the arc at its radius.
     pub fn size(&self) -> f64 {
         self.amplitude() * self.radius.unwrap_or(1.0)
     }
-    /// Phase of the first harmonic against `cos Ωt`, degrees in (-180, 180]; not a number where other harmonics are all of the motion.
+    /// Returns the phase of the first harmonic relative to `cos Ωt`, degrees in (-180, 180]. NaN
+    /// if the motion has no first harmonic.
     pub fn phase_deg(&self) -> f64 {
         let amplitude = self.amplitude();
         if amplitude > 0.0 && self.first_harmonic.norm() <= NO_PHASE * amplitude {
@@ -58,22 +63,23 @@ impl PlaceMotion {
     }
 }
 
-/// What one joint does over a period.
+/// Motion of one joint over a period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointMotion {
     /// Name.
     pub name: String,
-    /// Energy lost in friction per period, J.
+    /// Energy dissipated by friction per period, J.
     pub dissipation: f64,
     /// Fraction of the period in which the joint slips.
     pub slip_fraction: f64,
-    /// Fraction of the period in which its faces rest on each other.
+    /// Fraction of the period in which the faces stick.
     pub stick_fraction: f64,
-    /// Fraction of the period in which its faces are apart. What the three fractions leave of one is a stop that touches.
+    /// Fraction of the period in which the faces are separated. The rest of the period is the
+    /// contact of a stop.
     pub open_fraction: f64,
-    /// Smallest and largest relative displacement along each of its directions, m.
+    /// Smallest and largest relative displacement in each direction, m.
     pub displacement: Vec<(f64, f64)>,
-    /// Changes between stick and slip, or of the slip direction, per period.
+    /// Transitions between stick and slip, or changes of the slip direction, per period.
     pub switches: usize,
 }
 

@@ -1,4 +1,4 @@
-//! The numbers of any path, from its samples alone: Gauss quadrature between its switches.
+//! Results of any path from its samples alone, by Gauss quadrature between its transitions.
 
 use super::measure::{Faces, Shares, Signals, extremes, sticks};
 use super::{Path, Sample};
@@ -7,7 +7,8 @@ use num_complex::Complex64;
 use std::convert::Infallible;
 use stickslip_numerics::quadrature;
 
-/// Intervals of a period, and at least two between switches: harmonics up to the twentieth are then integrated to 1e-9.
+/// Intervals per period, with at least two between transitions. Harmonics up to the twentieth
+/// are then integrated to 1e-9.
 const INTERVALS: f64 = 512.0;
 
 /// A path at the nodes of a quadrature over its period.
@@ -40,7 +41,7 @@ impl<'a> Sampled<'a> {
         Sampled { system, axes: system.axes().collect(), omega, period, nodes, samples }
     }
 
-    /// Direction of an axis within its joint.
+    /// Returns the joint of an axis, and the direction of the axis within the joint.
     fn direction(&self, axis: usize) -> (usize, usize) {
         let (joint, _) = self.axes[axis];
         (joint, (0..axis).filter(|before| self.axes[*before].0 == joint).count())
@@ -50,7 +51,8 @@ impl<'a> Sampled<'a> {
         self.samples.iter().map(at).collect()
     }
 
-    /// Least and largest value over the period, from value, slope and curvature at a node.
+    /// Returns the smallest and the largest value over the period, from value, slope and
+    /// curvature at each node.
     fn range_of(&self, at: impl Fn(usize) -> [f64; 3]) -> (f64, f64) {
         let count = self.nodes.len();
         let spans = (0..count).map(|i| {
@@ -62,7 +64,7 @@ impl<'a> Sampled<'a> {
     }
 }
 
-/// Signals are their values at the nodes.
+/// Signals are values at the nodes.
 impl Signals for Sampled<'_> {
     type Signal = Vec<f64>;
     type Error = Infallible;
@@ -129,7 +131,8 @@ impl Signals for Sampled<'_> {
 }
 
 impl Sampled<'_> {
-    /// Whether every sample has as many numbers as the system has places and joints, all of them finite.
+    /// Tells whether every sample matches the numbers of degrees of freedom and joints, and is
+    /// finite.
     pub fn fits(&self) -> bool {
         let n = self.system.dofs();
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());

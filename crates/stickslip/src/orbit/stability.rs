@@ -1,7 +1,8 @@
-//! Stability: what becomes of a small disturbance of an orbit.
+//! Stability of an orbit against small disturbances.
 //!
-//! Where no two motions of the system ever separate, every orbit is stable and nothing is computed ([`System::contracts`]). Elsewhere the
-//! largest Floquet multipliers decide, eigenvalues of the derivative of the return map.
+//! If no two motions of the system diverge, every orbit is stable, and nothing is computed
+//! ([`System::contracts`]). Otherwise the Floquet multipliers of largest modulus decide. They
+//! are eigenvalues of the derivative of the return map.
 //!
 //! [`System::contracts`]: crate::model::System::contracts
 
@@ -11,26 +12,27 @@ use num_complex::Complex64;
 use std::borrow::Cow;
 use stickslip_numerics::eigen;
 
-/// A multiplier up to this much above one counts as on the unit circle: those of stick offsets and of undamped systems are
-/// exactly one, and the eigenvalues of a return map carry about its rounding, 1e-12, or the square root of it if they meet.
+/// A multiplier that exceeds one by less than this counts as on the unit circle. Multipliers of
+/// stick offsets and of undamped systems equal one. The eigenvalues of a return map have a
+/// rounding error of about 1e-12, or its square root if two of them coincide.
 const NEUTRAL: f64 = 1e-6;
 
-/// What is known of an orbit's stability.
+/// Knowledge about the stability of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stability {
     /// No disturbance grows, by theorem: see [`crate::model::System::contracts`].
     Proven,
-    /// By the Floquet multipliers.
+    /// Determined by the Floquet multipliers.
     Computed {
-        /// The largest modulus of them, over the full period.
+        /// Largest modulus of the multipliers over the full period.
         largest: f64,
     },
-    /// The method made no return map to tell, or its eigenvalues were not found.
+    /// The method did not compute a return map, or the computation of its eigenvalues failed.
     Unknown,
 }
 
 impl Orbit {
-    /// Whether no small disturbance grows, and how that is known.
+    /// Tells whether the orbit is stable, and the source of this knowledge.
     pub fn stability(&self) -> Stability {
         if self.contracts {
             return Stability::Proven;
@@ -44,7 +46,7 @@ impl Orbit {
         }
     }
 
-    /// Whether no small disturbance grows; `None` if that is not known (see [`Orbit::stability`]).
+    /// Tells whether no small disturbance grows; `None` if unknown (see [`Orbit::stability`]).
     pub fn is_stable(&self) -> Option<bool> {
         match self.stability() {
             Stability::Proven => Some(true),
@@ -53,9 +55,11 @@ impl Orbit {
         }
     }
 
-    /// All Floquet multipliers of the full period, by falling modulus; `None` if there is no return map (places without mass, exact
-    /// and smooth laws mixed), or if its eigenvalues were not found. Stuck contacts contribute zeros (they swallow disturbances)
-    /// and, while they stick for the whole period, a one for their free offset.
+    /// Returns all Floquet multipliers of the full period, in decreasing order of modulus.
+    /// `None` without a return map (places without mass, exact and smooth laws mixed), or if the
+    /// computation of the eigenvalues failed. A stuck contact contributes zeros, because it
+    /// absorbs disturbances. A permanently stuck contact also contributes a one for its free
+    /// offset.
     ///
     /// Source: Leine and Nijmeijer (2004), Ch. 7.
     pub fn multipliers(&self) -> Option<Vec<Complex64>> {
@@ -70,17 +74,19 @@ impl Orbit {
         Some(multipliers)
     }
 
-    /// Distance between the state at t = 0 and where an independent flow brings it after a return, relative to the vibration, in the energy norm
-    /// ([`super::Evidence::return_defect`]), of an orbit of any size: where its method did not follow the motion, it is followed now, over one period.
-    /// `None` where no flow takes the laws of the system.
+    /// Returns the distance between the state at t = 0 and its return under an independent time
+    /// integration, relative to the vibration, in the energy norm
+    /// ([`super::Evidence::return_defect`]). It works for systems of any size: if the defect is
+    /// not known yet, this call integrates the motion over one return. `None` if no integrator
+    /// supports the laws of the system.
     pub fn return_defect(&self) -> Option<f64> {
         self.evidence.return_defect.or_else(|| self.path.return_defect(&self.start, self.symmetry))
     }
 
-    /// The multiplier of the full period from that of a return.
+    /// Converts the multiplier of a return into that of the full period.
     fn over_period(&self, value: Complex64) -> Complex64 {
         match self.symmetry {
-            // the half-period map with its sign is the square root of the full one
+            // the signed half-period map is the square root of the full map
             Symmetry::HalfPeriod => value * value,
             Symmetry::FullPeriod => value,
         }

@@ -1,126 +1,147 @@
-//! Follows the curve of a mode from its large end, by arc length, and reads motions from it.
+//! Arc-length continuation of a nonlinear mode from large amplitudes, and evaluation of its
+//! motions.
 
 use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
 use std::convert::Infallible;
 use stickslip_numerics::maximum::maximum;
 
-/// A part of the curve that turns back: the values below `at` are not those that end at `at`.
+/// A part of the curve that turns back. Below `at`, the motion does not continue the motion at
+/// `at`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
-    /// Modal amplitude below which the motion is another one, m √kg.
+    /// Modal amplitude below which the motion is a different one, m √kg.
     pub at: f64,
-    /// Modal amplitude to which the curve goes back before it falls for good; between both there are several motions.
+    /// Modal amplitude to which the curve returns before it falls, m √kg. Several motions exist
+    /// between both amplitudes.
     pub up: f64,
 }
 
-/// A mode that ended.
+/// The end of a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lost {
     /// Modal amplitude of the last motion, m √kg.
     pub at: f64,
-    /// Why.
+    /// Cause of the end.
     pub reason: Reason,
 }
 
-/// Why a mode ended.
+/// Cause of the end of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
     /// The structure without joints has no such mode, or its frequency is zero.
     #[error("no motion near the mode of the structure without its joints was found, or that mode has no frequency")]
     NoBeginning,
-    /// The curve turned and went back to where friction hardly matters.
+    /// The curve turned and returned to amplitudes at which friction is negligible.
     #[error(
         "its curve turns there and goes back to large amplitudes: it becomes one with another mode, and does not exist below"
     )]
     Merged,
-    /// The curve turned and did not come back to smaller amplitudes.
+    /// The curve turned and did not return to smaller amplitudes.
     #[error("its curve turns there and has not come back to smaller amplitudes after 1000 steps; try fewer harmonics")]
     Turned,
-    /// No shorter step converged.
+    /// The corrector fails even at the smallest step size.
     #[error("no neighbouring motion was found; try more harmonics")]
     Stalled,
-    /// The damping ratio is above ten for many steps.
+    /// The damping ratio exceeds ten over many steps.
     #[error(
         "its damping ratio is above ten there: nothing vibrates, and it is not followed further; ask for larger amplitudes"
     )]
     Overdamped,
-    /// It is followed from its small end to there, and from its large end not at all.
+    /// The branch from small amplitudes ends there, and no branch from large amplitudes was
+    /// found.
     #[error(
         "it is followed from small amplitudes to there, where nothing vibrates or no neighbouring motion was found, and at large amplitudes no motion \
          was found either"
     )]
     FromRest,
-    /// The states of a law took too many steps.
+    /// Laws with internal states exceeded their work limit.
     #[error(
         "it is not followed further: the states of a law change so fast there that every motion takes long; ask for other amplitudes"
     )]
     Dear,
-    /// All steps are used up.
+    /// The maximum number of steps is reached.
     #[error("it was not followed to the end within 4000 steps; try fewer harmonics")]
     Steps,
 }
-/// Share of friction in the forces of the linear mode at which a mode begins: its frequency and damping are then right to this share.
+/// Ratio of friction to the forces of the linear mode at which the continuation begins.
+/// Frequency and damping of the linear mode are then accurate to this ratio.
 const FAINT: f64 = 1e-4;
-/// The same relative to what distinguishes it from the nearest mode: its shape is then the linear one to a percent.
+/// Ratio of friction to the difference from the nearest mode at which the continuation begins.
+/// The linear shape is then accurate to one percent.
 const APART: f64 = 1e-2;
-/// Factors by which a mode may begin lower or higher, if Newton's method does not come from the linear mode to the nonlinear one: where a joint
-/// hardly moves in the linear mode, friction alone decides how it does, and with it the phase of its force.
+/// Factors on the initial amplitude, tried in this order if Newton's method does not converge
+/// from the linear mode. This happens if a joint hardly moves in the linear mode: friction alone
+/// then determines its motion and the phase of its force.
 const OTHERS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
-/// Steps, refused ones included. The couples take about 100, internal resonances some hundreds.
+/// Maximum number of steps, including rejected ones. The blade couples take about 100, internal
+/// resonances some hundreds.
 const MOST_STEPS: usize = 4000;
-/// Steps without an amplitude below all before, after which the curve is left: it runs in a loop, or to another mode.
+/// Maximum number of steps without a new smallest amplitude. The curve then runs in a loop, or
+/// follows another mode.
 const PATIENCE: usize = 1000;
-/// Damping ratio, a tenth of which is critical, from which nothing has vibrated for long.
+/// Damping ratio above which a motion counts as overdamped, ten times critical damping.
 const OVERDAMPED: f64 = 10.0;
-/// Harmonics times samples of all steps that are spent on such motions: two seconds or so. Rigid friction that is followed to a nanometre takes
-/// thousands of steps, of which nobody has anything where each is dear.
+/// Work limit of overdamped motions: harmonics times samples, summed over the steps; about two
+/// seconds. Following rigid friction down to a nanometre would take thousands of expensive steps
+/// without a useful result.
 const CREEPING: usize = 8_000_000;
-/// Steps of laws with memory that a curve may take: ten seconds or so. A curve of one joint takes
-/// a few millions.
+/// Work limit of laws with memory, in steps of the law; about ten seconds. A curve of one joint
+/// takes a few million.
 const MARCHED: usize = 4_000_000;
-/// Arc lengths, see [`ModeEquations::step`]: the longest step changes the amplitude by up to a half, or a fifth of the shape.
+/// Longest step in arc length, see [`ModeEquations::step`]. It changes the amplitude by up to a
+/// half, or the shape by a fifth.
 const LONGEST: f64 = 0.2;
-/// The first step, and that after a leap.
+/// First step, also after a leap.
 const FIRST: f64 = 0.02;
 /// A step below this is rounding: the curve ends.
 const SHORTEST: f64 = 1e-7;
-/// Steps below this may take a corner: where a sampled joint begins to slip, the curve has kinks.
+/// Steps below this may pass a corner. The curve has kinks at the points at which a sampled
+/// joint begins to slip.
 const CORNER: f64 = 1e-3;
-/// Most distance of a solution from where the tangent pointed, relative to such a step: a corner of up to 79 degrees.
+/// Largest distance of a solution from the predictor, relative to such a step: a corner of up to
+/// 79 degrees.
 const BENT: f64 = 5.0;
-/// Arc length over which the curve may jump: where a sampled force turns within another sample, it is not continuous. Measured 1e-6.
+/// Arc length over which the curve may jump. A sampled force is discontinuous if its reversal
+/// moves to another sample. Measured: 1e-6.
 const GAP: f64 = 1e-5;
-/// Least cosine between the tangents at both ends of a step.
+/// Smallest cosine between the tangents at both ends of a step.
 const STRAIGHT: f64 = 0.9;
-/// Most distance of a solution from where the tangent pointed, relative to the step.
+/// Largest distance of a solution from the predictor, relative to the step.
 const OFF: f64 = 0.5;
-/// Least modal assurance between neighbours.
+/// Smallest modal assurance criterion between neighbours.
 const SHAPE: f64 = 0.9;
-/// A step is lengthened after at most this many Newton iterations: at kinks it takes more than the usual three without being in danger.
+/// A step that takes at most this many Newton iterations is followed by a longer one. At kinks,
+/// Newton's method takes more than the usual three without being close to failure.
 const FEW: usize = 8;
-/// Parts of a decade by which a mode is sought below where its curve cannot be followed.
+/// Fractions of a decade in amplitude by which a leap skips a part of the curve that cannot be
+/// followed.
 const LEAPS: [f64; 6] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.7];
-/// Rigidity of the shape, see [`ModeEquations::rigidity`], below which two modes count as merging. In the blade couple it falls to 0.3 with one
-/// harmonic, to 0.03 with 15, to 0.1 with 31, and which mode goes on to which motion is not the same in the three.
+/// Rigidity of the shape, see [`ModeEquations::rigidity`], below which two modes count as
+/// merging. In the blade couple it falls to 0.3 with one harmonic, to 0.03 with 15 and to 0.1
+/// with 31. The three cases connect the modes differently.
 const MERGING: f64 = 1.0 / 3.0;
-/// Short steps from a followed state to an amplitude beside it, where one long step fails.
+/// Number of short steps from a computed state to a nearby amplitude, if a single step fails.
 const PARTS: u32 = 16;
-/// Relative amplitude up to which a turn is one of the sampled force and not of the mode, and is not told.
+/// Relative change of amplitude up to which a turn is an effect of the sampled force and is not
+/// reported.
 const TREMOR: f64 = 1e-3;
-/// Relative amplitude to which the largest damping is located: its value is then right to the square of this.
+/// Relative tolerance of the amplitude with the largest damping. The damping is then accurate to
+/// its square.
 const LOCATED: f64 = 1e-3;
 
-/// A mode's curve, followed from its large end.
+/// The curve of a mode.
 pub(super) struct ModeCurve {
     linear: Option<LinearMode>,
     arcs: Vec<ModeArc>,
-    /// Whether all motions below the last followed one are its multiples: the joints stick.
+    /// True if all motions below the last computed one are its multiples, because the joints
+    /// stick.
     sticks: bool,
     pub(super) lost: Option<Lost>,
 }
 
 impl ModeCurve {
-    /// Follows mode `index` until it is below the modal amplitude `low`; where forces grow with amplitude, up to `high` as well.
+    /// Follows mode `index` down to the modal amplitude `low`. If forces grow with amplitude,
+    /// follows it up to `high` as well.
     pub(super) fn follow(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Self {
         let modes = equations.linear_modes();
         let begun = equations.marched();
@@ -130,9 +151,10 @@ impl ModeCurve {
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
         let faint = equations.faint(&modes, index, FAINT, APART);
-        // without friction any amplitude will do
+        // without friction, any amplitude serves
         let faint = if faint > 0.0 { faint } else { low };
-        // of a pair whose joints are not alike no wave is a motion
+        // If the joints of a pair of modes are not alike, a travelling wave is not a motion. The
+        // standing shape is then tried.
         let shapes = [Some(linear.clone()), linear.standing()];
         let start = shapes.into_iter().flatten().find_map(|linear| {
             equations.mixes = linear.stands.is_some();
@@ -160,7 +182,8 @@ impl ModeCurve {
             if at < low {
                 return path;
             }
-            // of equal blades whose joints stick any mixture is a motion as good, and no step would find its way among them
+            // With equal blades whose joints stick, any combination of modes is a motion, and a
+            // step could not choose among them.
             if equations.is_proportional(&now.state, at) {
                 path.sticks = true;
                 return path;
@@ -197,7 +220,7 @@ impl ModeCurve {
                 }
                 None => Reason::Stalled,
             };
-            // the mode goes on where its shape does
+            // continue with the same shape at a smaller amplitude
             let Some(next) = leap(equations, &path.arcs[lowest]) else {
                 path.lost = Some(Lost { at: path.arcs[lowest].amplitude, reason });
                 return path;
@@ -209,9 +232,9 @@ impl ModeCurve {
         path
     }
 
-    /// Follows mode `index` from where all joints hold as in small motion, at the modal amplitude
-    /// `low`, until it is above `high` or no step goes on. `None`
-    /// where no motion is found there.
+    /// Follows mode `index` upwards from the modal amplitude `low`, beginning with all joints
+    /// linearized for small motion. Ends above `high` or when no step succeeds. `None` if no
+    /// motion is found at `low`.
     pub(super) fn from_rest(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Option<Self> {
         equations.mixes = false;
         let guess = equations.at_rest(index, low)?;
@@ -222,17 +245,17 @@ impl ModeCurve {
         Some(ModeCurve { linear: None, arcs, sticks: false, lost: None })
     }
 
-    /// The largest amplitude that was reached.
+    /// Returns the largest amplitude on the curve.
     pub(super) fn top(&self) -> f64 {
         self.arcs.iter().fold(0.0, |most, arc| most.max(arc.amplitude))
     }
 
-    /// Whether it is one of the two waves of a pair.
+    /// Tells whether the mode is one of the two travelling waves of a pair.
     pub(super) fn travels(&self) -> bool {
         self.linear.as_ref().is_some_and(|linear| linear.stands.is_some())
     }
 
-    /// The smallest amplitude that was reached.
+    /// Returns the smallest amplitude on the curve.
     pub(super) fn end(&self) -> f64 {
         if self.sticks {
             return 0.0;
@@ -240,7 +263,7 @@ impl ModeCurve {
         self.arcs.iter().fold(f64::INFINITY, |least, arc| least.min(arc.amplitude))
     }
 
-    /// The motion at modal amplitude `a`, where the curve passes it first.
+    /// Returns the motion at modal amplitude `a`, at the first passage of the curve.
     pub(super) fn at(&self, equations: &mut ModeEquations<'_>, a: f64) -> Option<ModeState> {
         let first = self.arcs.first()?;
         if a >= first.amplitude {
@@ -248,7 +271,7 @@ impl ModeCurve {
             let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
             return (equations.assurance(&guess, &found) >= SHAPE).then_some(found);
         }
-        // a curve from its small end begins at an amplitude that is asked for
+        // A branch from small amplitudes begins at a requested amplitude.
         if let Some(last) = self.arcs.last().filter(|last| last.amplitude == a) {
             return Some(last.state.clone());
         }
@@ -268,7 +291,7 @@ impl ModeCurve {
                 return Some(found);
             }
         }
-        // between kinks: in short steps from above
+        // between kinks: short steps from above
         let (mut before, mut state) = (pair[0].amplitude, pair[0].state.clone());
         for part in 1..=PARTS {
             let next = pair[0].amplitude * (a / pair[0].amplitude).powf(f64::from(part) / f64::from(PARTS));
@@ -278,8 +301,9 @@ impl ModeCurve {
         near(equations, &state, before)
     }
 
-    /// Followed states within a range, where the curve passes an amplitude first, and those at its ends, by falling amplitude; with the
-    /// number of the followed state before them.
+    /// Returns the computed states within a range, at the first passage of each amplitude, and
+    /// the states at its ends, in decreasing order of amplitude. The index is that of the
+    /// preceding computed state.
     pub(super) fn within(
         &self,
         equations: &mut ModeEquations<'_>,
@@ -306,15 +330,15 @@ impl ModeCurve {
         all
     }
 
-    /// Amplitude and motion where damping is largest within a range: among the followed states, then by golden-section search between
-    /// the neighbours of the best.
+    /// Returns amplitude and motion with the largest damping within a range: the best computed
+    /// state, then golden-section search between its neighbours.
     pub(super) fn largest(&self, equations: &mut ModeEquations<'_>, range: (f64, f64)) -> Option<(f64, ModeState)> {
         let all = self.within(equations, range);
         let best = (0..all.len()).max_by(|&i, &k| all[i].2.damping.total_cmp(&all[k].2.damping))?;
         let (_, amplitude, state) = &all[best];
         let mut top = (*amplitude, state.clone());
         let (low, high) = (all[(best + 1).min(all.len() - 1)].1.ln(), all[best.saturating_sub(1)].1.ln());
-        // where there is no motion it is not larger
+        // no motion counts as no damping
         let mut damping = |at: f64| {
             let Some(found) = self.at(equations, at.exp()) else { return f64::NEG_INFINITY };
             let damping = found.damping;
@@ -328,10 +352,12 @@ impl ModeCurve {
         Some(top)
     }
 
-    /// Amplitudes of the followed states at which the shape is least rigid, of every stretch of the curve where it is [`MERGING`].
+    /// Returns the amplitudes of the computed states with the smallest rigidity, one for each
+    /// part of the curve below [`MERGING`].
     pub(super) fn merges(&self, equations: &ModeEquations<'_>) -> Vec<f64> {
         let mut merges = Vec::new();
-        // a wave is orthogonal to itself all along: its partner is the wave that runs the other way
+        // A travelling wave is orthogonal to itself everywhere; its partner is the wave in the
+        // opposite direction.
         if self.travels() {
             return merges;
         }
@@ -348,7 +374,8 @@ impl ModeCurve {
         merges
     }
 
-    /// Where the curve turns back and then passes on to amplitudes that it has not had.
+    /// Returns the parts of the curve that turn back and later continue to new, smaller
+    /// amplitudes.
     pub(super) fn turns(&self) -> Vec<Turn> {
         let mut turns = Vec::new();
         let (mut least, mut up): (f64, Option<f64>) = (f64::INFINITY, None);
@@ -366,7 +393,7 @@ impl ModeCurve {
     }
 }
 
-/// A step of the curve, if it stays with it.
+/// Takes a step. `None` if the corrector fails or leaves the curve.
 fn taken(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<Step> {
     let step = equations.step(now, length, length < CORNER)?;
     let smooth = step.off <= OFF * length && step.straight >= STRAIGHT && step.to.side * now.side >= 0.0;
@@ -374,8 +401,9 @@ fn taken(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Optio
     ((smooth || corner) && equations.assurance(&now.state, &step.to.state) >= SHAPE).then_some(step)
 }
 
-/// What the curve is above its beginning, by falling amplitude, up to `high` or to where no step goes on: the linear mode is no guess where
-/// forces grow with amplitude.
+/// Follows the curve upwards from `start` to `high`, or until no step succeeds. Returns the
+/// points in decreasing order of amplitude. It is needed for forces that grow with amplitude,
+/// because the linear mode is then not a useful initial guess.
 fn risen(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
     let mut arcs = Vec::new();
     let (mut now, mut length, mut creeping, begun) = (start.reversed(), FIRST, 0, equations.marched());
@@ -404,7 +432,8 @@ fn risen(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<M
     arcs
 }
 
-/// Over a kink that no step passes, or off a curve that does not come back, by solving at a smaller amplitude for the same shape.
+/// Skips a kink that no step passes, or leaves a curve that does not return. Solves at a smaller
+/// amplitude for the same shape.
 fn leap(equations: &mut ModeEquations<'_>, now: &ModeArc) -> Option<ModeArc> {
     LEAPS.iter().find_map(|part| {
         let amplitude = now.amplitude * 10f64.powf(-part);

@@ -1,4 +1,4 @@
-//! The orbits between three points of a curve, and the peaks that they settle.
+//! The search for peaks between three points of a curve, with orbits that all quantities share.
 
 use super::shrink::{Shrink, form, parabola};
 use super::{Peak, PeakOf, Point, Unsettled};
@@ -6,38 +6,48 @@ use crate::method::Solver;
 use crate::orbit::Orbit;
 use std::collections::BTreeMap;
 
-/// How often a peak is sought again because the search for another one has met something higher.
+/// Maximum number of repetitions if the search for another quantity finds a higher point.
 const OVERTAKEN: usize = 3;
-/// Orbits that may fail while the peak of one quantity is refined: what fails costs most.
+/// Maximum number of failed orbits in the search for one peak, because a failed search costs
+/// most.
 const FAILURES: usize = 2;
-/// Share of the first bracket beyond which an orbit that its neighbour does not lead to is sought in every way.
+/// Distance from the neighbour, relative to the initial bracket, beyond which a failed search is
+/// repeated with all fallbacks.
 const AWAY: f64 = 1e-3;
-/// Relative rise to an orbit that was not found, below which that no longer matters to a peak.
+/// A missing orbit does not matter to a peak if the predicted relative rise towards it is below
+/// this value.
 const SETTLED: f64 = 1e-5;
-/// Fall of a quantity beside its highest point, as a share, from which a search that has ended there has not found how high the peak is. [`CLOSEST`]
-/// leaves 1e-7 of it beside a kink, 1e-3 beside a fold, and half of it where nothing bounds the peak.
+/// Relative fall of a quantity next to its highest point that shows an unfinished search. At the
+/// final bracket width ([`CLOSEST`]) the fall is 1e-7 at a kink, 1e-3 at a fold, and one half at
+/// an unbounded peak.
 const STEEP: f64 = 1e-2;
-/// Share of the first bracket over which a straight `1/a²` that comes to nothing says that nothing in sight bounds the curve. Its slope to a point so many
-/// times as far away as the nearest tells straight from bent: less than the first one over this.
+/// Criteria of an unbounded curve, see [`Bracket::is_cut_off`]. `1/a²` falls in a straight line
+/// and would reach zero within `REACH` times the initial bracket. It counts as straight if its
+/// slope to the nearest point is less than `BENT` times the slope to a distant point. The second
+/// constant is the ratio of both distances.
 const REACH: f64 = 0.5;
 const FARTHER: f64 = 4.0;
 const BENT: f64 = 1.5;
-/// Share of the first bracket that neighbours of the highest point have left between them where a search has come to its end at a jump: more means that it
-/// was not ended. [`CLOSEST`] on both sides, doubled by the last step.
+/// Largest distance between the neighbours of the highest point, relative to the initial
+/// bracket, if a search has ended at a jump. A larger distance means an unfinished search. The
+/// value is [`CLOSEST`] on both sides, doubled by the last step.
 const OPEN: f64 = 4.0 * CLOSEST;
-/// Two orbits closer than this share of the first bracket tell nothing but rounding.
+/// Orbits closer than this fraction of the initial bracket differ by rounding only.
 pub(super) const CLOSEST: f64 = 1e-7;
-/// Orbits that the peak of one quantity may take beside those that others have asked for; smooth peaks take 3 to 6, kinks up to 15.
+/// Maximum number of orbits for the peak of one quantity, in addition to the orbits of other
+/// quantities. Smooth peaks take 3 to 6, kinks up to 15.
 pub(super) const ORBITS: usize = 40;
-/// The work of these searches together, as a share of what one point of a curve may take, at which a search ends where each of them takes long.
+/// Work limit of the search for one peak, relative to the work limit of a point.
 const EFFORT: f64 = 1.0;
 
-/// Three points of a curve, of which the middle one is a maximum of some quantities, and the orbits between them that were asked for since.
+/// Three points of a curve, with a maximum of some quantities in the middle, and the orbits that
+/// the searches added between them.
 pub(super) struct Bracket {
     pub(super) points: Vec<Point>,
-    /// Distance of the ends, rad/s.
+    /// Initial distance of the ends, rad/s.
     width: f64,
-    /// Where the last search for the peak of a quantity ended (rad/s), and whether it had found it.
+    /// For each quantity, the frequency at which its last search ended (rad/s), and whether it
+    /// found the peak.
     pub(super) ended: BTreeMap<usize, (f64, bool)>,
 }
 
@@ -46,13 +56,13 @@ impl Bracket {
         Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new() }
     }
 
-    /// What the parabola about the highest point of a quantity reaches.
+    /// Returns the vertex value of the parabola at the highest point of a quantity.
     pub(super) fn reach(&self, quantity: usize) -> f64 {
         let top = best(&self.points, quantity);
         reach(&self.points[top - 1..=top + 1], quantity)
     }
 
-    /// Asks for orbits until the peak of a quantity is found.
+    /// Computes orbits until the peak of a quantity is found.
     pub(super) fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
         let points = &mut self.points;
         let mut shrink = Shrink::default();
@@ -63,12 +73,13 @@ impl Bracket {
             if failures == FAILURES || effort > EFFORT {
                 break;
             }
-            // the orbit's neighbour on the side of the new point is as good a start as any
+            // The highest point is a sufficient initial guess on either side.
             let start = points[best].start.as_deref();
             let error = points[best].error;
             start.into_iter().for_each(|start| solver.begin_at(points[best].omega, start));
             let found = match solver.between(omega, start) {
-                // far from the neighbour it takes more than its help; close to it there is nothing to be gained
+                // Far from the neighbour, all fallbacks are tried; close to it they gain
+                // nothing.
                 Err(_) if (omega - points[best].omega).abs() > AWAY * self.width => solver.orbit(omega, start),
                 found => found,
             };
@@ -87,7 +98,8 @@ impl Bracket {
         self.ended.insert(quantity, (points[top].omega, shrink.found));
     }
 
-    /// Seeks the peaks of quantities again above which others have met a higher point since: between two points of a curve there may be several tops.
+    /// Repeats the search for quantities if another search has found a higher point since. There
+    /// may be several maxima between two points of a curve.
     pub(super) fn refine_overtaken(&mut self, solver: &mut dyn Solver, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
         for _ in 0..OVERTAKEN {
             let moved = |(quantity, (omega, _)): (&usize, &(f64, bool))| {
@@ -101,15 +113,18 @@ impl Bracket {
         }
     }
 
-    /// Whether the highest point of a quantity is a peak that its search has found.
+    /// Tells whether the highest point of a quantity is a peak that its search has found.
     fn found(&self, quantity: usize) -> bool {
         let omega = self.points[best(&self.points, quantity)].omega;
         self.ended.get(&quantity) == Some(&(omega, true))
     }
 
-    /// Whether the curve jumps down on one side of the highest point and rises to it from the other as straight as to something without a bound, or has come
-    /// to an end of the bracket, which is where a sweep found another orbit and not where this one ends. To a fold it rises with the root of the distance,
-    /// to a top in front of one ever less.
+    /// Tells whether the peak is cut off by a jump. There are two cases. In the first case, the
+    /// curve jumps down on one side of the highest point. From the other side it rises in a
+    /// straight line, as to an unbounded peak. In the second case, the highest point is next to
+    /// an end of the bracket, where the sweep found another orbit although this one continues.
+    /// The curve rises to a fold with the square root of the distance, and flattens towards a
+    /// maximum.
     fn is_cut_off(&self, top: usize, quantity: usize) -> bool {
         let here = &self.points[top];
         let value = here.value(quantity);
@@ -131,13 +146,14 @@ impl Bracket {
             || [self.points.first(), self.points.last()].into_iter().flatten().any(at_end)
     }
 
-    /// Whether the search has ended while there was more to be had between the neighbours of the highest point.
+    /// Tells whether the search ended although the neighbours of the highest point predict a
+    /// higher value.
     fn is_open(&self, top: usize, quantity: usize) -> bool {
         let near = &self.points[top - 1..=top + 1];
         near[2].omega - near[0].omega > OPEN * self.width && parabola(near, 1, quantity).0 > SETTLED
     }
 
-    /// The peak of a quantity, as far as it is refined.
+    /// Returns the peak of a quantity in its present state.
     pub(super) fn peak(&self, quantity: usize) -> PeakOf {
         let top = best(&self.points, quantity);
         let point = &self.points[top];
@@ -158,7 +174,8 @@ impl Bracket {
     }
 }
 
-/// The peaks of the `wanted` quantities, each of which is largest at the middle one of three points.
+/// Returns the peaks of the `wanted` quantities, each of which has its maximum at the middle one
+/// of three points.
 pub(super) fn refine(
     solver: &mut dyn Solver,
     near: &[Point],
@@ -171,37 +188,41 @@ pub(super) fn refine(
     wanted.iter().map(|&quantity| bracket.peak(quantity)).collect()
 }
 
-/// The value at the vertex of the parabola through three points of which the middle one is the highest: a bound where the points are further apart than
-/// the peak is wide, and infinite where they say nothing of its height.
+/// Returns the vertex value of the parabola through three points with the highest in the middle.
+/// It is an upper bound if the points are further apart than the width of the peak. It is
+/// infinite if they do not determine the height.
 pub(super) fn reach(near: &[Point], quantity: usize) -> f64 {
     let value = near[1].value(quantity);
     let (rise, _) = parabola(near, 1, quantity);
-    // of 1/a² the relative rise is twice that of a, for small ones: the square says it for all
+    // For small rises, the relative change of 1/a² is twice that of a; the square root is exact
+    // for all rises.
     let left = 1.0 - 2.0 * rise;
     if left > 0.0 { value / left.sqrt() } else { f64::INFINITY }
 }
 
-/// Whether an orbit beside the highest of three points was not found, and the line from the other side through that point rises to there.
+/// Tells whether an orbit next to the highest of three points is missing, and the line from the
+/// other side rises towards it.
 fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
     let rises = |other: usize, failed: usize| {
         let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
         let here = form(near[1].value(quantity));
         let rise = (here - form(near[other].value(quantity))) * run / (2.0 * here.abs());
-        // without an orbit on the other side nothing is known
+        // without an orbit on the other side, the rise is unknown
         near[failed].values.is_empty() && (near[other].values.is_empty() || rise > SETTLED)
     };
     rises(0, 2) || rises(2, 0)
 }
 
-/// Whether a quantity falls on both sides of the middle one of three points by more than it does beside a kink or a fold by the time that the bracket is
-/// closed: near a fold with the root of the distance, on one side.
+/// Tells whether a quantity falls steeply on both sides of the middle one of three points. Such
+/// a fall is larger than that of a kink or a fold in a closed bracket. Near a fold the fall is
+/// steep on one side only.
 fn is_needle(near: &[Point], quantity: usize) -> bool {
     let value = near[1].value(quantity);
     let falls = |point: &Point| value - point.value(quantity) > STEEP * value;
     falls(&near[0]) && falls(&near[2])
 }
 
-/// The highest inner point; the first and the last one are not above it.
+/// Returns the index of the highest inner point; the first and the last point are not higher.
 pub(super) fn best(points: &[Point], quantity: usize) -> usize {
     (1..points.len() - 1)
         .max_by(|&a, &b| points[a].value(quantity).total_cmp(&points[b].value(quantity)))

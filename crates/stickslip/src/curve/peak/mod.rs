@@ -1,6 +1,7 @@
 //! Peaks of response curves, refined between the points of the curve.
 //!
-//! All quantities of an orbit share the orbits: what one mass asks for narrows the brackets of all others.
+//! All quantities share the computed orbits: an orbit for one quantity narrows the brackets of
+//! all others.
 
 mod bracket;
 mod point;
@@ -14,19 +15,21 @@ use bracket::{Bracket, reach, refine};
 pub use point::{Peak, PeakOf, Point, Unsettled};
 use rayon::prelude::*;
 
-/// A point that stands out from its neighbours by less than this share is the rounding of a level curve, not a peak.
+/// A point that exceeds its neighbours by less than this fraction is rounding, not a peak.
 const LEVEL: f64 = 1e-10;
-/// Peaks about one point that share a solver with its memory: few enough for two hundred peaks about a handful of points to keep all threads at work,
-/// and the same on any number of these.
+/// Number of peaks at one point that share a solver and its stored data. It is small enough to
+/// keep all threads busy, and does not depend on their number.
 const TOGETHER: usize = 12;
-/// Maxima of the given points whose parabola reaches less than this share of the highest cannot hide the highest peak between them, unless these are
-/// far too few; and the same once other quantities have asked for orbits between them.
+/// A maximum is searched only if the vertex of its parabola reaches this fraction of the highest
+/// value. Other maxima cannot contain the highest peak, unless the points are far too few. The
+/// second value applies after other quantities have added orbits.
 const CANDIDATE: f64 = 0.8;
 const LIKELY: f64 = 0.95;
 
-/// The highest peak of the first `wanted` quantities over a curve whose points are `points` (rising), refined between its neighbours with orbits of
-/// `solver`. Each quantity's tops are sought by themselves: the highest of several quantities is the highest of their own peaks, while the largest of
-/// them at every frequency would hide the top of one behind the flank of another.
+/// Returns the highest peak of the first `wanted` quantities over a curve. `points` are in order
+/// of frequency; `solver` refines the peak between its neighbours. Each quantity is searched
+/// separately. The maximum over all quantities at each frequency would hide the peak of one
+/// quantity behind the flank of another.
 ///
 /// Returns `None` if no point converged.
 ///
@@ -64,12 +67,12 @@ pub fn highest(
             Some((reach(near, *here.first()?), i, here))
         })
         .collect();
-    // the most promising first: what it reaches leaves fewer of the others to look at
+    // The most promising maximum comes first, because its value excludes other maxima.
     tops.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, i, here) in tops {
         let mut bracket = Bracket::new(&points[i - 1..=i + 1]);
         for quantity in here {
-            // what others have asked for tells more of this one than the points of the curve
+            // orbits that others added predict the peak better than the points of the curve
             let share = if bracket.points.len() > 3 { LIKELY } else { CANDIDATE };
             if bracket.reach(quantity) >= share * peak.value {
                 bracket.refine(solver, quantity, quantities);
@@ -83,15 +86,17 @@ pub fn highest(
     Some(peak)
 }
 
-/// The higher one of two peaks; of equal ones the one that is not at an end.
+/// Returns the higher of two peaks; among equal ones, the one that is not at an end.
 fn higher(one: Peak, other: Peak) -> Peak {
     if other.value > one.value || (other.value == one.value && one.at_end) { other } else { one }
 }
 
-/// Amplitudes below this share of what the loads would do to a mass by itself are rounding: friction holds it.
+/// Amplitudes below this fraction of the response of a single mass to the loads are rounding:
+/// friction holds the mass.
 const HELD: f64 = 1e-10;
 
-/// The amplitude (m) below which a place counts as held at a frequency: a share of `F / (k + Ω²m)`, the largest there is.
+/// Returns the amplitude (m) below which a place counts as held at a frequency: a fraction of
+/// the largest `F / (k + Ω²m)`.
 pub fn held(system: &System, omega: f64) -> f64 {
     let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
     let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
@@ -100,10 +105,11 @@ pub fn held(system: &System, omega: f64) -> f64 {
     HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }
 
-/// Every local maximum of the first `wanted` quantities among the inner points of `points` (rising), refined, by frequency.
+/// Returns all local maxima of the first `wanted` quantities among the inner `points`, refined,
+/// in order of frequency. `points` are in order of frequency.
 ///
 /// # Errors
-/// The method cannot take the system.
+/// The method does not support the system.
 ///
 /// # Example
 /// ```
@@ -141,12 +147,13 @@ pub fn all(
     for some in found {
         peaks.extend(some?);
     }
-    // peaks about one point are in the order of their quantities
+    // peaks at one point stay in the order of their quantities
     peaks.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
     Ok(peaks)
 }
 
-/// Whether the middle one of three points stands out; of two equal ones the second does.
+/// Tells whether the middle one of three points is a maximum. Among two equal points, the second
+/// one counts.
 fn is_maximum(near: &[Point], quantity: usize) -> bool {
     let [left, here, right] = [0, 1, 2].map(|i| near[i].value(quantity));
     let known = near.iter().all(|point| !point.values.is_empty());
@@ -168,8 +175,9 @@ mod tests {
         assert!(is_maximum(&[point(&[1.0]), point(&[2.0]), point(&[1.0])], 0));
     }
 
-    /// Two masses side by side, |x| = F / (c ω) at their resonances: a wide one of 2.5 mm, and a narrow one of 9.1 mm that 13 points five half-widths
-    /// apart show as 1.8 mm, below the wide one.
+    /// Two separate masses with resonances of |x| = F / (c ω): a wide one of 2.5 mm, and a
+    /// narrow one of 9.1 mm. The 13 points, five half-widths apart, show the narrow one as 1.8
+    /// mm, below the wide one.
     #[test]
     fn a_narrow_top_between_two_points_counts_beside_a_wide_one() {
         let mut model = Model::default();
@@ -189,7 +197,8 @@ mod tests {
         assert!((peak.value / expected - 1.0).abs() < RISE && peak.unsettled.is_none(), "{peak:?}");
     }
 
-    /// Without damping a slider of 2 N bounds nothing that 10 N drive: 4/π·2 N < 10 N. With as much damping as bounds it the peak is found.
+    /// Without damping, a slider of 2 N cannot bound the response to 10 N, since 4/π·2 N < 10 N.
+    /// With sufficient damping the peak is found.
     #[test]
     fn a_peak_without_a_bound_is_open() {
         let peak = |damping: f64| {
@@ -214,8 +223,10 @@ mod tests {
         assert_eq!(peak(0.5).unsettled, None);
     }
 
-    /// A stop on one side bends the resonance over: without damping it grows without a bound towards `2 / (1/ω + 1/ω')` with the frequencies `ω` off and `ω'`
-    /// on the stop, 117.1573 rad/s, and is lost before; with damping it has a top in front of its fold.
+    /// A one-sided stop bends the resonance to higher frequencies. Without damping, the response
+    /// grows without bound towards `2 / (1/ω + 1/ω')`, 117.1573 rad/s, with the frequencies `ω`
+    /// off and `ω'` on the stop. The branch is lost before. With damping the curve has a maximum
+    /// before its fold.
     #[test]
     fn a_peak_that_is_lost_on_its_way_up_is_open() {
         let peak = |damping: f64, points: usize| {

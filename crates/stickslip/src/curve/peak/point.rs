@@ -1,4 +1,4 @@
-//! Points of a curve, and peaks among them.
+//! Points of a curve, and its peaks.
 
 use crate::orbit::Orbit;
 
@@ -7,24 +7,25 @@ use crate::orbit::Orbit;
 pub struct Peak {
     /// Frequency, rad/s.
     pub omega: f64,
-    /// The quantity that was maximised.
+    /// Value of the maximised quantity.
     pub value: f64,
-    /// True if the largest value stands at an end of the range: the real peak may lie beyond.
+    /// True if the largest value is at an end of the range; the actual peak may lie beyond.
     pub at_end: bool,
-    /// Why the real peak may be higher; `None` where the search found it.
+    /// Why the actual peak may be higher; `None` if the search found it.
     pub unsettled: Option<Unsettled>,
 }
 
-/// Why a search for a peak left open how high it is.
+/// Why a search left the height of a peak undetermined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unsettled {
-    /// Orbits beside the highest one were not found.
+    /// Orbits next to the highest one were not found.
     Neighbours,
-    /// The curve still rises steeply from both sides where the search ends.
+    /// The curve still rises steeply from both sides at the end of the search.
     Needle,
-    /// The curve still rises steeply where it jumps to another orbit.
+    /// The curve still rises steeply at a jump to another orbit.
     CutOff,
-    /// The search has taken all orbits that it may, and its neighbours promise more.
+    /// The search reached its maximum number of orbits, and the neighbours predict a higher
+    /// value.
     Open,
 }
 
@@ -51,32 +52,32 @@ impl std::fmt::Display for Unsettled {
     }
 }
 
-/// A point of a curve on which peaks are sought.
+/// A point of a curve for the peak search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// Frequency, rad/s.
     pub omega: f64,
     /// The quantities; empty if there is no orbit.
     pub values: Vec<f64>,
-    /// State of the orbit, a start for its neighbours.
+    /// State of the orbit, an initial guess for its neighbours.
     pub start: Option<Vec<f64>>,
-    /// Estimated relative error of the quantities; zero of exact orbits.
+    /// Estimated relative error of the quantities; zero for exact orbits.
     pub error: f64,
 }
 
 impl Point {
-    /// What a curve keeps of an orbit.
+    /// Extracts the data of an orbit that a curve needs.
     pub fn new(orbit: &Orbit, quantities: &dyn Fn(&Orbit) -> Vec<f64>) -> Self {
         let error = orbit.evidence.truncation.unwrap_or(0.0);
         Point { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.start.clone()), error }
     }
 
-    /// A frequency at which no orbit was found.
+    /// Creates a point without an orbit.
     pub fn failed(omega: f64) -> Self {
         Point { omega, values: Vec::new(), start: None, error: 0.0 }
     }
 
-    /// A quantity; below all others if there is no orbit.
+    /// Returns a quantity; negative infinity if there is no orbit.
     pub(super) fn value(&self, quantity: usize) -> f64 {
         self.values.get(quantity).copied().filter(|value| value.is_finite()).unwrap_or(f64::NEG_INFINITY)
     }
@@ -85,10 +86,10 @@ impl Point {
 /// A peak of one of several quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeakOf {
-    /// The number of the quantity.
+    /// Index of the quantity.
     pub quantity: usize,
     /// The peak.
     pub peak: Peak,
-    /// All quantities there.
+    /// Values of all quantities at the peak.
     pub values: Vec<f64>,
 }

@@ -1,43 +1,48 @@
-//! How the bracket of one peak shrinks.
+//! Reduction of the bracket of one peak.
 //!
-//! Near a resonance the inverse square of an amplitude is a parabola in the frequency (exactly so for a linear oscillator of light
-//! damping), so that parabolas through `1/a²` find the peak in a few orbits. Where the highest point is a kink, the onset of slip, two
-//! straight lines do.
+//! Near a resonance, the inverse square of an amplitude is a parabola in frequency (exactly for
+//! a linear oscillator with light damping). Parabolas through `1/a²` therefore find the peak in
+//! a few orbits. If the peak is a kink (the onset of slip), the intersection of two straight
+//! lines finds it.
 
 use super::Point;
 
-/// Relative rise of a quantity, as the parabola predicts it, below which its peak counts as found: a hundred times the rounding of a
-/// closed orbit. The frequency is then known to 1e-5 of the width of the peak.
+/// Predicted relative rise below which a peak counts as found: a hundred times the rounding of a
+/// closed orbit. The frequency is then accurate to 1e-5 of the peak's width.
 pub(super) const RISE: f64 = 1e-10;
-/// Share of the estimated error of an orbit below which a rise is its noise, and the largest rise that counts as such: the switches of a
-/// sampled series move in steps.
+/// A rise below `NOISE` times the estimated error of an orbit is noise, but at most
+/// `MOST_NOISE`. The transitions of a sampled series move in steps.
 const NOISE: f64 = 1e-4;
 const MOST_NOISE: f64 = 1e-7;
-/// Share of the rise that a parabola predicts which must come true for the next trial to be a parabola again.
+/// Fraction of the predicted rise that must be reached, so that the next trial is a parabola
+/// again.
 const KEPT: f64 = 0.5;
-/// Broken promises after which only halving is left.
+/// Number of consecutive failed predictions after which only bisection is used.
 const JUMP: usize = 15;
-/// A step by a parabola is no longer than this share of the last but one (R. P. Brent, Algorithms for minimization without derivatives, 1973): in front of
-/// a jump parabolas keep what they promise by ever the same little, and creep.
+/// A parabolic step is not longer than this fraction of the step before the last one (R. P.
+/// Brent, Algorithms for minimization without derivatives, 1973). Otherwise parabolas would
+/// converge too slowly near a jump.
 const CREEPING: f64 = 0.5;
 
-/// How the bracket of one quantity shrinks: by parabolas as long as they keep what they promise, else by crossing lines and by halving.
+/// State of the bracket reduction for one quantity. Parabolas are used while their predictions
+/// are confirmed; otherwise intersecting lines and bisection.
 #[derive(Debug, Default)]
 pub(super) struct Shrink {
-    /// The quantity that the last trial was to reach.
+    /// Value that the last trial was predicted to reach.
     promised: Option<f64>,
-    /// Trials that did not keep their promise since one did.
+    /// Number of failed predictions since the last confirmed one.
     broken: usize,
-    /// Where the last trial was two lines that cross: the form there, as promised.
+    /// If the last trial was an intersection of two lines: its frequency and the predicted value
+    /// of the interpolated function.
     kink: Option<(f64, f64)>,
-    /// How far from the highest point of their time the last trial was and the one before.
+    /// Distances of the last two trials from the highest point at their time.
     steps: [Option<f64>; 2],
-    /// Whether the peak is found: there is nothing more to be had.
+    /// True if the peak is found.
     pub(super) found: bool,
 }
 
 impl Shrink {
-    /// The frequency of the next orbit; `None` if the peak is found.
+    /// Returns the frequency of the next orbit; `None` if the peak is found.
     pub(super) fn next(&mut self, points: &[Point], best: usize, quantity: usize, closest: f64) -> Option<f64> {
         let [left, middle, right] = [best - 1, best, best + 1].map(|i| points[i].omega);
         let value = points[best].value(quantity);
@@ -51,7 +56,7 @@ impl Shrink {
             Some(promised) if value < promised => self.broken += 1,
             _ => self.broken = 0,
         }
-        // a promise that nothing more is to be had counts only from who has kept the last one
+        // A prediction of no further rise counts only if the previous prediction was confirmed.
         self.found = (rise <= enough && self.broken == 0) || at_kink;
         if self.found || right - left <= 2.0 * floor {
             return None;
@@ -61,7 +66,7 @@ impl Shrink {
         let wider = if right - middle > middle - left { 0.5 * (middle + right) } else { 0.5 * (left + middle) };
         let inside = |omega: &f64| *omega > left + floor && *omega < right - floor;
         let creeps = |omega: &f64| self.steps[1].is_some_and(|step| (omega - middle).abs() > CREEPING * step);
-        // what neither describes is a jump
+        // a curve that fits neither form has a jump
         let form = if self.broken < JUMP { self.broken % 3 } else { 2 };
         let trial = match form {
             0 => vertex.filter(inside).filter(|omega| !creeps(omega)),
@@ -73,7 +78,7 @@ impl Shrink {
         };
         let mut trial = trial.unwrap_or(wider);
         if (trial - middle).abs() < floor {
-            // a step to the side on which the bracket is wider closes it there
+            // a minimal step towards the wider side closes the bracket there
             trial = middle + if right - middle > middle - left { floor } else { -floor };
         }
         self.steps = [Some((trial - middle).abs()), self.steps[0]];
@@ -81,13 +86,15 @@ impl Shrink {
     }
 }
 
-/// What is interpolated: `1/a²` of positive quantities, which falls where they rise.
+/// The interpolated function `-1/a²` of a positive quantity, which rises with the quantity.
+/// Negative infinity if the quantity is not positive.
 pub(super) fn form(value: f64) -> f64 {
     if value > 0.0 { -1.0 / (value * value) } else { f64::NEG_INFINITY }
 }
 
-/// Of the parabola through a point and its neighbours: how far its vertex lies above the point, as a share of the quantity, and where.
-/// Without one (a failed neighbour, a straight line) the rise is unbounded.
+/// Returns the vertex of the parabola through a point and its neighbours: its rise above the
+/// point, relative to the quantity, and its frequency. The rise is infinite without a parabola
+/// (a failed neighbour, a straight line).
 pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, Option<f64>) {
     let [a, x, b] = [best - 1, best, best + 1].map(|i| points[i].omega);
     let [fa, fx, fb] = [best - 1, best, best + 1].map(|i| form(points[i].value(quantity)));
@@ -99,11 +106,12 @@ pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, 
     // slope of the parabola at the middle point
     let slope = (left * (b - x) - right * (x - a)) / (b - a);
     let rise = slope * slope / (4.0 * curvature);
-    // f = -a⁻²: a relative rise r of the quantity is 2 r |f|
+    // f = -a⁻²: a relative rise r of the quantity changes f by 2 r |f|
     (0.5 * rise / fx.abs(), Some(x + 0.5 * slope / curvature))
 }
 
-/// Where the two straight lines cross that the points left and right of the best one lie on, and the form there.
+/// Returns the intersection of the two straight lines through the points left and right of the
+/// best one, and the interpolated function there.
 fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)> {
     let at = |i: usize| Some((points.get(i)?.omega, form(points.get(i)?.value(quantity))));
     let (before, after) = (at(best.checked_sub(2)?)?, at(best + 2)?);
@@ -113,10 +121,10 @@ fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)
         let omega = p.0 + (q.1 - p.1 - t * (q.0 - p.0)) / (s - t);
         (omega, p.1 + s * (omega - p.0))
     };
-    // the best point lies on the one line or on the other
+    // the best point belongs to one of the two lines
     let rising = meet(here, slope(left, here), right, slope(right, after));
     let falling = meet(left, slope(before, left), here, slope(here, right));
-    // a crossing below the best point is none
+    // an intersection below the best point is invalid
     [rising, falling].into_iter().find(|(omega, form)| *omega > left.0 && *omega < right.0 && *form >= here.1)
 }
 
@@ -125,7 +133,8 @@ mod tests {
     use super::super::bracket::{CLOSEST, ORBITS, best};
     use super::*;
 
-    /// Refines the middle one of three points of a formula; returns frequency, value, and evaluations.
+    /// Refines the middle one of three points of a given curve. Returns frequency, value and
+    /// number of evaluations.
     fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
         let point = |omega: f64| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 };
         let mut points = vec![point(a), point(x), point(b)];
@@ -144,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_peak_of_a_linear_oscillator_takes_a_handful_of_orbits() {
-        // |1/(1 - w² + 2 j ζ w)| is highest at w² = 1 - 2 ζ² with 1/(2 ζ √(1 - ζ²))
+        // |1/(1 - w² + 2 j ζ w)| has the maximum 1/(2 ζ √(1 - ζ²)) at w² = 1 - 2 ζ²
         let zeta: f64 = 1e-3;
         let curve = |w: f64| 1.0 / (1.0 - w * w).hypot(2.0 * zeta * w);
         let (omega, value, count) = check(&curve, [0.99, 0.9991, 1.01]);
@@ -164,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_top_closely_in_front_of_a_jump_is_found() {
-        // at 1 - 2e-3 of the bracket the curve is level, then it falls to another orbit
+        // The curve is level just before the fold, then it falls to another orbit.
         let top = |w: f64| 1.0 / (1.0 + (100.0 * (w - 1.0)).powi(2) + (60.0 * (w - 1.0)).powi(3)).sqrt();
         for fold in [1.0003, 1.001, 1.003] {
             let curve = |w: f64| if w < fold { top(w) } else { 0.3 * fold / w };
@@ -177,7 +186,8 @@ mod tests {
     #[test]
     fn a_jump_ends_within_the_bound() {
         let (omega, _, count) = check(&|w| if w < 1.05 { 1.0 + w } else { 0.1 }, [0.9, 1.0, 1.2]);
-        // the points below the jump lie on a slope that a parabola creeps up, and every third step halves: it ends close to the edge
+        // Parabolas approach the jump slowly from below, and every third step is a bisection.
+        // The search ends close to the edge.
         assert!((omega - 1.05).abs() < 2e-5 * 0.3, "{omega} {count}");
         assert!(count <= ORBITS, "{count}");
     }
