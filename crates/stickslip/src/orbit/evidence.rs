@@ -62,7 +62,7 @@ pub struct Evidence {
     /// equilibrium, or the opposite ones. `None` if amplitudes do not depend on the history, or
     /// if it was not measured (methods other than harmonic balance).
     pub history_spread: Option<f64>,
-/// The algorithm that found the orbit: the method's name, or the successful search of harmonic
+    /// The algorithm that found the orbit: the method's name, or the successful search of harmonic
     /// balance.
     ///
     /// These are `newton`, `interior-points`, `proximal-points`, `slip-limit-homotopy`, and
