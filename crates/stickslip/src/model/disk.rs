@@ -78,7 +78,7 @@ pub struct Disk {
 pub struct Ring {
     /// Number of sectors.
     pub sectors: usize,
-    /// Whether all sectors are equal.
+    /// True if all sectors are equal.
     pub equal: bool,
     /// Order of the travelling excitation of equal sectors. Sector n repeats the motion of the
     /// first one, earlier by `order n / sectors` of a period. Harmonic h of the motion then has

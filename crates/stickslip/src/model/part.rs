@@ -344,7 +344,7 @@ mod tests {
         }
     }
 
-    /// The same sector by matrices: rows 0 and 1 are the low and the high side of the disk,
+    /// That sector by matrices: rows 0 and 1 are the low and the high side of the disk,
     /// rows 2 and 3 are the blade.
     fn by_matrices(deviation: f64, reduction: Reduction, damping: SubstructureDamping) -> Model {
         let springs = [(0, 1, 20.0), (0, 2, 5.0), (2, 3, 3.0)];
