@@ -21,7 +21,7 @@ pub(super) struct Stuck {
     pub(super) pressed: Option<f64>,
     /// Viscous damping in small motion, without friction and in the stuck state, kg/s.
     pub(super) damping: [f64; 2],
-    /// Whether the joint slips gradually. `hold` then contains the limit of complete slip.
+    /// True if the joint slips gradually. `hold` then contains the limit of complete slip.
     pub(super) gradual: bool,
 }
 

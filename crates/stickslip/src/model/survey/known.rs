@@ -36,7 +36,7 @@ pub struct FirstSlip {
     /// Relative displacement from the unloaded state at which slip begins, m. `None` if the
     /// joint is rigid up to the limit.
     pub displacement: Option<f64>,
-    /// Whether the joint slips gradually, with micro-slip at every load.
+    /// True if the joint slips gradually, with micro-slip at every load.
     pub gradual: bool,
     /// For a normal direction, which opens and closes but never slips: the force that presses
     /// the faces together at zero displacement, N; zero if they are apart. `None` for other
@@ -69,10 +69,9 @@ pub struct Onset {
 pub struct Loose {
     /// Names of the places.
     pub masses: Vec<String>,
-    /// Whether stuck joints hold the body.
+    /// True if stuck joints hold the body.
     pub held_by_friction: bool,
-    /// Whether the body is held by joints of unbounded force that have no stiffness in static
-    /// equilibrium.
+    /// True if joints of unbounded force without stiffness in static equilibrium hold the body.
     pub held_in_motion: bool,
     /// Joints with faces that press on the body and hold it as long as they do.
     pub contacts: Vec<String>,

@@ -24,7 +24,7 @@ pub(super) struct Linear {
     /// Shapes of the elastic modes with `φᵀMφ = 1`, one per column. `None` if some stiffnesses
     /// had to count as rigid.
     pub(super) shapes: Option<DMatrix<f64>>,
-    /// Whether the damping has a gyroscopic part. Modes are then those of free vibration;
+    /// True if the damping has a gyroscopic part. Modes are then those of free vibration;
     /// shapes are those without that part.
     pub(super) turning: bool,
 }
