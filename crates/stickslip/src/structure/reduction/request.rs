@@ -10,7 +10,7 @@ pub enum Reduction {
         /// applies to every mode up to this frequency.
         up_to: f64,
     },
-    /// As many modes as the error requires.
+    /// The number of modes follows from the required error.
     UpTo {
         /// Highest frequency of interest, rad/s, including all significant harmonics of the
         /// excitation.
