@@ -105,7 +105,7 @@ impl Method for Subharmonic {
 /// Solver for orbits by exact motion, with Newton's method or by waiting.
 pub(crate) struct Exact<'a> {
     system: &'a System,
-    /// The same system, shared with the returned orbits.
+    /// The system, shared with the returned orbits.
     shared: Arc<System>,
     /// Name of the calling method.
     name: &'static str,
@@ -371,7 +371,7 @@ mod tests {
         }
     }
 
-    /// Of two rigid joints in series, the weaker one slips. The method solves this as long as
+    /// The weaker of two rigid joints in series slips. The method solves this as long as
     /// the inertia between them has significant digits, and rejects it otherwise.
     #[test]
     fn a_shoe_between_two_joints_is_light_or_refused() {
