@@ -6,7 +6,7 @@
 //! and the package index.
 //!
 //! The case is the massless blade couple at 2 N, 119.5 to 122.5 Hz, odd harmonics up to H, 1024
-//! samples per period, each point with a warm start from the previous one. A point of Stickslip
+//! samples per period. Each point has a warm start from the previous one. A point of Stickslip
 //! includes its stability and its error estimate, a second solution with twice the harmonics. A
 //! point of pyHarm includes neither.
 //!

@@ -11,8 +11,8 @@ use stickslip::structure::Structure;
 use stickslip_numerics::sparse::Matrix;
 
 /// Returns nodes of `directions` degrees of freedom on springs. Springs and a contact couple
-/// each node to the next. The excitation is a travelling wave with one period per `nodes /
-/// waves` nodes.
+/// each node to the next. The excitation is a travelling wave with one period per
+/// `nodes / waves` nodes.
 fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System {
     let (mass, stiffness, coupling, damping) = (0.2, 1e5, 4e3, 1.5);
     let at = |node: usize, direction: usize| (node % nodes) * directions + direction;

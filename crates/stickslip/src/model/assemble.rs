@@ -1,5 +1,5 @@
-//! Assembles a system from a model: checks, and the matrices of `M x'' + C x' + K x + Σ W f =
-//! F(t)`.
+//! Assembles a system from a model: checks, and the matrices of
+//! `M x'' + C x' + K x + Σ W f = F(t)`.
 
 use super::coordinates::{Coordinates, combined};
 use super::error::{Element, ModelError};

@@ -1,7 +1,7 @@
 //! Rigid bodies with small rotations about the centre of mass, and points of them by offset.
 //!
-//! A point at the offset `r` moves by `u + θ × r` (right-hand rule). The coordinates are the
-//! displacements `u` of the centre of mass and, for each principal axis `e` of the inertia, the
+//! A point at the offset `r` moves by `u + θ × r` (right-hand rule). The first coordinates are
+//! the displacements `u` of the centre of mass. Each principal axis `e` of the inertia adds the
 //! length `ρ (e · θ)` with the radius of gyration `ρ = √(J/m)`. Their mass matrix is `m` times
 //! the identity, and all coordinates are in metres.
 
@@ -284,8 +284,8 @@ mod tests {
         assert!(found.iter().zip(expected).all(close), "{found:?} {expected:?}");
     }
 
-    /// An unsymmetric bar on two springs at its ends. Both frequencies are roots of `det(K - ω²
-    /// M)` with `K = [[k+l, (l-k)a], [(l-k)a, (k+l)a²]]`.
+    /// An unsymmetric bar on two springs at its ends. Both frequencies are roots of
+    /// `det(K - ω² M)` with `K = [[k+l, (l-k)a], [(l-k)a, (k+l)a²]]`.
     #[test]
     fn a_bar_on_two_springs_has_its_two_frequencies() {
         let (m, j, a, k, l) = (2.0, 0.3, 0.7, 1.1e4, 3.7e3);

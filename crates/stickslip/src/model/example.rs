@@ -1,5 +1,5 @@
-//! Two example models, built by calls: the blade couples of Pust, Pesek, Radolfova (2015), Sec.
-//! 4.
+//! Two example models, built by calls: the blade couples of Pust, Pesek, Radolfova (2015),
+//! Sec. 4.
 //!
 //! Values in SI: blades of 0.182 kg on springs of 105103 N/m with dampers of 0.2 kg/s, a
 //! contact stiffness of 1e4 N/m, a slip limit of 2 N, a force of 10 N on blade 1. A single

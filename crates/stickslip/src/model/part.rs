@@ -344,8 +344,8 @@ mod tests {
         }
     }
 
-    /// That sector by matrices: rows 0 and 1 are the low and the high side of the disk,
-    /// rows 2 and 3 are the blade.
+    /// The corresponding sector by matrices: rows 0 and 1 are the low and the high side of the
+    /// disk, rows 2 and 3 are the blade.
     fn by_matrices(deviation: f64, reduction: Reduction, damping: SubstructureDamping) -> Model {
         let springs = [(0, 1, 20.0), (0, 2, 5.0), (2, 3, 3.0)];
         let linked = springs.into_iter().flat_map(|(a, b, k)| [(a, a, k), (b, b, k), (a, b, -k), (b, a, -k)]);

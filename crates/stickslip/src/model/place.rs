@@ -22,7 +22,8 @@ pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
 /// # Example
 /// ```
 /// use stickslip::model::{Frame, Place};
-/// // rows 6, 7, 8 of the matrices are x, y, z of a node; the contact plane is inclined by 30 degrees about x
+/// // rows 6, 7, 8 of the matrices are x, y, z of a node
+/// // the contact plane is inclined by 30 degrees about x
 /// let (sin, cos) = (0.5, 0.75f64.sqrt());
 /// let frame = Frame::new([0.0, -sin, cos], Some([1.0, 0.0, 0.0])).unwrap();
 /// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).turned(frame);

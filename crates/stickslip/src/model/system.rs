@@ -414,7 +414,8 @@ impl SystemBuilder {
     /// Checks the parts and returns the system.
     ///
     /// # Errors
-    /// [`SystemError`]: axes that do not fit the law, degrees of freedom that do not exist, numbers that are not finite, or invalid parameters of a law.
+    /// [`SystemError`]: axes that do not fit the law, degrees of freedom that do not exist,
+    /// numbers that are not finite, or invalid parameters of a law.
     pub fn build(self) -> Result<System, SystemError> {
         if let Some(wrong) = self.wrong {
             return Err(wrong);

@@ -175,7 +175,8 @@ impl Component {
     /// row may be empty.
     ///
     /// # Errors
-    /// [`StructureError`]: sizes that differ, an unsymmetric mass or stiffness matrix, a mass matrix that is not positive semidefinite.
+    /// [`StructureError`]: sizes that differ, an unsymmetric mass or stiffness matrix, a mass
+    /// matrix that is not positive semidefinite.
     pub fn new(
         rows: Vec<String>,
         mass: Matrix,
@@ -305,7 +306,8 @@ impl Component {
     /// is stored for repeated calls.
     ///
     /// # Errors
-    /// [`ReductionError`]: no place, a failure of the mode computation, or no reduction within the tolerance.
+    /// [`ReductionError`]: no place, a failure of the mode computation, or no reduction within
+    /// the tolerance.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
         once(&self.0.reductions, &(seen.to_vec(), *how), || {
             self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
@@ -319,7 +321,8 @@ impl Component {
     /// weighted sums of its rows.
     ///
     /// # Errors
-    /// [`ReductionError`]: sizes that differ, no place, a failure of the mode computation, or no reduction within the tolerance.
+    /// [`ReductionError`]: sizes that differ, no place, a failure of the mode computation, or
+    /// no reduction within the tolerance.
     ///
     /// # Example
     /// A mass on a rod of springs, which tension stiffens.

@@ -1,10 +1,10 @@
 //! One sector of a disk given by matrices, with both its sides, as a part of a ring.
 //!
-//! The high side of a sector coincides with the low side of the next one: `x_high(s) = R
-//! x_low(s+1)`. `R` is a rotation by `2π/N` about the axis, because every sector has its own
-//! axes of displacement. The high side is eliminated, `x(s) = T₀ q(s) + T₁ q(s+1)`. Each matrix
-//! becomes `A₀ = T₀ᵀAT₀ + T₁ᵀAT₁` within the sector, `A₁ = T₀ᵀAT₁` to the next and `A₋₁ =
-//! T₁ᵀAT₀` to the previous sector.
+//! The high side of a sector coincides with the low side of the next one:
+//! `x_high(s) = R x_low(s+1)`. `R` is a rotation by `2π/N` about the axis, because every sector
+//! has its own axes of displacement. The high side is eliminated, `x(s) = T₀ q(s) + T₁ q(s+1)`.
+//! Each matrix becomes `A₀ = T₀ᵀAT₀ + T₁ᵀAT₁` within the sector, `A₁ = T₀ᵀAT₁` to the next and
+//! `A₋₁ = T₁ᵀAT₀` to the previous sector.
 //!
 //! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth.
 //! Engng 14, 81-102.
@@ -138,7 +138,7 @@ impl Boundary {
     /// named `node.direction`.
     ///
     /// Without an axis, rows of the same direction are equal. With an axis, the directions are
-    /// x, y, z (rx, ry, rz), and the high side is the end of the sector by the right-hand rule
+    /// x, y, z (rx, ry, rz). The high side is then the end of the sector by the right-hand rule
     /// about the axis.
     ///
     /// # Errors
@@ -228,8 +228,8 @@ impl Boundary {
         self.alike.iter().map(|[low, _]| *low).chain(turned)
     }
 
-    /// Returns every row of the high side as (row, rows of the low side of the next sector with
-    /// their weights), on a disk with the given number of sectors.
+    /// Returns every row of the high side as a weighted sum of rows of the low side of the next
+    /// sector, on a disk with the given number of sectors.
     fn ties(&self, sectors: usize) -> Vec<(usize, Row)> {
         let mut ties: Vec<(usize, Row)> = self.alike.iter().map(|[low, high]| (*high, vec![(*low, 1.0)])).collect();
         if let Some(axis) = self.axis {

@@ -141,7 +141,8 @@ impl<'a> Faces<'a> {
     /// Checks that these pairs (low, high) agree with the coordinates and are complete.
     ///
     /// # Errors
-    /// [`FacesError`]: a node without coordinates, a pair that does not coincide, or a missing pair.
+    /// [`FacesError`]: a node without coordinates, a pair that does not coincide, or a missing
+    /// pair.
     pub fn check(&self, pairs: &[(String, String)]) -> Result<(), FacesError> {
         let of: BTreeMap<&str, [f64; 3]> = self.nodes.iter().map(|(name, at)| (name.as_str(), *at)).collect();
         let find = |name: &String| of.get(name.as_str()).copied().ok_or_else(|| FacesError::Unknown(name.clone()));

@@ -1,8 +1,8 @@
 //! Free vibration of a structure with gyroscopic damping.
 //!
-//! The gyroscopic part of the damping does no work. The frequencies are eigenvalues of `q'' + D
-//! q' + Λ q = 0` in the undamped modes. `D` couples modes according to their frequencies, so
-//! that much higher modes can be omitted.
+//! The gyroscopic part of the damping does no work. The frequencies are eigenvalues of
+//! `q'' + D q' + Λ q = 0` in the undamped modes. `D` couples modes according to their
+//! frequencies, so that much higher modes can be omitted.
 //!
 //! Source: Genta, "Dynamics of Rotating Systems" (2005), Ch. 2.
 
@@ -48,8 +48,8 @@ mod tests {
     use super::*;
     use nalgebra::dmatrix;
 
-    /// A shaft in two directions: `λ² + (c ± jg) λ + ω₀² = 0`, with the roots `λ = -(c ± jg)/2
-    /// + sqrt((c ± jg)²/4 - ω₀²)`.
+    /// A shaft in two directions: `λ² + (c ± jg) λ + ω₀² = 0`, with the roots
+    /// `λ = -(c ± jg)/2 + sqrt((c ± jg)²/4 - ω₀²)`.
     #[test]
     fn a_shaft_whirls_forward_and_backward() {
         let (c, g, square) = (10.0, 60.0, 2e5);

@@ -144,7 +144,8 @@ impl Structure {
     /// stiffness are symmetric; damping may have a gyroscopic part.
     ///
     /// # Errors
-    /// [`StructureError`]: a wrong size, an entry that is not finite, an unsymmetric mass or stiffness matrix, a mass matrix that is not positive semidefinite.
+    /// [`StructureError`]: a wrong size, an entry that is not finite, an unsymmetric mass or
+    /// stiffness matrix, a mass matrix that is not positive semidefinite.
     ///
     /// # Example
     /// ```

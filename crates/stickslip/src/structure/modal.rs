@@ -1,8 +1,8 @@
 //! Modal damping `U Uᵀ` with one column `√(2 ζ ω) M φ` per mode.
 //!
 //! It couples all rows. Therefore sparse structures store these columns instead of a matrix.
-//! The inverse of the dynamic stiffness follows from one solution per column: `(Z + s U Uᵀ)⁻¹ =
-//! Z⁻¹ - s Z⁻¹ U (1 + s Uᵀ Z⁻¹ U)⁻¹ Uᵀ Z⁻¹`.
+//! The inverse of the dynamic stiffness follows from one solution per column:
+//! `(Z + s U Uᵀ)⁻¹ = Z⁻¹ - s Z⁻¹ U (1 + s Uᵀ Z⁻¹ U)⁻¹ Uᵀ Z⁻¹`.
 //!
 //! Sources: Woodbury (1950), "Inverting modified matrices", Memorandum Rept. 42, Statistical
 //! Research Group, Princeton. Damping: Wilson and Penzien (1972), "Evaluation of orthogonal

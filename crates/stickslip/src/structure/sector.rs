@@ -1,9 +1,10 @@
 //! One sector of a ring of equal sectors, and its matrices in a travelling wave.
 //!
 //! If all sectors move with the same phase lag, `x_s = X e^{j d θ s}` with `θ = 2π/N` and the
-//! nodal diameter `d`. The ring's matrices then reduce to those of one sector, `K_d = Σ_s
-//! K_{0s} e^{j d θ s}`: Hermitian, of the size of a sector. In real numbers, this is a
-//! symmetric matrix of twice the size, `[[Re K_d, -Im K_d], [Im K_d, Re K_d]]` over `(x, -jx)`.
+//! nodal diameter `d`. The ring's matrices then reduce to those of one sector,
+//! `K_d = Σ_s K_{0s} e^{j d θ s}`: Hermitian, of the size of a sector. In real numbers, this is
+//! a symmetric matrix of twice the size, `[[Re K_d, -Im K_d], [Im K_d, Re K_d]]` over
+//! `(x, -jx)`.
 //!
 //! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth.
 //! Engng 14, 81-102.
@@ -141,8 +142,8 @@ impl Sector {
     /// [`StructureError`]: the matrices do not form a valid structure.
     ///
     /// # Example
-    /// A chain closed to a ring: the wave of nodal diameter d has the stiffness `k + 2 kc (1 -
-    /// cos 2πd/N)`.
+    /// A chain closed to a ring: the wave of nodal diameter d has the stiffness
+    /// `k + 2 kc (1 - cos 2πd/N)`.
     /// ```
     /// use num_complex::Complex64;
     /// use stickslip::structure::{Sector, Structure};

@@ -59,8 +59,8 @@ impl Structure {
     }
 }
 
-/// Computes modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`. Motions without mass have `θ
-/// = 0`: modal mass θ and stiffness `1 - σ θ`.
+/// Computes modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`. Motions without mass have
+/// `θ = 0`: modal mass θ and stiffness `1 - σ θ`.
 fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let Matrices { mass, damping, stiffness } = matrices;
     let n = mass.nrows();

@@ -15,9 +15,9 @@ fn brick(elements: [usize; 3], held: bool) -> Brick {
     Brick::new(elements, elements.map(|e| EDGE * e as f64), held)
 }
 
-/// Eigenvalues, rad²/s², from `benches/peers/scipy_brick.py` for `{"elements": [16, 8, 7],
-/// "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU). The script assembles the
-/// block independently.
+/// Eigenvalues, rad²/s², from `benches/peers/scipy_brick.py` for
+/// `{"elements": [16, 8, 7], "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU).
+/// The script assembles the block independently.
 const HELD: [f64; 20] = [
     6.747094462738e+08,
     8.216043066283e+08,

@@ -137,9 +137,9 @@ impl SegmentedMotion {
         &self.segments[..self.used]
     }
 
-    /// Computes the motion from `state`, which becomes the end state, over `[start, start +
-    /// duration]`. `sensitivity`, if given, is multiplied from the left by the derivative of
-    /// the end state with respect to the initial state.
+    /// Computes the motion from `state`, which becomes the end state, over
+    /// `[start, start + duration]`. `sensitivity`, if given, is multiplied from the left by the
+    /// derivative of the end state with respect to the initial state.
     pub fn run(
         &mut self,
         state: &mut [f64],
@@ -328,9 +328,10 @@ impl SegmentedMotion {
 
     /// Builds the signals whose zeros are switches.
     ///
-    /// The signals are `static limit ∓ f` in stick, the velocity in slip direction in slip, and
-    /// the depth of a closed stop or the remaining gap of an open one. If `eased`, signals that
-    /// begin at zero may change sign within the tolerance of zero.
+    /// For sliders, the signal is `static limit ∓ f` in stick, and the velocity in slip
+    /// direction in slip. For stops, it is the depth of a closed one or the remaining gap of an
+    /// open one. If `eased`, signals that begin at zero may change sign within the tolerance of
+    /// zero.
     fn watch(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
         nearest(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
@@ -433,8 +434,8 @@ impl SegmentedMotion {
         }
     }
 
-    /// Applies the saltation matrix at a switch of `part` to the sensitivity: `S = I + (F⁺ -
-    /// F⁻) ∇g / g'`.
+    /// Applies the saltation matrix at a switch of `part` to the sensitivity:
+    /// `S = I + (F⁺ - F⁻) ∇g / g'`.
     ///
     /// `shape` is the pattern of the segment that ends. Source: Leine and Nijmeijer (2004),
     /// Sec. 7.

@@ -72,12 +72,13 @@ pub(crate) struct Pattern {
     hold: DMatrix<f64>,
     /// Stiffness including the springs of stuck sliders and closed stops, n × n.
     pub stiffness: DMatrix<f64>,
-    /// Forces of the stuck rigid sliders: `multiplier (F - C v - K x - other parts) +
-    /// inverse_delassus g''`. Sizes held × n and held × held.
+    /// Forces of the stuck rigid sliders:
+    /// `multiplier (F - C v - K x - other parts) + inverse_delassus g''`. Sizes held × n and
+    /// held × held.
     multiplier: DMatrix<f64>,
     inverse_delassus: DMatrix<f64>,
-    /// `multiplier` times C, K, and the directions of the parts: held × n, held × n, held ×
-    /// parts.
+    /// `multiplier` times C, K, and the directions of the parts: held × n, held × n,
+    /// held × parts.
     pub held_by_velocity: DMatrix<f64>,
     pub held_by_displacement: DMatrix<f64>,
     pub held_by_parts: DMatrix<f64>,
@@ -789,9 +790,9 @@ mod tests {
         ([real_dot(&signal, &values), real_dot(&speed, &values)], derivative)
     }
 
-    /// Returns displacement and velocity at the end of the segment of `x'' + c x' + k x =
-    /// Re(load e^{iωt}) + constant`, and their derivative: the steady motion plus the matrix
-    /// exponential of the remainder.
+    /// Returns displacement and velocity at the end of the segment of
+    /// `x'' + c x' + k x = Re(load e^{iωt}) + constant`, and their derivative: the steady
+    /// motion plus the matrix exponential of the remainder.
     fn closed_form(k: f64, load: Complex64, constant: f64, start: [f64; 2]) -> ([f64; 2], Matrix2<f64>) {
         let s = Complex64::new(0.0, OMEGA);
         let steady = |time: f64| {
@@ -831,8 +832,8 @@ mod tests {
         assert!((derivative - DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0])).amax() < 1e-13);
     }
 
-    /// A stuck slider in series with a spring acts as that spring: `f = f₀ + kt (x - x₀ - (g -
-    /// g₀))`. Its force is also a state.
+    /// A stuck slider in series with a spring acts as that spring:
+    /// `f = f₀ + kt (x - x₀ - (g - g₀))`. Its force is also a state.
     #[test]
     fn a_sticking_spring_is_a_spring() {
         let (kt, force) = (2.5, 0.1);

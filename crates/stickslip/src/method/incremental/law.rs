@@ -1,8 +1,8 @@
 //! Evaluation of a law over a step: the force and the states at its end, with all derivatives.
 //!
 //! A law with a step view is evaluated by it. In a plane, a step resolves the direction of slip
-//! only to first order. Therefore it is also evaluated in two halves and extrapolated: `2 (two
-//! halves) - (whole)`. The force of an ideal slider in series with a spring follows the
+//! only to first order. Therefore it is also evaluated in two halves and extrapolated:
+//! `2 (two halves) - (whole)`. The force of an ideal slider in series with a spring follows the
 //! displacement up to its limit; a stop depends on the displacement alone. A law with a rate
 //! view is integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
 

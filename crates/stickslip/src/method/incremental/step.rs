@@ -1,8 +1,9 @@
 //! One step of average acceleration for a linear structure with joints.
 //!
-//! `M (v₁ - v₀) = h/2 (r₀ + r₁)`, `x₁ = x₀ + h/2 (v₀ + v₁)`, with the forces `r = F - C v - K x
-//! - W f`. The velocities of the axes at the end are `w = (linear in the state and the loads) -
-//! h/2 G (f₀ + f₁)`. Newton's method has one unknown per axis, for any number of masses.
+//! `M (v₁ - v₀) = h/2 (r₀ + r₁)`, `x₁ = x₀ + h/2 (v₀ + v₁)`, with the forces
+//! `r = F - C v - K x - W f`. The velocities of the axes at the end are
+//! `w = (linear in the state and the loads) - h/2 G (f₀ + f₁)`. Newton's method has one unknown
+//! per axis, for any number of masses.
 
 use super::law::{At, Follower};
 use crate::law::Relative;
@@ -16,9 +17,9 @@ use stickslip_numerics::lu::Lu;
 #[derive(Debug, Clone)]
 pub(super) struct Eliminated {
     pub length: f64,
-    /// Velocities at the end as functions of displacements and velocities at the start (n ×
-    /// 2n), of the sum of the loads at start and end (n × n), and of the sum of the forces at
-    /// start and end (n × axes).
+    /// Matrices of the velocities at the end, as a function of displacements and velocities at
+    /// the start (n × 2n). `from_load` multiplies the sum of the loads at start and end
+    /// (n × n), `from_force` the sum of the forces (n × axes).
     from_state: DMatrix<f64>,
     from_load: DMatrix<f64>,
     from_force: DMatrix<f64>,
@@ -297,8 +298,8 @@ mod tests {
         (state, derivative)
     }
 
-    /// For a linear motion `y' = J y`, a step is the trapezoidal rule, `(1 - hJ/2) y₁ = (1 +
-    /// hJ/2) y₀`, which conserves the energy of an undamped motion.
+    /// For a linear motion `y' = J y`, a step is the trapezoidal rule,
+    /// `(1 - hJ/2) y₁ = (1 + hJ/2) y₀`, which conserves the energy of an undamped motion.
     #[test]
     fn a_linear_step_is_the_trapezoidal_rule() {
         for (k, c, h) in [(4.0, 0.6, 0.7), (4.0, 0.0, 3.0)] {

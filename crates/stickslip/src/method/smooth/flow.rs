@@ -196,8 +196,8 @@ impl SmoothFlow {
     /// Returns the error of the step relative to the tolerance: the embedded estimate with a
     /// filter, so that stiff components do not dominate.
     ///
-    /// A step at the border of a layer is stiff at only one end, and a filter from the stiff
-    /// end would hide an error at the layer. Therefore the larger of both filtered estimates
+    /// A step at the border of a layer is stiff at only one end. A filter from the stiff end
+    /// would hide an error at the layer. Therefore the larger of both filtered estimates
     /// counts.
     fn error(&mut self, state: &[f64], time: f64, scale: (f64, f64)) -> f64 {
         if self.assembly.states() == 0 {

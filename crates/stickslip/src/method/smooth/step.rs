@@ -1,10 +1,11 @@
 //! One step of Radau IIA-9 for a linear structure with smooth joints.
 //!
 //! Only the joints are nonlinear. Therefore the structure is eliminated once per step size: the
-//! stage velocities along the joints' axes are `u'ᵢ = (linear in the state and the loads) + Σ G
-//! fₖ`. Newton's method has five unknowns per axis and per internal state of a law, for any
-//! number of masses. Step sizes are powers of two times a tick, so that a few eliminations
-//! serve a whole orbit. The filter of the error estimate is eliminated in the same way.
+//! stage velocities along the joints' axes are
+//! `u'ᵢ = (linear in the state and the loads) + Σ G fₖ`. Newton's method has five unknowns per
+//! axis and per internal state of a law, for any number of masses. Step sizes are powers of two
+//! times a tick, so that a few eliminations serve a whole orbit. The filter of the error
+//! estimate is eliminated in the same way.
 
 use crate::law::{RatePoint, Relative};
 use crate::method::assembly::{Assembly, PlacedLaw};
@@ -757,11 +758,11 @@ mod tests {
         0.0
     }
 
-    /// For a linear motion `y' = J y`, a step of Radau IIA of order 9 is `y₁ = Q(hJ)⁻¹ P(hJ)
-    /// y₀`, the (4,5) Padé approximation of the exponential.
+    /// For a linear motion `y' = J y`, a step of Radau IIA of order 9 is
+    /// `y₁ = Q(hJ)⁻¹ P(hJ) y₀`, the (4,5) Padé approximation of the exponential.
     ///
-    /// Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec.
-    /// IV.3 and IV.5.
+    /// Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996),
+    /// Sec. IV.3 and IV.5.
     #[test]
     fn a_linear_step_is_the_pade_approximation() {
         let (k, c, h) = (4.0, 0.6, 0.7);
@@ -780,8 +781,8 @@ mod tests {
         }
     }
 
-    /// A force that is a polynomial of degree 7 in time moves a free mass exactly: `x = Σ aₙ
-    /// hⁿ⁺²/((n+1)(n+2))`. For degree 8, only the velocity is exact.
+    /// A force that is a polynomial of degree 7 in time moves a free mass exactly:
+    /// `x = Σ aₙ hⁿ⁺²/((n+1)(n+2))`. For degree 8, only the velocity is exact.
     #[test]
     fn polynomial_loads_are_exact() {
         let h = 1.3f64;

@@ -2,10 +2,10 @@
 //! sensitivities.
 //!
 //! Joints at rest stick if forces within their limits keep their accelerations at zero. This is
-//! a linear complementarity problem in the box of the limits, for all of them together. At a
-//! switch at time τ, a zero of `n(z, t)`, the sensitivity is multiplied by the saltation matrix
-//! `I + (f⁺ - f⁻) nᵀ/(nᵀ f⁻ + ∂n/∂t)`, with the time derivatives f⁻ and f⁺ of the state before
-//! and after.
+//! a linear complementarity problem in the box of the limits, for all of them together. A
+//! switch at time τ is a zero of `n(z, t)`. There the sensitivity is multiplied by the
+//! saltation matrix `I + (f⁺ - f⁻) nᵀ/(nᵀ f⁻ + ∂n/∂t)`, with the time derivatives f⁻ and f⁺ of
+//! the state before and after.
 //!
 //! Source: Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems"
 //! (2004), Ch. 7.

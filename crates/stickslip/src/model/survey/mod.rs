@@ -1,7 +1,7 @@
 //! Survey of a model before any computation of orbits.
 //!
-//! A survey contains the linear modes with all joints free and with all joints stuck, the
-//! motion at which each joint begins to slip, and the bodies that nothing holds.
+//! A survey contains the linear modes with all joints free and with all joints stuck. It also
+//! contains the motion at which each joint begins to slip, and the bodies that nothing holds.
 //!
 //! Free: no joint carries a force. Stuck: no slider slips, so that a joint is a set of springs,
 //! or a constraint if it is rigid. The resonances of the model with friction lie between the

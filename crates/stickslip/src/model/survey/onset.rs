@@ -235,8 +235,8 @@ impl Survey {
         Some((0..self.joints.len()).map(largest).collect())
     }
 
-    /// Returns the complex load over limit of every stuck joint at harmonic `h`: `Z x + W f =
-    /// F`, `Wᵀx + g = 0` for rigid joints.
+    /// Returns the complex load over limit of every stuck joint at harmonic `h`:
+    /// `Z x + W f = F`, `Wᵀx + g = 0` for rigid joints.
     fn joint_loads(&self, h: u32, omega: f64) -> Option<Vec<Complex64>> {
         let (n, rigid, system) = (self.dofs(), self.rigid(), &self.system);
         let w = f64::from(h) * omega;

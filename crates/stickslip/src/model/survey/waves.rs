@@ -30,10 +30,10 @@ pub struct WaveModes {
     /// Shapes of the modes of `free`, [mode][place of the sector] in the order of
     /// [`Model::sector_places`], 1/√kg.
     ///
-    /// In sector n of N, the displacement of a standing wave is the real part of `shape · e^{j
-    /// 2π diameter n/N}`, with `φᵀMφ = 1` for the whole disk. The place with the largest motion
-    /// in the first sector is real and positive. Empty if the stiffnesses are too different for
-    /// one eigenvalue problem.
+    /// In sector n of N, the displacement of a standing wave is the real part of
+    /// `shape · e^{j 2π diameter n/N}`, with `φᵀMφ = 1` for the whole disk. The place with the
+    /// largest motion in the first sector is real and positive. Empty if the stiffnesses are
+    /// too different for one eigenvalue problem.
     pub free_shapes: Vec<Vec<Complex64>>,
     /// Shapes of the modes of `stuck`, in the same form.
     pub stuck_shapes: Vec<Vec<Complex64>>,
@@ -417,8 +417,8 @@ mod tests {
         }
     }
 
-    /// The shapes of a chain around a ring are cosines, `√(2/(N m)) cos(2π d n/N)`, and `√(1/(N
-    /// m))` if the wave does not travel.
+    /// The shapes of a chain around a ring are cosines, `√(2/(N m)) cos(2π d n/N)`, and
+    /// `√(1/(N m))` if the wave does not travel.
     #[test]
     fn shapes_of_a_chain_are_cosines() {
         let between = |other: &str| ["blade".to_owned(), other.to_owned()];
@@ -437,9 +437,9 @@ mod tests {
         }
     }
 
-    /// For every frequency of the ring, the sum of `φφᵀ` over the eigenvectors of the whole
-    /// ring equals the sum over the standing waves, `Re(X e^{j 2π d n/N})` and the wave shifted
-    /// by a quarter.
+    /// Compares the sums of `φφᵀ` for every frequency of the ring. The first is over the
+    /// eigenvectors of the whole ring. The second is over the standing waves,
+    /// `Re(X e^{j 2π d n/N})` and the wave shifted by a quarter.
     ///
     /// This checks shapes, phases and `φᵀMφ = 1` together. Two uncoupled blades in a sector
     /// form pairs of pairs, which the solver must separate.

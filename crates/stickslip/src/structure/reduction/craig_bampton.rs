@@ -1,9 +1,9 @@
 //! Craig-Bampton reduction: modes with fixed ports, and static responses to unit displacements
 //! of the ports.
 //!
-//! The degrees of freedom of the ports (`b`) are retained. The others (`i`) are `x_i = Φ q + Ψ
-//! x_b` with the modes Φ of `(K_ii, M_ii)` and `Ψ = -K_ii⁻¹ K_ib`. The static response is exact
-//! for any number of modes.
+//! The degrees of freedom of the ports (`b`) are retained. The others (`i`) are
+//! `x_i = Φ q + Ψ x_b` with the modes Φ of `(K_ii, M_ii)` and `Ψ = -K_ii⁻¹ K_ib`. The static
+//! response is exact for any number of modes.
 //!
 //! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
 

@@ -269,7 +269,8 @@ impl Whole {
     /// displacements that joints, forces and observers use.
     ///
     /// # Errors
-    /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a negative damping ratio.
+    /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a
+    /// negative damping ratio.
     pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
         Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
     }
@@ -436,7 +437,8 @@ impl Reduced {
     /// Returns this structure with another damping, which is not a matrix.
     ///
     /// # Errors
-    /// [`ReductionError`]: invalid parameters, or a damping matrix, which must be reduced together with the other matrices.
+    /// [`ReductionError`]: invalid parameters, or a damping matrix, which must be reduced
+    /// together with the other matrices.
     pub fn damped(&self, by: &Damping) -> Result<Self, ReductionError> {
         by.check()?;
         Ok(Reduced { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })

@@ -83,8 +83,9 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f6
     Err(failed.unwrap_or(ReductionError::OutOfRange))
 }
 
-/// Returns springs that fix each free motion once. The first is at the degree of freedom that
-/// moves most, the next at the one that moves most with the first one fixed, and so on.
+/// Returns springs that fix each free motion once. The first spring is at the degree of freedom
+/// that moves most. The next one is at that with the largest motion when the first is fixed,
+/// and so on.
 fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);

@@ -1,10 +1,11 @@
 //! Receptance of the ports as a modal sum and a power series of the residual, for methods that
 //! need receptances only.
 //!
-//! `R(ω) = Σ φ φᵀ / (λ - ω² + jω c) + Σⱼ (z - σ)ʲ Qⱼ / (1 + jω β)`, `z = (ω² - jω α) / (1 + jω
-//! β)`. Here `Qⱼ = Fᵀ Xⱼ` with the residual vectors X, and `α M + β K` is the damping outside
-//! the modes. J orders of vectors yield 2 J terms, because `Q₍ᵢ₊ⱼ₊₁₎ = Xᵢᵀ M Xⱼ`. The error
-//! decreases like `((ω² - σ) / (λ - σ))²ᴶ`, with λ of the first omitted mode.
+//! `R(ω) = Σ φ φᵀ / (λ - ω² + jω c) + Σⱼ (z - σ)ʲ Qⱼ / (1 + jω β)`,
+//! `z = (ω² - jω α) / (1 + jω β)`. Here `Qⱼ = Fᵀ Xⱼ` with the residual vectors X, and
+//! `α M + β K` is the damping outside the modes. J orders of vectors yield 2 J terms, because
+//! `Q₍ᵢ₊ⱼ₊₁₎ = Xᵢᵀ M Xⱼ`. The error decreases like `((ω² - σ) / (λ - σ))²ᴶ`, with λ of the
+//! first omitted mode.
 //!
 //! Sources: Hansteen and Bell (1979); Dickens, Nakagawa and Wittbrodt (1997), as in `residual`.
 
