@@ -390,7 +390,7 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
     Ok(Complex64::from_polar(1.0, phase) * amplitude)
 }
 
-/// `matrix += value · row rowᵀ`
+/// Computes `matrix += value · row rowᵀ`.
 fn add_along(entries: &mut Vec<(usize, usize, f64)>, row: &Row, value: f64) {
     for &(i, a) in row {
         entries.extend(row.iter().map(|&(k, b)| (i, k, value * (a * b))));

@@ -337,7 +337,7 @@ impl Turned {
         combined(parts.collect())
     }
 
-    /// `Tᵀ A T`.
+    /// Returns `Tᵀ A T`.
     fn entries(&self, entries: Entries) -> Entries {
         if !self.pivot.contains(&true) {
             return entries;
@@ -351,7 +351,7 @@ impl Turned {
         out
     }
 
-    /// `Tᵀ U`.
+    /// Returns `Tᵀ U`.
     fn modes(&self, modes: &DampedModes, moved: usize) -> DampedModes {
         let n = self.free + moved;
         let mut columns = vec![0.0; modes.iter().count() * n];

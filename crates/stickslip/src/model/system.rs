@@ -99,20 +99,20 @@ impl PartialEq for SystemJoint {
 }
 
 impl SystemJoint {
-    /// Name.
+    /// Returns its name.
     pub fn name(&self) -> &str {
         &self.name
     }
-    /// Its law.
+    /// Returns its law.
     pub fn law(&self) -> &SharedLaw {
         &self.law
     }
-    /// Its axes, one per direction of the law.
+    /// Returns its axes, one per direction of the law.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
-    /// Labels of its axes in results: the joint's name, or `joint.direction` for each of
-    /// several axes.
+    /// Returns the labels of its axes in results: the joint's name, or `joint.direction` for
+    /// each of several axes.
     pub fn labels(&self) -> impl Iterator<Item = String> {
         let several = self.axes.len() > 1;
         self.axes.iter().enumerate().map(move |(a, axis)| match &axis.name {
@@ -619,7 +619,7 @@ impl System {
         self.seen.iter().map(|axis| axis.along(values)).collect()
     }
 
-    /// The joints.
+    /// Returns the joints.
     pub fn joints(&self) -> &[SystemJoint] {
         &self.joints
     }

@@ -60,8 +60,9 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// residual. Measured amplitude errors of the couple: at most 3e-11 with this step, 6e-11
 /// without it. One orbit in fifty takes the step.
 const NEAREST: f64 = 7e-12;
-/// Relative stiffness and relative force below which a direction counts as unsupported or
-/// supported. It covers rounding of a stiffness matrix that lost some digits in its assembly.
+/// Relative stiffness below which a direction counts as unsupported, and relative residual force
+/// below which a load counts as supported. It covers rounding of a stiffness matrix that lost
+/// some digits in its assembly.
 const UNHELD: f64 = 1e-12;
 
 /// The exact event-driven method.

@@ -297,7 +297,7 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
     Reduced { frequencies, damping, vectors }
 }
 
-/// `matrix += value · row rowᵀ`
+/// Computes `matrix += value · row rowᵀ`.
 fn add(matrix: &mut DMatrix<f64>, row: &[(usize, f64)], value: f64) {
     for (i, a) in row {
         for (j, b) in row {

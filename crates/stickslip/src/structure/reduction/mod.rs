@@ -415,7 +415,7 @@ pub struct Reduced {
 }
 
 impl Reduced {
-    /// Galerkin projection on the columns of `basis`, n × r.
+    /// Computes the Galerkin projection on the columns of `basis`, n × r.
     fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
         let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
