@@ -227,8 +227,8 @@ impl Places {
             );
             return Err(ModelError::new(element, key, message));
         }
-        // tangents may differ, but a different normal would make the result depend on the order
-        // of the nodes
+        // tangents are interchangeable, but with different normals the order of the nodes would
+        // decide which one counts
         let normals = normal.map(|at| nodes.iter().filter_map(|own| own.get(at)).collect::<Vec<_>>());
         if let Some([one, other]) = normals.as_deref().filter(|ends| ends.len() == 2 && ends[0] != ends[1]) {
             let message = format!(

@@ -286,8 +286,8 @@ impl Decision {
         self.undecided.clear();
         for (k, &i) in self.at_rest.iter().enumerate() {
             let (relative, lambda) = (problem.relative[k], problem.lambda[k]);
-            // compared with the effect of the limits at its own masses, because another joint
-            // can have much lighter ones
+            // relative to the effect of the limits at its own masses, because another joint can
+            // connect much lighter masses
             let own = problem.delassus.column(k);
             let held: f64 = own.iter().zip(&problem.high).map(|(d, limit)| d.abs() * limit).sum();
             let size = problem.push[k].abs() + held;

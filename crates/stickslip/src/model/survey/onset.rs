@@ -90,8 +90,8 @@ impl Survey {
         bare.filter(|(index, mode)| driven(*index, mode.omega)).map(|(_, mode)| mode.omega).collect()
     }
 
-    /// Returns the modal amplitude (m √kg) at which the first joint slips in mode `index` (from
-    /// 0) of the stuck structure.
+    /// Returns the modal amplitude (m √kg) at which the first joint slips in a mode of the stuck
+    /// structure. `index` counts the modes from 0.
     ///
     /// For two modes of equal frequency, it applies to their waves, `(φ₁ ± jφ₂)/√2`. Returns
     /// `None` if the mode does not exist or loads no joint.
