@@ -228,8 +228,8 @@ impl Boundary {
         self.alike.iter().map(|[low, _]| *low).chain(turned)
     }
 
-    /// Returns every row of the high side as a weighted sum of rows of the low side of the next
-    /// sector, on a disk with the given number of sectors.
+    /// Returns every row of the high side as a weighted sum of rows of the next sector's low
+    /// side. The rotation depends on the number of sectors.
     fn ties(&self, sectors: usize) -> Vec<(usize, Row)> {
         let mut ties: Vec<(usize, Row)> = self.alike.iter().map(|[low, high]| (*high, vec![(*low, 1.0)])).collect();
         if let Some(axis) = self.axis {
