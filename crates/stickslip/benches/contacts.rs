@@ -1,8 +1,10 @@
-//! Contact nodes of three directions on a block of steel, all coupled through it: a resonance curve by their number.
+//! Resonance curves of contact nodes with three directions on a steel block, which couples all
+//! of them, by number of nodes.
 //!
-//! `cargo bench -p stickslip --bench contacts [-- NODES[,NODES…][:DOFS]…]`; without a number of degrees of freedom the block is 12 elements long. Its
-//! cross-section has room for the most nodes that stand together, so that all of them are on the same block. At the end stands the exponent
-//! with which the time of a point grows with the nodes.
+//! `cargo bench -p stickslip --bench contacts [-- NODES[,NODES…][:DOFS]…]`. Without DOFS, the
+//! block is 12 elements long. Its cross-section has room for the largest number of nodes in a
+//! group, so that all curves of the group use the same block. The last line of a group is the
+//! exponent of the time per point over the number of nodes.
 
 #![allow(clippy::print_stdout)] // a bench prints its result
 
@@ -20,16 +22,18 @@ use stickslip::orbit::{JointMotion, Orbit};
 use stickslip::structure::Structure;
 use stickslip::structure::reduction::{Damping, Free, Whole};
 
-/// Modes that are kept, beside the residual vectors of the contacts.
+/// Number of retained modes, in addition to the residual vectors of the contacts.
 const MODES: usize = 20;
 const HARMONICS: usize = 5;
 const POINTS: usize = 21;
-/// To this error five harmonics know such a motion.
+/// Error of five harmonics for such a motion.
 const TOLERANCE: f64 = 0.01;
-/// Force that presses all contacts together, N, and that on the first node across and along the normal, which slides the face and tilts it.
+/// Total contact force, N, and the force on the first node, across and along the normal, which
+/// slides and tilts the face.
 const PRELOAD: f64 = 100.0;
 const FORCE: [f64; 3] = [120.0, 30.0, 15.0];
-/// The curve, in multiples of the first frequency of the block without contacts. At the resonance all contacts slip, and many separate.
+/// Frequency range, in multiples of the first frequency of the block without contacts. At the
+/// resonance, all contacts slip, and many separate.
 const RANGE: [f64; 2] = [0.9, 1.7];
 
 fn main() {
@@ -43,7 +47,7 @@ fn main() {
     blocks.into_iter().for_each(|(nodes, dofs)| block(&nodes, dofs));
 }
 
-/// The curves of one block with each of these numbers of nodes.
+/// Computes the curves of one block for each number of nodes.
 fn block(nodes: &[usize], dofs: usize) {
     let most = nodes.iter().copied().max().unwrap_or(1);
     let edge = ((most as f64).sqrt().ceil() as usize).max(6);
@@ -56,7 +60,8 @@ fn block(nodes: &[usize], dofs: usize) {
     }
 }
 
-/// The block in few coordinates with so many nodes, and its first frequency without them, rad/s.
+/// Returns the reduced block with this number of nodes, and its first frequency without
+/// contacts, rad/s.
 fn system(brick: &Brick, nodes: usize) -> (System, f64) {
     forget_memory();
     let begin = seconds();
@@ -75,7 +80,7 @@ fn system(brick: &Brick, nodes: usize) -> (System, f64) {
     let structure =
         Structure::new(names, reduced.mass.clone(), reduced.damping.clone(), reduced.stiffness.clone()).unwrap();
     let row = |axis: usize| Axis::new((0..reduced.dofs()).map(|k| (k, reduced.ports[(axis, k)])).collect());
-    // stiff beside the block's first mode, together
+    // total contact stiffness well above that of the block's first mode
     let stiffness = 4.0 * reduced.stiffness[(0, 0)]
         / (reduced.ports[(0, 0)].abs().max(reduced.ports[(1, 0)].abs()).max(reduced.ports[(2, 0)].abs()).powi(2)
             * nodes as f64);
@@ -98,7 +103,7 @@ fn system(brick: &Brick, nodes: usize) -> (System, f64) {
     (builder.build().unwrap(), first)
 }
 
-/// Seconds for a point of the curve with so many nodes, on the average.
+/// Returns the mean time of a point of the curve, s.
 fn curve(brick: &Brick, nodes: usize) -> f64 {
     let (system, first) = system(brick, nodes);
     forget_memory();
@@ -141,7 +146,7 @@ fn curve(brick: &Brick, nodes: usize) -> f64 {
     point
 }
 
-/// What the points of a curve have in common.
+/// Statistics of the points of a curve.
 #[derive(Default)]
 struct Tally {
     status: BTreeMap<&'static str, usize>,
@@ -172,7 +177,7 @@ impl Tally {
     }
 }
 
-/// The slope of the line through the logarithms that has the least squares.
+/// Returns the least-squares slope in logarithms.
 fn exponent(points: &[(f64, f64)]) -> f64 {
     let logarithms: Vec<_> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
     let mean = |of: fn(&(f64, f64)) -> f64| logarithms.iter().map(of).sum::<f64>() / logarithms.len() as f64;
@@ -182,20 +187,20 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
     above / below
 }
 
-/// The most memory that is held from here on counts.
+/// Resets the peak memory of this process.
 fn forget_memory() {
-    // where the system cannot, it is the most of all
+    // if the system does not support this, the overall peak is reported
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// The most memory that was held.
+/// Returns the peak memory.
 fn memory() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let most = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("").trim();
     format!("{most} at most")
 }
 
-/// Seconds of this processor, so that other work on the machine does not count.
+/// Returns the processor time of this process, s, which is independent of other processes.
 fn seconds() -> f64 {
     let ran = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     ran.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map_or(0.0, |ns| 1e-9 * ns)

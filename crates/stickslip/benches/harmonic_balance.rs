@@ -1,4 +1,5 @@
-//! Speed of harmonic balance, on one core: the massless couple of the paper by number of harmonics, its hard neighbour whole, chains, mistuned rings.
+//! Speed of harmonic balance on one core: the massless couple of the paper by number of
+//! harmonics, complete curves of the couple with contact mass, chains, mistuned rings.
 
 #![allow(clippy::print_stdout)] // a bench prints its result
 
@@ -11,21 +12,22 @@ use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
 
-/// Blades of the chains.
+/// Numbers of blades of the chains.
 const CHAINS: [usize; 4] = [10, 30, 100, 300];
-/// Blades of the rings.
+/// Numbers of blades of the rings.
 const RINGS: [usize; 6] = [30, 48, 60, 120, 240, 480];
 
 fn main() {
     divan::main();
-    // cargo test --benches passes --test, and a filter asks for something else
+    // cargo test --benches passes --test, and a filter selects other benches
     if std::env::args().skip(1).all(|argument| argument == "--bench") {
         println!("time of a point of a chain ~ blades^{:.2}", growth(&CHAINS, &|blades| chain(blades), 5));
         println!("time of a point of a mistuned ring ~ blades^{:.2}", growth(&RINGS, &|blades| ring(blades), 7));
     }
 }
 
-/// Exponent of the time per point over the number of blades, by least squares in the logarithms.
+/// Returns the exponent of the time per point over the number of blades, by least squares in
+/// the logarithms.
 fn growth(sizes: &[usize], made: &dyn Fn(usize) -> System, harmonics: usize) -> f64 {
     let points: Vec<(f64, f64)> = sizes
         .iter()
@@ -49,7 +51,8 @@ fn growth(sizes: &[usize], made: &dyn Fn(usize) -> System, harmonics: usize) -> 
         / points.iter().map(|p| (p.0 - x) * (p.0 - x)).sum::<f64>()
 }
 
-/// Neighbouring points from 121 Hz upwards, each started from the one before; none twice, which the last two would lead to without a step.
+/// Successive points from 121 Hz upward, each with a warm start from the previous one. No point
+/// repeats, because an identical point would need no step.
 struct Neighbours<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     start: Vec<f64>,
@@ -74,7 +77,7 @@ fn balance(harmonics: usize) -> HarmonicBalance {
     HarmonicBalance { harmonics: Some(harmonics), samples: Some(1024), tolerance: None }
 }
 
-/// A curve of `points` orbits from 119.5 to 122.5 Hz.
+/// Computes a curve of `points` orbits from 119.5 to 122.5 Hz.
 fn curve(method: HarmonicBalance, system: &System, points: u32) {
     let mut solver = method.solver(system).unwrap();
     let mut start: Option<Vec<f64>> = None;
@@ -84,14 +87,15 @@ fn curve(method: HarmonicBalance, system: &System, points: u32) {
     }
 }
 
-/// 100 points of the massless couple at 2 N, with error estimate and stability: divide by 100.
+/// 100 points of the massless couple at 2 N, with error estimate and stability. Divide the time
+/// by 100.
 #[divan::bench(args = [1, 3, 5, 9, 15])]
 fn massless_couple_100_points(bencher: Bencher, harmonics: usize) {
     let system = example::blade_couple_massless().assemble().unwrap();
     bencher.bench_local(|| curve(balance(harmonics), &system, 100));
 }
 
-/// Fig. 6 whole, 4 x 241 orbits of rigid friction with a contact mass, nine harmonics.
+/// The complete Fig. 6: 4 x 241 orbits of rigid friction with a contact mass, nine harmonics.
 #[divan::bench(sample_count = 3)]
 fn figure_6_whole(bencher: Bencher) {
     bencher.bench_local(|| {
@@ -101,15 +105,16 @@ fn figure_6_whole(bencher: Bencher) {
     });
 }
 
-/// The couple with a contact mass and this slip limit, N.
+/// Returns the couple with a contact mass and this slip limit, N.
 fn couple(limit: f64) -> Model {
     let mut couple = example::blade_couple();
     couple.joints[0].law = Arc::new(Coulomb { limit });
     couple
 }
 
-/// Blades under engine order 3 with a joint between neighbours, and one between the last and the first if it is closed. Stiffnesses are spread
-/// evenly by `mistuning`, in an order that does not repeat.
+/// Returns blades under engine order 3 with a joint between adjacent blades, and one between
+/// the last and the first if `closed`. `mistuning` spreads the stiffnesses uniformly, in an
+/// order that does not repeat.
 fn row(blades: usize, closed: bool, mistuning: f64) -> System {
     let name = |i: usize| format!("b{i}");
     let golden = 0.5 * (5f64.sqrt() - 1.0);
@@ -134,12 +139,13 @@ fn chain(blades: usize) -> System {
     row(blades, false, 0.0)
 }
 
-/// Mistuned by one percent.
+/// Returns a ring with a mistuning of one percent.
 fn ring(blades: usize) -> System {
     row(blades, true, 0.01)
 }
 
-/// One point of a chain of blades with a joint between neighbours, five harmonics, started from the point 0.02 Hz below.
+/// One point of a chain of blades with a joint between adjacent blades, five harmonics, with a
+/// warm start from 0.02 Hz below.
 #[divan::bench(args = CHAINS, sample_count = 5)]
 fn chain_point(bencher: Bencher, blades: usize) {
     let system = chain(blades);
@@ -147,7 +153,8 @@ fn chain_point(bencher: Bencher, blades: usize) {
     bencher.bench_local(|| series.next());
 }
 
-/// One point of a mistuned ring, seven harmonics, with its estimate, started from the point 0.02 Hz below.
+/// One point of a mistuned ring, seven harmonics, with error estimate, with a warm start from
+/// 0.02 Hz below.
 #[divan::bench(args = RINGS, sample_count = 5)]
 fn ring_point(bencher: Bencher, blades: usize) {
     let system = ring(blades);

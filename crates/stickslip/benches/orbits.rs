@@ -1,4 +1,5 @@
-//! Speed of orbits of the paper's couple, on one core. The same orbits are checked in the verification tests.
+//! Speed of orbits of the paper's couple on one core. The verification tests check these
+//! orbits.
 
 use divan::Bencher;
 use std::f64::consts::TAU;
@@ -20,7 +21,8 @@ fn couple(ft: f64, alpha: Option<f64>) -> System {
     model.assemble().unwrap()
 }
 
-/// One orbit in slip (2 N) and in stick-slip (4, 8 N), started from the orbit 0.0125 Hz below, as in a sweep.
+/// One orbit in slip (2 N) and in stick-slip (4, 8 N), with a warm start from 0.0125 Hz below,
+/// as in a sweep.
 #[divan::bench(args = [(2, 12125), (4, 12075), (8, 12100)])]
 fn event_driven_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let system = couple(f64::from(ft), None);
@@ -30,7 +32,7 @@ fn event_driven_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
 }
 
-/// Fig. 6 whole: 4 x 241 orbits with amplitudes, phases, losses and stability.
+/// The complete Fig. 6: 4 x 241 orbits with amplitudes, phases, losses and stability.
 #[divan::bench(sample_count = 20)]
 fn figure_6_exact() {
     for ft in [2.0, 4.0, 6.0, 8.0] {
@@ -45,7 +47,8 @@ fn figure_6_exact() {
     }
 }
 
-/// One orbit of the arctan law at 25 s/mm, started from the orbit 0.0125 Hz below; error below 1e-7.
+/// One orbit of the arctan law at 25 s/mm, with a warm start from 0.0125 Hz below; the error is
+/// below 1e-7.
 #[divan::bench(args = [(2, 12125), (4, 12075), (8, 12100)], sample_count = 50)]
 fn smooth_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let system = couple(f64::from(ft), Some(25e3));
@@ -55,7 +58,8 @@ fn smooth_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
 }
 
-/// A mass of 1 kg on a spring of 10 N/mm and a damper of 3 N s/m under 6 N, with a law to the ground.
+/// A mass of 1 kg on a spring of 10 N/mm and a damper of 3 N s/m under 6 N, with a law to the
+/// ground.
 fn mass(law: SharedLaw) -> System {
     let between = || ["m".to_owned(), GROUND.to_owned()];
     let model = Model {
@@ -68,21 +72,22 @@ fn mass(law: SharedLaw) -> System {
     model.assemble().unwrap()
 }
 
-/// One orbit as `auto` finds it, started from the orbit 0.05 Hz below.
+/// Times one orbit of method `auto`, with a warm start from 0.05 Hz below.
 fn warm(bencher: Bencher, system: &System, hertz: f64) {
     let mut solver = Auto.solver(system).unwrap();
     let start = solver.orbit(TAU * (hertz - 0.05), None).unwrap().start;
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
 }
 
-/// Falling friction that sticks (4, 8 Hz), turns at once (12 Hz) and slides far (15 Hz).
+/// Decreasing friction in a motion that sticks (4, 8 Hz), reverses immediately (12 Hz) and
+/// slips far (15 Hz).
 #[divan::bench(args = [4, 8, 12, 15], sample_count = 20)]
 fn stribeck_orbit_warm(bencher: Bencher, hertz: u32) {
     let law = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.02 });
     warm(bencher, &mass(law), f64::from(hertz));
 }
 
-/// The distribution itself (0) and 32 and 300 sliders in its place, beyond full slip.
+/// The continuous distribution (0), and 32 and 300 sliders in its place, beyond complete slip.
 #[divan::bench(args = [0, 32, 300], sample_count = 20)]
 fn iwan_orbit_warm(bencher: Bencher, elements: u32) {
     let law = Arc::new(Iwan { stiffness: 5e3, limit: 4.0, chi: -0.5, beta: 0.3, elements });

@@ -1,7 +1,8 @@
-//! The same orbits with Stickslip and with SciPy, in the same run, as ratios.
+//! Ratios of computing time between Stickslip and SciPy for the same orbits in the same run.
 //!
-//! `cargo bench -p stickslip --bench peers` makes a virtual environment under `target/` and installs SciPy there; it needs Python 3 and
-//! the package index. Every orbit starts from its neighbour 0.0125 Hz below.
+//! `cargo bench -p stickslip --bench peers` creates a virtual environment under `target/` and
+//! installs SciPy there. It needs Python 3 and the package index. Every orbit has a warm start
+//! from 0.0125 Hz below.
 
 #![allow(clippy::print_stdout)] // a bench prints its table
 
@@ -18,13 +19,13 @@ use stickslip::model::{System, example};
 const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
 /// Slip limit (N) and frequency (Hz): slip only, stick-slip, stick-slip.
 const CASES: [(f64, f64); 3] = [(2.0, 121.25), (4.0, 120.75), (8.0, 121.0)];
-/// The paper's steepness, s/m.
+/// Steepness in the paper, s/m.
 const ALPHA: f64 = 25e3;
-/// Runs of ours per case, of which the median counts.
+/// Number of runs of Stickslip per case; the median counts.
 const RUNS: usize = 101;
 
 fn main() {
-    // cargo test --benches passes --test: there is nothing to test here
+    // cargo test --benches passes --test: nothing to test here
     if std::env::args().any(|a| a == "--test") {
         return;
     }
@@ -82,7 +83,7 @@ impl Ours {
     }
 }
 
-/// Start state, and median seconds and amplitude of the orbit.
+/// Returns the initial state, and the median time (s) and the amplitude of the orbit.
 fn time(method: &dyn Method, system: &System, hertz: f64) -> (Vec<f64>, (f64, f64)) {
     let mut solver = method.solver(system).unwrap();
     let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().start;

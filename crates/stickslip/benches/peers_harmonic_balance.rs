@@ -1,12 +1,18 @@
-//! The same curve with the method `harmonic-balance` and with the Python package pyHarm, in the same run, as ratios.
+//! Ratios of computing time between `harmonic-balance` and the Python package pyHarm for the
+//! same curve in the same run.
 //!
-//! `cargo bench -p stickslip --bench peers_harmonic_balance` makes a virtual environment under `target/` and installs pyHarm there (1.3 GB
-//! with what it needs); it needs Python 3 and the package index. The massless blade couple at 2 N, 119.5 to 122.5 Hz, odd harmonics up
-//! to H, 1024 samples per period, each point from its neighbour. A point of Stickslip includes its error estimate, which is a second
-//! solution with twice the harmonics, and its stability; one of pyHarm has neither.
+//! `cargo bench -p stickslip --bench peers_harmonic_balance` creates a virtual environment
+//! under `target/` and installs pyHarm there (1.3 GB with its dependencies). It needs Python 3
+//! and the package index.
 //!
-//! The amplitudes differ by the samples: with 16384 of them those of pyHarm change by up to 1.2e-5, those of Stickslip, which places
-//! the switches between samples, by 3e-7 (five harmonics).
+//! The case is the massless blade couple at 2 N, 119.5 to 122.5 Hz, odd harmonics up to H, 1024
+//! samples per period. Each point has a warm start from the previous one. A point of Stickslip
+//! includes its stability and its error estimate, a second solution with twice the harmonics. A
+//! point of pyHarm includes neither.
+//!
+//! The amplitudes differ because of the sampling. With 16384 samples, those of pyHarm change by
+//! up to 1.2e-5. Those of Stickslip change by 3e-7 (five harmonics), because it locates the
+//! switches between samples.
 
 #![allow(clippy::print_stdout)] // a bench prints its table
 
@@ -21,16 +27,16 @@ use stickslip::model::{System, example};
 const PYHARM: Peer = Peer { package: "pyharm-os", version: "1.2.2", folder: "peers-pyharm" };
 const HARMONICS: [usize; 5] = [1, 3, 5, 9, 15];
 const SAMPLES: usize = 1024;
-/// Hz, and points of the curve.
+/// Frequency range, Hz, and number of points of the curve.
 const RANGE: (f64, f64) = (119.5, 122.5);
 const POINTS: usize = 241;
-/// The derivatives that pyHarm has for its Jenkins element.
+/// Options of pyHarm for the derivatives of its Jenkins element.
 const JACOBIANS: [&str; 2] = ["analytical", "jax"];
-/// Runs of ours per number of harmonics, of which the median counts.
+/// Number of runs of Stickslip per number of harmonics; the median counts.
 const RUNS: usize = 21;
 
 fn main() {
-    // cargo test --benches passes --test: there is nothing to test here
+    // cargo test --benches passes --test: nothing to test here
     if std::env::args().any(|a| a == "--test") {
         return;
     }
@@ -66,7 +72,7 @@ fn main() {
     }
 }
 
-/// Amplitudes of blade 1 along `hertz`, each orbit from the one before.
+/// Returns the amplitudes of blade 1 at the frequencies `hertz`, with warm starts.
 fn amplitudes(harmonics: usize, system: &System, hertz: impl Iterator<Item = f64>) -> Vec<f64> {
     let method = HarmonicBalance { harmonics: Some(harmonics), samples: Some(SAMPLES), tolerance: None };
     let mut solver = method.solver(system).unwrap();
@@ -81,7 +87,7 @@ fn amplitudes(harmonics: usize, system: &System, hertz: impl Iterator<Item = f64
         .collect()
 }
 
-/// Median over the runs of the mean over the curve.
+/// Returns the median over the runs of the mean time per point, s.
 fn seconds_per_point(harmonics: usize, system: &System) -> f64 {
     let step = (RANGE.1 - RANGE.0) / (POINTS - 1) as f64;
     let mut seconds: Vec<f64> = (0..RUNS)
@@ -95,7 +101,7 @@ fn seconds_per_point(harmonics: usize, system: &System) -> f64 {
     seconds[RUNS / 2]
 }
 
-/// A line per number of harmonics and Jacobian.
+/// Returns one line per number of harmonics and Jacobian.
 fn pyharm() -> Result<Vec<String>, String> {
     let cases: Vec<String> = HARMONICS
         .iter()
@@ -111,7 +117,7 @@ fn pyharm() -> Result<Vec<String>, String> {
     PYHARM.measure("pyharm_couple.py", &format!("[{}]", cases.join(", ")))
 }
 
-/// What pyHarm found: the converged points, and how many there are in all.
+/// Results of pyHarm: its converged points, and the total number of points.
 struct Curve {
     seconds: f64,
     points: f64,
@@ -129,14 +135,15 @@ impl Curve {
         })
     }
 
-    /// Largest relative difference to our amplitudes at the same frequencies.
+    /// Returns the largest relative difference to the amplitudes of Stickslip at the same
+    /// frequencies.
     fn difference(&self, harmonics: usize, system: &System) -> f64 {
         let ours = amplitudes(harmonics, system, self.hertz.iter().copied());
         ours.iter().zip(&self.amplitudes).map(|(a, b)| (a - b).abs() / a).fold(0.0, f64::max)
     }
 }
 
-/// The numbers in the list behind `"key":` in a line of JSON.
+/// Returns the numbers of the list with `"key":` in a line of JSON.
 fn numbers(line: &str, key: &str) -> Option<Vec<f64>> {
     let rest = line.split_once(&format!("\"{key}\": ["))?.1;
     rest.split_once(']')?.0.split(',').map(|number| number.trim().parse().ok()).collect()

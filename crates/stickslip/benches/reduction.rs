@@ -1,8 +1,9 @@
-//! A block of steel of 61,000 degrees of freedom: time and memory of its analysis, factor, modes and reduction, beside SciPy.
+//! Time and memory of analysis, factorization, modes and reduction of a steel block with 61,000
+//! degrees of freedom, compared with SciPy.
 //!
-//! `cargo bench -p stickslip --bench reduction [-- 50 20 18]`, elements along each edge. Times are those of one processor, so that other
-//! work on the
-//! machine does not count where the system tells them.
+//! `cargo bench -p stickslip --bench reduction [-- 50 20 18]`, with the numbers of elements
+//! along each edge. Times are processor times, which are independent of other processes, if the
+//! system provides them.
 
 #![allow(clippy::print_stdout)]
 
@@ -19,7 +20,7 @@ use stickslip_numerics::sparse::{Analysis, NaturalModes, Wanted};
 
 const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
 const MODES: usize = 20;
-/// Modes with the ports held are kept up to this multiple of the highest of them.
+/// Ratio of the highest fixed-interface mode to the highest free mode.
 const BEYOND: f64 = 1.3;
 
 fn main() {
@@ -74,7 +75,7 @@ fn main() {
     }
 }
 
-/// Seconds of one processor, or of the wall where the system does not tell.
+/// Processor time, s, or wall time if the system does not provide it.
 struct Clock {
     start: Instant,
     last: f64,

@@ -10,8 +10,9 @@ use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
 use stickslip_numerics::sparse::Matrix;
 
-/// Nodes of `directions` degrees of freedom on springs, each coupled to the next by springs and a contact, in a travelling wave that goes round the
-/// ring once for `nodes / waves` nodes.
+/// Returns nodes of `directions` degrees of freedom on springs. Springs and a contact couple
+/// each node to the next. The excitation is a travelling wave with one period per
+/// `nodes / waves` nodes.
 fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System {
     let (mass, stiffness, coupling, damping) = (0.2, 1e5, 4e3, 1.5);
     let at = |node: usize, direction: usize| (node % nodes) * directions + direction;
@@ -41,7 +42,7 @@ fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System
     builder.build().unwrap()
 }
 
-/// Orbits over a resonance, each started from the one before, or alone.
+/// Computes orbits over a resonance, each with a warm start from the previous one.
 fn sweep(system: &System, omegas: &[f64]) -> Vec<Orbit> {
     let method = HarmonicBalance { harmonics: Some(3), samples: Some(256), tolerance: None };
     let mut solver = method.solver(system).unwrap();
@@ -55,7 +56,8 @@ fn sweep(system: &System, omegas: &[f64]) -> Vec<Orbit> {
     orbits
 }
 
-/// A quarter of the circle between neighbours: four nodes move as any multiple of four do.
+/// The phase between adjacent nodes is a quarter of a period, so that four nodes move like any
+/// multiple of four.
 fn check(directions: usize, law: SharedLaw, nodes: usize, omegas: &[f64]) {
     let small = sweep(&ring(4, 1, directions, law.clone()), omegas);
     let large = sweep(&ring(nodes, nodes / 4, directions, law), omegas);
@@ -93,11 +95,13 @@ fn laws_of_rates() {
     check(1, Arc::new(Dahl { stiffness: 1e4, limit: 3.0 }), 200, &OMEGAS[1..3]);
 }
 
-/// Blades whose springs are spread by 2 %, without a pattern, with a damper between each and the next, under engine order 5.
+/// Returns blades with stiffnesses spread irregularly by 2 %, with a damper joint between
+/// adjacent blades, under engine order 5.
 fn mistuned(blades: usize) -> System {
     let mut model = Model::default();
     let name = |i: usize| format!("b{}", i % blades);
-    // an odd multiplier modulo 2^32 (Knuth), summed to a spread with a standard deviation of one
+    // an odd multiplier modulo 2^32 (Knuth), summed to a spread with a standard deviation of
+    // one
     let mut state = 12345u32;
     let mut uniform = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -116,7 +120,8 @@ fn mistuned(blades: usize) -> System {
     model.assemble().unwrap()
 }
 
-/// Newton iterations of a point, each started from the one `step` Hz before: mean and most.
+/// Returns mean and maximum of the Newton iterations of a point, each with a warm start from
+/// `step` Hz below.
 fn iterations(blades: usize, from: f64, step: f64, points: u32) -> (f64, usize) {
     let system = mistuned(blades);
     let method = HarmonicBalance { harmonics: Some(5), samples: None, tolerance: Some(0.1) };
@@ -132,7 +137,8 @@ fn iterations(blades: usize, from: f64, step: f64, points: u32) -> (f64, usize) 
     (counts.iter().sum::<usize>() as f64 / f64::from(points), counts.into_iter().max().unwrap())
 }
 
-/// The more dampers, the more of them begin to slip or to stick between two points: they are settled by themselves, and the ring takes no more steps.
+/// With more dampers, more of them begin to slip or stick between two points. The solver
+/// settles them separately, and the number of steps does not grow.
 #[test]
 fn steps_do_not_grow_with_the_blades() {
     let [(few, _), (mean, most)] = [24, 96].map(|blades| iterations(blades, 113.5, 0.05, 12));

@@ -1,10 +1,11 @@
-//! Python packages as peers: a virtual environment under `target/` with one pinned package, and a script that measures it.
+//! Python packages as peers: a virtual environment under `target/` with one pinned package, and
+//! a script for the measurement.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A package of the index, and the folder under `target/` of its environment.
+/// A package of the index, and the folder of its environment under `target/`.
 pub struct Peer {
     pub package: &'static str,
     pub version: &'static str,
@@ -12,16 +13,17 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// The lines that `script` (in `benches/peers/`) prints for the JSON `input`; the environment is made if it is absent.
+    /// Runs `script` (in `benches/peers/`) with the JSON `input` and returns the printed lines.
+    /// Creates the environment if it is missing.
     ///
     /// # Errors
-    /// A sentence, if Python or the index is absent or the script fails.
+    /// A message if Python or the index is not available, or if the script fails.
     pub fn measure(&self, script: &str, input: &str) -> Result<Vec<String>, String> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().map_err(|e| e.to_string())?;
         let folder = root.join("target").join(self.folder);
         let mut child = Command::new(self.python(&folder)?)
             .arg(root.join("benches/peers").join(script))
-            // packages that keep settings and caches of their own keep them here
+            // packages store their settings and caches here
             .current_dir(&folder)
             .env("HOME", &folder)
             .env("OMP_NUM_THREADS", "1")
@@ -40,7 +42,8 @@ impl Peer {
         Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
     }
 
-    /// The Python of the environment, with the package in its version.
+    /// Returns the Python interpreter of the environment, with the package in the pinned
+    /// version.
     fn python(&self, folder: &Path) -> Result<PathBuf, String> {
         let python = folder.join("bin/python");
         let run = |command: &mut Command| match command.stdout(Stdio::null()).status() {
@@ -59,7 +62,7 @@ impl Peer {
     }
 }
 
-/// The number behind `"key":` in a line of JSON.
+/// Returns the number with `"key":` in a line of JSON.
 pub fn number(line: &str, key: &str) -> Option<f64> {
     let rest = line.split_once(&format!("\"{key}\":"))?.1;
     rest.split([',', '}']).next()?.trim().parse().ok()

@@ -1,4 +1,5 @@
-//! From a model to a system: checks, and the matrices of `M x'' + C x' + K x + Σ W f = F(t)`.
+//! Assembles a system from a model: checks, and the matrices of
+//! `M x'' + C x' + K x + Σ W f = F(t)`.
 
 use super::coordinates::{Coordinates, combined};
 use super::error::{Element, ModelError};
@@ -16,7 +17,8 @@ use std::sync::Arc;
 use stickslip_numerics::sparse::Matrix;
 
 impl Model {
-    /// The names of all places: ground, those of the substructure and the masses with their directions, the moved places.
+    /// Returns the names of all places: the ground, those of the nodes with their directions,
+    /// the moved places.
     pub fn place_names(&self) -> Vec<String> {
         let mut names = vec![GROUND.to_owned()];
         names.extend(self.nodes().flat_map(|(name, directions)| places_of(name, directions)));
@@ -28,12 +30,13 @@ impl Model {
         names
     }
 
-    /// The places that can move freely or are moved: all but the ground.
+    /// Returns the names of all places except the ground.
     pub fn moving_names(&self) -> Vec<String> {
         self.place_names().split_off(1)
     }
 
-    /// What results call the axes of every joint: its name, or `joint.direction` where it joins nodes.
+    /// Returns the labels of the axes of every joint in results: its name, or `joint.direction`
+    /// for joints between nodes.
     ///
     /// # Example
     /// ```
@@ -58,9 +61,13 @@ impl Model {
     /// Checks the model and assembles its matrices.
     ///
     /// # Errors
-    /// [`ModelError`] names the first element that is wrong: a name that is no identifier or stands twice, a place that does
-    /// not exist, a value that is not finite or has the wrong sign, a force on a place that is no degree of freedom, a law whose directions are
-    /// not those of the nodes that it joins.
+    /// [`ModelError`] names the first invalid element:
+    ///
+    /// - a name that is not an identifier or occurs twice
+    /// - a place that does not exist
+    /// - a value that is not finite or has the wrong sign
+    /// - a force on a place that is not a degree of freedom
+    /// - a law whose directions differ from those of the nodes at the joint
     ///
     /// # Example
     /// ```
@@ -80,7 +87,8 @@ impl Model {
         let (builder, signs) = assembler.joints(builder, &motions)?;
         let builder = assembler.moved(builder, &matrices, (&motions, &forces), &signs);
         let system = builder.build().map_err(|error| whole(&error))?;
-        // what has been changed since it was made a ring may be none any more, and is solved whole
+        // a ring that was edited after its creation can lack the symmetry; then the whole ring
+        // is solved
         Ok(match self.ring.and_then(Ring::wave) {
             Some(wave) => system.clone().travelling(wave).unwrap_or(system),
             None => system,
@@ -88,39 +96,40 @@ impl Model {
     }
 }
 
-/// What is wrong with the structure as a whole.
+/// Converts an error of the whole structure.
 pub(super) fn whole(error: &dyn fmt::Display) -> ModelError {
     ModelError::new(Element::Whole, "mass", error.to_string())
 }
 
-/// A model while it becomes a system.
+/// Intermediate data of the assembly.
 struct Assembler<'a> {
     model: &'a Model,
     places: Places,
     coordinates: Coordinates,
 }
 
-/// Matrices over free and then moved coordinates.
+/// Matrices over the free coordinates, followed by the moved coordinates.
 struct Matrices {
     mass: Matrix,
     damping: Matrix,
-    /// What the damping has beside that.
+    /// Damped modes, in addition to `damping`.
     modes: Option<DampedModes>,
     stiffness: Matrix,
 }
 
 impl Matrices {
-    /// An entry of all damping.
+    /// Returns an entry of the total damping.
     fn damping(&self, row: usize, column: usize) -> f64 {
         self.damping.get(row, column) + self.modes.as_ref().map_or(0.0, |modes| modes.get(row, column))
     }
 }
 
-/// Harmonics of an imposed motion.
+/// Amplitudes of an imposed motion by harmonic.
 type Harmonics = BTreeMap<u32, Complex64>;
 
 impl Assembler<'_> {
-    /// A place, or of two the difference, as a weighted sum of free and then moved coordinates.
+    /// Returns the sum of places with the given signs, as weights of the free and then the
+    /// moved coordinates.
     fn along(&self, ends: &[(End, f64)]) -> Row {
         let parts = ends.iter().flat_map(|(end, sign)| {
             let row: &[(usize, f64)] = match end {
@@ -132,7 +141,7 @@ impl Assembler<'_> {
         combined(parts.collect())
     }
 
-    /// That a spring joins rotations with each other, or displacements.
+    /// Checks that a spring connects two rotations or two displacements.
     fn alike(&self, between: &[String; 2], ends: [End; 2], element: Element) -> Result<(), ModelError> {
         let turns = ends.map(|end| self.places.is_rotation(end));
         if turns[0] == turns[1] || ends.contains(&End::Ground) {
@@ -176,7 +185,7 @@ impl Assembler<'_> {
         Ok(Matrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
     }
 
-    /// What of the matrices belongs to free coordinates.
+    /// Returns the structure of the free coordinates.
     fn structure(&self, matrices: &Matrices) -> Result<Structure, ModelError> {
         let Coordinates { free: n, moved, names, .. } = &self.coordinates;
         let block = |matrix: &Matrix| {
@@ -199,7 +208,7 @@ impl Assembler<'_> {
         })
     }
 
-    /// The places that are free to move, at which results are given.
+    /// Adds the places of results: those without imposed motion.
     fn seen(&self, mut builder: SystemBuilder) -> SystemBuilder {
         let unseen = &self.coordinates.unseen;
         for ((place, row), unseen) in self.places.stated.iter().zip(&self.coordinates.places).zip(unseen) {
@@ -215,14 +224,15 @@ impl Assembler<'_> {
         builder
     }
 
-    /// The axis along a row; what of it belongs to moved coordinates is in the second part.
+    /// Splits a row into an axis over the free coordinates and the part over the moved
+    /// coordinates.
     fn axis(&self, row: &Row) -> (Axis, Row) {
         let n = self.coordinates.free;
         let (free, moved): (Row, Row) = row.iter().partition(|(at, _)| *at < n);
         (Axis::new(free), moved.into_iter().map(|(at, weight)| (at - n, weight)).collect())
     }
 
-    /// The motion of every moved place.
+    /// Returns the motion of every moved place.
     fn motions(&self) -> Result<Vec<Harmonics>, ModelError> {
         let mut motions = vec![Harmonics::new(); self.coordinates.moved];
         for (i, motion) in self.model.motions.iter().enumerate() {
@@ -237,7 +247,7 @@ impl Assembler<'_> {
         Ok(motions)
     }
 
-    /// The forces; what of them acts on moved coordinates is given back.
+    /// Adds the forces on free coordinates and returns those on moved coordinates.
     fn forces(&self, mut builder: SystemBuilder) -> Result<(SystemBuilder, Vec<Harmonics>), ModelError> {
         let mut on_moved = vec![Harmonics::new(); self.coordinates.moved];
         for (i, force) in self.model.forces.iter().enumerate() {
@@ -261,7 +271,8 @@ impl Assembler<'_> {
         Ok((builder, on_moved))
     }
 
-    /// What moved places do to free coordinates by springs, dampers and the mass that they share.
+    /// Adds the loads of moved places on free coordinates through shared springs, dampers and
+    /// masses.
     fn loads_of_motions(
         &self,
         mut builder: SystemBuilder,
@@ -286,7 +297,7 @@ impl Assembler<'_> {
         builder
     }
 
-    /// The joints, and for every moved place its sign along each of their axes.
+    /// Adds the joints and returns, for every moved place, its sign along each of their axes.
     fn joints(
         &self,
         mut builder: SystemBuilder,
@@ -317,7 +328,7 @@ impl Assembler<'_> {
         Ok((builder, signs))
     }
 
-    /// The moved places, for the forces that move them.
+    /// Adds the moved places with the data for the forces that move them.
     fn moved(
         &self,
         mut builder: SystemBuilder,
@@ -361,7 +372,8 @@ fn finite_at_least_zero(value: f64, element: Element, key: &'static str, unit: &
     Err(ModelError::new(element, key, format!("must be a finite number, zero or more, in {unit}, found {value}")))
 }
 
-/// Amplitudes (N, m) of which energies, over their stiffness and damping, neither vanish nor overflow.
+/// Amplitudes (N, m) for which energies neither underflow nor overflow after division by
+/// stiffness or damping.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
 fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Complex64, ModelError> {
@@ -378,7 +390,7 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
     Ok(Complex64::from_polar(1.0, phase) * amplitude)
 }
 
-/// `matrix += value · row rowᵀ`
+/// Computes `matrix += value · row rowᵀ`.
 fn add_along(entries: &mut Vec<(usize, usize, f64)>, row: &Row, value: f64) {
     for &(i, a) in row {
         entries.extend(row.iter().map(|&(k, b)| (i, k, value * (a * b))));

@@ -1,8 +1,9 @@
-//! Rigid bodies: mass and moments of inertia, small rotations about the centre of mass, and points by their offset from it.
+//! Rigid bodies with small rotations about the centre of mass, and points of them by offset.
 //!
-//! A point at the offset `r` moves by `u + θ × r` (right-hand rule). Coordinates are the displacements `u` of the centre of mass, and for each principal
-//! axis `e` of the inertia the length `ρ (e · θ)` with the radius of gyration `ρ = √(J/m)`: their mass matrix is `m` times the identity, and all of them are
-//! metres.
+//! A point at the offset `r` moves by `u + θ × r` (right-hand rule). The first coordinates are
+//! the displacements `u` of the centre of mass. Each principal axis `e` of the inertia adds the
+//! length `ρ (e · θ)` with the radius of gyration `ρ = √(J/m)`. Their mass matrix is `m` times
+//! the identity, and all coordinates are in metres.
 
 use super::place::Place;
 use crate::structure::reduction::Row;
@@ -10,16 +11,19 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 use stickslip_numerics::eigen;
 
-/// Displacements of a rigid body.
+/// Directions of displacement of a rigid body.
 pub const TRANSLATIONS: [&str; 3] = ["x", "y", "z"];
-/// Its rotations about x, y and z.
+/// Rotations of a rigid body about x, y and z.
 pub const ROTATIONS: [&str; 3] = ["rx", "ry", "rz"];
 
-/// A rigid body. Its places are `name.direction`: displacements of the centre of mass in m, rotations in rad. A [`Place`] of it is a point, see
-/// [`Body::point`].
+/// A rigid body.
+///
+/// Its places are `name.direction`: displacements of the centre of mass in m, rotations in rad.
+/// A [`Place`] of a body is a point; see [`Body::point`].
 ///
 /// # Example
-/// A bar of length L on two equal springs at its ends: it heaves at √(2k/m), and pitches at √(6k/m).
+/// A bar of length L on two equal springs at its ends: it heaves at √(2k/m), and pitches at
+/// √(6k/m).
 /// ```
 /// use stickslip::model::{Body, GROUND, Model, Spring};
 /// let (mass, length, stiffness) = (3.0, 0.8, 1e4);
@@ -42,32 +46,36 @@ pub struct Body {
     pub name: String,
     /// Mass, kg.
     pub mass: f64,
-    /// Inertia matrix about the centre of mass, along x, y, z, kg m²; only the rows of its rotations count.
+    /// Inertia matrix about the centre of mass, along x, y, z, kg m². Only the rows of its
+    /// rotations matter.
     pub inertia: [[f64; 3]; 3],
     /// Its directions: some of [`TRANSLATIONS`] and [`ROTATIONS`], at least one rotation.
     pub directions: Vec<String>,
 }
 
-/// What is wrong with a body: the key, and why.
+/// A fault of a body: the key and the message.
 type Wrong = (&'static str, String);
 
 impl Body {
-    /// A body that moves along two of x, y, z and turns about the third, with its moment of inertia (kg m²) about that.
+    /// Creates a body that moves along two of x, y, z and rotates about the third axis.
+    /// `inertia` is the moment of inertia about that axis (kg m²).
     pub fn in_plane(name: impl Into<String>, mass: f64, inertia: f64, directions: [&str; 2]) -> Self {
         Body { name: name.into(), mass, inertia: diagonal([inertia; 3]), directions: with_rotations(&directions) }
     }
 
-    /// A body with all six directions and its principal moments of inertia (kg m²) about x, y, z.
+    /// Creates a body with all six directions and the principal moments of inertia (kg m²)
+    /// about x, y, z.
     pub fn in_space(name: impl Into<String>, mass: f64, inertia: [f64; 3]) -> Self {
         Body { name: name.into(), mass, inertia: diagonal(inertia), directions: with_rotations(&TRANSLATIONS) }
     }
 
-    /// The places that it makes, one for each direction.
+    /// Returns the names of its places, one per direction.
     pub fn places(&self) -> Vec<String> {
         super::place::places_of(&self.name, &self.directions)
     }
 
-    /// A point at an offset (m) from the centre of mass: a node with a displacement along each direction in which points of the body move.
+    /// Returns a point at an offset (m) from the centre of mass. The point is a node with one
+    /// displacement for each axis along which points of the body can move.
     pub fn point(&self, name: impl Into<String>, offset: [f64; 3]) -> Place {
         let axes = self.axes();
         let rows = axes.iter().map(|axis| self.row(offset, unit(*axis))).collect();
@@ -75,14 +83,16 @@ impl Body {
         Place::node(name, &names, rows).of_node(self.name.as_str())
     }
 
-    /// Which of x, y, z points of the body can move along, by number: two of a body in a plane.
+    /// Returns the axes x, y, z, by index, along which points of the body can move. A body in a
+    /// plane has two.
     pub fn axes(&self) -> Vec<usize> {
         let about = self.rotations();
         let moves = |axis: &usize| self.has(TRANSLATIONS[*axis]) || about.iter().any(|about| about != axis);
         (0..TRANSLATIONS.len()).filter(moves).collect()
     }
 
-    /// The displacement of the point at `offset` (m) along a unit vector, as a weighted sum of the body's directions, counted from 0.
+    /// Returns the displacement of the point at `offset` (m) along a unit vector, as a weighted
+    /// sum of the body's directions, counted from 0.
     pub fn row(&self, offset: [f64; 3], along: [f64; 3]) -> Row {
         let weight = |direction: &String| {
             let find = |names: [&str; 3]| names.iter().position(|name| name == direction);
@@ -96,12 +106,12 @@ impl Body {
         weights.filter(|(_, weight)| *weight != 0.0).collect()
     }
 
-    /// The axes about which it turns, by number.
+    /// Returns the axes of its rotations, by index.
     fn rotations(&self) -> Vec<usize> {
         (0..ROTATIONS.len()).filter(|axis| self.has(ROTATIONS[*axis])).collect()
     }
 
-    /// The radius of gyration of a rotation, m.
+    /// Returns the radius of gyration of a rotation, m.
     pub(super) fn radius(&self, direction: &str) -> Option<f64> {
         let axis = ROTATIONS.iter().position(|name| *name == direction)?;
         Some((self.inertia[axis][axis] / self.mass).sqrt())
@@ -111,12 +121,13 @@ impl Body {
         self.directions.iter().any(|own| own == direction)
     }
 
-    /// Whether its numbers are those of a body.
+    /// Returns whether its directions, mass and inertia are valid.
     pub fn is_sound(&self) -> bool {
         self.check().is_ok()
     }
 
-    /// What is wrong with it, if something is; names of directions that stand twice are found with those of all nodes.
+    /// Checks directions, mass and inertia. Duplicate directions are detected together with
+    /// those of all nodes.
     pub(super) fn check(&self) -> Result<(), Wrong> {
         let known = |name: &String| TRANSLATIONS.iter().chain(&ROTATIONS).any(|known| known == name);
         if let Some(other) = self.directions.iter().find(|name| !known(name)) {
@@ -161,7 +172,7 @@ impl Body {
                 "the moment of inertia about every axis must be above zero, and the smallest is {least:e} kg m^2; what has none is a [[mass]]"
             ));
         }
-        // that of typed numbers, of a few digits
+        // tolerance for typed numbers with few digits
         if let [small, middle, large] = moments[..]
             && small + middle < 0.99 * large
         {
@@ -172,7 +183,7 @@ impl Body {
         Ok(())
     }
 
-    /// The principal axes of its inertia, among the axes about which it turns.
+    /// Returns the principal axes of its inertia, within the axes of its rotations.
     pub(super) fn principal(&self) -> Vec<Principal> {
         let about = self.rotations();
         let matrix = DMatrix::from_fn(about.len(), about.len(), |i, k| self.inertia[about[i]][about[k]]);
@@ -190,7 +201,8 @@ impl Body {
         found
     }
 
-    /// A direction over the coordinates of the body, which begin at `first`: displacements in their order, then principal rotations.
+    /// Returns a direction over the coordinates of the body, which begin at `first`:
+    /// displacements in their order, then principal rotations.
     pub(super) fn coordinates(&self, direction: &str, first: usize) -> Row {
         let displacements = || self.directions.iter().filter(|name| TRANSLATIONS.contains(&name.as_str()));
         if let Some(at) = displacements().position(|name| name == direction) {
@@ -204,13 +216,14 @@ impl Body {
     }
 }
 
-/// A principal axis of an inertia, of unit length, and the moment about it, kg m².
+/// A principal axis of the inertia, of unit length, and its moment, kg m².
 pub(super) struct Principal {
     pub moment: f64,
     pub axis: [f64; 3],
 }
 
-/// The directions of a body of which no rotation is named: those that it has in its plane, or all three in space.
+/// Adds the rotations to the directions of a body if none is named: the rotation in its plane,
+/// or all three in space.
 ///
 /// # Example
 /// ```
@@ -271,7 +284,8 @@ mod tests {
         assert!(found.iter().zip(expected).all(close), "{found:?} {expected:?}");
     }
 
-    /// A bar on two springs of its ends, unsymmetric: both frequencies are roots of `det(K - ω² M)` with `K = [[k+l, (l-k)a], [(l-k)a, (k+l)a²]]`.
+    /// An unsymmetric bar on two springs at its ends. Both frequencies are roots of
+    /// `det(K - ω² M)` with `K = [[k+l, (l-k)a], [(l-k)a, (k+l)a²]]`.
     #[test]
     fn a_bar_on_two_springs_has_its_two_frequencies() {
         let (m, j, a, k, l) = (2.0, 0.3, 0.7, 1.1e4, 3.7e3);
@@ -291,7 +305,8 @@ mod tests {
         near(&frequencies(&model), &[(half - root).sqrt(), (half + root).sqrt()], 1e-13);
     }
 
-    /// `J + m d²` about the pivot, which a motion of amplitude zero holds, and a spring at the other end.
+    /// `J + m d²` about the pivot: a motion of amplitude zero fixes the pivot, and a spring
+    /// acts on the other end.
     #[test]
     fn a_pinned_bar_turns_about_its_pivot() {
         let (m, length, k) = (1.3, 0.6, 900.0);
@@ -309,14 +324,14 @@ mod tests {
         let system = model.assemble().unwrap();
         assert_eq!(system.dofs(), 1);
         assert_eq!(system.places(), ["bar.x", "bar.z", "bar.ry", "tip.x", "tip.z"]);
-        // a moment turns it by M/(k L²) at rest; its tip goes down, along -z
+        // a static moment rotates it by M/(k L²); its tip moves down, along -z
         let turned = solved(&system, 0.0);
         let ry = system.places().iter().position(|place| place == "bar.ry").unwrap();
         assert!((turned[ry] - 4.0 / (k * length * length)).abs() < 1e-15, "{turned:?}");
         assert!((turned[4] + turned[ry] * length).abs() < 1e-15 && turned[3].abs() < 1e-18);
     }
 
-    /// Places under the forces of the first harmonic at `omega`, without joints.
+    /// Returns the places under the forces of the first harmonic at `omega`, without joints.
     fn solved(system: &crate::model::System, omega: f64) -> Vec<f64> {
         let dynamic = system.structure().stiffness() - system.structure().mass() * (omega * omega);
         let force = system.loads()[0].at(omega).map(|f| f.re);
@@ -324,7 +339,7 @@ mod tests {
         system.at_places(x.as_slice())
     }
 
-    /// A cylinder that sticks where it stands moves with 3/2 of its mass.
+    /// A cylinder that rolls without slip has an effective mass of 3/2 of its mass.
     #[test]
     fn a_rolling_cylinder_has_three_halves_of_its_mass() {
         let (m, r, k) = (0.04, 3e-3, 2e4);
@@ -349,7 +364,8 @@ mod tests {
         assert_eq!(survey.free().rigid, 1, "free it turns as it likes");
     }
 
-    /// Three point masses on stiff bars come nearer to the body of the same mass and inertia as the bars become stiffer.
+    /// Three point masses on stiff bars approach the body of the same mass and inertia as the
+    /// bars become stiffer.
     #[test]
     fn point_masses_on_stiff_bars_become_the_body() {
         let (points, masses) = ([[0.0, 0.0], [0.05, 0.01], [0.02, 0.04]], [0.3, 0.2, 0.4]);
@@ -389,7 +405,8 @@ mod tests {
         assert!(soft < 1e-3 && stiff < 0.11 * soft && stiff > 0.09 * soft, "{soft} {stiff}");
     }
 
-    /// 50 random bodies on springs against `Tᵀ K T` and `diag(m, J)`, assembled here: the static and dynamic motion of a point under forces and moments.
+    /// Compares 50 random bodies on springs with `Tᵀ K T` and `diag(m, J)`, assembled here: the
+    /// static and dynamic motion of a point under forces and moments.
     #[test]
     fn random_bodies_move_as_an_independent_assembly_says() {
         for case in 0..50u64 {
@@ -401,7 +418,7 @@ mod tests {
             };
             let plane = case % 2 == 0;
             let mass = 1.0 + next().abs();
-            // a cloud of points has an inertia that a body can have
+            // a cloud of points has a physically possible inertia
             let cloud: Vec<[f64; 3]> = (0..6).map(|_| [next(), next(), next()].map(|x| 0.02 * x)).collect();
             let mut inertia = [[0.0; 3]; 3];
             for r in &cloud {
@@ -420,7 +437,7 @@ mod tests {
                 .collect();
             let (mut stiffness, mut model) = (DMatrix::<f64>::zeros(6, 6), Model::default());
             let transform = |offset: [f64; 3]| {
-                // u + θ × r, written out
+                // u + θ × r as a matrix
                 let [x, y, z] = offset;
                 nalgebra::dmatrix![1.0, 0.0, 0.0, 0.0, z, -y; 0.0, 1.0, 0.0, -z, 0.0, x; 0.0, 0.0, 1.0, y, -x, 0.0]
             };

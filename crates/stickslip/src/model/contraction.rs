@@ -1,25 +1,38 @@
-//! Whether two motions of a system can separate.
+//! Decides whether two motions of a system can move apart.
 //!
-//! Let `δ` be the difference of two motions under the same drive, and `Eⱼ` the elastic energy that joint `j` keeps of the difference of its
-//! states. Joints that are incrementally passive give no energy to the difference, `δfⱼ δuⱼ' ≥ dEⱼ/dt`, hence
+//! Let `δ` be the difference of two motions under the same excitation. Let `Eⱼ` be the elastic
+//! energy in joint `j` of the difference of its states. Joints that are incrementally passive
+//! do not supply energy to the difference: `δfⱼ δuⱼ' ≥ dEⱼ/dt`. It follows that
 //!
 //! `E = ½ δx'ᵀ M δx' + ½ δxᵀ K δx + Σ Eⱼ`,   `dE/dt ≤ -δx'ᵀ C δx' ≤ 0`.
 //!
-//! That needs `M` and `K` symmetric and positive *semi*definite, and the symmetric part of `C` positive *semi*definite; zero damping will do.
-//! As `E` is a quadratic form of small disturbances that no return increases, no Floquet multiplier lies outside the unit circle: where
-//! `E > 0` because of that, and where `E = 0` because the difference then rests. (It rests if no direction is without mass, spring and
-//! damper at once: `M + C + K` is positive definite, as it is where every place has a mass.) What `E` does not see is a displacement that no spring
-//! holds: it stays, with a multiplier of one, or drifts at the constant velocity that a disturbance gave to it. Multipliers inside the circle, so
-//! that disturbances die, need more: damping, of every motion that the joints do not damp.
+//! This requires that `M` and `K` are symmetric and positive *semi*definite, and that the
+//! symmetric part of `C` is positive *semi*definite. Zero damping is allowed.
 //!
-//! Source: Leine and van de Wouw, "Stability and Convergence of Mechanical Systems with Unilateral Constraints" (2008), Ch. 8.
+//! `E` is a quadratic form of small disturbances, and no return map increases it. Therefore no
+//! Floquet multiplier lies outside the unit circle:
+//!
+//! - Where `E > 0`, the bound on `E` excludes such a multiplier.
+//! - Where `E = 0`, the difference is at rest, provided that `M + C + K` is positive
+//!   definite. This holds if every place has a mass.
+//! - A displacement without a restoring spring does not contribute to `E`. It stays constant
+//!   with a multiplier of one, or drifts at the constant velocity of the disturbance.
+//!
+//! Multipliers inside the circle, so that disturbances decay, require damping of every motion
+//! that the joints do not damp.
+//!
+//! Source: Leine and van de Wouw, "Stability and Convergence of Mechanical Systems with
+//! Unilateral Constraints" (2008), Ch. 8.
 
 use super::System;
 
 impl System {
-    /// Whether no two motions under the same drive ever separate: masses and springs are symmetric and positive semidefinite, dampers take no
-    /// less than nothing, and every law is incrementally passive ([`crate::law::Law::is_incrementally_passive`]). Every orbit is
-    /// then stable, whatever it is and however large the system.
+    /// Returns whether no two motions under the same excitation can move apart.
+    ///
+    /// This holds if masses and springs are symmetric and positive semidefinite, dampers never
+    /// supply energy, and every law is incrementally passive
+    /// ([`crate::law::Law::is_incrementally_passive`]). Then every orbit is stable, for a
+    /// system of any size.
     ///
     /// # Example
     /// ```
@@ -36,7 +49,7 @@ impl System {
         self.has_passive_joints() && self.structure().dissipates()
     }
 
-    /// Whether no joint lets two motions under the same drive separate.
+    /// Returns whether every joint is incrementally passive.
     pub(crate) fn has_passive_joints(&self) -> bool {
         self.joints().iter().all(|joint| joint.law().is_incrementally_passive())
     }
@@ -48,7 +61,8 @@ mod tests {
     use crate::structure::Structure;
     use nalgebra::DMatrix;
 
-    /// Two masses, each on the ground, and a spring between them, each spring with its damper.
+    /// Two masses, each with a spring to the ground, and a spring between them; each spring has
+    /// a damper in parallel.
     fn system(masses: [f64; 2], springs: [f64; 3], dampers: [f64; 3]) -> System {
         let between = [["a", GROUND], ["b", GROUND], ["a", "b"]];
         let springs = between.iter().zip(springs).zip(dampers).map(|((between, stiffness), damping)| Spring {
@@ -76,7 +90,7 @@ mod tests {
         assert!(!system([1.0, 0.0], [1.0, 0.0, 0.0], zero).contracts(), "a massless place that nothing holds");
         assert!(!system(one, two, [-0.1, 1.0, 0.05]).contracts(), "a damper that gives energy");
         assert!(system(one, two, [-0.1, 1.0, 1.0]).contracts(), "others take more: 0.9 · 2 > 1");
-        // a system with other dampers and springs
+        // returns a system with changed dampers and springs
         type Change<'a> = &'a dyn Fn(&mut DMatrix<f64>);
         let with = |system: System, damping: Change, stiffness: Change| {
             let old = system.structure();

@@ -1,8 +1,12 @@
-//! The coordinates of a model, and its places as weighted sums of them.
+//! Coordinates of a model, and its places as weighted sums of them.
 //!
-//! They are those of its substructure (all its rows, or the few of its reduction), then one for each mass along each of its directions, then those of
-//! rigid bodies; of a ring those of the first sector, then those of the second, and so on. Places with an imposed motion are coordinates too: each takes the place of the one that it depends on most, so that `x = T (q, u)` with the moved
-//! displacements `u` at the end, and `Tᵀ M T` has what they share with the others.
+//! The order is: coordinates of the substructure (all its rows, or those of its reduction), one
+//! coordinate for each direction of each mass, and those of the rigid bodies. A ring has the
+//! coordinates of its first sector, then those of the second, and so on.
+//!
+//! Places with an imposed motion are coordinates too. Each replaces the coordinate on which it
+//! depends most: `x = T (q, u)` with the moved displacements `u` at the end. `Tᵀ M T` contains
+//! their coupling with the other coordinates.
 
 use super::Model;
 use super::body::Body;
@@ -19,26 +23,30 @@ use stickslip_numerics::eigen;
 
 /// Coordinates of a model.
 pub(super) struct Coordinates {
-    /// How many are free.
+    /// Number of free coordinates.
     pub free: usize,
-    /// How many are moved; they follow the free ones.
+    /// Number of moved coordinates, which follow the free ones.
     pub moved: usize,
-    /// Names of the free ones.
+    /// Names of the free coordinates.
     pub names: Vec<String>,
-    /// The stated places, over free and then moved coordinates.
+    /// The declared places, over the free and then the moved coordinates.
     pub places: Vec<Row>,
-    /// Which of them have no results, as they follow what moves a body.
+    /// Marks places without results: places of a body that follow an imposed motion of that
+    /// body.
     pub unseen: Vec<bool>,
-    /// Mass, damping and stiffness of the substructure.
+    /// Mass, damping and stiffness of the substructure and the bodies.
     pub entries: [Entries; 3],
-    /// Damping of its modes beside that, over free and then moved coordinates.
+    /// Modal damping in addition to the damping entries, over the free and then the moved
+    /// coordinates.
     pub modes: Option<DampedModes>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
-/// Places beyond which moved displacements are not kept from them: their Gram matrix would be large.
+/// Largest number of places for which [`Turned::unseen`] decouples the moved displacements. The
+/// Gram matrix of more places would be large.
 const MOST_UNSEEN: usize = 2000;
-/// A moved place that depends on the others by all but this share is no coordinate of its own.
+/// Relative tolerance: a moved place whose free part is smaller depends on other places and is
+/// not a separate coordinate.
 const DEPENDENT: f64 = 1e-10;
 
 impl Coordinates {
@@ -47,7 +55,7 @@ impl Coordinates {
         let of_disk = model.substructure.as_ref().is_some_and(|own| own.disk.is_some());
         let masses: usize = model.masses.iter().map(|mass| mass.directions.len().max(1)).sum();
         let bodies: usize = model.bodies.iter().map(|body| body.directions.len()).sum();
-        // a ring of masses and no bodies stands sector by sector as it is stated
+        // a ring of masses without matrices and bodies is already in the order of its sectors
         let ring = model.ring.filter(|ring| of_disk || whole_sectors(ring.sectors, [part.names.len(), masses, bodies]));
         let sectors = ring.map_or(1, |ring| ring.sectors);
         let [part_each, masses_each, bodies_each] = [part.names.len(), masses, bodies].map(|count| count / sectors);
@@ -66,7 +74,7 @@ impl Coordinates {
                         return Err(ModelError::new(Element::Place(index), "name", message));
                     }
                 },
-                // once the masses have theirs
+                // filled in below, after the rows of the nodes
                 Of::View(..) => Row::new(),
                 Of::Own(_) => {
                     let at = if own < masses { order.of_mass(own) } else { names.len() };
@@ -109,7 +117,7 @@ impl Coordinates {
             .map(|(place, row)| (place.name.as_str(), row))
             .collect();
         let mut turned = Turned::new(names.len(), &moved)?;
-        // points of a body are more than it has coordinates, and one that is moved moves others
+        // a body has more points than coordinates, so that a moved point moves other points
         let of_body: Vec<bool> = match model.bodies.is_empty() {
             true => vec![false; rows.len()],
             false => places.stated.iter().map(|place| model.is_of_body(&place.name)).collect(),
@@ -131,13 +139,14 @@ impl Coordinates {
         })
     }
 
-    /// The number of a stated place among those that are moved.
+    /// Returns the number of a declared place among the moved places.
     pub fn moved_number(&self, places: &Places, place: usize) -> Option<usize> {
         places.stated[place].moved.then(|| places.stated[..place].iter().filter(|place| place.moved).count())
     }
 }
 
-/// A direction of a place that is another view of a node, over the coordinates of that node.
+/// Returns one direction of a place that is a second view of a node, over the coordinates of
+/// that node.
 fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
     let of = place.of.as_deref().unwrap_or_default();
     let is_of = |name: &str| name == of || name.split_once('.').is_some_and(|(node, _)| node == of);
@@ -150,10 +159,10 @@ fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
         .collect()
 }
 
-/// Where coordinates of a substructure, of masses and of bodies stand: sector by sector.
+/// The order of the coordinates of a substructure, of masses and of bodies: sector by sector.
 struct Order {
     sectors: usize,
-    /// Coordinates of each in a sector.
+    /// Number of coordinates of the substructure in a sector.
     part: usize,
     masses: usize,
     bodies: usize,
@@ -175,12 +184,12 @@ impl Order {
     }
 }
 
-/// Whether each of these stands for as much in every sector.
+/// Returns whether each count divides into equal parts per sector.
 fn whole_sectors(sectors: usize, counts: [usize; 3]) -> bool {
     counts.iter().all(|count| count.is_multiple_of(sectors))
 }
 
-/// Where the coordinates of every body begin.
+/// Index of the first coordinate of every body.
 struct Bodies {
     first: Vec<usize>,
 }
@@ -196,15 +205,18 @@ impl Bodies {
         Bodies { first: model.bodies.iter().map(first).collect() }
     }
 
-    /// Their mass: every coordinate of a body has its mass, as rotations count by the radius of gyration.
+    /// Returns their mass entries. Every coordinate of a body has the mass of the body, because
+    /// rotations are scaled by the radius of gyration.
     fn mass(&self, model: &Model) -> Entries {
         let bodies = model.bodies.iter().zip(&self.first);
         bodies.flat_map(|(body, first)| (*first..first + body.directions.len()).map(|at| (at, at, body.mass))).collect()
     }
 }
 
-/// Refuses places that follow moved ones whatever the structure does: results are read off the free coordinates alone. Those of bodies have no
-/// results instead; where what moves them stands still they have.
+/// Rejects places that follow moved places for any deformation of the structure.
+///
+/// Results come from the free coordinates alone. Places of moved bodies are not rejected. They
+/// are marked as places without results if their imposed motion is not zero.
 fn follows(
     model: &Model,
     places: &Places,
@@ -234,17 +246,17 @@ fn follows(
     Ok(unseen)
 }
 
-/// `x = T (q, u)`: coordinates of which some have given way to moved displacements.
+/// The transformation `x = T (q, u)`, in which moved displacements replace some coordinates.
 struct Turned {
     free: usize,
-    /// Which coordinates have given way.
+    /// Marks the replaced coordinates.
     pivot: Vec<bool>,
     rows: Vec<Row>,
 }
 
 impl Turned {
     fn new(count: usize, moved: &[(&str, &Row)]) -> Result<Self, ModelError> {
-        // x_p = Σ a x + Σ b u of every coordinate that gave way; u counts from `count`
+        // x_p = Σ a x + Σ b u for every replaced coordinate; the indices of u begin at `count`
         let mut given: BTreeMap<usize, Row> = BTreeMap::new();
         for (k, (name, row)) in moved.iter().enumerate() {
             let row = combined(substituted(row, &given));
@@ -278,9 +290,13 @@ impl Turned {
         Ok(Turned { free, rows: (0..count).map(row).collect(), pivot })
     }
 
-    /// Chooses what the coordinates do with a moved displacement so that none of these places, over free and moved coordinates, sees it directly: in few
-    /// coordinates all places would, as none of them is a coordinate. `x = Z q + t u` is the same structure for every `t` that moves the moved place by
-    /// one, and that with the least norm and no motion of the others is taken. Where there is none the places stay as they are.
+    /// Changes the transformation so that none of the places `others` depends directly on a
+    /// moved displacement.
+    ///
+    /// In a reduced model all places would depend on it, because none of them is a coordinate.
+    /// `x = Z q + t u` describes the same structure for every `t` that moves the moved place by
+    /// one. This function takes the `t` of the least norm that does not move the other places.
+    /// The places stay unchanged if no such `t` exists.
     fn unseen(&mut self, others: &[Row]) {
         let size = |row: &Row| row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
         let moved = self.rows.iter().flatten().map(|(at, _)| (at + 1).saturating_sub(self.free)).max().unwrap_or(0);
@@ -315,13 +331,13 @@ impl Turned {
         }
     }
 
-    /// A weighted sum of the coordinates over free and then moved ones.
+    /// Transforms a weighted sum of the coordinates to the free and then the moved coordinates.
     fn row(&self, row: &Row) -> Row {
         let parts = row.iter().flat_map(|(at, weight)| self.rows[*at].iter().map(move |(to, w)| (*to, weight * w)));
         combined(parts.collect())
     }
 
-    /// `Tᵀ A T`.
+    /// Returns `Tᵀ A T`.
     fn entries(&self, entries: Entries) -> Entries {
         if !self.pivot.contains(&true) {
             return entries;
@@ -335,7 +351,7 @@ impl Turned {
         out
     }
 
-    /// `Tᵀ U`.
+    /// Returns `Tᵀ U`.
     fn modes(&self, modes: &DampedModes, moved: usize) -> DampedModes {
         let n = self.free + moved;
         let mut columns = vec![0.0; modes.iter().count() * n];
@@ -348,7 +364,7 @@ impl Turned {
     }
 }
 
-/// A row in which coordinates that gave way are replaced.
+/// Returns a row in which the replaced coordinates are substituted.
 fn substituted(row: &Row, given: &BTreeMap<usize, Row>) -> Row {
     let mut out = Row::new();
     for &(at, weight) in row {
@@ -360,7 +376,7 @@ fn substituted(row: &Row, given: &BTreeMap<usize, Row>) -> Row {
     out
 }
 
-/// The same sum with every coordinate once, in the order in which they first stand there.
+/// Returns the same sum with every coordinate once, in the order of first occurrence.
 pub(super) fn combined(row: Row) -> Row {
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
     let mut out: Row = Vec::with_capacity(row.len());

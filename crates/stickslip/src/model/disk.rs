@@ -1,7 +1,8 @@
-//! Bladed disks: a model of one sector becomes that of the ring.
+//! Bladed disks: builds the model of the ring from the model of one sector.
 //!
-//! Sectors count from 0; what is called `blade` in a sector is `blade_0`, `blade_1` … in the ring, and `next.blade` the one of the sector after.
-//! The last sector's next is the first.
+//! Sectors count from 0. The name `blade` in a sector becomes `blade_0`, `blade_1` … in the
+//! ring. `next.blade` is the blade of the next sector; the next sector of the last one is the
+//! first.
 
 use super::{Cyclic, Element, GROUND, Model, ModelError};
 use serde::Serialize;
@@ -9,40 +10,42 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use stickslip_numerics::random::Stream;
 
-/// What stands before a place of the next sector.
+/// Prefix of a place in the next sector.
 pub const NEXT: &str = "next.";
-/// Sectors of a disk, at least: with one, a sector would be its own neighbour.
+/// Smallest number of sectors of a disk: a single sector would be adjacent to itself.
 pub const LEAST_SECTORS: usize = 2;
 
-/// How a force, or an imposed motion, is distributed over the sectors.
+/// The distribution of a force or an imposed motion over the sectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Around {
-    /// Sector n leads by `2π order n / sectors`: a wave that travels, the other way if the order is negative.
+    /// Sector n leads by `2π order n / sectors`: a travelling wave. A negative order reverses
+    /// the direction.
     EngineOrder(i64),
-    /// Sector n has the share `cos(2π diameter n / sectors)`: a wave that stands.
+    /// Sector n has the fraction `cos(2π diameter n / sectors)`: a standing wave.
     NodalDiameter(i64),
-    /// On one sector alone.
+    /// Excitation of one sector only.
     Sector(usize),
 }
 
 impl Around {
-    /// Share of the amplitude and phase lead (rad) in a sector.
+    /// Returns the fraction of the amplitude and the phase lead (rad) in a sector.
     fn at(self, sector: usize, sectors: usize) -> (f64, f64) {
         let phase = |order: i64| crate::structure::turn(turns(order, sector, sectors), sectors);
         match self {
-            // from whole turns less, so that orders that are the same on this disk have the same bits
+            // without whole turns, so that equivalent orders give identical bits
             Around::EngineOrder(order) => (1.0, TAU * turns(order, sector, sectors) as f64 / sectors as f64),
             Around::NodalDiameter(diameter) => (phase(diameter).re, 0.0),
             Around::Sector(one) => (if one == sector { 1.0 } else { 0.0 }, 0.0),
         }
     }
 
-    /// The wave that it is, if it travels: its order from 0 to the number of sectors.
+    /// Returns the order of the wave, from 0 to the number of sectors, if it travels.
     fn order(self, sectors: usize) -> Option<usize> {
         match self {
             Around::EngineOrder(order) => Some(turns(order, 1, sectors) as usize),
-            // all sectors alike, or each against its neighbours, is a wave that does both
+            // a wave with all sectors in phase, or with opposite adjacent sectors, both stands
+            // and travels
             Around::NodalDiameter(diameter) => {
                 let order = turns(diameter, 1, sectors) as usize;
                 (2 * order).is_multiple_of(sectors).then_some(order)
@@ -52,47 +55,51 @@ impl Around {
     }
 }
 
-/// `order · sector` without whole turns.
+/// Returns `order · sector` without whole turns.
 fn turns(order: i64, sector: usize, sectors: usize) -> i64 {
     let sectors = sectors as i64;
     (order.rem_euclid(sectors) * sector as i64).rem_euclid(sectors)
 }
 
-/// The ring that sectors make.
+/// A ring of sectors and the distribution of its excitation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Disk {
     /// Number of sectors.
     pub sectors: usize,
-    /// Of every force of the sector; engine order 0 where there is none.
+    /// Distribution of each force of the sector; engine order 0 if missing.
     pub forces: Vec<Around>,
-    /// Of every imposed motion.
+    /// Distribution of each imposed motion of the sector; engine order 0 if missing.
     pub motions: Vec<Around>,
 }
 
-/// What a model of a ring knows beside its elements: they stand sector by sector, each list as long in every one.
+/// Layout of a ring's model: elements are stored sector by sector, with equally long lists per
+/// sector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Ring {
     /// Number of sectors.
     pub sectors: usize,
-    /// Whether all sectors are equal.
+    /// True if all sectors are equal.
     pub equal: bool,
-    /// Where they are and the excitation travels: sector n moves as the first one, earlier by `order n / sectors` of a period.
-    /// Harmonic h of the motion then has the nodal diameter `h order`.
+    /// Order of the travelling excitation of equal sectors. Sector n repeats the motion of the
+    /// first one, earlier by `order n / sectors` of a period. Harmonic h of the motion then has
+    /// the nodal diameter `h order`.
     pub order: Option<usize>,
 }
 
 impl Disk {
-    /// The ring of sectors that `sector` states, each with the same elements and its own numbers.
+    /// Builds the ring from the sectors that `sector` returns. All sectors have the same
+    /// elements, with different values.
     ///
     /// # Errors
-    /// [`ModelError`], with the element of the sector: a place that the sector does not have, fewer than two sectors, a force on a sector
-    /// that does not exist.
+    /// [`ModelError`], with the element of the sector: a place that the sector does not have,
+    /// fewer than two sectors, a force on a sector that does not exist.
     ///
     /// # Panics
-    /// If the sectors have not the same elements.
+    /// If the numbers of elements differ between the sectors.
     ///
     /// # Example
-    /// Blades with springs between them, an engine order of 3 on 24 sectors: one wave with 3 nodal diameters.
+    /// Blades with springs between them, an engine order of 3 on 24 sectors: one wave with 3
+    /// nodal diameters.
     /// ```
     /// use stickslip::model::{Around, Disk};
     /// use stickslip::{Force, GROUND, Mass, Model, Spring};
@@ -160,7 +167,8 @@ impl Disk {
         Ok(model)
     }
 
-    /// The order of the wave that all excitation of equal sectors makes: `harmonic · order` is the engine order of each, up to whole turns.
+    /// Returns the order of the wave that the complete excitation of equal sectors forms.
+    /// `harmonic · order` is the engine order of each part, up to whole turns.
     fn order(&self, sector: &Model) -> Option<usize> {
         let forces =
             sector.forces.iter().zip(spread(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
@@ -182,7 +190,7 @@ impl Disk {
         })
     }
 
-    /// What a place of the sector is called in sector number `s`.
+    /// Returns the name in the ring for a place name in sector `s`.
     fn name(&self, name: &str, s: usize) -> String {
         let (name, s) = match name.strip_prefix(NEXT) {
             Some(name) => (name, (s + 1) % self.sectors),
@@ -195,7 +203,7 @@ impl Disk {
         }
     }
 
-    /// Whether the names of a sector lead somewhere. What else is wrong is found where the ring is assembled.
+    /// Checks the names of a sector. The assembly of the ring finds other errors.
     fn check(&self, sector: &Model) -> Result<(), ModelError> {
         let refuse = |element, key, message: String| Err(ModelError::new(element, key, message));
         if self.sectors < LEAST_SECTORS {
@@ -261,7 +269,9 @@ impl Disk {
     }
 }
 
-/// What is wrong with deviations of sectors, shares of one, of which one is as large as what it changes: nothing would be left, or percents were meant.
+/// Returns a message if a relative deviation of a sector is -1 or less, or 1 or more.
+///
+/// Such a deviation leaves no mass or stiffness, or it was meant in percent.
 ///
 /// # Example
 /// ```
@@ -275,8 +285,11 @@ pub fn too_far(deviations: &[f64]) -> Option<String> {
     nothing.or_else(|| first(|deviation| deviation >= 1.0).map(said))
 }
 
-/// Deviations of sectors: normal with mean 0 and this standard deviation, decided by the seed, the same bits on every machine. Seeds are samples of
-/// the same distribution, and a longer pattern begins with the shorter one.
+/// Returns normally distributed deviations of sectors with mean 0 and the given standard
+/// deviation.
+///
+/// The seed determines the same bits on every machine. Different seeds are samples of the same
+/// distribution. A longer pattern begins with the shorter one.
 ///
 /// # Example
 /// ```
@@ -288,21 +301,21 @@ pub fn normal_pattern(sectors: usize, deviation: f64, seed: u64) -> Vec<f64> {
     (0..sectors as u64).map(|sector| deviation * stream.normal(sector)).collect()
 }
 
-/// What of a sector deviates, where no two are alike.
+/// The property of a sector that deviates in a mistuned disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mistuned {
-    /// The mass of this name.
+    /// The mass with this name.
     Mass(String),
     /// The stiffness of the springs between these two places.
     Spring([String; 2]),
-    /// The stiffness of the blade of a sector by its matrices.
+    /// The stiffness of the blade, in a sector given by matrices.
     BladeStiffness,
-    /// All cantilever frequencies of that blade, each by the same share.
+    /// All cantilever frequencies of that blade, with the same relative deviation.
     BladeFrequency,
 }
 
 impl Mistuned {
-    /// The sector of which this is `1 + deviation` times as large.
+    /// Returns the sector with this property multiplied by `1 + deviation`.
     ///
     /// # Example
     /// ```
@@ -324,7 +337,7 @@ impl Mistuned {
                 return model;
             }
             Mistuned::BladeStiffness => deviation,
-            // the square of the frequency
+            // stiffness changes with the square of the frequency
             Mistuned::BladeFrequency => deviation * (2.0 + deviation),
         };
         if let Some(disk) = model.substructure.as_mut().and_then(|own| own.disk.as_mut()) {
@@ -333,7 +346,7 @@ impl Mistuned {
         model
     }
 
-    /// Whether the sector has it.
+    /// Returns whether the sector has this property.
     pub fn is_in(&self, sector: &Model) -> bool {
         match self {
             Mistuned::Mass(name) => sector.masses.iter().any(|mass| mass.name == *name),
@@ -350,18 +363,19 @@ fn joins([a, b]: &[String; 2], [c, d]: &[String; 2]) -> bool {
     (a, b) == (c, d) || (a, b) == (d, c)
 }
 
-/// Of every element, all alike where nothing is said.
+/// Extends the list with engine order 0 for all further elements.
 fn spread(stated: &[Around]) -> impl Iterator<Item = Around> {
     stated.iter().copied().chain(std::iter::repeat(Around::EngineOrder(0)))
 }
 
 impl Ring {
-    /// The wave that travels around it.
+    /// Returns the wave that travels around the ring.
     pub(super) fn wave(self) -> Option<Cyclic> {
         self.order.map(|order| Cyclic { sectors: self.sectors, order })
     }
 
-    /// The element of the sector that an element of the ring's model `model` comes from.
+    /// Returns the element of the sector that corresponds to an element of the ring's model
+    /// `model`.
     pub fn in_sector(self, element: Element, model: &Model) -> Element {
         let own = |index: usize, all: usize| index % (all / self.sectors.max(1)).max(1);
         match element {
@@ -419,7 +433,7 @@ mod tests {
         assert_eq!(element, Element::Spring(1));
     }
 
-    /// Engine orders that differ by whole turns are one excitation, to the last bit.
+    /// Engine orders that differ by whole turns give the same excitation, to the last bit.
     #[test]
     fn orders_alias() {
         for (a, b) in [(3, 27), (3, -21), (-3, 21), (0, 24), (12, -12)] {
@@ -428,7 +442,7 @@ mod tests {
         }
     }
 
-    /// A wave is solved on one sector only if every excitation travels with it.
+    /// One sector is solved only if the complete excitation travels with the wave.
     #[test]
     fn which_waves_travel() {
         let order = |forces: &[(u32, Around)], sectors: usize| {
@@ -446,7 +460,7 @@ mod tests {
         assert_eq!(order(&[(0, EngineOrder(3))], 24), None, "a constant load that differs from blade to blade");
         assert_eq!(order(&[(2, EngineOrder(3)), (4, EngineOrder(6))], 24), None, "no wave has half a diameter");
         assert_eq!(order(&[(2, EngineOrder(3))], 7), Some(5), "2 · 5 = 3 + 7");
-        // the drive is the speed of the rotor
+        // the excitation frequency is the speed of the rotor
         assert_eq!(order(&[(3, EngineOrder(3)), (5, EngineOrder(5))], 24), Some(1));
         assert_eq!(order(&[(1, EngineOrder(3)), (1, EngineOrder(4))], 24), None);
         assert_eq!(order(&[(1, NodalDiameter(3))], 24), None);

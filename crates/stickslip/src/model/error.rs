@@ -1,11 +1,11 @@
-//! Why a model is refused.
+//! Errors of an invalid model.
 
 use super::{Model, Spring};
 use std::fmt;
 
-/// The element of a model that an error is about.
+/// The element of a model that an error concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs)] // index into the list of the model that has the same name
+#[allow(missing_docs)] // index into the list of the same name in the model
 pub enum Element {
     Mass(usize),
     Body(usize),
@@ -19,7 +19,8 @@ pub enum Element {
 }
 
 impl Element {
-    /// The list of the model that it stands in, as in study files, and its place in that; `None` where there is but one.
+    /// Returns the name of the element's list, as in study files, and the index in that list.
+    /// The index is `None` for elements that exist only once.
     pub fn entry(self) -> (&'static str, Option<usize>) {
         match self {
             Element::Mass(i) => ("mass", Some(i)),
@@ -34,7 +35,8 @@ impl Element {
         }
     }
 
-    /// What it is called in a model, for messages: by its name, or by the places that it acts on.
+    /// Returns the name of the element for messages: its own name, or the places on which it
+    /// acts.
     ///
     /// # Example
     /// ```
@@ -69,17 +71,17 @@ impl fmt::Display for Element {
     }
 }
 
-/// Why a model is refused: which element, which key of it, what is wrong.
+/// The reason why a model is invalid: the element, its key and the fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{element}, `{key}`: {message}")]
 pub struct ModelError {
     /// The element.
     pub element: Element,
-    /// Its key (as in the study file).
+    /// Its key, as in the study file.
     pub key: &'static str,
-    /// What is wrong and what was expected.
+    /// The fault and the expected value.
     pub message: String,
-    /// The name that was probably meant, if there is one like it.
+    /// A name that does not exist, for which a caller can suggest a similar one.
     pub wrong_name: Option<String>,
 }
 

@@ -1,7 +1,9 @@
-//! Two models to try things on, built by calls: blade couples of Pust, Pesek, Radolfova (2015), Sec. 4.
+//! Two example models, built by calls: the blade couples of Pust, Pesek, Radolfova (2015),
+//! Sec. 4.
 //!
-//! Values in SI: blades of 0.182 kg on springs of 105103 N/m with dampers of 0.2 kg/s, a contact stiffness of 1e4
-//! N/m, a slip limit of 2 N, a force of 10 N on blade 1. Alone, a blade has its resonance at 121.25 Hz.
+//! Values in SI: blades of 0.182 kg on springs of 105103 N/m with dampers of 0.2 kg/s. The contact
+//! stiffness is 1e4 N/m and the slip limit 2 N. A force of 10 N acts on blade 1. A single blade
+//! has its resonance at 121.25 Hz.
 
 use super::{Force, GROUND, Joint, Mass, Model, Spring};
 use crate::law::{Coulomb, Jenkins, SharedLaw};
@@ -16,8 +18,8 @@ const STIFFNESS: f64 = 1e4;
 /// Slip limit, N.
 const LIMIT: f64 = 2.0;
 
-/// Two blades with friction between the first and a small contact mass, which a spring ties to the other: Fig. 5b,
-/// Eqs. (3)-(4).
+/// Returns two blades with friction between the first blade and a small contact mass. A spring
+/// connects the contact mass to the second blade: Fig. 5b, Eqs. (3)-(4).
 ///
 /// # Example
 /// ```
@@ -36,7 +38,8 @@ pub fn blade_couple() -> Model {
     model
 }
 
-/// The same without the contact mass: a spring in series with a slider joins the blades.
+/// Returns the couple without the contact mass: a spring in series with a slider connects the
+/// blades.
 ///
 /// # Example
 /// ```
@@ -57,7 +60,7 @@ fn shroud(other: &str, law: SharedLaw) -> Joint {
     Joint { name: "shroud".to_owned(), between: between("blade1", other), law }
 }
 
-/// Two blades that do not touch, the first of them driven.
+/// Returns two blades without contact; a force acts on the first blade.
 fn blades(mass: f64) -> Model {
     let names = ["blade1", "blade3"];
     Model {

@@ -1,22 +1,28 @@
-//! The line along which an axis moves: which axes have one relative motion, but for a factor and a constant.
+//! Detects axes with proportional relative motion.
+//!
+//! Two axes lie on one line if their relative motions differ only by a factor and a constant.
 
 use super::Axis;
 use num_complex::Complex64;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-/// Directions and imposed motions are parallel within this fraction of their largest entry: what the few roundings by which a direction is made
-/// leave. Directions farther apart are different ones.
+/// Relative tolerance for parallel directions and imposed motions, as a fraction of the largest
+/// entry.
+///
+/// It covers the few rounding errors in the construction of a direction. Directions with a
+/// larger difference count as different.
 pub(crate) const PARALLEL: f64 = 64.0 * f64::EPSILON;
 
-/// An axis that can be held against others.
+/// An axis in a form that can be compared with other axes.
 #[derive(Debug, Clone)]
 pub(crate) struct Line {
-    /// Degrees of freedom with their weights, rising, each once.
+    /// Degrees of freedom with their weights, sorted; each degree of freedom occurs once.
     rows: Vec<(usize, f64)>,
-    /// The one of the largest weight.
+    /// The entry with the largest absolute weight.
     lead: Option<(usize, f64)>,
-    /// Imposed motion without its mean, by harmonic: a constant offset changes nothing for what asks for velocities alone.
+    /// Imposed motion by harmonic, without its mean. Only the velocity matters, and a constant
+    /// offset does not change it.
     imposed: Vec<(u32, Complex64)>,
 }
 
@@ -29,12 +35,13 @@ impl Line {
         Line { rows, lead, imposed: axis.imposed().iter().copied().filter(|(h, _)| *h > 0).collect() }
     }
 
-    /// The factor by which the velocity along this one is that along `other` at all times, if there is one.
+    /// Returns the factor `velocity along self = factor · velocity along other`, if one factor
+    /// holds at all times.
     pub fn along(&self, other: &Line) -> Option<f64> {
         let (lead, weight) = other.lead?;
         let factor = self.weight(lead) / weight;
         if !factor.is_finite() || factor == 0.0 {
-            return None; // across, or nothing but imposed motion moves one of them
+            return None; // the axes are orthogonal, or only imposed motion moves one of them
         }
         let near = PARALLEL * self.lead.map_or(0.0, |(_, weight)| weight.abs());
         let parallel = both(&self.rows, &other.rows).all(|(own, its)| (own - factor * its).abs() <= near);
@@ -48,7 +55,8 @@ impl Line {
     }
 }
 
-/// Values of two lists that rise in their keys, side by side; zero where one has none.
+/// Pairs the values of two lists with sorted keys. A key that one list lacks counts as zero
+/// there.
 fn both<'a, K: Ord, T: Copy + Default>(one: &'a [(K, T)], other: &'a [(K, T)]) -> impl Iterator<Item = (T, T)> + 'a {
     let (mut one, mut other) = (one.iter().peekable(), other.iter().peekable());
     std::iter::from_fn(move || {
@@ -83,7 +91,7 @@ mod tests {
         {
             assert_eq!((factor(&first, &other), factor(&other, &first)), (None, None), "{other:?}");
         }
-        // what roundings leave of a direction
+        // rounding errors in a direction
         let near = axis(&[(0, 0.1 + 0.2), (3, -0.3)]);
         assert!((factor(&near, &first).unwrap() - 0.3).abs() < 1e-15);
     }
@@ -97,7 +105,7 @@ mod tests {
         for imposed in [vec![], vec![(1, g)], vec![(1, g * -2.0), (3, g)]] {
             assert_eq!(factor(&axis(-2.0, imposed), &first), None);
         }
-        // motion that nothing but an imposed one makes has no direction
+        // an axis with imposed motion alone has no direction
         let moved = |rows| Axis::new(rows).moved([(1, g)]);
         assert_eq!(factor(&moved(vec![]), &moved(vec![])), None);
     }

@@ -1,6 +1,8 @@
-//! What the user states: a structure by its matrices and its places, masses, rigid bodies, springs, joints, forces, imposed motions.
+//! The model as the user defines it: matrices, places, masses, bodies, springs, joints,
+//! excitation.
 //!
-//! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and turns it into a [`System`] of matrices.
+//! A [`Model`] is plain data in SI units. [`Model::assemble`] checks it and converts it into a
+//! [`System`] of matrices.
 
 mod assemble;
 mod body;
@@ -33,50 +35,52 @@ use serde::{Serialize, Serializer};
 /// Name of the fixed frame.
 pub const GROUND: &str = "ground";
 
-/// A structure with joints and its excitation, as stated by the user; all values SI.
+/// A structure with joints and its excitation; all values in SI units.
 ///
-/// A place is a mass, a direction of one (`name.direction`), [`GROUND`], or a place that is moved (see [`Motion`]).
+/// A place is a mass, a direction of a mass (`name.direction`), [`GROUND`], or a place with an
+/// imposed motion (see [`Motion`]).
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Model {
-    /// A structure by its matrices; all else may be added to it at its places.
+    /// A structure given by its matrices. Other elements attach to it at its places.
     pub substructure: Option<Substructure>,
     /// Places of the substructure.
     pub places: Vec<Place>,
-    /// Point masses; each is one degree of freedom.
+    /// Point masses. Each mass has one degree of freedom per direction.
     pub masses: Vec<Mass>,
-    /// Rigid bodies, which turn as well.
+    /// Rigid bodies, with translations and rotations.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<Body>,
     /// Springs and dampers.
     pub springs: Vec<Spring>,
-    /// Places that rub.
+    /// Joints between places that touch or rub.
     pub joints: Vec<Joint>,
     /// Forces, harmonic in time.
     pub forces: Vec<Force>,
     /// Imposed motions, harmonic in time.
     pub motions: Vec<Motion>,
-    /// If it is the ring of a [`Disk`]: how its elements stand.
+    /// Layout of the elements if the model is the ring of a [`Disk`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ring: Option<Ring>,
 }
 
-/// A structure by its matrices, as a part of a model.
+/// A structure given by its matrices, as a part of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Substructure {
     /// The matrices.
     pub component: Component,
     /// Its damping.
     pub damping: SubstructureDamping,
-    /// How it is brought into few coordinates.
+    /// Reduction of the component to fewer coordinates.
     pub reduction: Reduction,
-    /// Where its matrices are themselves those of a reduction: what that one left out.
+    /// Error of an earlier reduction, if the matrices themselves come from a reduced model.
     pub earlier: Option<ReductionEvidence>,
-    /// If it is a sector of a [`Disk`]: how it goes on.
+    /// Coupling to the next sector, if the structure is a sector of a [`Disk`].
     pub disk: Option<DiskPart>,
 }
 
 impl Substructure {
-    /// The same structure, with the same damping, in as many coordinates as it takes to reach `times` as far as `few` of it do.
+    /// Returns this structure with the same damping and a reduction that is accurate to a
+    /// higher frequency: `times` the range of the reduced component `few`.
     #[must_use]
     pub fn farther(&self, few: &ReducedComponent, times: f64) -> Substructure {
         let (tolerance, kind) = match self.reduction {
@@ -92,60 +96,62 @@ impl Substructure {
     }
 }
 
-/// How far a structure in few coordinates is from the whole.
+/// Error of a reduced model relative to the full structure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReductionEvidence {
-    /// The largest relative error of what is seen.
+    /// Largest relative error at the observed places.
     pub error: f64,
-    /// The error holds up to there, rad/s.
+    /// Upper end of the frequency range in which the error holds, rad/s.
     pub up_to: f64,
 }
 
 impl ReductionEvidence {
-    /// Of one reduction and another of its result: small relative errors add.
+    /// Combines the errors of two successive reductions: small relative errors add.
     #[must_use]
     pub fn then(self, next: ReductionEvidence) -> ReductionEvidence {
         ReductionEvidence { error: self.error + next.error, up_to: self.up_to.min(next.up_to) }
     }
 }
 
-/// A structure by its matrices as a sector of a disk.
+/// Data of a structure that is one sector of a disk.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskPart {
-    /// How it is tied to the next sector.
+    /// Coupling to the next sector.
     pub boundary: Boundary,
-    /// Rows of the matrices that belong to the blade; none if the blades do not differ.
+    /// Rows of the matrices that belong to the blade. Empty if all blades are equal.
     pub blade: Vec<usize>,
-    /// Deviation of the blade's stiffness, relative: that of this sector, and of a ring those of all sectors. None if they do not differ.
+    /// Relative deviations of the blade stiffness. A sector has one entry, a ring has one entry
+    /// per sector; empty if all blades are equal.
     pub deviations: Vec<f64>,
 }
 
 /// Damping of a substructure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SubstructureDamping {
-    /// That of the component's own matrix; none if it has none.
+    /// The damping matrix of the component, or no damping if the component has no damping
+    /// matrix.
     Own,
-    /// Every mode up to the frequency of interest has this share of critical damping; what lies above is damped in proportion to its
-    /// stiffness.
+    /// Each mode up to the frequency of interest has this fraction of critical damping. Motion
+    /// above that frequency is damped in proportion to its stiffness.
     Ratio(f64),
-    /// The same up to a frequency that is stated, whatever the reduction reaches.
+    /// Like `Ratio`, up to a given frequency that does not depend on the reduction.
     RatioUpTo {
-        /// Share of critical damping.
+        /// Fraction of critical damping.
         ratio: f64,
-        /// rad/s.
+        /// Highest frequency with this ratio, rad/s.
         up_to: f64,
     },
-    /// `C = mass M + stiffness K`, 1/s and s.
+    /// `C = mass M + stiffness K`.
     Rayleigh {
-        /// 1/s.
+        /// Factor of the mass matrix, 1/s.
         mass: f64,
-        /// s.
+        /// Factor of the stiffness matrix, s.
         stiffness: f64,
     },
 }
 
 impl Serialize for Substructure {
-    /// What it is, without its matrices.
+    /// Serializes the settings and the sizes of the matrices, not the matrices.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let (mass, _, stiffness) = self.component.matrices();
         let fields = 5 + usize::from(self.earlier.is_some());
@@ -162,24 +168,28 @@ impl Serialize for Substructure {
     }
 }
 
-/// A point mass. It has one displacement and is a place, or several, and then is a node with a place `name.direction` for each.
+/// A point mass.
+///
+/// A mass with one displacement is a place. A mass with several directions is a node, with one
+/// place `name.direction` per direction.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mass {
     /// Identifier.
     pub name: String,
     /// Mass, kg.
     pub mass: f64,
-    /// Its directions if it is a node, at most three, in the order in which laws take them; a normal is the last.
+    /// Directions of a node, at most three, in the order that laws expect; a normal comes last.
+    /// Empty for a mass with one displacement.
     pub directions: Vec<String>,
 }
 
 impl Mass {
-    /// A mass with one displacement.
+    /// Creates a mass with one displacement.
     pub fn new(name: impl Into<String>, mass: f64) -> Self {
         Mass { name: name.into(), mass, directions: Vec::new() }
     }
 
-    /// The same mass free to move along several directions.
+    /// Returns this mass with several directions of motion.
     #[must_use]
     pub fn along(mut self, directions: &[&str]) -> Self {
         self.directions = directions.iter().map(|&along| along.to_owned()).collect();
@@ -190,7 +200,7 @@ impl Mass {
 /// A spring, with a viscous damper in parallel to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spring {
-    /// The two places it joins.
+    /// The two places that it connects.
     pub between: [String; 2],
     /// Stiffness, N/m; between rotations N m/rad.
     pub stiffness: f64,
@@ -198,8 +208,10 @@ pub struct Spring {
     pub damping: f64,
 }
 
-/// Two places or nodes that rub or touch: along each direction `u` is the displacement of the first minus that of the second, and the law's force `f` acts on the
-/// first as `-f`, on the second as `+f`.
+/// A joint between two places or nodes.
+///
+/// Along each direction, `u` is the displacement of the first place minus that of the second.
+/// The force `f` of the law acts as `-f` on the first place and as `+f` on the second.
 #[derive(Debug, Clone, Serialize)]
 pub struct Joint {
     /// Identifier.
@@ -216,29 +228,31 @@ impl PartialEq for Joint {
     }
 }
 
-/// A force `amplitude · cos(harmonic · Ω t + phase)`; a harmonic 0 makes it constant.
+/// A force `amplitude · cos(harmonic · Ω t + phase)`. Harmonic 0 is a constant force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Force {
-    /// The mass it acts on.
+    /// The place on which it acts.
     pub on: String,
-    /// Amplitude, N; of a moment, on a rotation, N m.
+    /// Amplitude, N; for a moment on a rotation, N m.
     pub amplitude: f64,
     /// Phase lead, rad.
     pub phase: f64,
-    /// Multiple of the drive frequency.
+    /// Multiple of the excitation frequency.
     pub harmonic: u32,
 }
 
-/// An imposed motion `amplitude · cos(harmonic · Ω t + phase)` of a place. The place is either one that exists only by this
-/// motion, or a mass, which then is no degree of freedom any more. Several motions of one place add up.
+/// An imposed motion `amplitude · cos(harmonic · Ω t + phase)` of a place.
+///
+/// The place either exists only because of this motion, or it is a mass, which then is no
+/// longer a degree of freedom. Several motions of one place add up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Motion {
-    /// The place that is moved.
+    /// The place that moves.
     pub on: String,
-    /// Amplitude, m; of a rotation rad.
+    /// Amplitude, m; for a rotation, rad.
     pub amplitude: f64,
     /// Phase lead, rad.
     pub phase: f64,
-    /// Multiple of the drive frequency.
+    /// Multiple of the excitation frequency.
     pub harmonic: u32,
 }

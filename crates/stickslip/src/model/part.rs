@@ -1,4 +1,6 @@
-//! A structure by its matrices, as a part of a model: its coordinates, its matrices over them, and its places; of a disk those of all sectors.
+//! A matrix structure as a part of a model: its coordinates, matrices and places.
+//!
+//! For a disk, they cover all sectors.
 
 use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Substructure, SubstructureDamping};
@@ -9,18 +11,19 @@ use crate::structure::{
 use std::sync::Arc;
 use stickslip_numerics::sparse::ModesError;
 
-/// Row, column, value.
+/// Entries of a matrix: (row, column, value).
 pub(super) type Entries = Vec<(usize, usize, f64)>;
 
-/// The substructure in coordinates of its own; of a ring those of all sectors, one after the other.
+/// The substructure in its own coordinates. For a ring, the coordinates of all sectors, one
+/// sector after the other.
 #[derive(Default)]
 pub(super) struct Part {
     pub names: Vec<String>,
-    /// For each place of the model, each of its directions.
+    /// Rows for each place of the model and each of its directions.
     pub places: Vec<Vec<Row>>,
-    /// Of mass, damping and stiffness.
+    /// Entries of mass, damping and stiffness.
     pub entries: [Entries; 3],
-    /// Damping of modes beside that, over its coordinates.
+    /// Modal damping in addition to the damping entries, over its coordinates.
     pub modes: Option<DampedModes>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
@@ -41,7 +44,7 @@ impl Part {
         }
         match (model.ring, &substructure.disk) {
             (Some(ring), Some(of)) => return Part::ring(substructure, of, ring.sectors, model),
-            // places of all sectors would be those of one
+            // without a ring, places of all sectors would refer to one sector
             (None, Some(_)) => {
                 let message = "a sector by its matrices is no model by itself: its ring, which `Disk::ring` makes, says how many of them there are; for \
                                the whole ring without its waves take `Ring { order: None, .. }`";
@@ -118,7 +121,7 @@ impl Part {
         })
     }
 
-    /// A sector of a disk, as often as there are sectors.
+    /// Returns the parts of all sectors of a disk.
     fn ring(substructure: &Substructure, disk: &DiskPart, sectors: usize, model: &Model) -> Result<Self, ModelError> {
         let Substructure { component, reduction, .. } = substructure;
         if let Some(i) = model.places.iter().position(|place| place.of.is_some()) {
@@ -189,7 +192,7 @@ impl Part {
         })
     }
 
-    /// A ring in modes of its own.
+    /// Returns a mistuned ring in its own modes.
     fn in_modes(
         substructure: &Substructure,
         component: Arc<ReducedComponent>,
@@ -215,13 +218,13 @@ impl Part {
     }
 }
 
-/// A sector as it stands in a ring.
+/// One sector as a part of a ring.
 struct OneSector {
     names: Vec<String>,
-    /// Of everything that is seen of it.
+    /// One row for each observed displacement.
     places: Vec<RingRow>,
     entries: [Vec<RingEntry>; 3],
-    /// What a share of one of its blade's stiffness adds, where the blades differ.
+    /// Stiffness entries of the blade for a relative deviation of one, if the blades differ.
     of_blade: Vec<(usize, usize, f64)>,
     reduced: Option<Arc<ReducedComponent>>,
 }
@@ -275,7 +278,7 @@ impl OneSector {
     }
 }
 
-/// What a row of the matrices is called.
+/// Returns the name of a row of the matrices.
 fn row_name(at: usize, name: &str) -> String {
     if name.is_empty() { format!("row {}", at + 1) } else { format!("row {name}") }
 }
@@ -294,7 +297,7 @@ fn failed(error: ReductionError) -> ModelError {
     ModelError::new(Element::Substructure, key, error.to_string())
 }
 
-/// The damping of a reduced component, if it is none by a matrix.
+/// Returns the damping of a reduced component, unless a matrix defines the damping.
 fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Option<Damping> {
     match substructure.damping {
         SubstructureDamping::Own => None,
@@ -323,7 +326,8 @@ mod tests {
         vec![Force { on: "tip".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }]
     }
 
-    /// A disk mass that a spring joins to the next, and on it a blade of two masses, whose springs deviate.
+    /// A sector of masses: a disk mass with a spring to the next sector, and a blade of two
+    /// masses whose springs deviate.
     fn by_masses(deviation: f64) -> Model {
         let spring = |a: &str, b: &str, stiffness| Spring { between: [a.into(), b.into()], stiffness, damping: 0.0 };
         let blade = 1.0 + deviation;
@@ -340,12 +344,13 @@ mod tests {
         }
     }
 
-    /// The same by matrices: rows 0 and 1 are the disk at its low and high side, 2 and 3 the blade.
+    /// The corresponding sector by matrices: rows 0 and 1 are the low and the high side of the
+    /// disk, rows 2 and 3 are the blade.
     fn by_matrices(deviation: f64, reduction: Reduction, damping: SubstructureDamping) -> Model {
         let springs = [(0, 1, 20.0), (0, 2, 5.0), (2, 3, 3.0)];
         let linked = springs.into_iter().flat_map(|(a, b, k)| [(a, a, k), (b, b, k), (a, b, -k), (b, a, -k)]);
         let stiffness = Matrix::from_triplets(4, linked.chain([(0, 0, 30.0)])).unwrap();
-        // what the boundary carries may stand on either side
+        // the mass on the boundary may be on either side
         let mass = Matrix::from_triplets(4, [(0, 0, 1.5), (1, 1, 0.5), (2, 2, 0.3), (3, 3, 0.2)]).unwrap();
         let names = ["1.x", "2.x", "3.x", "4.x"].map(str::to_owned).to_vec();
         let component = Component::new(names, mass, None, stiffness).unwrap();
@@ -364,7 +369,8 @@ mod tests {
         disk.ring(|s| sector(deviations.get(s).copied().unwrap_or(0.0))).unwrap()
     }
 
-    /// Where one row carries a blade its own energy is all that its springs have: the matrices are those of masses and springs.
+    /// If only one row carries the blade, its energy is that of its springs, and the matrices
+    /// equal those of masses and springs.
     #[test]
     fn a_ring_of_matrices_is_that_of_its_masses() {
         for deviations in [&[][..], &DEVIATIONS] {
@@ -390,7 +396,8 @@ mod tests {
         }
     }
 
-    /// As many modes as a sector has rows leave nothing out; a damping ratio is that of every mode of the ring.
+    /// With as many modes as rows of the sector, the reduction is exact. A damping ratio
+    /// applies to every mode of the ring.
     #[test]
     fn all_coordinates_are_the_whole_ring() {
         let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin, orders: 1, up_to: 0.0 };

@@ -1,10 +1,12 @@
-//! Places of a structure that came by its matrices, or of a node of masses: weighted sums of their rows, nodes with directions, and local
-//! frames.
+//! Places of a matrix structure or of a node of masses.
+//!
+//! A place is a weighted sum of rows. A node has several directions, optionally in a local
+//! frame.
 
 use crate::structure::reduction::Row;
 use serde::Serialize;
 
-/// The places of a name with these directions: itself, or one for each.
+/// Returns the names of the places of a node: the name itself, or one name per direction.
 pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
     if directions.is_empty() {
         return vec![name.to_owned()];
@@ -12,13 +14,16 @@ pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
     directions.iter().map(|along| format!("{name}.{along}")).collect()
 }
 
-/// A place of a model's [`Substructure`](super::Substructure), or of one of its nodes of masses seen in another frame: one displacement, or up to
-/// three of a node.
+/// A place of a model's [`Substructure`](super::Substructure), or a second view of a node of
+/// masses.
+///
+/// A place has one displacement; a node has up to three.
 ///
 /// # Example
 /// ```
 /// use stickslip::model::{Frame, Place};
-/// // rows 6, 7, 8 of the matrices are x, y, z of a node; the contact plane is inclined by 30 degrees about x
+/// // rows 6, 7, 8 of the matrices are x, y, z of a node
+/// // the contact plane is inclined by 30 degrees about x
 /// let (sin, cos) = (0.5, 0.75f64.sqrt());
 /// let frame = Frame::new([0.0, -sin, cos], Some([1.0, 0.0, 0.0])).unwrap();
 /// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).turned(frame);
@@ -30,39 +35,46 @@ pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
 pub struct Place {
     /// Identifier.
     pub name: String,
-    /// Its directions if it is a node, at most three, in the order in which laws take them; a normal is the last.
+    /// Directions of a node, at most three, in the order that laws expect; a normal comes last.
+    /// Empty for a place with one displacement.
     pub directions: Vec<String>,
-    /// The displacement along each direction, or the one that it has: (row from 0, weight). With a frame those along x, y, z of the structure.
+    /// The displacement along each direction, as (row from 0, weight). With a frame, the
+    /// displacements along x, y, z of the structure.
     pub rows: Vec<Row>,
-    /// The axes that its directions have; those of the structure without it.
+    /// Axes of the directions. `None` means the axes of the structure.
     pub frame: Option<Frame>,
-    /// The node of a mass that it is another view of: its rows count that node's directions, from 0. Without it they are rows of the substructure.
+    /// The node of masses of which this place is another view. The rows then count the
+    /// directions of that node, from 0. `None` means that they are rows of the substructure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }
 
 impl Place {
-    /// With one displacement.
+    /// Creates a place with one displacement.
     pub fn new(name: impl Into<String>, row: Row) -> Self {
         Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None, of: None }
     }
 
-    /// A node with a displacement along each direction.
+    /// Creates a node with one displacement per direction.
     pub fn node(name: impl Into<String>, directions: &[&str], rows: Vec<Row>) -> Self {
         let directions = directions.iter().map(|&along| along.to_owned()).collect();
         Place { name: name.into(), directions, rows, frame: None, of: None }
     }
 
-    /// The same along the axes of a local frame; its rows are those of x, y, z.
+    /// Returns this node with axes along a local frame. Its rows are the displacements along x,
+    /// y, z.
     #[must_use]
     pub fn turned(self, frame: Frame) -> Self {
         Place { frame: Some(frame), ..self }
     }
 
-    /// The same, of a node of masses instead of the substructure: a face of a rigid body that is turned against the axes along which it moves.
+    /// Returns this place as a view of a node of masses instead of the substructure.
+    ///
+    /// An example is a face of a rigid body that is inclined to the axes of its motion.
     ///
     /// # Example
-    /// A mass that moves along x and z has a face inclined by 30 degrees, which joints and forces may then name.
+    /// A mass moves along x and z. It has a face inclined by 30 degrees, which joints and
+    /// forces can name.
     /// ```
     /// use stickslip::model::Place;
     /// use stickslip::{Mass, Model};
@@ -77,7 +89,8 @@ impl Place {
         Place { of: Some(node.into()), ..self }
     }
 
-    /// The displacement along each direction, of `rows` that are its own, whatever they count.
+    /// Returns the displacement along each direction for the given `rows`, in the numbering of
+    /// those rows.
     pub fn displacements(&self, rows: &[Row]) -> Vec<Row> {
         let Some(frame) = &self.frame else { return rows.to_vec() };
         let along = |axis: &[f64; 3]| {
@@ -87,43 +100,47 @@ impl Place {
         frame.axes.iter().map(along).collect()
     }
 
-    /// The places that it makes: itself, or one for each of its directions.
+    /// Returns the names of its places: its own name, or one name per direction.
     pub fn places(&self) -> Vec<String> {
         places_of(&self.name, &self.directions)
     }
 }
 
-/// Two tangents and a normal, orthogonal and of unit length, right-handed.
+/// Two tangents and a normal: orthogonal unit vectors, right-handed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Frame {
     axes: [[f64; 3]; 3],
 }
 
-/// Vectors that make no frame.
+/// Vectors that do not define a frame.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrameError {
-    /// A vector without direction.
+    /// A vector is zero or not finite.
     #[error("the {0} must be three finite numbers, not all zero")]
     NoDirection(&'static str),
-    /// The tangent is no tangent.
+    /// The tangent is parallel to the normal.
     #[error(
         "the tangent stands {angle:.1} degrees from the normal, and must be more than {LEAST} degrees away from it"
     )]
     Parallel {
-        /// Angle between both, degrees.
+        /// Angle between tangent and normal, degrees.
         angle: f64,
     },
 }
 
-/// Angle in degrees that a tangent must have to the normal or its opposite: vectors of three digits then still make a plane.
+/// Smallest angle between a tangent and the normal or its opposite, degrees. Vectors with three
+/// digits still define a plane at this angle.
 const LEAST: f64 = 1.0;
 
 impl Frame {
-    /// Of a normal, and a vector whose part across the normal is the first tangent; the second completes a right-handed frame. Without a vector
-    /// the first tangent lies along the axis that is farthest from the normal.
+    /// Creates a frame from a normal and an optional tangent.
+    ///
+    /// The component of `tangent` orthogonal to the normal is the first tangent; the second
+    /// tangent completes a right-handed frame. Without `tangent`, the first tangent follows the
+    /// coordinate axis that has the largest angle to the normal.
     ///
     /// # Errors
-    /// [`FrameError`]: a vector without direction, or both along one line.
+    /// [`FrameError`]: a vector has no direction, or both vectors are parallel.
     pub fn new(normal: [f64; 3], tangent: Option<[f64; 3]>) -> Result<Self, FrameError> {
         let normal = unit(normal).ok_or(FrameError::NoDirection("normal"))?;
         let along = match tangent {
@@ -145,7 +162,7 @@ impl Frame {
         Ok(Frame { axes: [first, second, normal] })
     }
 
-    /// First tangent, second tangent, normal.
+    /// Returns the first tangent, the second tangent and the normal.
     pub fn axes(&self) -> &[[f64; 3]; 3] {
         &self.axes
     }
@@ -155,7 +172,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The same direction with length one.
+/// Returns the unit vector of the same direction, or `None` if the vector is zero or not
+/// finite.
 fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     let largest = vector.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
     if !(vector.iter().all(|v| v.is_finite()) && largest > 0.0) {

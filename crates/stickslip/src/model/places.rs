@@ -1,4 +1,6 @@
-//! Where the names of a model lead: each a weighted sum of coordinates, the ground, or a place that is moved.
+//! Resolution of the names in a model.
+//!
+//! A name is a weighted sum of coordinates, the ground, or a moved place.
 
 use super::body::{Body, ROTATIONS, TRANSLATIONS};
 use super::error::{Element, ModelError};
@@ -7,89 +9,94 @@ use super::{GROUND, Mass, Model};
 use crate::structure::reduction::Row;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a name stands for.
+/// The target of a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum End {
     Ground,
-    /// A place by its number in [`Places::stated`].
+    /// A place, by its index in [`Places::stated`].
     At(usize),
 }
 
-/// What the displacement of a place is made of.
+/// The source of a place's displacement.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Of {
-    /// Rows of the component: its place by number, and which of its directions.
+    /// Rows of the component: index of the place, and index of its direction.
     Component(usize, usize),
-    /// Another view of a node of masses: its place by number, and which of its directions.
+    /// Another view of a node of masses: index of the place, and index of its direction.
     View(usize, usize),
-    /// A coordinate of its own with this mass, kg.
+    /// A separate coordinate with this mass, kg.
     Own(f64),
-    /// A rigid body by its number, and which of its directions.
+    /// A rigid body: index of the body, and index of its direction.
     Body(usize, usize),
 }
 
-/// A place as it is stated.
+/// A declared place.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stated {
     pub name: String,
     pub of: Of,
     pub moved: bool,
-    /// Of an angle: the radius of gyration, m.
+    /// Radius of gyration for an angle, m.
     pub radius: Option<f64>,
 }
 
-/// A direction that a joint acts along: its name, if there are several, and where both ends lead.
+/// A direction of a joint: its name, if there are several directions, and both ends.
 pub(super) type Along<'a> = (Option<&'a str>, [End; 2]);
 
-/// Every place of a model, and the directions of every node.
+/// All places of a model, and the directions of all nodes.
 pub(super) struct Places {
-    /// In their order: those of the component, the masses, other views of these, those that exist by their motion alone.
+    /// In this order: places of the component, masses, bodies, other views of these, places
+    /// that exist only by their imposed motion.
     pub stated: Vec<Stated>,
     ends: BTreeMap<String, End>,
-    /// Directions in their order, of names that have any.
+    /// Directions of each node, in their order.
     directions: BTreeMap<String, Vec<String>>,
 }
 
-/// Whether `name` is an identifier `[A-Za-z][A-Za-z0-9_]*`.
+/// Returns whether `name` is an identifier `[A-Za-z][A-Za-z0-9_]*`.
 pub fn is_identifier(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
-/// Whether `name` is an identifier, or a node and a direction of it, `node.direction`.
+/// Returns whether `name` is an identifier, or a node and its direction, `node.direction`.
 pub fn is_place(name: &str) -> bool {
     name.split_once('.')
         .map_or_else(|| is_identifier(name), |(node, along)| is_identifier(node) && is_identifier(along))
 }
 
 impl Mass {
-    /// The places that it makes: itself, or one for each of its directions.
+    /// Returns the names of its places: its own name, or one name per direction.
     pub fn places(&self) -> Vec<String> {
         places_of(&self.name, &self.directions)
     }
 }
 
 impl Model {
-    /// The nodes and places that are stated: names with their directions, none of a place with one displacement. Those of the substructure come
-    /// first, then the masses.
+    /// Iterates over the declared nodes and places, as names with directions. A place with one
+    /// displacement has no directions.
+    ///
+    /// The places come first, then the masses, then the bodies.
     pub fn nodes(&self) -> impl Iterator<Item = (&str, &[String])> {
         let places = self.places.iter().map(|place| (place.name.as_str(), place.directions.as_slice()));
         let masses = self.masses.iter().map(|mass| (mass.name.as_str(), mass.directions.as_slice()));
         places.chain(masses).chain(self.bodies.iter().map(|body| (body.name.as_str(), body.directions.as_slice())))
     }
 
-    /// Whether a name is a place of a rigid body: one of its directions, or of a point of it.
+    /// Returns whether a name is a place of a rigid body: a direction of the body, or of one of
+    /// its points.
     pub(super) fn is_of_body(&self, place: &str) -> bool {
         let node = place.split_once('.').map_or(place, |(node, _)| node);
         let of = self.places.iter().find(|place| place.name == node).and_then(|place| place.of.as_deref());
         self.bodies.iter().any(|body| body.name == of.unwrap_or(node))
     }
 
-    /// Whether imposed motions move bodies: their other directions then share mass.
+    /// Returns whether an imposed motion acts on a body. The other directions of that body then
+    /// share mass with the moved one.
     pub(super) fn moves_bodies(&self) -> bool {
         !self.bodies.is_empty() && self.motions.iter().any(|motion| self.is_of_body(&motion.on))
     }
 
-    /// Whether a place is a rotation of a body, an angle in rad.
+    /// Returns whether a place is a rotation of a body, an angle in rad.
     pub fn is_rotation(&self, place: &str) -> bool {
         let of_body = |node: &str| self.bodies.iter().any(|body| body.name == node);
         place.split_once('.').is_some_and(|(node, along)| ROTATIONS.contains(&along) && of_body(node))
@@ -97,7 +104,7 @@ impl Model {
 }
 
 impl Places {
-    /// Every name once, an identifier, and where it leads.
+    /// Collects all names and checks that each is an identifier and occurs once.
     pub fn new(model: &Model) -> Result<Self, ModelError> {
         if model.masses.is_empty() && model.bodies.is_empty() && model.motions.is_empty() && model.places.is_empty() {
             let message = if model.substructure.is_some() {
@@ -152,7 +159,7 @@ impl Places {
         Ok(places)
     }
 
-    /// Where one place leads.
+    /// Returns the target of a place name.
     pub fn find(&self, name: &str, element: Element, key: &'static str) -> Result<End, ModelError> {
         if let Some(end) = self.ends.get(name) {
             return Ok(*end);
@@ -172,12 +179,13 @@ impl Places {
         Err(ModelError { wrong_name: Some(name.to_owned()), ..ModelError::new(element, key, message) })
     }
 
-    /// Whether a name leads to an angle.
+    /// Returns whether the target of a name is an angle.
     pub fn is_rotation(&self, end: End) -> bool {
         matches!(end, End::At(place) if self.stated[place].radius.is_some())
     }
 
-    /// Where both ends of a joint lead, along each of `count` directions, one of which may be the normal.
+    /// Returns both ends of a joint along each of its `count` directions. `normal` is the index
+    /// of the normal direction.
     pub fn axes(
         &self,
         between: &[String; 2],
@@ -219,7 +227,8 @@ impl Places {
             );
             return Err(ModelError::new(element, key, message));
         }
-        // tangents are alike, and which direction is the normal would go by which node is named first
+        // tangents are interchangeable, but with different normals the order of the nodes would
+        // decide which one counts
         let normals = normal.map(|at| nodes.iter().filter_map(|own| own.get(at)).collect::<Vec<_>>());
         if let Some([one, other]) = normals.as_deref().filter(|ends| ends.len() == 2 && ends[0] != ends[1]) {
             let message = format!(
@@ -241,7 +250,8 @@ impl Places {
     }
 }
 
-/// Whether the node that a place is a view of has the directions that its rows count.
+/// Checks a place that is a view of another node: the node must have the directions that its
+/// rows use.
 fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelError> {
     let Some(of) = &place.of else { return Ok(()) };
     let mass = model.masses.iter().find(|mass| mass.name == *of).map(|mass| mass.places().len());
@@ -268,10 +278,10 @@ fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelErr
     Ok(())
 }
 
-/// Places while they are collected.
+/// The places during collection.
 struct Collected<'a> {
     places: Places,
-    /// Columns of results are named after places, with `_` for the point.
+    /// Column names of results: names of places with `_` instead of the point.
     columns: BTreeSet<String>,
     /// Places with an imposed motion.
     motions: BTreeSet<&'a str>,
@@ -309,7 +319,7 @@ impl Collected<'_> {
         Ok(())
     }
 
-    /// Adds a rigid body. As a node it has its displacements: those of its centre of mass.
+    /// Adds a rigid body. As a node, the body has the displacements of its centre of mass.
     fn body(&mut self, index: usize, body: &Body) -> Result<(), ModelError> {
         let element = Element::Body(index);
         identifier(&body.name, element, "name", is_identifier)?;
@@ -339,7 +349,7 @@ impl Collected<'_> {
         Ok(())
     }
 
-    /// Adds places that exist by their motion alone.
+    /// Adds the places that exist only by their imposed motion.
     fn moved(&mut self, model: &Model) -> Result<(), ModelError> {
         for (i, motion) in model.motions.iter().enumerate() {
             let element = Element::Motion(i);
@@ -348,7 +358,8 @@ impl Collected<'_> {
                 continue;
             }
             if self.places.directions.contains_key(&motion.on) {
-                self.places.find(&motion.on, element, "on")?; // says that a direction is missing
+                // returns the error that a direction is missing
+                self.places.find(&motion.on, element, "on")?;
             }
             let place = Stated { name: motion.on.clone(), of: Of::Own(0.0), moved: true, radius: None };
             self.place(place, element, "on")?;

@@ -1,4 +1,4 @@
-//! A model checked and assembled: a structure, its joints, its excitation.
+//! A checked and assembled model: a structure, its joints, its excitation.
 
 use super::ReductionEvidence;
 use crate::law::{LawError, SharedLaw};
@@ -12,10 +12,11 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// A checked, assembled model.
 ///
-/// `M x'' + C x' + K x + Σ_j W_j f_j = F(t)`, with `u_j = W_jᵀ x + g_j(t)` along the axes of joint `j`, where `g_j` comes from imposed motion.
+/// `M x'' + C x' + K x + Σ_j W_j f_j = F(t)`, with `u_j = W_jᵀ x + g_j(t)` along the axes of
+/// joint `j`. Imposed motion causes `g_j`.
 ///
 /// # Example
-/// Two masses that share inertia, and a joint between the first and the ground.
+/// Two masses share inertia, and a joint connects the first mass to the ground.
 /// ```
 /// use nalgebra::dmatrix;
 /// use num_complex::Complex64;
@@ -46,23 +47,26 @@ pub struct System {
     cyclic: Option<Cyclic>,
 }
 
-/// The symmetry of a ring of equal sectors under an excitation that travels around it: sector n does what the first one does, earlier by
-/// `order n / sectors` of a period of the drive. Degrees of freedom, joints and moved places stand sector by sector.
+/// The symmetry of a ring of equal sectors under a travelling excitation.
+///
+/// Sector n repeats the motion of the first sector, earlier by `order n / sectors` of a period
+/// of the excitation. Degrees of freedom, joints and moved places are stored sector by sector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cyclic {
     /// Number of sectors.
     pub sectors: usize,
-    /// Nodal diameters of the first harmonic.
+    /// Nodal diameter of the first harmonic.
     pub order: usize,
 }
 
 impl Cyclic {
-    /// The nodal diameter of a harmonic of the drive.
+    /// Returns the nodal diameter of a harmonic of the excitation.
     pub fn diameter(self, harmonic: usize) -> usize {
         harmonic % self.sectors * self.order % self.sectors
     }
 
-    /// By how much a harmonic of sector `sector` leads that of the first, `e^{j 2π h order n / sectors}`.
+    /// Returns the phase factor of a harmonic in sector `sector` relative to the first sector,
+    /// `e^{j 2π h order n / sectors}`.
     pub fn lead(self, harmonic: usize, sector: usize) -> Complex64 {
         turn((self.diameter(harmonic) * sector) as i64, self.sectors)
     }
@@ -95,19 +99,20 @@ impl PartialEq for SystemJoint {
 }
 
 impl SystemJoint {
-    /// Name.
+    /// Returns its name.
     pub fn name(&self) -> &str {
         &self.name
     }
-    /// Its law.
+    /// Returns its law.
     pub fn law(&self) -> &SharedLaw {
         &self.law
     }
-    /// Its axes, one for each of the law's directions.
+    /// Returns its axes, one per direction of the law.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
-    /// What results call its axes: the joint's name, or `joint.direction` for each of several.
+    /// Returns the labels of its axes in results: the joint's name, or `joint.direction` for
+    /// each of several axes.
     pub fn labels(&self) -> impl Iterator<Item = String> {
         let several = self.axes.len() > 1;
         self.axes.iter().enumerate().map(move |(a, axis)| match &axis.name {
@@ -118,58 +123,62 @@ impl SystemJoint {
     }
 }
 
-/// A weighted sum of degrees of freedom: one direction of a joint, `u = Σ w x + g(t)`, whose force acts on the structure as `-w f`; or a
-/// place, at which results are given.
+/// A weighted sum of degrees of freedom: one direction of a joint, or a place of results.
+///
+/// For a joint, `u = Σ w x + g(t)`, and the force acts on the structure as `-w f`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
-    /// The direction's name, if its joint has several.
+    /// Name of the direction, if the joint has several.
     name: Option<String>,
     rows: Vec<(usize, f64)>,
     imposed: Vec<(u32, Complex64)>,
-    /// Of an angle: the radius, m, at which it counts beside displacements.
+    /// Radius of a rotation, m. An angle times this radius is comparable with displacements.
     radius: Option<f64>,
 }
 
 impl Axis {
-    /// Along degrees of freedom with their weights.
+    /// Creates an axis from degrees of freedom and their weights.
     pub fn new(rows: Vec<(usize, f64)>) -> Self {
         Axis { name: None, rows, imposed: Vec::new(), radius: None }
     }
 
-    /// The same as an angle, rad, instead of a displacement; where sizes of both are compared, it counts as the arc at this radius, m.
+    /// Returns this axis as an angle in rad instead of a displacement. In comparisons of sizes
+    /// it counts as the arc at this radius, m.
     #[must_use]
     pub fn rotation(self, radius: f64) -> Self {
         Axis { radius: Some(radius), ..self }
     }
 
-    /// Whether it is an angle, rad.
+    /// Returns whether this axis is an angle in rad.
     pub fn is_rotation(&self) -> bool {
         self.radius.is_some()
     }
 
-    /// The SI unit of what it measures: m, or rad.
+    /// Returns the SI unit of the coordinate: m or rad.
     pub fn unit(&self) -> &'static str {
         if self.is_rotation() { "rad" } else { "m" }
     }
 
-    /// The length, m, that one unit of it counts as beside displacements.
+    /// Returns the length in m to which one unit of the coordinate corresponds in comparisons
+    /// with displacements.
     pub fn length(&self) -> f64 {
         self.radius.unwrap_or(1.0)
     }
 
-    /// The same with a name, where a joint has several axes.
+    /// Returns this axis with a name, for joints with several axes.
     #[must_use]
     pub fn named(mut self, name: impl Into<String>) -> Self {
         self.name = Some(name.into());
         self
     }
 
-    /// Name of the direction, of joints that act along several.
+    /// Returns the name of the direction, for joints with several directions.
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 
-    /// The same with imposed relative motion `g(t) = Re Σ_h G_h e^{j h Ω t}`: (harmonic, complex amplitude in m).
+    /// Returns this axis with imposed relative motion `g(t) = Re Σ_h G_h e^{j h Ω t}`, as
+    /// (harmonic, complex amplitude in m).
     pub fn moved(mut self, imposed: impl IntoIterator<Item = (u32, Complex64)>) -> Self {
         let mut sum: BTreeMap<u32, Complex64> = self.imposed.into_iter().collect();
         for (harmonic, amplitude) in imposed {
@@ -179,33 +188,34 @@ impl Axis {
         self
     }
 
-    /// Degrees of freedom and their weights.
+    /// Returns the degrees of freedom and their weights.
     pub fn rows(&self) -> &[(usize, f64)] {
         &self.rows
     }
 
-    /// Imposed relative motion: sorted (harmonic, complex amplitude in m).
+    /// Returns the imposed relative motion: sorted (harmonic, complex amplitude in m).
     pub fn imposed(&self) -> &[(u32, Complex64)] {
         &self.imposed
     }
 
-    /// Imposed relative motion of one harmonic, m.
+    /// Returns the imposed relative motion of one harmonic, m.
     pub fn imposed_at(&self, harmonic: u32) -> Complex64 {
         self.imposed.iter().find(|(h, _)| *h == harmonic).map_or(ZERO, |(_, g)| *g)
     }
 
-    /// What displacements or velocities of the degrees of freedom (length n) are along it, without imposed motion.
+    /// Returns the component of displacements or velocities (length n) along this axis, without
+    /// imposed motion.
     #[inline]
     pub fn along(&self, values: &[f64]) -> f64 {
         self.rows.iter().map(|&(i, w)| w * values[i]).sum()
     }
 
-    /// The same of complex amplitudes.
+    /// Returns the component of complex amplitudes along this axis, without imposed motion.
     pub fn along_complex(&self, values: &DVector<Complex64>) -> Complex64 {
         self.rows.iter().map(|&(i, w)| values[i] * w).sum()
     }
 
-    /// That it names degrees of freedom below `n` and has finite numbers.
+    /// Checks that the axis uses degrees of freedom below `n` and finite numbers.
     fn check(&self, n: usize, what: impl Fn() -> String) -> Result<(), SystemError> {
         if let Some(&(row, _)) = self.rows.iter().find(|(row, _)| *row >= n) {
             return Err(SystemError::Row { what: what(), row, dofs: n });
@@ -217,7 +227,7 @@ impl Axis {
         Ok(())
     }
 
-    /// Its weights over all `n` degrees of freedom.
+    /// Returns its weights over all `n` degrees of freedom.
     pub fn dense(&self, n: usize) -> DVector<f64> {
         let mut out = DVector::zeros(n);
         self.rows.iter().for_each(|&(i, w)| out[i] += w);
@@ -225,16 +235,19 @@ impl Axis {
     }
 }
 
-/// One harmonic of the excitation: `Re((force + s·by_velocity + s²·by_acceleration) e^{st})` at `s = jhΩ`.
+/// One harmonic of the excitation: `Re((force + s·by_velocity + s²·by_acceleration) e^{st})` at
+/// `s = jhΩ`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
     /// Harmonic number h; 0 is constant.
     pub harmonic: u32,
     /// Complex force amplitudes, length n, N.
     pub force: DVector<Complex64>,
-    /// Amplitudes of imposed motion times the dampers through which it acts, length n, kg m/s.
+    /// Amplitudes of imposed motion times the damping that couples it to each degree of
+    /// freedom, length n, kg m/s.
     pub by_velocity: DVector<Complex64>,
-    /// Amplitudes of imposed motion times the masses that it shares with degrees of freedom, length n, kg m.
+    /// Amplitudes of imposed motion times the mass that couples it to each degree of freedom,
+    /// length n, kg m.
     pub by_acceleration: DVector<Complex64>,
 }
 
@@ -244,7 +257,8 @@ impl Load {
         Load { harmonic, force: zeros(), by_velocity: zeros(), by_acceleration: zeros() }
     }
 
-    /// Complex force amplitudes at drive frequency `omega` (rad/s), length n, N.
+    /// Returns the complex force amplitudes at excitation frequency `omega` (rad/s), length n,
+    /// N.
     pub fn at(&self, omega: f64) -> DVector<Complex64> {
         let s = Complex64::new(0.0, f64::from(self.harmonic) * omega);
         &self.force + &self.by_velocity * s + &self.by_acceleration * (s * s)
@@ -255,70 +269,73 @@ impl Load {
     }
 }
 
-/// A place with imposed motion, and what hangs on it: needed for the force that moves it.
+/// A place with imposed motion, with the data for the force that moves it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovedPlace {
     /// Name.
     pub name: String,
     /// Sorted (harmonic, complex amplitude in m).
     pub motion: Vec<(u32, Complex64)>,
-    /// Forces that act on it besides, those of places that move along: sorted (harmonic, complex amplitude in N).
+    /// Applied forces of places that move with this place: sorted (harmonic, complex amplitude
+    /// in N).
     pub force: Vec<(u32, Complex64)>,
-    /// Row of the mass matrix towards the degrees of freedom (length n), and towards the moved places, kg.
+    /// Row of the mass matrix over the degrees of freedom (length n) and over the moved places,
+    /// kg.
     pub mass: (DVector<f64>, Vec<f64>),
-    /// The same of the stiffness matrix, N/m.
+    /// Row of the stiffness matrix, in the same form, N/m.
     pub stiffness: (DVector<f64>, Vec<f64>),
-    /// The same of the damping matrix, kg/s.
+    /// Row of the damping matrix, in the same form, kg/s.
     pub damping: (DVector<f64>, Vec<f64>),
-    /// For each axis of all joints, in their order, the sign with which its force acts back on this place: the drive must supply `+sign · f`.
+    /// For each axis of all joints, in their order, the sign of its force on this place. The
+    /// excitation must supply `+sign · f`.
     pub joints: Vec<f64>,
 }
 
-/// Why a system cannot be.
+/// The reason why a system is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SystemError {
-    /// A joint has another number of axes than its law has directions.
+    /// The number of axes of a joint differs from the number of directions of its law.
     #[error("joint `{joint}` has {axes} axes, and its law `{law}` acts along {directions}")]
     Axes {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// Its law.
+        /// Name of its law.
         law: &'static str,
-        /// Its axes.
+        /// Number of axes of the joint.
         axes: usize,
-        /// The law's directions.
+        /// Number of directions of the law.
         directions: usize,
     },
     /// A degree of freedom does not exist.
     #[error("{what} names degree of freedom {row}, and there are {dofs}: they count from 0")]
     Row {
-        /// The joint or load.
+        /// The joint, place or load.
         what: String,
-        /// The number.
+        /// The invalid number of a degree of freedom.
         row: usize,
-        /// Degrees of freedom.
+        /// Number of degrees of freedom of the system.
         dofs: usize,
     },
     /// A number is not finite.
     #[error("{what} has an entry that is not finite")]
     NotFinite {
-        /// The joint or load.
+        /// The joint, place or load.
         what: String,
     },
-    /// The law's parameters are wrong.
+    /// A parameter of a law is invalid.
     #[error("joint `{joint}`: {error}")]
     Law {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// What is wrong.
+        /// The fault in the parameters.
         error: LawError,
     },
-    /// It is not as symmetric as it is said to be.
+    /// The system does not have the claimed cyclic symmetry.
     #[error("the sectors are not alike: {0} differ from those of the first sector")]
     NotCyclic(&'static str),
 }
 
-/// Puts a system together; [`SystemBuilder::build`] checks it.
+/// Builder of a [`System`]; [`SystemBuilder::build`] checks it.
 #[derive(Debug, Clone)]
 pub struct SystemBuilder {
     structure: Structure,
@@ -332,7 +349,7 @@ pub struct SystemBuilder {
 }
 
 impl SystemBuilder {
-    /// Adds a place at which results are given; without any, each degree of freedom is one.
+    /// Adds a place of results. Without any call, each degree of freedom is a place.
     #[must_use]
     pub fn place(mut self, name: impl Into<String>, along: Axis) -> Self {
         let (names, seen) = self.places.get_or_insert_default();
@@ -341,19 +358,19 @@ impl SystemBuilder {
         self
     }
 
-    /// Says that part of the structure is a component in few coordinates.
+    /// Sets the reduced component that is a part of the structure.
     #[must_use]
     pub(super) fn reduced(self, reduced: Option<Arc<ReducedComponent>>) -> Self {
         SystemBuilder { reduced, ..self }
     }
 
-    /// Says that part of the structure came in few coordinates.
+    /// Sets the error of an earlier reduction of a part of the structure.
     #[must_use]
     pub(super) fn earlier(self, earlier: Option<ReductionEvidence>) -> Self {
         SystemBuilder { earlier, ..self }
     }
 
-    /// Adds a joint with one axis for each of its law's directions.
+    /// Adds a joint with one axis per direction of its law.
     #[must_use]
     pub fn joint(mut self, name: impl Into<String>, law: SharedLaw, axes: Vec<Axis>) -> Self {
         self.joints.push(SystemJoint { name: name.into(), law, axes });
@@ -366,8 +383,10 @@ impl SystemBuilder {
         self.load(row, harmonic, [amplitude, ZERO, ZERO])
     }
 
-    /// Adds a force (N), one that grows with frequency (kg m/s, times s) and one that grows with its square (kg m, times s²) on a degree
-    /// of freedom.
+    /// Adds to the load on one degree of freedom, as `[force, by_velocity, by_acceleration]`.
+    ///
+    /// The parts are a force (N), a force proportional to `s` (kg m/s) and a force proportional
+    /// to `s²` (kg m).
     #[must_use]
     pub(super) fn load(mut self, row: usize, harmonic: u32, parts: [Complex64; 3]) -> Self {
         let n = self.structure.dofs();
@@ -392,11 +411,11 @@ impl SystemBuilder {
         self
     }
 
-    /// The system.
+    /// Checks the parts and returns the system.
     ///
     /// # Errors
-    /// [`SystemError`]: axes that do not fit the law, numbers of degrees of freedom that do not exist, numbers that are not finite, a law
-    /// whose parameters are wrong.
+    /// [`SystemError`]: axes that do not fit the law, degrees of freedom that do not exist,
+    /// numbers that are not finite, or invalid parameters of a law.
     pub fn build(self) -> Result<System, SystemError> {
         if let Some(wrong) = self.wrong {
             return Err(wrong);
@@ -434,11 +453,12 @@ impl SystemBuilder {
     }
 }
 
-/// Difference between loads of a sector and those of the first, relative to the largest, that counts as rounding of phases.
+/// Relative difference between loads of a sector and those of the first sector that counts as
+/// rounding of the phases. It is relative to the largest load.
 const ALIKE: f64 = 1e-12;
 
 impl System {
-    /// Begins a system on a structure.
+    /// Creates a builder for a system on a structure.
     pub fn builder(structure: Structure) -> SystemBuilder {
         SystemBuilder {
             structure,
@@ -452,15 +472,16 @@ impl System {
         }
     }
 
-    /// Its linear part.
+    /// Returns the linear part of the system.
     pub fn structure(&self) -> &Structure {
         &self.structure
     }
 
-    /// The same joints and loads on another structure with as many degrees of freedom.
+    /// Returns the same joints and loads on another structure with the same number of degrees
+    /// of freedom.
     ///
     /// # Errors
-    /// As [`SystemBuilder::build`].
+    /// See [`SystemBuilder::build`].
     pub fn on(&self, structure: Structure) -> Result<System, SystemError> {
         let loads = self.loads.iter().map(|load| (load.harmonic, load.clone()));
         let builder = SystemBuilder {
@@ -475,10 +496,12 @@ impl System {
         builder.build()
     }
 
-    /// The same system, driven by harmonics of a frequency that is so many times lower: harmonic h becomes `h · periods`, and what repeats after
-    /// so many periods of the drive repeats after one.
+    /// Returns the same system in terms of a lower base frequency, for subharmonic orbits.
+    ///
+    /// Harmonic h becomes `h · periods`. A motion that repeats after `periods` periods of the
+    /// excitation repeats after one period of the new system.
     pub(crate) fn slowed(&self, periods: u32) -> System {
-        // what repeats after several periods need not travel as the drive does
+        // a motion of several periods need not travel with the excitation
         let mut system = System { cyclic: None, ..self.clone() };
         system.loads.iter_mut().for_each(|load| load.harmonic *= periods);
         let axes = system.joints.iter_mut().flat_map(|joint| &mut joint.axes);
@@ -487,10 +510,11 @@ impl System {
         system
     }
 
-    /// The same system, known to be a ring of equal sectors in a travelling wave: harmonic balance then solves one sector.
+    /// Returns this system with the cyclic symmetry of a ring in a travelling wave. Harmonic
+    /// balance then solves one sector.
     ///
     /// # Errors
-    /// [`SystemError::NotCyclic`]: its sectors differ, or its loads do not travel so.
+    /// [`SystemError::NotCyclic`]: the sectors differ, or the loads do not travel with the wave.
     pub fn travelling(self, cyclic: Cyclic) -> Result<System, SystemError> {
         match self.off(cyclic) {
             Some(what) => Err(SystemError::NotCyclic(what)),
@@ -498,12 +522,13 @@ impl System {
         }
     }
 
-    /// The symmetry of a ring in a travelling wave, if it is known, see [`System::travelling`].
+    /// Returns the symmetry of a ring in a travelling wave, if it is known; see
+    /// [`System::travelling`].
     pub fn cyclic(&self) -> Option<Cyclic> {
         self.cyclic
     }
 
-    /// What of the system has not this symmetry.
+    /// Returns the first part of the system that violates the given symmetry.
     fn off(&self, cyclic: Cyclic) -> Option<&'static str> {
         let Cyclic { sectors, order } = cyclic;
         let n = self.dofs();
@@ -552,29 +577,34 @@ impl System {
         None
     }
 
-    /// Number of degrees of freedom.
+    /// Returns the number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.structure.dofs()
     }
 
-    /// Names of the places, at which results are given. In a model of masses they are the degrees of freedom; of a reduced structure
-    /// they are what is looked at, and fewer or more.
+    /// Returns the names of the places of results.
+    ///
+    /// In a model of masses they are the degrees of freedom. In a reduced structure they are
+    /// the observed displacements, whose number differs from the number of coordinates.
     pub fn places(&self) -> &[String] {
         &self.places
     }
 
-    /// How each place follows from the degrees of freedom.
+    /// Returns each place as a weighted sum of degrees of freedom.
     pub fn seen(&self) -> &[Axis] {
         &self.seen
     }
 
-    /// The component in few coordinates that part of the structure is, and its error.
+    /// Returns the reduced component that is a part of the structure, with its error.
     pub fn reduced(&self) -> Option<&ReducedComponent> {
         self.reduced.as_deref()
     }
 
-    /// What its structure lacks of the whole: the largest relative error of what places see, of all reductions that made it, one after the other, and up
-    /// to which frequency (rad/s) it holds; none where nothing was reduced.
+    /// Returns the error of all successive reductions of the structure, or `None` if nothing is
+    /// reduced.
+    ///
+    /// It is the largest relative error at the places and the upper end of its frequency range
+    /// (rad/s).
     pub fn reduction_evidence(&self) -> Option<ReductionEvidence> {
         let now = self.reduced().map(|reduced| ReductionEvidence { error: reduced.error(), up_to: reduced.up_to() });
         match (self.earlier, now) {
@@ -583,43 +613,51 @@ impl System {
         }
     }
 
-    /// Displacements, velocities or accelerations of the degrees of freedom (length n), at the places.
+    /// Returns displacements, velocities or accelerations at the places, from those of the
+    /// degrees of freedom (length n).
     pub fn at_places(&self, values: &[f64]) -> Vec<f64> {
         self.seen.iter().map(|axis| axis.along(values)).collect()
     }
 
-    /// The joints.
+    /// Returns the joints.
     pub fn joints(&self) -> &[SystemJoint] {
         &self.joints
     }
 
-    /// The axes of all joints, in their order: (joint, axis).
+    /// Iterates over the axes of all joints, in their order: (joint, axis).
     pub fn axes(&self) -> impl Iterator<Item = (usize, &Axis)> {
         self.joints.iter().enumerate().flat_map(|(j, joint)| joint.axes.iter().map(move |axis| (j, axis)))
     }
 
-    /// Excitation by harmonics, sorted by harmonic number, each at most once.
+    /// Returns the excitation by harmonic, sorted by harmonic number; each number occurs at
+    /// most once.
     pub fn loads(&self) -> &[Load] {
         &self.loads
     }
 
-    /// Places with imposed motion that belong to no degree of freedom.
+    /// Returns the places with imposed motion, which are not degrees of freedom.
     pub fn moved(&self) -> &[MovedPlace] {
         &self.moved
     }
 
-    /// Complex force amplitudes at drive frequency `omega` (rad/s): (harmonic, length n).
+    /// Returns the complex force amplitudes at excitation frequency `omega` (rad/s): (harmonic,
+    /// length n).
     pub fn excitation(&self, omega: f64) -> Vec<(u32, DVector<Complex64>)> {
         self.loads.iter().map(|load| (load.harmonic, load.at(omega))).collect()
     }
 
-    /// Whether the excitation changes its sign after half a period, and all laws with it: then an orbit with `x(t + T/2) = -x(t)` exists.
+    /// Returns whether excitation and laws are odd, so that an orbit with `x(t + T/2) = -x(t)`
+    /// exists.
+    ///
+    /// The excitation is odd if it has odd harmonics only, so that it changes its sign after
+    /// half a period.
     pub fn is_odd(&self) -> bool {
         let laws = self.joints.iter().all(|joint| joint.law.is_odd());
         laws && self.harmonics_of_excitation(|z| z != ZERO).iter().all(|h| !h.is_multiple_of(2))
     }
 
-    /// The harmonics of loads and imposed motions whose amplitudes `counts` accepts; some may stand more than once.
+    /// Returns the harmonics of loads and imposed motions whose amplitudes `counts` accepts. A
+    /// harmonic can occur more than once.
     pub(crate) fn harmonics_of_excitation(&self, counts: impl Fn(Complex64) -> bool) -> Vec<u32> {
         let loads = self.loads.iter().filter(|load| load.amplitudes().any(|z| counts(*z))).map(|load| load.harmonic);
         let imposed = self.axes().flat_map(|(_, axis)| &axis.imposed);

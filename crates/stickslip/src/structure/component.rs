@@ -1,5 +1,7 @@
-//! A structure by its matrices, as finite-element programs write them, before it becomes a part of a model: what its rows are called, and what
-//! a model sees of it, in few coordinates or in all.
+//! A structure given by its matrices, before it becomes a part of a model.
+//!
+//! The matrices come from finite-element programs. A component has named rows and gives its
+//! full or reduced form for observed places.
 
 use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
@@ -14,10 +16,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definite::sparse_definite_in_order;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 
-/// Matrices of a structure and the names of their rows. A copy is a reference to the same matrices, and to the reductions made of them.
+/// Matrices of a structure and the names of their rows.
+///
+/// A copy is a reference to the same matrices and to their stored reductions.
 ///
 /// # Example
-/// A rod of 400 masses that a model will see at its end.
+/// A rod of 400 masses that a model observes at its end.
 /// ```
 /// use std::f64::consts::TAU;
 /// use stickslip::structure::{Component, Reduction};
@@ -42,19 +46,19 @@ struct Kept {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
     whole: Whole,
-    /// Whether every motion has kinetic energy.
+    /// True if the mass matrix is positive definite.
     definite_mass: bool,
-    /// What was asked for, and what came of it: cases of a study ask the same.
+    /// Stored reductions by request, because the cases of a study repeat requests.
     reductions: Known<Asked, Answer>,
-    /// The damping of its modes, by ratio and largest frequency.
+    /// Stored modal damping, by ratio and largest frequency.
     damped: Known<(f64, f64), Damped>,
-    /// Its modes below a frequency.
+    /// Stored numbers of modes below a frequency.
     counts: Known<f64, Option<usize>>,
-    /// As one of so many sectors of a ring.
+    /// The component as a sector of a ring, by boundary and number of sectors.
     sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
 }
 
-/// A component as a sector of a ring, and what was asked of it.
+/// A component as a sector of a ring, with its stored results.
 #[derive(Debug)]
 pub(crate) struct KeptSector {
     pub sector: CyclicSector,
@@ -62,23 +66,23 @@ pub(crate) struct KeptSector {
     blades: Known<Vec<usize>, KeptBlade>,
 }
 
-/// The blade of a sector, and what was asked of it.
+/// The blade of a sector, with its stored results.
 #[derive(Debug)]
 pub(crate) struct SectorBlade {
     blade: Blade,
     entries: OnceLock<Vec<(usize, usize, f64)>>,
-    /// In the coordinates of a reduction with that many steps of its vectors.
+    /// Stored reductions, by request and number of steps of blade vectors.
     reductions: Known<(Asked, usize), Relieved>,
-    /// By the deviations of all blades.
+    /// Stored results, by request and deviations of all blades.
     mistuned: Known<Pattern, Arc<ReducedComponent>>,
 }
 
 type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
-/// What was asked for, and the deviations of all blades.
+/// A request, and the deviations of all blades.
 type Pattern = (Asked, Vec<f64>);
 type Relieved = Result<Arc<InFew>, ReductionError>;
 
-/// A sector in few coordinates, the ring that is sought in them, and what they lack of it.
+/// A reduced sector, the ring in its coordinates, and the estimate of its error.
 #[derive(Debug)]
 struct InFew {
     component: Arc<ReducedComponent>,
@@ -86,86 +90,93 @@ struct InFew {
     lacking: Lacking,
 }
 
-/// What was asked, and the answers.
+/// Requests with their results.
 type Known<K, V> = Mutex<Vec<(K, V)>>;
 type Asked = (Vec<Row>, Reduction);
 type Answer = Result<Arc<ReducedComponent>, ReductionError>;
-/// In proportion to the stiffness, s, and what the modes have beside that.
+/// Factor of the stiffness, s, and the remaining modal damping.
 type Damped = Result<(f64, DampedModes), ReductionError>;
 
-/// A component in few coordinates, and how far it is from the whole.
+/// A reduced component, with its error relative to the full component.
 #[derive(Debug, Clone)]
 pub struct ReducedComponent {
     form: Form,
     deviation: Deviation,
-    /// Frequencies of the whole, rad/s, as far as they were computed.
+    /// Computed frequencies of the full component, rad/s.
     frequencies: Vec<f64>,
-    /// Of which so many are free motions.
+    /// Number of free motions among them.
     free: usize,
-    /// The error holds up to there, rad/s.
+    /// Upper end of the frequency range in which the error holds, rad/s.
     up_to: f64,
-    /// Its modes serve up to there, rad/s.
+    /// Highest frequency for which the basis is intended, rad/s.
     serves: f64,
 }
 
-/// A component in few coordinates that also serve another stiffness, see [`Component::reduced_between`].
+/// A reduced component that also serves a second stiffness; see [`Component::reduced_between`].
 #[derive(Debug, Clone)]
 pub struct BetweenComponent {
-    /// With its own stiffness.
+    /// The reduced component with its own stiffness.
     pub component: Component,
-    /// The other stiffness over the same coordinates, N/m.
+    /// The second stiffness in the same coordinates, N/m.
     pub there: Matrix,
-    /// What is seen, over the coordinates.
+    /// The observed displacements, over the coordinates.
     pub seen: Vec<Row>,
-    /// How it was made, in words.
+    /// Description of the reduction.
     pub kind: String,
-    /// The largest relative error of what is seen, at both ends and between.
+    /// Largest relative error of the observed displacements, for both stiffnesses and between
+    /// them.
     pub error: f64,
-    /// The error holds up to there, rad/s.
+    /// Upper end of the frequency range in which the error holds, rad/s.
     pub up_to: f64,
 }
 
-/// A sector of a ring in few coordinates, itself a sector: its rows are the coordinates, and once more those of the next sector.
+/// A reduced sector of a ring, again as a sector: its rows are its coordinates, followed by
+/// those of the next sector.
 #[derive(Debug, Clone)]
 pub struct SectorComponent {
-    /// Its rows are called `number.q`.
+    /// The component, with rows named `number.q`.
     pub component: Component,
-    /// The numbers of its low and its high side.
+    /// Node numbers of its low and its high side.
     pub pairs: Vec<(String, String)>,
-    /// What is seen, over its rows.
+    /// The observed displacements, over its rows.
     pub seen: Vec<Row>,
-    /// How it was made, in words.
+    /// Description of the reduction.
     pub kind: String,
-    /// The largest relative error of what is seen.
+    /// Largest relative error of the observed displacements.
     pub error: f64,
-    /// The error holds up to there, rad/s.
+    /// Upper end of the frequency range in which the error holds, rad/s.
     pub up_to: f64,
 }
 
-/// Small matrices.
+/// The reduced matrices.
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
-    /// Of a component; without its basis.
+    /// A single component, without its basis.
     Alone(Arc<Reduced>),
-    /// Of one sector of a ring.
+    /// One sector of a ring.
     Sector(Arc<ReducedSector>),
-    /// Of a ring whose blades differ.
+    /// A ring with different blades.
     Ring(Arc<RingModes>),
 }
 
-/// Patterns of blades whose modes are remembered: a case is assembled several times in a row, and a campaign has a million. Those of 240 blades with five
-/// places each are 40 MB.
+/// Number of mistuning patterns whose modes are stored. A case is assembled several times in
+/// succession, and a campaign has a million patterns. The modes of 240 blades with five places
+/// each use 40 MB.
 const PATTERNS: usize = 16;
 
-/// A mode that is kept, in multiples of the frequency up to which it serves: the last ones only complete those below.
+/// Ratio of the highest retained frequency to the highest frequency of interest. The last modes
+/// only improve those below.
 const BEYOND: f64 = 1.5;
 
 impl Component {
-    /// Of named rows (empty where a row has no name) and symmetric sparse matrices of mass (kg), damping (kg/s) if there is one, and
-    /// stiffness (N/m).
+    /// Creates a component from row names and symmetric sparse matrices.
+    ///
+    /// The matrices are mass (kg), damping (kg/s), if any, and stiffness (N/m). The name of a
+    /// row may be empty.
     ///
     /// # Errors
-    /// [`StructureError`]: sizes that differ, mass or stiffness that is not symmetric, a mass matrix that is not positive semidefinite.
+    /// [`StructureError`]: sizes that differ, an unsymmetric mass or stiffness matrix, a mass
+    /// matrix that is not positive semidefinite.
     pub fn new(
         rows: Vec<String>,
         mass: Matrix,
@@ -183,7 +194,7 @@ impl Component {
         }
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
-        // sizes and symmetry were looked at
+        // sizes and symmetry are already checked
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let definite = sparse_definite_in_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
@@ -192,17 +203,17 @@ impl Component {
         Ok(Component(Arc::new(Kept { rows, index, whole, definite_mass, reductions, damped, counts, sectors })))
     }
 
-    /// Rows of the matrices.
+    /// Returns the number of rows of the matrices.
     pub fn dofs(&self) -> usize {
         self.0.rows.len()
     }
 
-    /// Names of the rows; an empty one where a row has none.
+    /// Returns the names of the rows; unnamed rows have an empty name.
     pub fn rows(&self) -> &[String] {
         &self.0.rows
     }
 
-    /// The row of that name.
+    /// Returns the row with a name.
     pub fn row(&self, name: &str) -> Option<usize> {
         let index = self.0.index.get_or_init(|| {
             let named = self.0.rows.iter().enumerate().filter(|(_, name)| !name.is_empty());
@@ -211,7 +222,7 @@ impl Component {
         index.get(name).copied()
     }
 
-    /// Mass (kg), damping (kg/s) if it has one, and stiffness (N/m).
+    /// Returns mass (kg), damping (kg/s), if any, and stiffness (N/m).
     pub fn matrices(&self) -> (&Matrix, Option<&Matrix>, &Matrix) {
         let Whole { mass, damping, stiffness, .. } = &self.0.whole;
         let own = match damping {
@@ -221,12 +232,13 @@ impl Component {
         (mass, own, stiffness)
     }
 
-    /// Whether every motion of it has kinetic energy, as methods that follow motions in time ask for.
+    /// Returns whether the mass matrix is positive definite. Time integration requires this.
     pub fn has_definite_mass(&self) -> bool {
         self.0.definite_mass
     }
 
-    /// Its lowest natural frequencies, rad/s, rising; free motions have none to rounding.
+    /// Returns the lowest natural frequencies, rad/s, in ascending order. Free motions have a
+    /// frequency of zero up to rounding.
     ///
     /// # Errors
     /// [`ReductionError::Modes`].
@@ -236,8 +248,11 @@ impl Component {
         Ok(natural(&modes))
     }
 
-    /// The lowest frequencies of free vibration, rad/s, rising, where its damping has a gyroscopic part; `None` if it has none. Modes beyond four
-    /// times as many are left out.
+    /// Returns the lowest frequencies of free vibration, rad/s, in ascending order, for damping
+    /// with a gyroscopic part.
+    ///
+    /// Returns `None` if the damping is symmetric. The computation uses four times `count`
+    /// modes without damping.
     ///
     /// # Errors
     /// [`ReductionError::Modes`].
@@ -265,8 +280,11 @@ impl Component {
         Ok(found.map(|found| found.iter().take(count).map(|one| one.omega).collect()))
     }
 
-    /// How many natural modes it has below `omega` (rad/s), by one factorisation, which is made once for all that ask the same; `None` if that is
-    /// singular to rounding.
+    /// Returns the number of natural modes below `omega` (rad/s), from the inertia of one
+    /// factorization.
+    ///
+    /// The result is stored for repeated calls. Returns `None` if the matrix is singular up to
+    /// rounding.
     ///
     /// # Example
     /// ```
@@ -284,24 +302,30 @@ impl Component {
         })
     }
 
-    /// The component in few coordinates, seen at these weighted sums of its rows; computed once for all that ask the same.
+    /// Returns the reduced component, observed at these weighted sums of its rows. The result
+    /// is stored for repeated calls.
     ///
     /// # Errors
-    /// [`ReductionError`]: no place, modes that cannot be had, or no reduction that is close enough.
+    /// [`ReductionError`]: no place, a failure of the mode computation, or no reduction within
+    /// the tolerance.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
         once(&self.0.reductions, &(seen.to_vec(), *how), || {
             self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
         })
     }
 
-    /// The component in few coordinates that serve it with another stiffness as well, such as that at a speed of rotation, and all between,
-    /// `K + s (K₁ - K)` with s from 0 to 1; seen at these weighted sums of its rows.
+    /// Returns a reduced component whose basis also serves a second stiffness `K₁`, such as
+    /// that at a speed of rotation.
+    ///
+    /// It serves all stiffnesses `K + s (K₁ - K)` with s from 0 to 1, observed at these
+    /// weighted sums of its rows.
     ///
     /// # Errors
-    /// [`ReductionError`]: sizes that differ, no place, modes that cannot be had, or no reduction that is close enough.
+    /// [`ReductionError`]: sizes that differ, no place, a failure of the mode computation, or
+    /// no reduction within the tolerance.
     ///
     /// # Example
-    /// A mass on a rod of springs, which pull tightens.
+    /// A mass on a rod of springs, which tension stiffens.
     /// ```
     /// use stickslip::structure::{Component, Reduction, ReductionKind};
     /// use stickslip_numerics::sparse::Matrix;
@@ -339,11 +363,15 @@ impl Component {
         })
     }
 
-    /// As one of `sectors` sectors of a ring in few coordinates, as a sector of such a ring again: `Tᵀ M T` over its own coordinates and those of the
-    /// next sector, which its high side follows. So matrices stay positive semidefinite, and the ring is that of the reduction.
+    /// Reduces the component as one of `sectors` sectors of a ring. The result is again a
+    /// sector of such a ring.
+    ///
+    /// It is `Tᵀ M T` over its own coordinates and those of the next sector, which its high
+    /// side follows. The matrices stay positive semidefinite, and they describe the ring of the
+    /// reduced sectors.
     ///
     /// # Errors
-    /// As [`Component::reduced`].
+    /// See [`Component::reduced`].
     pub fn reduced_sector(
         &self,
         boundary: &Boundary,
@@ -358,7 +386,7 @@ impl Component {
         let columns = kept.sector.whole_columns(&reduced.basis);
         let (mass, damping, stiffness) = self.matrices();
         let project = |matrix: &Matrix| columns::products(self.dofs(), &columns, &matrix.times_columns(&columns));
-        // rounding apart they are symmetric
+        // symmetric up to rounding
         let symmetric = |matrix: &Matrix| {
             let product = project(matrix);
             sparse(&((&product + product.transpose()) * 0.5))
@@ -380,7 +408,8 @@ impl Component {
         })
     }
 
-    /// The damping of all its modes up to a frequency (rad/s) by one ratio, and of what lies above in proportion to its stiffness; computed once.
+    /// Returns damping with one ratio for all modes up to a frequency (rad/s), and proportional
+    /// to the stiffness above. The result is stored.
     pub(crate) fn modal_damping(&self, ratio: f64, up_to: f64) -> Damped {
         once(&self.0.damped, &(ratio, up_to), || {
             let (beta, columns) = self.0.whole.modal_damping(ratio, up_to)?;
@@ -388,7 +417,7 @@ impl Component {
         })
     }
 
-    /// The component as one of `sectors` sectors of a ring.
+    /// Returns the component as one of `sectors` sectors of a ring.
     pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<KeptSector> {
         let mut known = self.0.sectors.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((.., kept)) = known.iter().find(|(own, count, _)| own == boundary && *count == sectors) {
@@ -401,14 +430,15 @@ impl Component {
     }
 }
 
-/// The entries of a small matrix.
+/// Converts a small dense matrix to a sparse one.
 fn sparse(dense: &DMatrix<f64>) -> Result<Matrix, ReductionError> {
     let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
     let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
     Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
 }
 
-/// An answer that is computed once: whoever asks the same at the same time waits for the one who computes.
+/// Returns a stored result, or computes it once. Concurrent identical requests wait for the
+/// first one.
 fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
     let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, answer)) = known.iter().find(|(key, _)| key == asked) {
@@ -420,7 +450,7 @@ fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute:
 }
 
 impl KeptSector {
-    /// The sector in few coordinates.
+    /// Returns the reduced sector.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
         once(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
     }
@@ -439,7 +469,7 @@ impl KeptSector {
         }))
     }
 
-    /// The blade that the rows `blade` of the component are.
+    /// Returns the blade that consists of the rows `blade` of the component.
     pub fn blade(&self, component: &Component, blade: &[usize]) -> KeptBlade {
         once(&self.blades, &blade.to_vec(), || {
             let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
@@ -448,15 +478,18 @@ impl KeptSector {
         })
     }
 
-    /// The ring whose blades deviate by these shares of their stiffness in its own modes: with as many vectors of the blade in the coordinates of its
-    /// sectors as the error of that ring asks for, or with those that come nearest.
+    /// Returns the mistuned ring in its own modes, for these relative deviations of blade
+    /// stiffness.
+    ///
+    /// The sector basis receives as many blade vectors as the error requires, or the number
+    /// with the smallest error.
     pub fn mistuned(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
         let asked = ((seen.to_vec(), *how), deviations.to_vec());
         let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
             return Ok(answer.clone());
         }
-        // others wait for no pattern but their own
+        // other patterns need not wait
         drop(known);
         let answer = self.nearest(blade, deviations, seen, how)?;
         let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
@@ -468,14 +501,14 @@ impl KeptSector {
     }
 
     fn nearest(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
-        // without vectors of the blade only as many modes as are stated
+        // the number of modes is fixed, without blade vectors
         let (steps, enough) = match *how {
             Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
             _ => (0..1, f64::INFINITY),
         };
         let mut best: Option<(Arc<InFew>, Mixed, Deviation)> = None;
         for step in steps {
-            // what has served is kept where more of it fails
+            // a later failure keeps the earlier result
             let few = match (self.few(blade, seen, how, step), &best) {
                 (Ok(few), _) => few,
                 (Err(_), Some(_)) => continue,
@@ -504,7 +537,7 @@ impl KeptSector {
         Ok(Arc::new(ReducedComponent { form, deviation, ..ReducedComponent::clone(&few.component) }))
     }
 
-    /// With the vectors of the blade from that step on.
+    /// Reduces the sector with the blade vectors of this step; step 0 has none.
     fn few(&self, blade: &SectorBlade, seen: &[Row], how: &Reduction, step: usize) -> Relieved {
         once(&blade.reductions, &((seen.to_vec(), *how), step), || {
             let component = match step {
@@ -521,14 +554,14 @@ impl KeptSector {
 }
 
 impl SectorBlade {
-    /// What a share of one of its stiffness adds, over all rows that are left.
+    /// Returns the stiffness entries for a relative deviation of one, over all remaining rows.
     pub fn entries(&self) -> &[(usize, usize, f64)] {
         self.entries.get_or_init(|| self.blade.entries())
     }
 }
 
 impl std::fmt::Debug for Component {
-    /// Its size, not its matrices.
+    /// Writes the size, not the matrices.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (mass, _, stiffness) = self.matrices();
         write!(f, "Component of {} rows, {} and {} entries", self.dofs(), stiffness.len(), mass.len())
@@ -541,7 +574,7 @@ impl PartialEq for Component {
     }
 }
 
-/// Natural frequencies, rad/s; zero of what rounding makes negative.
+/// Returns natural frequencies, rad/s. Negative eigenvalues due to rounding give zero.
 fn natural(modes: &NaturalModes) -> Vec<f64> {
     modes.values.iter().map(|value| value.max(0.0).sqrt()).collect()
 }
@@ -553,15 +586,15 @@ fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionE
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
 
-/// A whole in few coordinates.
+/// A reduced form of the whole component.
 struct Fewer {
     reduced: Reduced,
     deviation: Deviation,
-    /// That it took.
+    /// The modes that it uses.
     modes: NaturalModes,
-    /// The error holds up to there, rad/s.
+    /// Upper end of the frequency range in which the error holds, rad/s.
     up_to: f64,
-    /// Its modes serve up to there, rad/s.
+    /// Highest frequency for which the basis is intended, rad/s.
     serves: f64,
 }
 
@@ -588,7 +621,8 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
 }
 
 impl ReducedComponent {
-    /// Coordinates; of a sector of a ring those of one sector, unless its blades differ.
+    /// Returns the number of coordinates. For a sector of a ring with equal blades, it is that
+    /// of one sector.
     pub fn dofs(&self) -> usize {
         match &self.form {
             Form::Alone(reduced) => reduced.dofs(),
@@ -597,7 +631,7 @@ impl ReducedComponent {
         }
     }
 
-    /// What it is made of, in words.
+    /// Returns a description of the reduction.
     pub fn kind(&self) -> &str {
         match &self.form {
             Form::Alone(reduced) => &reduced.kind,
@@ -606,37 +640,39 @@ impl ReducedComponent {
         }
     }
 
-    /// The largest relative error of what is seen, up to [`ReducedComponent::up_to`].
+    /// Returns the largest relative error of the observed displacements, up to
+    /// [`ReducedComponent::up_to`].
     pub fn error(&self) -> f64 {
         self.deviation.error
     }
 
-    /// Where the error is largest, rad/s.
+    /// Returns the frequency of the largest error, rad/s.
     pub fn worst_at(&self) -> f64 {
         self.deviation.omega
     }
 
-    /// The error holds up to there, rad/s.
+    /// Returns the upper end of the frequency range in which the error holds, rad/s.
     pub fn up_to(&self) -> f64 {
         self.up_to
     }
 
-    /// Its modes serve up to there, rad/s: a damping ratio is that of each of them.
+    /// Returns the highest frequency for which the basis is intended, rad/s. A damping ratio
+    /// applies to all modes up to this frequency.
     pub fn serves(&self) -> f64 {
         self.serves
     }
 
-    /// Frequencies of the whole component, rad/s, rising, as many as it took.
+    /// Returns the computed frequencies of the full component, rad/s, in ascending order.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
     }
 
-    /// How many of its modes are free motions.
+    /// Returns the number of free motions among its modes.
     pub fn free(&self) -> usize {
         self.free
     }
 
-    /// Its small matrices.
+    /// Returns the reduced matrices.
     pub(crate) fn form(&self) -> &Form {
         &self.form
     }

@@ -1,10 +1,13 @@
-//! One sector of a disk by its matrices, with both its sides, as a part of a ring.
+//! One sector of a disk given by matrices, with both its sides, as a part of a ring.
 //!
-//! What lies on the high side of a sector lies on the low side of the next: `x_high(s) = R x_low(s+1)`, turned by `2π/N` about the axis, since every
-//! sector has its displacements along axes of its own. The high side gives way, `x(s) = T₀ q(s) + T₁ q(s+1)`, and each matrix becomes
-//! `A₀ = T₀ᵀAT₀ + T₁ᵀAT₁` on the sector itself, `A₁ = T₀ᵀAT₁` towards the next and `A₋₁ = T₁ᵀAT₀` towards the one before.
+//! The high side of a sector coincides with the low side of the next one:
+//! `x_high(s) = R x_low(s+1)`. `R` is a rotation by `2π/N` about the axis, because every sector
+//! has its own axes of displacement. The high side is eliminated, `x(s) = T₀ q(s) + T₁ q(s+1)`.
+//! Each matrix becomes `A₀ = T₀ᵀAT₀ + T₁ᵀAT₁` within the sector, `A₁ = T₀ᵀAT₁` to the next and
+//! `A₋₁ = T₁ᵀAT₀` to the previous sector.
 //!
-//! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth. Engng 14, 81-102.
+//! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth.
+//! Engng 14, 81-102.
 
 use super::reduction::{Damping, ReductionError, Row, Whole};
 use super::sector::in_wave;
@@ -12,10 +15,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use stickslip_numerics::sparse::{Analysis, Matrix};
 
-/// How both sides of a sector belong together.
+/// The coupling between the two sides of a sector.
 ///
 /// # Example
-/// A sector of two rows: what is row 1 here is row 0 of the next sector.
+/// A sector of two rows: row 1 is row 0 of the next sector.
 /// ```
 /// use stickslip::structure::{Boundary, Component};
 /// use stickslip_numerics::sparse::Matrix;
@@ -29,14 +32,16 @@ use stickslip_numerics::sparse::{Analysis, Matrix};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
-    /// Rows (low, high) that are the same along axes that turn with the sectors.
+    /// Pairs of rows (low, high) that are equal along axes that rotate with the sectors.
     alike: Vec<[usize; 2]>,
-    /// Rows along x, y, z of the low and of the high side, which the next sector has turned.
+    /// Rows along x, y, z of the low and of the high side, which are rotated in the next
+    /// sector.
     turned: Vec<[[Option<usize>; 3]; 2]>,
     axis: Option<Axis>,
 }
 
-/// The axis of a disk: displacements are along x, y and z, and the next sector is turned about it by the right-hand rule.
+/// The axis of a disk. Displacements are along x, y and z; the next sector is rotated about the
+/// axis by the right-hand rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
     /// x
@@ -47,24 +52,24 @@ pub enum Axis {
     Z,
 }
 
-/// Why two sides do not belong together.
+/// The reason why the two sides of a sector do not match.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoundaryError {
-    /// No pair.
+    /// There is no pair.
     #[error("there is no pair of nodes; every node of the low side needs one on the high side")]
     Empty,
     /// Neither node has a row.
     #[error("the structure has no rows of node `{0}`")]
     NoRows(String),
-    /// A node stands twice.
+    /// A node occurs twice on one side.
     #[error("node `{0}` stands twice on the {1} side")]
     Twice(String, &'static str),
-    /// A node of both sides.
+    /// A node occurs on both sides.
     #[error(
         "node `{0}` stands on both sides: what lies on the axis turns about itself and cannot be tied; hold it, or leave it out of the model"
     )]
     Both(String),
-    /// A node without any row, whose other has some.
+    /// One node of a pair has no rows, but the other has.
     #[error(
         "the structure has no row of node `{0}`, and rows of node `{1}` that it is tied to: is that its name? what is constrained is so on both sides"
     )]
@@ -74,21 +79,21 @@ pub enum BoundaryError {
         "node `{high}` of the high side moves along {along}, and node `{low}` of the low side lacks a direction for that; constrain both alike"
     )]
     Constrained {
-        /// Of the low side.
+        /// Node of the low side.
         low: String,
-        /// Of the high side.
+        /// Node of the high side.
         high: String,
         /// Direction of the row.
         along: String,
     },
-    /// A direction that nobody knows how to turn.
+    /// The rotation of a direction is unknown.
     #[error(
         "row `{0}` is not along x, y, z, rx, ry or rz and cannot be turned; leave out the axis if the rows turn with the sectors"
     )]
     Direction(String),
 }
 
-/// Names of directions that are turned together.
+/// Names of directions that rotate together.
 const DIRECTIONS: [[&str; 3]; 2] = [["x", "y", "z"], ["rx", "ry", "rz"]];
 
 impl std::fmt::Display for Axis {
@@ -98,13 +103,13 @@ impl std::fmt::Display for Axis {
 }
 
 impl Axis {
-    /// Distance of a point from it.
+    /// Returns the distance of a point from the axis.
     pub(super) fn radius(self, at: [f64; 3]) -> f64 {
         let [a, b] = self.across(at);
         a.hypot(b)
     }
 
-    /// The angle from one point to another about it, rad, from -π to π.
+    /// Returns the angle from one point to another about the axis, rad, from -π to π.
     pub(super) fn angle(self, from: [f64; 3], to: [f64; 3]) -> f64 {
         let ([a, b], [c, d]) = (self.across(from), self.across(to));
         (a * d - b * c).atan2(a * c + b * d)
@@ -115,7 +120,8 @@ impl Axis {
         [at[(own + 1) % 3], at[(own + 2) % 3]]
     }
 
-    /// Displacements along fixed axes of what moved along x, y, z of a sector that lies further by `angle` (rad).
+    /// Returns the rotation by `angle` (rad): it maps displacements along x, y, z of the
+    /// rotated sector to fixed axes.
     pub(super) fn turn(self, angle: f64) -> [[f64; 3]; 3] {
         let (sin, cos) = angle.sin_cos();
         let own = self as usize;
@@ -128,11 +134,15 @@ impl Axis {
 }
 
 impl Boundary {
-    /// Of nodes (low, high) of a structure with these rows: they are called `node.direction`. Without an axis the rows of both nodes that have the same direction are the same;
-    /// with one their directions are x, y, z (rx, ry, rz), and the high side is where the sector ends by the right-hand rule about it.
+    /// Creates the coupling from pairs of nodes (low, high) of a structure with these rows,
+    /// named `node.direction`.
+    ///
+    /// Without an axis, rows of the same direction are equal. With an axis, the directions are
+    /// x, y, z (rx, ry, rz). The high side is then the end of the sector by the right-hand rule
+    /// about the axis.
     ///
     /// # Errors
-    /// [`BoundaryError`]: nodes without rows, or whose rows do not belong together.
+    /// [`BoundaryError`]: nodes without rows, or nodes whose rows do not match.
     pub fn of_nodes(rows: &[String], pairs: &[(String, String)], axis: Option<Axis>) -> Result<Self, BoundaryError> {
         if pairs.is_empty() {
             return Err(BoundaryError::Empty);
@@ -171,7 +181,8 @@ impl Boundary {
         Ok(boundary)
     }
 
-    /// Ties one node to another; a direction that cannot be, and whether nobody knows how it turns.
+    /// Couples one node to another. The error is a direction that cannot be coupled, and
+    /// whether its rotation is unknown.
     fn tie(&mut self, low: &BTreeMap<&str, usize>, high: &BTreeMap<&str, usize>) -> Result<(), (String, bool)> {
         let all = || low.keys().chain(high.keys()).copied();
         let Some(axis) = self.axis else {
@@ -191,7 +202,7 @@ impl Boundary {
         for directions in DIRECTIONS {
             let rows = [low, high].map(|side| directions.map(|along| side.get(along).copied()));
             for (k, along) in directions.iter().enumerate() {
-                // along the axis a row stays itself, across it two mix
+                // the row along the axis is unchanged; the two rows across it mix
                 let mixed = (0..3).filter(|&i| i == k || (i != axis as usize && k != axis as usize));
                 let have = mixed.flat_map(|i| [rows[0][i], rows[1][i]]).collect::<Vec<_>>();
                 if have.iter().any(Option::is_some) != have.iter().all(Option::is_some) {
@@ -205,19 +216,20 @@ impl Boundary {
         Ok(())
     }
 
-    /// The rows that give way to those of the next sector.
+    /// Returns the rows of the high side, which those of the next sector replace.
     pub fn high_rows(&self) -> impl Iterator<Item = usize> + '_ {
         let turned = self.turned.iter().flat_map(|[_, high]| high.iter().flatten().copied());
         self.alike.iter().map(|[_, high]| *high).chain(turned)
     }
 
-    /// The rows of the low side, which the sector before shares.
+    /// Returns the rows of the low side, which the previous sector shares.
     pub fn low_rows(&self) -> impl Iterator<Item = usize> + '_ {
         let turned = self.turned.iter().flat_map(|[low, _]| low.iter().flatten().copied());
         self.alike.iter().map(|[low, _]| *low).chain(turned)
     }
 
-    /// Every row of the high side as (row, rows of the low side of the next sector with their weights), on a disk of so many sectors.
+    /// Returns every row of the high side as a weighted sum of rows of the next sector's low
+    /// side. The rotation depends on the number of sectors.
     fn ties(&self, sectors: usize) -> Vec<(usize, Row)> {
         let mut ties: Vec<(usize, Row)> = self.alike.iter().map(|[low, high]| (*high, vec![(*low, 1.0)])).collect();
         if let Some(axis) = self.axis {
@@ -234,29 +246,30 @@ impl Boundary {
     }
 }
 
-/// An entry of a ring's matrix in the rows of one sector: row, column, by how many sectors the column lies further, value.
+/// An entry of a ring's matrix in the rows of one sector: row, column, offset of the column in
+/// sectors, value.
 pub(crate) type RingEntry = (usize, usize, i64, f64);
-/// A weighted sum of rows: row, by how many sectors it lies further, weight.
+/// A weighted sum of rows: row, offset in sectors, weight.
 pub(crate) type RingRow = Vec<(usize, i64, f64)>;
 
-/// A component as one of the equal sectors of a ring: without the rows of its high side.
+/// A component as one of the equal sectors of a ring, without the rows of its high side.
 #[derive(Debug, Clone)]
 pub(crate) struct CyclicSector {
     pub sectors: usize,
-    /// Rows that are left.
+    /// Number of remaining rows.
     pub dofs: usize,
-    /// Of every row of the component: what it is of those that are left.
+    /// Every row of the component, in terms of the remaining rows.
     rows: Vec<RingRow>,
-    /// Which rows of the component are left.
+    /// Indices in the component of the remaining rows.
     pub kept: Vec<usize>,
     pub mass: Vec<RingEntry>,
-    /// Of a damping matrix.
+    /// Entries of the damping matrix, if any.
     pub damping: Option<Vec<RingEntry>>,
     pub stiffness: Vec<RingEntry>,
 }
 
 impl CyclicSector {
-    /// Of mass, damping and stiffness of one sector.
+    /// Creates a sector from its mass, damping and stiffness.
     pub fn new(
         (mass, damping, stiffness): (&Matrix, Option<&Matrix>, &Matrix),
         boundary: &Boundary,
@@ -279,20 +292,21 @@ impl CyclicSector {
         CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness }
     }
 
-    /// What a sector has of these entries with its neighbours held.
+    /// Returns the matrix of a sector with the adjacent sectors fixed.
     pub fn alone(&self, entries: &[RingEntry]) -> Result<Matrix, ReductionError> {
         let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
         Matrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
     }
 
-    /// A weighted sum of the component's rows, over those that are left.
+    /// Converts a weighted sum of the component's rows to the remaining rows.
     pub fn row(&self, row: &Row) -> RingRow {
         let parts =
             row.iter().flat_map(|(at, w)| self.rows[*at].iter().map(move |(to, shift, v)| (*to, *shift, w * v)));
         parts.collect()
     }
 
-    /// All rows of the component, by columns: first over coordinates of the rows that are left, then over the same of the next sector.
+    /// Returns the columns `basis` over all rows of the component: first for the coordinates of
+    /// this sector, then for those of the next one.
     pub fn whole_columns(&self, basis: &[f64]) -> Vec<f64> {
         let (n, all) = (self.dofs.max(1), self.rows.len());
         let half = basis.len() / n * all;
@@ -308,7 +322,8 @@ impl CyclicSector {
         columns
     }
 
-    /// The structure of a wave, seen at these weighted sums of the component's rows: along the real and, if the wave has one, the
+    /// Returns the structure of a wave, observed at these weighted sums of the component's
+    /// rows. There is one port for the real part and, if the wave is complex, one for the
     /// imaginary part.
     pub fn wave(&self, diameter: usize, seen: &[Row]) -> Result<Whole, ReductionError> {
         let (n, sectors) = (self.dofs, self.sectors);
@@ -325,7 +340,7 @@ impl CyclicSector {
         let mut ports = vec![Row::new(); copies * seen.len()];
         for (p, row) in seen.iter().enumerate() {
             let all = self.row(row).into_iter().map(|(at, shift, weight)| (p, at, shift, weight));
-            // the ports of the imaginary part follow all of the real part
+            // the ports of the imaginary part follow all ports of the real part
             for (port, at, weight) in in_wave(all, [seen.len(), n], diameter, sectors) {
                 ports[port].push((at, weight));
             }
@@ -333,13 +348,16 @@ impl CyclicSector {
         whole.seen_at(ports)
     }
 
-    /// What `δ` of all stiffness of the component's rows `blade` adds to the stiffness, for `δ` = 1: the energy of the blade beyond that of
-    /// following its foundation, over the rows that are left.
+    /// Returns the stiffness change per unit `δ` if the component's rows `blade` have their
+    /// stiffness scaled by `1 + δ`.
+    ///
+    /// It is the strain energy of the blade in excess of a static motion that follows its
+    /// foundation, over the remaining rows.
     pub fn blade(&self, names: &[String], stiffness: &Matrix, blade: &[usize]) -> Result<Blade, BladeError> {
         if blade.is_empty() {
             return Err(BladeError::Empty);
         }
-        // what the sector before ends with
+        // low side, shared with the previous sector
         let low: BTreeSet<usize> = self.rows.iter().flatten().filter(|part| part.1 == 1).map(|part| part.0).collect();
         let mut inside = BTreeMap::new();
         for &row in blade {
@@ -374,38 +392,38 @@ impl CyclicSector {
     }
 }
 
-/// Why a set of rows is no blade.
+/// The reason why a set of rows is not a valid blade.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BladeError {
-    /// It reaches the boundary of the sector.
+    /// The blade reaches the boundary of the sector.
     #[error(
         "row `{0}` of the blade stands on the boundary of the sector, or beside it: only what one sector has alone can be mistuned"
     )]
     OnBoundary(String),
-    /// There is none.
+    /// The set of rows is empty.
     #[error("the blade has no node")]
     Empty,
-    /// It is no cantilever.
+    /// The blade is not a cantilever.
     #[error(
         "with all other rows held the blade can still move, or nothing else holds it: name all nodes of the blade, and not those of the disk"
     )]
     NotHeld,
 }
 
-/// The blade of a sector, held by all that is no blade.
+/// The blade of a sector, clamped at all other rows.
 #[derive(Debug)]
 pub(crate) struct Blade {
-    /// Its rows among those that are left.
+    /// Its rows among the remaining rows.
     at: Vec<usize>,
     own: Matrix,
-    /// Row of the blade, row that is left and no blade, stiffness.
+    /// Row of the blade, remaining row outside the blade, stiffness.
     towards: Vec<(usize, usize, f64)>,
     factor: stickslip_numerics::sparse::Factor,
 }
 
 impl Blade {
-    /// `[K_bb, K_bi; K_ib, K_ib K_bb⁻¹ K_bi]` over the rows that are left: the energy `(x_b - Ψ x_i)ᵀ K_bb (x_b - Ψ x_i)` with
-    /// `Ψ = -K_bb⁻¹ K_bi`.
+    /// Returns `[K_bb, K_bi; K_ib, K_ib K_bb⁻¹ K_bi]` over the remaining rows. This is the
+    /// energy `(x_b - Ψ x_i)ᵀ K_bb (x_b - Ψ x_i)` with `Ψ = -K_bb⁻¹ K_bi`.
     pub fn entries(&self) -> Vec<(usize, usize, f64)> {
         let n = self.at.len();
         let mut all: Vec<(usize, usize, f64)> =
@@ -429,20 +447,21 @@ impl Blade {
         all
     }
 
-    /// Their product with displacements of the rows that are left: forces on these.
+    /// Returns the product of [`Blade::entries`] with displacements of the remaining rows, as
+    /// forces on these rows.
     pub fn times(&self, displacements: &[f64]) -> Vec<f64> {
         let moved: Vec<f64> = self.at.iter().map(|at| displacements[*at]).collect();
         let mut forces = self.own.times(&moved);
         self.towards.iter().for_each(|(row, at, value)| forces[*row] += value * displacements[*at]);
         let mut all = vec![0.0; displacements.len()];
         self.at.iter().zip(&forces).for_each(|(at, force)| all[*at] = *force);
-        // what the foundation feels is what the blade would follow it by
+        // forces on the foundation: K_ib K_bb⁻¹ times the forces on the blade
         self.factor.solve(&mut forces);
         self.towards.iter().for_each(|(row, at, value)| all[*at] += value * forces[*row]);
         all
     }
 
-    /// The same over columns of length `n`, `Vᵀ D V`.
+    /// Returns `Vᵀ D V` over columns of length `n`, with the matrix `D` of [`Blade::entries`].
     pub fn along(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
         let forces: Vec<f64> = basis.chunks_exact(n).flat_map(|column| self.times(column)).collect();
         let energy = stickslip_numerics::sparse::columns::products(n, basis, &forces);
@@ -451,7 +470,7 @@ impl Blade {
     }
 }
 
-/// `TᵀAT` in the rows of one sector, with each entry once, sorted.
+/// Returns `TᵀAT` in the rows of one sector, sorted, without duplicate entries.
 fn eliminated(matrix: &Matrix, rows: &[RingRow]) -> Vec<RingEntry> {
     let mut all: Vec<RingEntry> = Vec::with_capacity(matrix.len());
     for (i, k, value) in matrix.entries() {
@@ -462,9 +481,9 @@ fn eliminated(matrix: &Matrix, rows: &[RingRow]) -> Vec<RingEntry> {
     summed(all)
 }
 
-/// Each entry once, sorted.
+/// Sorts the entries and sums duplicates.
 fn summed(mut all: Vec<RingEntry>) -> Vec<RingEntry> {
-    // a stable sort: sums are of one order
+    // a stable sort keeps the order of the sums
     all.sort_by_key(|entry| (entry.0, entry.1, entry.2));
     all.dedup_by(|next, sum| {
         let same = (next.0, next.1, next.2) == (sum.0, sum.1, sum.2);
@@ -476,7 +495,8 @@ fn summed(mut all: Vec<RingEntry>) -> Vec<RingEntry> {
     all
 }
 
-/// The mean of a ring's matrix and its mirror image, whose columns lie as many sectors back: symmetric to the last bit.
+/// Returns the mean of a ring's matrix and its transpose, symmetric to the last bit. `back`
+/// returns the opposite sector offset.
 pub(super) fn symmetrised(entries: Vec<RingEntry>, back: impl Fn(i64) -> i64) -> Vec<RingEntry> {
     let halves = entries.into_iter().flat_map(|(i, k, shift, value)| {
         let half = 0.5 * value;
@@ -497,14 +517,16 @@ mod tests {
         pairs.iter().map(|(low, high)| ((*low).to_owned(), (*high).to_owned())).collect()
     }
 
-    /// A translation of the whole disk is one displacement in all sectors: along turned axes it follows from that of the next sector.
+    /// A translation of the whole disk is one displacement in all sectors. Along rotated axes,
+    /// it follows from that of the next sector.
     #[test]
     fn the_next_sector_is_turned_by_the_right_hand_rule() {
         let rows = ["1.x", "1.y", "1.z", "2.x", "2.y", "2.z"];
         for (axis, across) in [(Axis::X, [1, 2]), (Axis::Y, [2, 0]), (Axis::Z, [0, 1])] {
             let boundary = Boundary::of_nodes(&named(&rows), &pairs(&[("1", "2")]), Some(axis)).unwrap();
             let angle = TAU / 5.0;
-            // along the first of the directions across the axis; the next sector sees it turned back
+            // along the first direction across the axis, which the next sector sees rotated
+            // backwards
             let mut next = [0.0; 3];
             (next[across[0]], next[across[1]]) = (angle.cos(), -angle.sin());
             let mut own = [0.0; 3];
@@ -528,7 +550,7 @@ mod tests {
         assert!(refused(&free, &[("8", "9")], None).contains("no rows of node `9`"));
         let held = named(&["1.x", "1.z", "2.x", "2.y", "2.z"]);
         assert!(refused(&held, &[("1", "2")], Some(Axis::Z)).contains("constrain both alike"));
-        // what both sides lack is held
+        // a direction that both sides lack is fixed
         let held = named(&["1.z", "2.z"]);
         assert_eq!(
             Boundary::of_nodes(&held, &pairs(&[("1", "2")]), Some(Axis::Z)).unwrap().ties(7),

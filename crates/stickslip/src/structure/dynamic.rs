@@ -1,4 +1,4 @@
-//! What a structure answers to harmonic forces: `(s² M + s C + K) x = F` at `s = jhΩ`.
+//! The dynamic stiffness of a structure: `(s² M + s C + K) x = F` at `s = jhΩ`.
 
 use super::modal::WithModes;
 use super::{Form, Structure};
@@ -6,7 +6,8 @@ use num_complex::Complex64;
 use stickslip_numerics::dense::ComplexLu;
 use stickslip_numerics::sparse::{Analysis, ComplexFactor, Singular};
 
-/// The dynamic stiffness of a structure at one rate, factored: it answers as many loads as one likes.
+/// The factored dynamic stiffness of a structure at one complex frequency. It solves for any
+/// number of loads.
 #[derive(Debug, Clone)]
 pub struct DynamicStiffness {
     factor: Factor,
@@ -20,15 +21,17 @@ enum Factor {
 }
 
 impl Structure {
-    /// `s² M + s C + K` at any rate `s` (1/s), factored; harmonic h of the frequency Ω has `s = jhΩ`.
+    /// Factors `s² M + s C + K` at a complex frequency `s` (1/s). Harmonic h of the frequency Ω
+    /// has `s = jhΩ`.
     ///
     /// # Errors
-    /// [`Singular`]: a resonance without damping, or at rest a structure that can drift.
+    /// [`Singular`]: an undamped resonance, or a structure with free motions at `s = 0`.
     pub fn dynamic_stiffness(&self, s: Complex64) -> Result<DynamicStiffness, Singular> {
         self.held_stiffness(s, 0.0)
     }
 
-    /// The same with springs of `hold` (1/s²) times every mass.
+    /// Factors the dynamic stiffness with additional springs of `hold` (1/s²) times the mass
+    /// matrix.
     pub(crate) fn held_stiffness(&self, s: Complex64, hold: f64) -> Result<DynamicStiffness, Singular> {
         let of_mass = s * s + hold;
         let factor = match &self.0.form {
@@ -51,7 +54,8 @@ impl Structure {
         Ok(DynamicStiffness { factor })
     }
 
-    /// Memory of a [`DynamicStiffness`] of a sparse structure, bytes, from where its entries stand: nothing is factored. Zero of any other.
+    /// Returns the memory of a [`DynamicStiffness`] of a sparse structure, bytes, from its
+    /// sparsity pattern without a factorization. Zero for full matrices.
     pub(crate) fn factor_bytes(&self) -> usize {
         match &self.0.form {
             Form::Full(_) => 0,
@@ -64,7 +68,7 @@ impl Structure {
 }
 
 impl DynamicStiffness {
-    /// Memory of it, bytes.
+    /// Returns its memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         match &self.factor {
             Factor::Full(factor) => factor.bytes(),
@@ -73,10 +77,11 @@ impl DynamicStiffness {
         }
     }
 
-    /// Displacements (m) from forces (N), in place: columns of length n, one after the other.
+    /// Computes displacements (m) from forces (N) in place. The columns of length n are stored
+    /// one after the other.
     ///
     /// # Panics
-    /// If the length of `loads` is no multiple of n.
+    /// If the length of `loads` is not a multiple of n.
     pub fn solve(&self, loads: &mut [Complex64]) {
         match &self.factor {
             Factor::Full(factor) => factor.solve(loads),

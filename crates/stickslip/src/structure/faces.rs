@@ -1,71 +1,73 @@
-//! Where the nodes of a sector stand, and which of its low side are which of its high side.
+//! Coordinates of the nodes of a sector, to find or check the pairs of its low and high side.
 //!
-//! Turned by `2π/N` about the axis, the low side of a sector is its high side, node on node. Matrices do not say where a node stands: a wrong pair
-//! makes another disk, whose matrices are as good as those of the right one. Coordinates tell.
+//! A rotation of the low side by `2π/N` about the axis gives the high side, node on node. The
+//! matrices do not contain the coordinates of the nodes. A wrong pair defines another disk with
+//! valid matrices, which only coordinates can detect.
 
 use super::Axis;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// A node and where it stands, in any unit of length.
+/// A node and its coordinates, in any unit of length.
 pub type Node = (String, [f64; 3]);
 
-/// Distance of a node from where its counterpart is turned to, relative to the distance of the farthest node from the axis: meshes are written with
-/// six digits or more, and elements are larger.
+/// Tolerance for the distance between a node and its rotated counterpart, relative to the
+/// largest distance of a node from the axis. Meshes are written with six digits or more, and
+/// elements are larger.
 const TOGETHER: f64 = 1e-4;
 
-/// Why pairs of nodes are not the two sides of a sector.
+/// The reason why pairs of nodes are not the two sides of a sector.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FacesError {
-    /// A node stands nowhere.
+    /// A node has no coordinates.
     #[error("node `{0}` has no coordinates")]
     Unknown(String),
-    /// A pair that does not lie together.
+    /// The nodes of a pair do not coincide after rotation.
     #[error(
         "node `{low}` of the low side, turned by 360°/{sectors} about {axis}, is {apart:.3e} away from node `{high}` (sector's radius {radius:.3e}){}",
         hint.as_ref().map_or_else(String::new, |hint| format!("; {hint}"))
     )]
     Apart {
-        /// Of the low side.
+        /// Node of the low side.
         low: String,
-        /// Of the high side.
+        /// Node of the high side.
         high: String,
         /// Number of sectors.
         sectors: usize,
-        /// The axis.
+        /// Axis of the disk.
         axis: Axis,
         /// Distance, in the unit of the coordinates.
         apart: f64,
         /// Largest distance of a node from the axis.
         radius: f64,
-        /// What would fit.
+        /// A suggestion for a correction.
         hint: Option<String>,
     },
-    /// Nodes of both sides that no pair names.
+    /// Two nodes of the sides coincide after rotation, but no pair names them.
     #[error(
         "node `{low}` lies on the low side and node `{high}` is its counterpart, and no pair names them ({count} like it)"
     )]
     Missing {
-        /// Of the low side.
+        /// Node of the low side.
         low: String,
-        /// Of the high side.
+        /// Node of the high side.
         high: String,
-        /// How many pairs are missing.
+        /// Number of missing pairs.
         count: usize,
     },
-    /// No two nodes are one turn apart.
+    /// No two nodes coincide after rotation.
     #[error(
         "no node turned by 360°/{sectors} about {axis} meets another: are the axis and the number of sectors right?"
     )]
     None {
         /// Number of sectors.
         sectors: usize,
-        /// The axis.
+        /// Axis of the disk.
         axis: Axis,
     },
 }
 
-/// The nodes of a sector by their coordinates.
+/// The nodes of a sector with their coordinates.
 ///
 /// # Example
 /// A quarter of a disk: nodes 1 and 2 are its low side, 3 and 4 its high side.
@@ -85,12 +87,13 @@ pub struct Faces<'a> {
     axis: Axis,
     sectors: usize,
     radius: f64,
-    /// Nodes by the cell that they stand in.
+    /// Nodes by grid cell.
     cells: BTreeMap<[i64; 3], Vec<usize>>,
 }
 
 impl<'a> Faces<'a> {
-    /// Of all nodes of a sector, or of those that count, on a disk of so many sectors.
+    /// Creates it from the nodes of a sector, or from a selection of them, and the number of
+    /// sectors.
     pub fn new(nodes: &'a [Node], axis: Axis, sectors: usize) -> Self {
         let radius = nodes.iter().map(|(_, at)| axis.radius(*at)).fold(0.0, f64::max);
         let mut faces = Faces { nodes, axis, sectors, radius, cells: BTreeMap::new() };
@@ -108,7 +111,8 @@ impl<'a> Faces<'a> {
         at.map(|x| (x / self.tolerance().max(f64::MIN_POSITIVE)).floor() as i64)
     }
 
-    /// The pairs (low, high) that the coordinates tell, in the order of the nodes. Nodes on the axis are none.
+    /// Returns the pairs (low, high) according to the coordinates, in the order of the nodes.
+    /// Nodes on the axis are excluded.
     ///
     /// # Errors
     /// [`FacesError::None`].
@@ -117,14 +121,15 @@ impl<'a> Faces<'a> {
         let off_axis = self.nodes.iter().enumerate().filter(|(_, (_, at))| self.axis.radius(*at) > self.tolerance());
         let met = off_axis.filter_map(|(own, (low, at))| {
             let high = self.nearest(turned(&turn, *at))?;
-            // of two sectors each is the next of the other, and every pair is met from both ends
+            // with two sectors, each is the next one of the other, and every pair is found from
+            // both ends
             (self.sectors != 2 || own < high).then(|| (low.clone(), self.nodes[high].0.clone()))
         });
         let pairs: Vec<_> = met.collect();
         if pairs.is_empty() { Err(FacesError::None { sectors: self.sectors, axis: self.axis }) } else { Ok(pairs) }
     }
 
-    /// The node at a point.
+    /// Returns the node at a point.
     fn nearest(&self, point: [f64; 3]) -> Option<usize> {
         let cell = self.cell(point);
         let beside = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
@@ -133,10 +138,11 @@ impl<'a> Faces<'a> {
         near.filter(|(apart, _)| *apart <= self.tolerance()).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, index)| index)
     }
 
-    /// Whether these pairs (low, high) are those of the coordinates, none wrong and none missing.
+    /// Checks that these pairs (low, high) agree with the coordinates and are complete.
     ///
     /// # Errors
-    /// [`FacesError`]: a node without coordinates, a pair that does not lie together, or one that is missing.
+    /// [`FacesError`]: a node without coordinates, a pair that does not coincide, or a missing
+    /// pair.
     pub fn check(&self, pairs: &[(String, String)]) -> Result<(), FacesError> {
         let of: BTreeMap<&str, [f64; 3]> = self.nodes.iter().map(|(name, at)| (name.as_str(), *at)).collect();
         let find = |name: &String| of.get(name.as_str()).copied().ok_or_else(|| FacesError::Unknown(name.clone()));
@@ -173,7 +179,7 @@ impl<'a> Faces<'a> {
         apart(turned(&axis.turn(angle), from), to)
     }
 
-    /// What would make a pair fit.
+    /// Returns a suggestion that makes a pair fit.
     fn hint(&self, from: [f64; 3], to: [f64; 3]) -> Option<String> {
         let angle = TAU / self.sectors as f64;
         let fits = |axis: Axis, angle: f64| self.after_turn(axis, angle, from, to) <= self.tolerance();
@@ -213,7 +219,8 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Two radii and two heights on both sides of a sector of ten, and a blade in its middle.
+    /// Two radii and two heights on both sides of one of ten sectors, and a blade in its
+    /// middle.
     fn nodes(axis: Axis) -> Vec<Node> {
         let turn = |angle: f64, at: [f64; 3]| turned(&axis.turn(angle), at);
         let mut nodes = Vec::new();
@@ -261,7 +268,7 @@ mod tests {
             let message = refused(axis, sectors, pairs).unwrap_err();
             assert!(message.contains(words), "{words}: {message}");
         }
-        // of two sectors it does not matter which side is which
+        // with two sectors, the order of the sides does not matter
         let half: Vec<Node> = [("1", 3.0), ("2", -3.0)].map(|(name, x)| (name.to_owned(), [x, 0.0, 1.0])).to_vec();
         let faces = Faces::new(&half, Axis::Z, 2);
         assert_eq!(faces.pairs().unwrap(), named(&[("1", "2")]));

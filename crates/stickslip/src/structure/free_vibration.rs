@@ -1,7 +1,10 @@
-//! Free vibration of a structure whose damping has a gyroscopic part, one that turns velocities and takes no power: eigenvalues of
-//! `q'' + D q' + Λ q = 0` in the modes without damping.
+//! Free vibration of a structure with gyroscopic damping.
 //!
-//! `D` couples modes by their frequencies, so that those far above may be left out. Source: Genta, "Dynamics of Rotating Systems" (2005), Ch. 2.
+//! The gyroscopic part of the damping does no work. The frequencies are eigenvalues of
+//! `q'' + D q' + Λ q = 0` in the undamped modes. `D` couples modes according to their
+//! frequencies, so that much higher modes can be omitted.
+//!
+//! Source: Genta, "Dynamics of Rotating Systems" (2005), Ch. 2.
 
 use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
@@ -15,10 +18,11 @@ pub(crate) struct FreeVibration {
     pub damping: f64,
 }
 
-/// All free vibrations, by rising frequency, of modes with these squares of frequencies Λ and this damping D, `D_ik = φᵢᵀ C φₖ`. `None` if D is symmetric.
+/// Returns all free vibrations in ascending order of frequency, for modes with squared
+/// frequencies Λ and damping `D_ik = φᵢᵀ C φₖ`. Returns `None` if D is symmetric.
 pub(crate) fn free_vibrations(squares: &[f64], damping: &DMatrix<f64>) -> Option<Vec<FreeVibration>> {
     let n = squares.len();
-    // matrices may have ten digits
+    // matrices can have ten digits
     let rounding = 1e-9 * damping.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     if (0..n).all(|i| (0..i).all(|k| (damping[(i, k)] - damping[(k, i)]).abs() <= rounding)) {
         return None;
@@ -30,7 +34,7 @@ pub(crate) fn free_vibrations(squares: &[f64], damping: &DMatrix<f64>) -> Option
         _ => 0.0,
     });
     let values = eigen::eigenvalues(&first_order)?;
-    // the double zero of a free motion splits by the root of rounding
+    // the double zero of a free motion splits by the square root of the rounding error
     let least = 1e-6 * values.iter().fold(0.0, |most: f64, value| most.max(value.norm()));
     let vibrating = values.iter().filter(|value| value.im > least);
     let mut found: Vec<FreeVibration> =
@@ -44,7 +48,8 @@ mod tests {
     use super::*;
     use nalgebra::dmatrix;
 
-    /// A shaft in two directions: `λ² + (c ± jg) λ + ω₀² = 0`, with the roots `λ = -(c ± jg)/2 + sqrt((c ± jg)²/4 - ω₀²)`.
+    /// A shaft in two directions: `λ² + (c ± jg) λ + ω₀² = 0`, with the roots
+    /// `λ = -(c ± jg)/2 + sqrt((c ± jg)²/4 - ω₀²)`.
     #[test]
     fn a_shaft_whirls_forward_and_backward() {
         let (c, g, square) = (10.0, 60.0, 2e5);
@@ -61,7 +66,7 @@ mod tests {
             assert!((found.damping / (-expected.re / expected.norm()) - 1.0).abs() < 1e-10);
         }
         assert_eq!(free_vibrations(&[square, square], &dmatrix![c, g; g, c]), None);
-        // a free rotor: two motions that nothing resists, and their nutation
+        // a free rotor: two motions without a restoring force, and their nutation
         let free = free_vibrations(&[0.0, 0.0], &dmatrix![0.0, g; -g, 0.0]).unwrap();
         assert!(free.len() == 1 && (free[0].omega / g - 1.0).abs() < 1e-13);
     }

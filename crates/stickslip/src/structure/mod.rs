@@ -1,4 +1,6 @@
-//! The linear part of a system: the only owner of mass, damping and stiffness.
+//! The linear part of a system: mass, damping and stiffness.
+//!
+//! No other module stores these matrices.
 
 mod component;
 mod cyclic;
@@ -28,11 +30,11 @@ use std::sync::{Arc, OnceLock};
 use stickslip_numerics::definite::{is_semidefinite, semidefinite, sparse_definite};
 use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
 
-/// `M x'' + C x' + K x`, over places that are free to move.
+/// `M x'' + C x' + K x`, over the places that are free to move.
 ///
-/// Masses need not stand on the diagonal alone. A copy is a reference to the same matrices. They are kept full where there are few degrees of
-/// freedom, or where each touches many others; else as the entries that are not zero. What a structure is asked does not depend on that,
-/// only how long it takes.
+/// The mass matrix need not be diagonal. A copy is a reference to the same matrices. Matrices
+/// are stored full if there are few degrees of freedom or many entries, otherwise sparse. The
+/// storage affects the computing time, but not the results.
 #[derive(Debug, Clone)]
 pub struct Structure(Arc<Kept>);
 
@@ -40,29 +42,29 @@ pub struct Structure(Arc<Kept>);
 struct Kept {
     places: Vec<String>,
     form: Form,
-    /// Largest magnitude of an entry of mass, damping, stiffness.
+    /// Largest absolute entries of mass, damping and stiffness.
     largest: [f64; 3],
     dissipates: OnceLock<bool>,
     uncoupled: OnceLock<Option<Arc<UncoupledModes>>>,
 }
 
 #[derive(Debug)]
-#[allow(clippy::large_enum_variant)] // one for each structure, behind its reference
+#[allow(clippy::large_enum_variant)] // one per structure, behind a reference
 enum Form {
     Full(Arc<Matrices>),
     Sparse {
         mass: Matrix,
         damping: Matrix,
         stiffness: Matrix,
-        /// What the damping has beside its matrix.
+        /// Modal damping in addition to the damping matrix.
         modes: Option<DampedModes>,
         analysis: OnceLock<Analysis>,
-        /// Written out when a method first asks for it.
+        /// Full copy, created when a method first requests it.
         full: OnceLock<Arc<Matrices>>,
     },
 }
 
-/// Mass (kg), damping (kg/s) and stiffness (N/m), each n × n, with all their zeros.
+/// Mass (kg), damping (kg/s) and stiffness (N/m), each n × n, with all zeros stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrices {
     /// `M`.
@@ -73,32 +75,33 @@ pub struct Matrices {
     pub stiffness: DMatrix<f64>,
 }
 
-/// Degrees of freedom up to which methods take full matrices: a product of two then takes seconds, and each has 32 MB.
+/// Largest number of degrees of freedom for methods with full matrices. At this size, a product
+/// of two takes seconds, and each uses 32 MB.
 pub const MOST_IN_FULL: usize = 2000;
-/// Degrees of freedom from which matrices are kept sparse.
+/// Number of degrees of freedom from which matrices are stored sparse.
 pub const SPARSE: usize = 40;
-/// Share of the entries that are not zero from which they are kept full all the same.
+/// Fraction of nonzero entries above which matrices are stored full at any size.
 const FULL: f64 = 0.3;
 
-/// Why matrices make no structure.
+/// The reason why matrices do not form a valid structure.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StructureError {
-    /// A matrix has another size than there are places.
+    /// The size of a matrix differs from the number of places.
     #[error("the {matrix} matrix is {rows} x {columns}, and there are {places} places: it must be {places} x {places}")]
     Size {
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: &'static str,
-        /// Its rows.
+        /// Its number of rows.
         rows: usize,
-        /// Its columns.
+        /// Its number of columns.
         columns: usize,
-        /// The places.
+        /// Number of places.
         places: usize,
     },
     /// A number is not finite.
     #[error("the {matrix} matrix has {value} in row {row}, column {column}; every entry must be finite")]
     NotFinite {
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: &'static str,
         /// Row, from 1.
         row: usize,
@@ -107,13 +110,13 @@ pub enum StructureError {
         /// The entry.
         value: f64,
     },
-    /// A matrix that must be symmetric is not.
+    /// A matrix is not symmetric, although it must be.
     #[error(
         "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column} and {mirrored:e} across the diagonal; \
          give both triangles, or their mean if they differ by rounding"
     )]
     NotSymmetric {
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: &'static str,
         /// Row, from 1.
         row: usize,
@@ -121,27 +124,28 @@ pub enum StructureError {
         column: usize,
         /// The entry.
         value: f64,
-        /// The other one.
+        /// The entry across the diagonal.
         mirrored: f64,
     },
-    /// The mass matrix has a direction of negative mass.
+    /// The mass matrix is not positive semidefinite.
     #[error("the mass matrix is not positive semidefinite: some motion has a negative kinetic energy")]
     NegativeMass,
-    /// Two places have one name.
+    /// Two places have the same name.
     #[error("the name `{0}` stands twice among the places")]
     Twice(String),
 }
 
-/// Difference between an entry and its mirror image, relative to the largest entry, that counts as rounding of a program that wrote the
-/// matrix with ten digits.
+/// Difference between an entry and its mirror image that counts as rounding, relative to the
+/// largest entry. Programs that write ten digits cause such differences.
 const SYMMETRIC: f64 = 1e-9;
 
 impl Structure {
-    /// Of places and full matrices (kg, kg/s, N/m), n × n. Mass and stiffness are symmetric; damping may have a gyroscopic part.
+    /// Creates a structure from places and full matrices (kg, kg/s, N/m), n × n. Mass and
+    /// stiffness are symmetric; damping may have a gyroscopic part.
     ///
     /// # Errors
-    /// [`StructureError`]: a size that does not fit, an entry that is not finite, mass or stiffness that is not symmetric, a mass matrix that
-    /// is not positive semidefinite.
+    /// [`StructureError`]: a wrong size, an entry that is not finite, an unsymmetric mass or
+    /// stiffness matrix, a mass matrix that is not positive semidefinite.
     ///
     /// # Example
     /// ```
@@ -180,13 +184,13 @@ impl Structure {
         Structure::sparse(places, mass?, damping?, stiffness?)
     }
 
-    /// The same of matrices by their entries.
+    /// Creates a structure from sparse matrices.
     ///
     /// # Errors
-    /// As [`Structure::new`].
+    /// See [`Structure::new`].
     ///
     /// # Example
-    /// A chain of 50,000 masses, which as full matrices would need 60 GB.
+    /// A chain of 50,000 masses, which would need 60 GB as full matrices.
     /// ```
     /// use num_complex::Complex64;
     /// use stickslip::structure::Structure;
@@ -226,7 +230,8 @@ impl Structure {
         Structure::checked(places, form)
     }
 
-    /// The same with springs along directions, by their rows with weights, and stiffnesses, N/m. `None` if some entry is no number then.
+    /// Returns this structure with additional springs. Each has a direction, as rows with
+    /// weights, and a stiffness, N/m. Returns `None` if an entry is then not finite.
     pub(crate) fn with_springs(&self, springs: &[(Vec<(usize, f64)>, f64)]) -> Option<Structure> {
         let added = springs.iter().flat_map(|(rows, k)| {
             rows.iter().flat_map(move |&(i, w)| rows.iter().map(move |&(l, v)| (i, l, w * v * k)))
@@ -252,10 +257,10 @@ impl Structure {
         largest[2].is_finite().then(|| Structure::kept(places, form, largest))
     }
 
-    /// The same with the damping of modes.
+    /// Returns this structure with additional modal damping.
     ///
     /// # Panics
-    /// If the columns are not as long as the structure.
+    /// If the length of the columns differs from the size of the structure.
     #[must_use]
     pub fn with_damped_modes(&self, of: &DampedModes) -> Structure {
         let n = self.dofs();
@@ -270,7 +275,7 @@ impl Structure {
             }
             Form::Sparse { mass, damping, stiffness, .. } => {
                 let (mass, damping, stiffness) = (mass.clone(), damping.clone(), stiffness.clone());
-                // of a sum of squares the largest entry is on the diagonal
+                // the largest entry of a positive semidefinite matrix is on the diagonal
                 most = (0..n).fold(most, |most, i| most.max((damping.get(i, i) + of.get(i, i)).abs()));
                 let (modes, analysis, full) = (Some(of.clone()), OnceLock::new(), OnceLock::new());
                 Form::Sparse { mass, damping, stiffness, modes, analysis, full }
@@ -307,23 +312,25 @@ impl Structure {
         Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new(), uncoupled: OnceLock::new() }))
     }
 
-    /// Number of degrees of freedom, n.
+    /// Returns the number of degrees of freedom, n.
     pub fn dofs(&self) -> usize {
         self.0.places.len()
     }
 
-    /// Names of the degrees of freedom, length n.
+    /// Returns the names of the degrees of freedom, length n.
     pub fn places(&self) -> &[String] {
         &self.0.places
     }
 
-    /// Whether only the entries that are not zero are kept.
+    /// Returns whether the matrices are stored sparse.
     pub fn is_sparse(&self) -> bool {
         matches!(self.0.form, Form::Sparse { .. })
     }
 
-    /// All matrices in full, for methods whose cost grows with the cube of n anyway: of a sparse structure they are written out at the first
-    /// call, 24 n² bytes. Who can do with entries, products or solutions asks for [`Structure::entries`] or
+    /// Returns the full matrices, for methods whose cost grows with the cube of n.
+    ///
+    /// A sparse structure creates them at the first call, with 24 n² bytes. Callers that need
+    /// only entries, products or solutions use [`Structure::entries`] or
     /// [`Structure::dynamic_stiffness`].
     pub fn full(&self) -> &Arc<Matrices> {
         match &self.0.form {
@@ -336,22 +343,22 @@ impl Structure {
         }
     }
 
-    /// Mass matrix `M` in full, n × n, kg; see [`Structure::full`].
+    /// Returns the full mass matrix `M`, n × n, kg; see [`Structure::full`].
     pub fn mass(&self) -> &DMatrix<f64> {
         &self.full().mass
     }
 
-    /// Damping matrix `C` in full, n × n, kg/s; see [`Structure::full`].
+    /// Returns the full damping matrix `C`, n × n, kg/s; see [`Structure::full`].
     pub fn damping(&self) -> &DMatrix<f64> {
         &self.full().damping
     }
 
-    /// Stiffness matrix `K` in full, n × n, N/m; see [`Structure::full`].
+    /// Returns the full stiffness matrix `K`, n × n, N/m; see [`Structure::full`].
     pub fn stiffness(&self) -> &DMatrix<f64> {
         &self.full().stiffness
     }
 
-    /// The mass on the diagonal in a row, kg.
+    /// Returns the diagonal entry of the mass matrix in a row, kg.
     pub fn own_mass(&self, row: usize) -> f64 {
         match &self.0.form {
             Form::Full(full) => full.mass[(row, row)],
@@ -359,7 +366,8 @@ impl Structure {
         }
     }
 
-    /// Whether every motion has kinetic energy, to rounding: the mass matrix is positive definite.
+    /// Returns whether the mass matrix is positive definite up to rounding, so that every
+    /// motion has kinetic energy.
     pub fn has_definite_mass(&self) -> bool {
         match &self.0.form {
             Form::Full(full) => semidefinite(&full.mass) == Some(self.dofs()),
@@ -367,12 +375,13 @@ impl Structure {
         }
     }
 
-    /// The largest magnitudes in the matrices of mass (kg), damping (kg/s) and stiffness (N/m).
+    /// Returns the largest absolute entries of mass (kg), damping (kg/s) and stiffness (N/m).
     pub fn largest(&self) -> [f64; 3] {
         self.0.largest
     }
 
-    /// What its damping has beside [`Structure::entries`]: of full matrices nothing.
+    /// Returns the modal damping in addition to [`Structure::entries`]. Full matrices contain
+    /// all damping and return `None`.
     pub fn damped_modes(&self) -> Option<&DampedModes> {
         match &self.0.form {
             Form::Full(_) => None,
@@ -380,8 +389,10 @@ impl Structure {
         }
     }
 
-    /// The entries of (mass, damping, stiffness) that are not all zero: row, column, values. Full matrices row by row, others column by column.
-    /// The damping has [`Structure::damped_modes`] as well.
+    /// Iterates over the nonzero entries of (mass, damping, stiffness): row, column, values.
+    ///
+    /// Full matrices are read row by row, sparse ones column by column. The damping includes
+    /// [`Structure::damped_modes`] in addition.
     pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
         let n = self.dofs();
         match &self.0.form {
@@ -409,17 +420,20 @@ impl Structure {
         }
     }
 
-    /// Whether masses, dampers and springs alone give no energy to a motion, and every motion has one of them: `M`, `K` and the symmetric part of
-    /// `C` are positive semidefinite, and their sum, each in its unit, is definite.
+    /// Returns whether the structure alone never supplies energy to a motion, and every motion
+    /// has mass, damping or stiffness.
+    ///
+    /// `M`, `K` and the symmetric part of `C` are positive semidefinite, and their sum, each
+    /// scaled by its largest entry, is definite.
     pub fn dissipates(&self) -> bool {
         *self.0.dissipates.get_or_init(|| match &self.0.form {
             Form::Full(full) => full.dissipates(),
             Form::Sparse { mass, damping, stiffness, .. } => {
                 let n = self.dofs();
-                // a part of the damping that only turns velocities takes no power
+                // the gyroscopic part of the damping does no work
                 let halves = damping.entries().flat_map(|(i, k, c)| [(i, k, 0.5 * c), (k, i, 0.5 * c)]);
                 let Ok(damping) = Matrix::from_triplets(n, halves) else { return false };
-                // that of modes takes power, and only from what has a mass
+                // modal damping dissipates energy, and only in motions with mass
                 let matrices = [mass, &damping, stiffness];
                 let [Some(definite), Some(_), Some(_)] = matrices.map(sparse_definite) else { return false };
                 definite || {
@@ -450,7 +464,7 @@ impl PartialEq for Structure {
 }
 
 impl StructureError {
-    /// Of entries that make no matrix.
+    /// Converts an error of matrix entries.
     fn of(matrix: &'static str, error: &MatrixError) -> Self {
         match *error {
             MatrixError::NotFinite { row, column, value } => {
@@ -483,7 +497,7 @@ impl Matrices {
                 }
             }
         }
-        // a diagonal needs no factor
+        // a diagonal matrix needs no factorization
         let off_diagonal = (0..n).any(|i| (0..i).any(|k| self.mass[(i, k)] != 0.0));
         let negative = (0..n).any(|i| self.mass[(i, i)] < 0.0);
         if (negative || off_diagonal) && !is_semidefinite(&self.mass) {
@@ -493,7 +507,7 @@ impl Matrices {
     }
 
     fn dissipates(&self) -> bool {
-        // a part of the damping that only turns velocities takes no power
+        // the gyroscopic part of the damping does no work
         let damping = (&self.damping + self.damping.transpose()) * 0.5;
         if ![&damping, &self.stiffness].into_iter().all(is_semidefinite) {
             return false;
@@ -501,14 +515,14 @@ impl Matrices {
         let Some(rank) = semidefinite(&self.mass) else { return false };
         let n = self.mass.nrows();
         rank == n || {
-            // each with its own unit: what one of them holds is held
+            // scaled by the largest entries, because the units differ
             let share = |matrix: &DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
             semidefinite(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
         }
     }
 }
 
-/// Whether matrices with so many entries are kept full.
+/// Returns whether matrices with these numbers of entries are stored full.
 fn is_full(n: usize, entries: [usize; 3]) -> bool {
     let most = entries.into_iter().max().unwrap_or(0);
     n < SPARSE || most as f64 > FULL * (n as f64) * (n as f64)
@@ -523,7 +537,7 @@ fn written_out(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices 
     Matrices { mass: full(mass), damping: full(damping), stiffness: full(stiffness) }
 }
 
-/// The mean of both triangles, if they differ by rounding only.
+/// Returns the mean of both triangles, if they differ only by rounding.
 fn symmetric(name: &'static str, matrix: Matrix) -> Result<Matrix, StructureError> {
     if matrix.asymmetry(0.0).is_none() {
         return Ok(matrix);
@@ -532,7 +546,7 @@ fn symmetric(name: &'static str, matrix: Matrix) -> Result<Matrix, StructureErro
         return Err(StructureError::NotSymmetric { matrix: name, row: row + 1, column: column + 1, value, mirrored });
     }
     let halves = matrix.entries().flat_map(|(i, k, value)| [(i, k, 0.5 * value), (k, i, 0.5 * value)]);
-    // halves of finite numbers that are nearly equal have finite sums, and their places are those of the matrix
+    // the sums of finite, nearly equal halves are finite, and the sparsity pattern is unchanged
     Ok(Matrix::from_triplets(matrix.n(), halves).unwrap_or(matrix))
 }
 
@@ -564,7 +578,8 @@ mod tests {
         assert_eq!(Structure::new(twice, one.clone(), one, k).unwrap_err(), StructureError::Twice("a".into()));
     }
 
-    /// A chain between walls with dampers to the ground, a gyroscopic pair and unequal masses, as full matrices.
+    /// Full matrices of a chain between walls, with dampers to the ground, a gyroscopic pair
+    /// and unequal masses.
     fn chain(n: usize) -> [DMatrix<f64>; 3] {
         let k = DMatrix::from_fn(n, n, |i, l| [2.0, -1.0, 0.0][i.abs_diff(l).min(2)]);
         let m = DMatrix::from_fn(n, n, |i, l| [1.0 + 0.1 * (i as f64).sin(), 0.2, 0.0][i.abs_diff(l).min(2)]);
@@ -577,7 +592,7 @@ mod tests {
         (0..n).map(|i| i.to_string()).collect()
     }
 
-    /// Full or sparse, a structure answers the same.
+    /// A full and a sparse structure give the same results.
     #[test]
     fn the_form_does_not_matter() {
         let n = SPARSE + 3;
@@ -608,7 +623,7 @@ mod tests {
         assert_ne!(sparse, full, "kept differently");
     }
 
-    /// What is refused of small structures is refused of large ones, in the same words.
+    /// Large structures reject the same input as small ones, with the same messages.
     #[test]
     fn wrong_entries_are_refused_as_wrong_matrices_are() {
         let n = 2 * SPARSE;
@@ -623,24 +638,24 @@ mod tests {
         assert!(error(&|_, _, k| k[(2, 3)] = -0.9).contains("stiffness matrix is not symmetric"));
         assert!(error(&|m, _, _| m[(4, 4)] = 0.01).contains("semidefinite"), "beside 0.2");
         assert!(error(&|m, _, _| m[(4, 4)] = -1.0).contains("semidefinite"));
-        // ten digits of a matrix in a file: the mean of both triangles counts
+        // matrices from a file with ten digits: the mean of both triangles is used
         let mut rounded = k.clone();
         rounded[(2, 3)] += 1e-10;
         let structure = Structure::new(numbered(n), m.clone(), c.clone(), rounded.clone()).unwrap();
         let mean = 0.5 * (rounded[(2, 3)] + rounded[(3, 2)]);
         assert_eq!([(2, 3), (3, 2)].map(|at| structure.stiffness()[at]), [mean, mean]);
-        // masses that some motions have none of
+        // a semidefinite mass matrix
         let mut semi = m.clone();
         semi.fill_row(5, 0.0);
         semi.fill_column(5, 0.0);
         assert!(Structure::new(numbered(n), semi, c.clone(), k.clone()).is_ok());
-        // a damper that drives
+        // a damper that supplies energy
         let mut driven = c;
         driven[(3, 3)] = -0.05;
         assert!(!Structure::new(numbered(n), m, driven, k).unwrap().dissipates());
     }
 
-    /// A hundred thousand degrees of freedom are checked and answered in seconds.
+    /// A structure with 100,000 degrees of freedom is checked and solved in seconds.
     #[test]
     fn large_structures() {
         let n = 100_000;
@@ -653,7 +668,8 @@ mod tests {
         };
         let structure = Structure::sparse(numbered(n), triple(1.0, 0.2), triple(0.02, 0.0), triple(2.0, -1.0)).unwrap();
         assert!(structure.dissipates());
-        // of a wave that fits between the walls: k = 2 - 2 cos θ, m = 1 + 0.4 cos θ, θ = π/2 nearly; whole turns are left out before they round
+        // a wave that fits between the walls: k = 2 - 2 cos θ, m = 1 + 0.4 cos θ, θ ≈ π/2;
+        // whole turns are removed before they cause rounding
         let (half_waves, walls) = (50_000, n + 1);
         let angle = |number: usize| std::f64::consts::PI * (number % (2 * walls)) as f64 / walls as f64;
         let wave = angle(half_waves);

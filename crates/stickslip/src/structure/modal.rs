@@ -1,10 +1,12 @@
-//! Damping of modes, `U Uᵀ` with a column `√(2 ζ ω) M φ` for each: it couples all rows, so that beside sparse matrices it is kept as these columns.
+//! Modal damping `U Uᵀ` with one column `√(2 ζ ω) M φ` per mode.
 //!
-//! What it does to a dynamic stiffness follows from as many answers of that as there are columns:
+//! It couples all rows. Therefore sparse structures store these columns instead of a matrix.
+//! The inverse of the dynamic stiffness follows from one solution per column:
 //! `(Z + s U Uᵀ)⁻¹ = Z⁻¹ - s Z⁻¹ U (1 + s Uᵀ Z⁻¹ U)⁻¹ Uᵀ Z⁻¹`.
 //!
-//! Source: Woodbury (1950), "Inverting modified matrices", Memorandum Rept. 42, Statistical Research Group, Princeton; the damping: Wilson and
-//! Penzien (1972), "Evaluation of orthogonal damping matrices", Int. J. Numer. Meth. Engng 4, 5-10.
+//! Sources: Woodbury (1950), "Inverting modified matrices", Memorandum Rept. 42, Statistical
+//! Research Group, Princeton. Damping: Wilson and Penzien (1972), "Evaluation of orthogonal
+//! damping matrices", Int. J. Numer. Meth. Engng 4, 5-10.
 
 use nalgebra::{DMatrix, DMatrixView};
 use num_complex::Complex64;
@@ -12,7 +14,7 @@ use std::sync::Arc;
 use stickslip_numerics::dense::ComplexLu;
 use stickslip_numerics::sparse::{ComplexFactor, Singular};
 
-/// Columns of U as long as the structure, one after the other.
+/// Columns of U, one after the other, each as long as the structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DampedModes {
     n: usize,
@@ -20,42 +22,42 @@ pub struct DampedModes {
 }
 
 impl DampedModes {
-    /// Of columns of length n.
+    /// Creates modal damping from columns of length n.
     ///
     /// # Panics
-    /// If the length of `columns` is no multiple of n.
+    /// If the length of `columns` is not a multiple of n.
     pub fn new(n: usize, columns: Arc<Vec<f64>>) -> Self {
         assert!(columns.len().is_multiple_of(n.max(1)), "{} numbers are no columns of {n}", columns.len());
         DampedModes { n, columns }
     }
 
-    /// Length of the columns, n.
+    /// Returns the length of the columns, n.
     pub fn n(&self) -> usize {
         self.n
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no columns.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()
     }
 
-    /// The columns.
+    /// Iterates over the columns.
     pub fn iter(&self) -> impl Iterator<Item = &[f64]> {
         self.columns.chunks_exact(self.n.max(1))
     }
 
-    /// An entry of `U Uᵀ`, kg/s.
+    /// Returns an entry of `U Uᵀ`, kg/s.
     pub fn get(&self, row: usize, column: usize) -> f64 {
         self.iter().map(|u| u[row] * u[column]).sum()
     }
 
-    /// `C += U Uᵀ`.
+    /// Computes `C += U Uᵀ`.
     pub(super) fn add_to(&self, damping: &mut DMatrix<f64>) {
         let columns = DMatrixView::from_slice(&self.columns, self.n, self.columns.len() / self.n.max(1));
         damping.gemm(1.0, &columns, &columns.transpose(), 1.0);
     }
 
-    /// `vᵀ U Uᵀ v`: the power that velocities lose, W.
+    /// Returns `vᵀ U Uᵀ v`: the power dissipated at velocities `v`, W.
     pub fn power(&self, v: &[f64]) -> f64 {
         self.iter().map(|u| dot(u, v).powi(2)).sum()
     }
@@ -77,14 +79,14 @@ pub(super) struct WithModes {
 }
 
 impl WithModes {
-    /// Of the factor at the rate s.
+    /// Creates it from the factor at complex frequency s.
     pub fn new(without: ComplexFactor, modes: &DampedModes, s: Complex64) -> Result<Self, Singular> {
         let mut answers: Vec<Complex64> = modes.columns.iter().map(|u| s * u).collect();
         without.solve(&mut answers);
         let count = modes.iter().count();
         let mut small = along(modes, &answers);
         (0..count).for_each(|k| small[k * count + k] += 1.0);
-        // a sum of modes has no row of its own
+        // the small system mixes all rows, so that the error names row 0
         let small = ComplexLu::new(small, count).map_err(|_| Singular { row: 0 })?;
         Ok(WithModes { without, modes: modes.clone(), answers, small })
     }
@@ -106,7 +108,7 @@ impl WithModes {
     }
 }
 
-/// `Uᵀ X`, column by column.
+/// Returns `Uᵀ X`, column by column.
 fn along(modes: &DampedModes, x: &[Complex64]) -> Vec<Complex64> {
     let each = |x: &[Complex64], u: &[f64]| -> Complex64 { x.iter().zip(u).map(|(x, u)| x * u).sum() };
     x.chunks_exact(modes.n).flat_map(|x| modes.iter().map(move |u| each(x, u))).collect()
@@ -118,7 +120,7 @@ mod tests {
     use crate::structure::{SPARSE, Structure};
     use nalgebra::DVector;
 
-    /// Beside sparse matrices and in full ones the damping of modes is the same: that of the dense product.
+    /// Sparse and full structures give the same modal damping, that of the dense product.
     #[test]
     fn the_form_does_not_matter() {
         let n = SPARSE + 5;
@@ -134,7 +136,7 @@ mod tests {
         assert!((sparse.damping() - &all).amax() < 1e-15);
         assert!((sparse.largest()[1] - all.amax()).abs() < 1e-15);
         assert_ne!(sparse, Structure::new(sparse.places().to_vec(), m.clone(), beside(0.01, 0.0), k.clone()).unwrap());
-        // full matrices take it in
+        // full matrices absorb the modal damping
         let twice = full.with_damped_modes(&modes);
         assert!(twice.damped_modes().is_none() && (twice.damping() - (&all + &u * u.transpose())).amax() < 1e-15);
         let v: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();

@@ -1,10 +1,13 @@
-//! One sector of a ring of equal sectors, and what it is in a travelling wave.
+//! One sector of a ring of equal sectors, and its matrices in a travelling wave.
 //!
-//! Where every sector moves as its neighbour does, `x_s = X e^{j d θ s}` with `θ = 2π/N` and the nodal diameter `d`, the ring's matrices become
-//! those of one sector, `K_d = Σ_s K_{0s} e^{j d θ s}`: Hermitian, as large as a sector. In real numbers that is a sector twice,
-//! `[[Re K_d, -Im K_d], [Im K_d, Re K_d]]` over `(x, -jx)`, symmetric again.
+//! If all sectors move with the same phase lag, `x_s = X e^{j d θ s}` with `θ = 2π/N` and the
+//! nodal diameter `d`. The ring's matrices then reduce to those of one sector,
+//! `K_d = Σ_s K_{0s} e^{j d θ s}`: Hermitian, of the size of a sector. In real numbers, this is
+//! a symmetric matrix of twice the size, `[[Re K_d, -Im K_d], [Im K_d, Re K_d]]` over
+//! `(x, -jx)`.
 //!
-//! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth. Engng 14, 81-102.
+//! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth.
+//! Engng 14, 81-102.
 
 use super::{Structure, StructureError};
 use num_complex::Complex64;
@@ -13,8 +16,8 @@ use stickslip_numerics::sparse::{Matrix, Singular};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Difference between a sector's matrices and those of the first one, relative to the largest entry, that counts as rounding of sums in another
-/// order.
+/// Difference between the matrices of a sector and those of the first one that counts as
+/// rounding of sums in another order. It is relative to the largest entry.
 const EQUAL: f64 = 1e-12;
 
 /// The rows of the first sector in the matrices of a ring.
@@ -22,21 +25,22 @@ const EQUAL: f64 = 1e-12;
 pub struct Sector {
     sectors: usize,
     places: Vec<String>,
-    /// Row, column, how many sectors further the column lies, values of mass, damping, stiffness.
+    /// Row, column, offset of the column in sectors, values of mass, damping, stiffness.
     entries: Vec<(usize, usize, usize, [f64; 3])>,
 }
 
-/// A wave of one nodal diameter on the sectors of a ring: its matrices.
+/// The matrices of a wave with one nodal diameter on the sectors of a ring.
 #[derive(Debug, Clone)]
 pub struct Wave {
     sectors: usize,
     diameter: usize,
     dofs: usize,
-    /// A sector twice, or once where the matrices of the wave are real.
+    /// A sector of twice the size, or of single size if the matrices of the wave are real.
     structure: Structure,
 }
 
-/// `e^{j 2π k/n}`; equal numbers of turns give equal bits, and quarter turns are exact.
+/// Returns `e^{j 2π k/n}`. Equivalent arguments give identical bits, and quarter turns are
+/// exact.
 pub(crate) fn turn(k: i64, n: usize) -> Complex64 {
     let n = n as i64;
     let k = k.rem_euclid(n);
@@ -45,19 +49,25 @@ pub(crate) fn turn(k: i64, n: usize) -> Complex64 {
         q if q == n => Complex64::new(0.0, 1.0),
         q if q == 2 * n => Complex64::new(-1.0, 0.0),
         q if q == 3 * n => Complex64::new(0.0, -1.0),
-        // the second half is the mirror image of the first, so that waves either way are
+        // the second half mirrors the first, so that waves in both directions are exact mirror
+        // images
         _ if 2 * k > n => Complex64::cis(TAU * (n - k) as f64 / n as f64).conj(),
         _ => Complex64::cis(TAU * k as f64 / n as f64),
     }
 }
 
-/// Whether the matrices of a wave are real: neighbours move alike, or against each other.
+/// Returns whether the matrices of a wave are real: adjacent sectors move in phase or in
+/// antiphase.
 pub(crate) fn is_real(diameter: usize, sectors: usize) -> bool {
     (2 * diameter).is_multiple_of(sectors)
 }
 
-/// What a matrix of a ring is in a wave, of its entries in the rows of a sector, of which there are so many, over its columns: row, column, by how many
-/// sectors the column lies further, value. As (row, column, value) of a sector twice, or once where the wave is real.
+/// Converts entries of a ring's matrix in the rows of a sector to the wave of one nodal
+/// diameter.
+///
+/// The input is (row, column, offset of the column in sectors, value) for a matrix of `rows` by
+/// `columns`. The output is (row, column, value) at twice the size, or at single size if the
+/// wave is real.
 pub(super) fn in_wave(
     entries: impl Iterator<Item = (usize, usize, i64, f64)>,
     [rows, columns]: [usize; 2],
@@ -79,8 +89,10 @@ pub(super) fn in_wave(
 }
 
 impl Sector {
-    /// The first of `sectors` equal ones, whose degrees of freedom stand sector by sector in `ring`. `None` if they are not equal, or if the damping of
-    /// modes couples each with all.
+    /// Returns the first of `sectors` equal sectors, whose degrees of freedom are stored sector
+    /// by sector in `ring`.
+    ///
+    /// Returns `None` if the sectors differ, or if modal damping couples all sectors.
     pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {
         let all = ring.dofs();
         if sectors == 0 || !all.is_multiple_of(sectors) || ring.damped_modes().is_some() {
@@ -113,23 +125,25 @@ impl Sector {
         (met == sectors * entries.len()).then(|| Sector { sectors, places: ring.places()[..n].to_vec(), entries })
     }
 
-    /// Degrees of freedom of a sector.
+    /// Returns the number of degrees of freedom of a sector.
     pub fn dofs(&self) -> usize {
         self.places.len()
     }
 
-    /// How many sectors there are.
+    /// Returns the number of sectors.
     pub fn sectors(&self) -> usize {
         self.sectors
     }
 
-    /// The matrices of the wave with this nodal diameter; those of `d` and `d + N` are the same.
+    /// Returns the matrices of the wave with this nodal diameter. The diameters `d` and `d + N`
+    /// are equivalent.
     ///
     /// # Errors
-    /// [`StructureError`]: matrices that are none of a structure.
+    /// [`StructureError`]: the matrices do not form a valid structure.
     ///
     /// # Example
-    /// A chain closed to a ring: the wave of nodal diameter d has the stiffness `k + 2 kc (1 - cos 2πd/N)`.
+    /// A chain closed to a ring: the wave of nodal diameter d has the stiffness
+    /// `k + 2 kc (1 - cos 2πd/N)`.
     /// ```
     /// use num_complex::Complex64;
     /// use stickslip::structure::{Sector, Structure};
@@ -170,37 +184,40 @@ impl Sector {
 }
 
 impl Wave {
-    /// Its nodal diameter, below the number of sectors.
+    /// Returns its nodal diameter, which is less than the number of sectors.
     pub fn diameter(&self) -> usize {
         self.diameter
     }
 
-    /// Whether a sector stands in [`Wave::structure`] twice, so that every mode of it does: one wave either way around.
+    /// Returns whether [`Wave::structure`] has twice the size of a sector. Each mode then
+    /// occurs twice, once for each direction of travel.
     pub fn is_double(&self) -> bool {
         self.structure.dofs() > self.dofs
     }
 
-    /// A sector twice, its motion and the same a quarter of a period later, or once where the matrices of the wave are real.
+    /// Returns the structure of the wave: the motion of a sector and the same motion a quarter
+    /// of a period later, or the motion alone if the matrices are real.
     pub fn structure(&self) -> &Structure {
         &self.structure
     }
 
-    /// The phase of a sector against the first one, `e^{j d θ s}`.
+    /// Returns the phase factor of a sector relative to the first one, `e^{j d θ s}`.
     pub fn phase(&self, sector: i64) -> Complex64 {
         turn(self.diameter as i64 * sector, self.sectors)
     }
 
-    /// `s² M_d + s C_d + K_d`, factored, with springs of `hold` (1/s²) times every mass.
+    /// Factors `s² M_d + s C_d + K_d`, with additional springs of `hold` (1/s²) times the mass
+    /// matrix.
     ///
     /// # Errors
-    /// [`Singular`]: a resonance without damping.
+    /// [`Singular`]: an undamped resonance.
     pub fn dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<WaveStiffness, Singular> {
         let factor = self.structure.held_stiffness(s, hold)?;
         Ok(WaveStiffness { dofs: self.dofs, double: self.is_double(), factor })
     }
 }
 
-/// The dynamic stiffness of a wave at one rate, factored.
+/// The factored dynamic stiffness of a wave at one complex frequency.
 #[derive(Debug, Clone)]
 pub struct WaveStiffness {
     dofs: usize,
@@ -209,7 +226,8 @@ pub struct WaveStiffness {
 }
 
 impl WaveStiffness {
-    /// Complex displacements of the first sector (m) from the forces on it (N), in place: columns, one after the other.
+    /// Computes complex displacements of the first sector (m) from the forces on it (N) in
+    /// place. The columns are stored one after the other.
     pub fn solve(&self, loads: &mut [Complex64]) {
         if !self.double {
             return self.factor.solve(loads);
@@ -233,7 +251,7 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    /// Two masses a sector, an asymmetric coupling to the next sector, a gyroscopic pair.
+    /// Two masses per sector, an asymmetric coupling to the next sector, a gyroscopic pair.
     fn ring(sectors: usize, spoiled: f64) -> Structure {
         let n = 2 * sectors;
         let [mut m, mut c, mut k] = [(); 3].map(|()| DMatrix::<f64>::zeros(n, n));
@@ -253,7 +271,7 @@ mod tests {
         Structure::new((0..n).map(|i| format!("p{i}")).collect(), m, c, k).unwrap()
     }
 
-    /// The sector answers a travelling force as the ring does.
+    /// The sector responds to a travelling force like the ring.
     #[test]
     fn a_sector_is_its_ring() {
         for sectors in [2, 3, 7, 24, 30] {
@@ -283,7 +301,8 @@ mod tests {
         assert!(Sector::of(&ring(7, 1e-6), 7).is_none());
         assert!(Sector::of(&ring(7, 0.0), 4).is_none());
         assert!(Sector::of(&ring(7, 0.0), 0).is_none());
-        // what is said to be fewer sectors than there are: each is then several of them
+        // a smaller number of sectors is valid: each then comprises several of the original
+        // ones
         assert_eq!(Sector::of(&ring(6, 0.0), 3).unwrap().dofs(), 4);
     }
 

@@ -1,6 +1,7 @@
-//! Modes of a structure that its damping leaves uncoupled, computed once for all who ask.
+//! Modes of a structure that its damping does not couple, computed once.
 //!
-//! Structures that were reduced by free modes and residual vectors come in such coordinates; others are brought there, if they are full.
+//! Structures reduced by free modes and residual vectors already have such coordinates. Other
+//! full structures are transformed to them.
 
 use super::{Matrices, Structure};
 use nalgebra::DMatrix;
@@ -8,11 +9,13 @@ use std::sync::Arc;
 use stickslip_numerics::dense::multiply_in_blocks;
 use stickslip_numerics::eigen;
 
-/// Damping between modes that counts as the rounding of matrices: relative to that of the two, and to the largest of all.
+/// Damping between modes that counts as rounding: relative to the damping of the two modes, and
+/// to the largest of all.
 const UNCOUPLED: [f64; 2] = [1e-9, 1e-13];
-/// Springs that hold free motions, relative to the lowest ratio of stiffness and mass on the diagonals.
+/// Shift for free motions, relative to the lowest ratio of stiffness to mass on the diagonals.
 const SHIFT: f64 = 1e-3;
-/// Degrees of freedom up to which modes are sought: the decomposition of so many takes a minute.
+/// Largest number of degrees of freedom for which modes are computed; the decomposition then
+/// takes a minute.
 const MOST: usize = 4000;
 
 /// A structure in its own modes.
@@ -20,12 +23,13 @@ const MOST: usize = 4000;
 pub(crate) struct UncoupledModes {
     /// Modal mass, damping and stiffness.
     pub own: Vec<[f64; 3]>,
-    /// The places by modes, n × n; none where they are the same.
+    /// Mode shapes at the places, n × n; `None` if the coordinates are already the modes.
     pub shapes: Option<DMatrix<f64>>,
 }
 
 impl Structure {
-    /// Its modes; `None` if damping couples them, or if there are too many. They are sought at the first call.
+    /// Returns its modes; `None` if damping couples them, or if there are too many. The first
+    /// call computes them.
     pub(crate) fn uncoupled(&self) -> Option<&Arc<UncoupledModes>> {
         let find = || match self.diagonals() {
             Some(own) => Some(UncoupledModes { own, shapes: None }),
@@ -38,7 +42,8 @@ impl Structure {
         self.0.uncoupled.get_or_init(|| find().map(Arc::new)).as_ref()
     }
 
-    /// Mass, damping and stiffness of coordinates that do not move each other, as those of a reduction by free modes are.
+    /// Returns mass, damping and stiffness if all matrices are diagonal, as after a reduction
+    /// by free modes.
     pub(crate) fn diagonals(&self) -> Option<Vec<[f64; 3]>> {
         if self.damped_modes().is_some() {
             return None;
@@ -54,7 +59,8 @@ impl Structure {
     }
 }
 
-/// Modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`, so that motions without mass have their place: mass θ and stiffness `1 - σ θ`.
+/// Computes modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`. Motions without mass have
+/// `θ = 0`: modal mass θ and stiffness `1 - σ θ`.
 fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let Matrices { mass, damping, stiffness } = matrices;
     let n = mass.nrows();
@@ -77,7 +83,7 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
             return None;
         }
     }
-    // a mass below zero is the rounding of none
+    // a negative mass is rounding of zero
     let own = values.iter().enumerate().map(|(m, theta)| {
         let mass = theta.max(0.0);
         [mass, modal[(m, m)], 1.0 - shift * mass]

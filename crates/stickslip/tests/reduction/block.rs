@@ -1,13 +1,13 @@
-//! Blocks of steel of 5 mm elements, held at one face or free.
+//! Steel blocks of 5 mm elements, fixed at one face or free.
 
 use super::brick::Brick;
 use std::f64::consts::TAU;
 use stickslip::structure::reduction::{Damping, Free, Reduce, Reference, Series, Whole};
 use stickslip_numerics::sparse::{Analysis, NaturalModes, Wanted};
 
-/// Modes are kept up to this multiple of the largest frequency of interest.
+/// Ratio of the highest retained mode to the highest frequency of interest.
 const BEYOND: f64 = 2.0;
-/// The same of modes with the ports held.
+/// Ratio of the highest fixed-interface mode to the highest frequency of interest.
 const BEYOND_HELD: f64 = 4.0;
 const EDGE: f64 = 0.005;
 
@@ -15,9 +15,9 @@ fn brick(elements: [usize; 3], held: bool) -> Brick {
     Brick::new(elements, elements.map(|e| EDGE * e as f64), held)
 }
 
-/// rad²/s², by `benches/peers/scipy_brick.py` of `{"elements": [16, 8, 7], "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU),
-/// which assembles the block
-/// in its own way.
+/// Eigenvalues, rad²/s², from `benches/peers/scipy_brick.py` for
+/// `{"elements": [16, 8, 7], "modes": 20}` (SciPy 1.17.1: eigsh with sigma = 0 and SuperLU).
+/// The script assembles the block independently.
 const HELD: [f64; 20] = [
     6.747094462738e+08,
     8.216043066283e+08,
@@ -40,7 +40,8 @@ const HELD: [f64; 20] = [
     1.413310583697e+11,
     1.445936595748e+11,
 ];
-/// The same of `{"elements": [12, 5, 4], "modes": 14, "held": false}`, without the six free motions.
+/// Eigenvalues for `{"elements": [12, 5, 4], "modes": 14, "held": false}`, without the six free
+/// motions.
 const FREE: [f64; 8] = [
     2.126849798549e+10,
     2.368365769307e+10,
@@ -59,7 +60,8 @@ fn modes_are_those_of_scipy() {
         let analysis = Analysis::new(&[&brick.stiffness, &brick.mass]);
         let modes = NaturalModes::new(&analysis, &brick.stiffness, &brick.mass, wanted).unwrap();
         let rigid = modes.count() - expected.len();
-        // free motions have the rounding of the largest eigenvalue, 1e13 rad²/s²
+        // the rounding error of free motions is relative to the largest eigenvalue, 1e13
+        // rad²/s²
         assert!(modes.values[..rigid].iter().all(|value| value.abs() < 0.1), "{:?}", modes.values);
         for (value, expected) in modes.values[rigid..].iter().zip(expected) {
             assert!((value / expected - 1.0).abs() < 1e-10, "{value:.12e} instead of {expected:.12e}");
@@ -67,9 +69,8 @@ fn modes_are_those_of_scipy() {
     }
 }
 
-/// 16 nodes of the free face are ports. Frequencies of the reduced block agree with those of the whole far better than 0.1 %, receptances
-/// as the modes that
-/// are left out let expect.
+/// Ports at 16 nodes of the free face. Frequencies of the reduced block agree with those of the
+/// whole much better than 0.1 %. The errors of receptances correspond to the omitted modes.
 #[test]
 fn reductions_of_the_block() {
     let brick = brick([12, 6, 5], true);
@@ -84,9 +85,9 @@ fn reductions_of_the_block() {
     let free = Free::new(&whole, &modes, 0.0, 2).unwrap();
     let [one, two] = [1, 2].map(|order| free.reduced(modes.count(), order).unwrap());
     let held = whole.craig_bampton(BEYOND_HELD * up_to).unwrap();
-    // the share of the first mode left out, `(ω² / λ)²ᴶ`, times its own share of the answer; with the ports held, a frequency that is off
-    // by 3e-4 is a sixteenth of the
-    // distance of a sample from its mode
+    // the contribution of the first omitted mode, `(ω² / λ)²ᴶ`, times its part of the response;
+    // with fixed ports, a frequency error of 3e-4 is a sixteenth of the distance between a
+    // sample and its mode
     let share: f64 = BEYOND.powi(-4);
     for (reduced, tolerance) in [(&one, share), (&two, share * share), (&held, 0.1)] {
         let deviation = reference.deviation(reduced);
@@ -100,12 +101,13 @@ fn reductions_of_the_block() {
     let shift = 0.5 * up_to * up_to;
     let series = Series::new(&Free::new(&whole, &modes, shift, 4).unwrap(), modes.count()).unwrap();
     let deviation = reference.deviation_of_series(&series);
-    // around the middle the step is half of it at most
+    // for a shift in the middle of the range, the step is at most half of it
     let step: f64 = 0.5 / (BEYOND * BEYOND - 0.5);
     assert!(deviation.error < step.powi(8), "{deviation:?}");
 }
 
-/// A block of square section bends both ways at one frequency; no sample stands between the two, which is at both.
+/// A block of square section has two bending modes of equal frequency. No sample may be placed
+/// between them, because it would coincide with both.
 #[test]
 fn samples_keep_clear_of_equal_modes() {
     let brick = brick([8, 3, 3], true);
@@ -121,12 +123,12 @@ fn samples_keep_clear_of_equal_modes() {
     }
     let reduced = Free::new(&whole, &modes, 0.0, 2).unwrap().reduced(modes.count(), 2).unwrap();
     let deviation = reference.deviation(&reduced);
-    // the share of the first mode left out, of twice as many terms as orders
+    // the contribution of the first omitted mode, with twice as many terms as orders
     assert!(deviation.error < 1.5f64.powi(-8), "{deviation:?}");
 }
 
-/// Where ports are many they are loaded together, and the error is about that of few of them, each loaded alone: of modes without residual vectors,
-/// which are the same for any ports.
+/// Many ports are loaded together. The error is about that of a few of them, each loaded
+/// separately: modes without residual vectors are the same for any ports.
 #[test]
 fn many_ports_are_judged_together() {
     let brick = brick([4, 6, 6], true);
@@ -144,7 +146,7 @@ fn many_ports_are_judged_together() {
     assert!(all > 0.5 * few && all < 2.0 * few && few > 1e-3, "{all:.2e} {few:.2e}");
 }
 
-/// As many modes and vectors as the error asks for.
+/// The required error determines the numbers of modes and vectors.
 #[test]
 fn the_error_chooses_the_size() {
     let brick = brick([10, 4, 4], true);
@@ -161,8 +163,9 @@ fn the_error_chooses_the_size() {
     assert!(last < whole.dofs() / 4, "{last} of {}", whole.dofs());
 }
 
-/// Of many ports an error that modes can reach is reached by modes, with one vector for each port. Whatever the order of the vectors, neither mass nor
-/// stiffness couples the coordinates, also where ports depend on each other.
+/// With many ports, the reduction reaches the required error by more modes, with one vector per
+/// port. For any order of the vectors, mass and stiffness are diagonal, even if ports are
+/// linearly dependent.
 #[test]
 fn many_ports_take_modes_before_orders() {
     let brick = brick([4, 6, 6], true);

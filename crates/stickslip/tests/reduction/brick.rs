@@ -1,13 +1,15 @@
-//! A steel block of 8-node hexahedra, held at one face or free: mass and stiffness of the textbook.
+//! A steel block of 8-node hexahedra, fixed at one face or free, with the textbook's mass and
+//! stiffness.
 //!
-//! Source: Zienkiewicz and Taylor, "The Finite Element Method" (2000), Vol. 1, Chap. 8: trilinear shape functions, 2 x 2 x 2 Gauss points.
+//! Source: Zienkiewicz and Taylor, "The Finite Element Method" (2000), Vol. 1, Chap. 8:
+//! trilinear shape functions, 2 x 2 x 2 Gauss points.
 
 use stickslip_numerics::sparse::Matrix;
 
 /// Young's modulus (Pa), Poisson's ratio, density (kg/m³).
 const STEEL: (f64, f64, f64) = (210e9, 0.3, 7850.0);
 
-/// Mass and stiffness, and where the nodes are.
+/// Mass and stiffness, and the grid of nodes.
 pub struct Brick {
     pub mass: Matrix,
     pub stiffness: Matrix,
@@ -16,7 +18,8 @@ pub struct Brick {
 }
 
 impl Brick {
-    /// `elements` along the directions of `sizes` (m); the face x = 0 is held or free.
+    /// Creates a block with `elements` along the directions of `sizes` (m). The face x = 0 is
+    /// fixed or free.
     pub fn new(elements: [usize; 3], sizes: [f64; 3], held: bool) -> Self {
         let edges: [f64; 3] = std::array::from_fn(|i| sizes[i] / elements[i] as f64);
         let (k, m) = element(edges);
@@ -50,14 +53,15 @@ impl Brick {
         3 * (nx + usize::from(!self.held)) * (ny + 1) * (nz + 1)
     }
 
-    /// The row of a node's displacement along `direction`; none where it is held.
+    /// Returns the row of a node's displacement along `direction`; `None` if the node is fixed.
     pub fn row(&self, node: [usize; 3], direction: usize) -> Option<usize> {
         let x = node[0].checked_sub(usize::from(self.held))?;
         let columns = self.elements[0] + usize::from(!self.held);
         Some(3 * ((node[2] * (self.elements[1] + 1) + node[1]) * columns + x) + direction)
     }
 
-    /// All directions of `count` nodes spread over the far face: rows of ports.
+    /// Returns the rows of all directions of `count` nodes, distributed over the face opposite
+    /// to x = 0.
     #[allow(dead_code)] // not every test that includes this file has ports
     pub fn face(&self, count: usize) -> Vec<Vec<(usize, f64)>> {
         let [nx, ny, nz] = self.elements;
@@ -72,7 +76,7 @@ fn empty() -> Matrix {
     Matrix::from_triplets(0, []).unwrap()
 }
 
-/// Stiffness, and mass of one direction, of a box.
+/// Returns the stiffness, and the mass of one direction, of a box element.
 fn element(edges: [f64; 3]) -> ([[f64; 24]; 24], [[f64; 8]; 8]) {
     let (young, poisson, density) = STEEL;
     let lame = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));

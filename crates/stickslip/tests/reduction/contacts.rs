@@ -1,4 +1,4 @@
-//! Contacts that a block couples: harmonic balance against integration in time.
+//! Contacts that a block couples: compares harmonic balance with time integration.
 
 use super::brick::Brick;
 use num_complex::Complex64;
@@ -9,13 +9,14 @@ use stickslip::method::{Method, shooting::Shooting};
 use stickslip::model::{Axis, System};
 use stickslip::structure::Structure;
 
-/// Relative error of a step of the integration, and of an orbit in such steps.
+/// Relative error of one integration step, and of an orbit.
 const STEP: f64 = 1e-7;
 const INTEGRATED: f64 = 1e3 * STEP;
-/// First natural frequency of the cube, rad/s, roughly: `√(G L / (m/3))`.
+/// Approximate first natural frequency of the cube, rad/s: `√(G L / (m/3))`.
 const FIRST: f64 = 2.8e5;
 
-/// A cube of 20 mm, held at one face, with `nodes` corners of the other pressed to the ground and pulled along it.
+/// Returns a cube of 20 mm that is fixed at one face. `nodes` corners of the opposite face are
+/// pressed to the ground and pulled along it.
 fn cube(nodes: usize) -> System {
     let brick = Brick::new([1, 1, 1], [0.02; 3], true);
     let n = brick.dofs();
@@ -40,7 +41,7 @@ fn cube(nodes: usize) -> System {
     builder.build().unwrap()
 }
 
-/// The same orbit within what both say of their errors, below the resonance and beside it.
+/// Both orbits agree within their reported errors, below and next to the resonance.
 #[test]
 fn contacts_of_a_block_move_as_in_time() {
     for (nodes, omega) in [(1, 0.6 * FIRST), (2, 0.8 * FIRST)] {

@@ -1,4 +1,4 @@
-//! Small structures whose whole receptance is a dense solution.
+//! Compares reductions of small structures with dense solutions of the whole receptance.
 
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
@@ -13,7 +13,8 @@ fn full(matrix: &Matrix) -> DMatrix<f64> {
     DMatrix::from_fn(matrix.n(), matrix.n(), |i, k| matrix.get(i, k))
 }
 
-/// Springs (i, k, stiffness); to oneself they are springs to the ground.
+/// Returns the stiffness of springs (i, k, stiffness). A spring with i = k connects to the
+/// ground.
 fn springs(n: usize, between: &[(usize, usize, f64)]) -> Matrix {
     let spring = |&(i, k, v): &(usize, usize, f64)| match i == k {
         true => vec![(i, i, v)],
@@ -32,7 +33,7 @@ fn masses(n: usize) -> Matrix {
     sparse(n, (0..n).map(|i| (i, i, 1.0 + 0.1 * (i % 4) as f64)))
 }
 
-/// `P (K - ω² M + jω C)⁻¹ Pᵀ`.
+/// Returns `P (K - ω² M + jω C)⁻¹ Pᵀ`.
 fn receptance(m: &Matrix, c: &DMatrix<f64>, k: &Matrix, ports: &[Row], omega: f64) -> DMatrix<Complex<f64>> {
     let n = m.n();
     let stiffness =
@@ -46,7 +47,7 @@ fn off(a: &DMatrix<Complex<f64>>, b: &DMatrix<Complex<f64>>) -> f64 {
     (a - b).norm() / b.norm()
 }
 
-/// λ and shapes of unit mass, by Cholesky's factor of M.
+/// Returns λ and shapes of unit mass, from the Cholesky factor of M.
 fn modes(m: &Matrix, k: &Matrix) -> (Vec<f64>, DMatrix<f64>) {
     let n = m.n();
     let inverse = full(m).cholesky().unwrap().l().solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
@@ -57,7 +58,7 @@ fn modes(m: &Matrix, k: &Matrix) -> (Vec<f64>, DMatrix<f64>) {
     (order.iter().map(|&i| eigen.eigenvalues[i]).collect(), shapes)
 }
 
-/// Ports: a place, a difference, a mean; and one that depends on them.
+/// Returns four ports: a place, a difference, a mean, and one that depends linearly on these.
 fn ports(n: usize) -> Vec<Row> {
     vec![
         vec![(n - 1, 1.0)],
@@ -67,14 +68,14 @@ fn ports(n: usize) -> Vec<Row> {
     ]
 }
 
-/// Above all frequencies of these structures, `√(4 · 3 / 1)`.
+/// A frequency above all modes of these structures, `√(4 · 3 / 1)`.
 const ABOVE_ALL: f64 = 4.0;
 
 const UNDAMPED: Damping = Damping::Rayleigh { mass: 0.0, stiffness: 0.0 };
 
-/// A reduction errs where its size says so: with residual vectors of J orders like `(ω² / λ)²ᴶ⁺¹` of the first mode left out, of which the
-/// answer at
-/// rest is exact, for held and for free structures.
+/// The error of a reduction with residual vectors of J orders behaves like `(ω² / λ)²ᴶ⁺¹`, with
+/// λ of the first omitted mode. The static response is exact. This holds for fixed and for free
+/// structures.
 #[test]
 fn residual_vectors_make_low_frequencies_exact() {
     let n = 60;
@@ -100,7 +101,8 @@ fn residual_vectors_make_low_frequencies_exact() {
     }
 }
 
-/// The first residual term of a free structure is its residual flexibility, the sum over the modes left out.
+/// The first residual term of a free structure is its residual flexibility, the sum over the
+/// omitted modes.
 #[test]
 fn residual_flexibility_of_a_free_structure() {
     let n = 40;
@@ -128,7 +130,8 @@ fn residual_flexibility_of_a_free_structure() {
     }
 }
 
-/// Modal damping is the ratio up to the bound and grows with frequency beyond, in the whole structure and in every reduction of it.
+/// The modal damping ratio is constant up to the bound and grows with frequency above it, in
+/// the whole structure and in every reduction.
 #[test]
 fn damping_by_ratio() {
     let n = 30;
@@ -152,13 +155,13 @@ fn damping_by_ratio() {
         assert!(error < 1e-6, "free modes at {omega}: {error:.1e}");
         let error = off(&series.receptance(omega), &expected);
         assert!(error < 1e-4, "series at {omega}: {error:.1e}");
-        // with all modes it is the whole structure
+        // with all modes, the reduction equals the whole structure
         let error = off(&whole.craig_bampton(ABOVE_ALL).unwrap().receptance(omega).unwrap(), &expected);
         assert!(error < 1e-9, "Craig-Bampton at {omega}: {error:.1e}");
     }
 }
 
-/// A damping matrix, gyroscopic too, is projected; a series refuses it.
+/// A damping matrix, also a gyroscopic one, is projected; a series rejects it.
 #[test]
 fn damping_matrix() {
     let n = 30;
@@ -175,7 +178,7 @@ fn damping_matrix() {
         .map(|omega| off(&reduced.receptance(omega).unwrap(), &receptance(&m, &full(&c), &k, &ports(n), omega)));
     let own = own.fold(0.0, f64::max);
     let deviation = reference.deviation(&reduced);
-    // in another norm, with other weights of the ports
+    // the norms differ, with other weights of the ports
     assert!(deviation.error < 5.0 * own && own < 5.0 * deviation.error, "{own:.1e} {deviation:?}");
     let all = whole.modes(ABOVE_ALL).unwrap();
     assert_eq!(all.count(), n);
@@ -183,7 +186,7 @@ fn damping_matrix() {
     assert!(reference.deviation(&exact).error < 1e-9, "{:?}", reference.deviation(&exact));
 }
 
-/// Places without mass, seen by a port.
+/// A port at a place without mass.
 #[test]
 fn ports_without_mass() {
     let n = 40;
@@ -191,7 +194,7 @@ fn ports_without_mass() {
     let k = chain(n, true);
     let ports = vec![vec![(n - 1, 1.0)], vec![(7, 1.0)]];
     let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports.clone()).unwrap();
-    // all twenty modes with a frequency; of the ports, one without mass adds its own spring
+    // all twenty modes with a frequency; of the two ports, the one without mass adds its spring
     let free = Free::new(&whole, &whole.modes(ABOVE_ALL).unwrap(), 0.0, 1).unwrap();
     assert_eq!(free.modes(), 20);
     for reduced in [free.reduced(20, 1).unwrap(), whole.craig_bampton(ABOVE_ALL).unwrap()] {
@@ -220,7 +223,8 @@ fn what_is_no_reduction_says_why() {
     }
     let negative = Damping::Ratio { ratio: -0.1, up_to: 1.0 };
     assert!(matches!(make(&m, &k, negative, ports(n)), Err(ReductionError::Number { .. })));
-    // a free chain seen as a difference has static answers to it, but held there alone it still moves
+    // a port at one end of two separate free chains does not remove the free motion of the
+    // second chain
     let two = [springs(n / 2, &(1..n / 2).map(|i| (i - 1, i, 1.0)).collect::<Vec<_>>()); 1];
     let apart = sparse(n, two[0].entries().flat_map(|(i, k, v)| [(i, k, v), (i + n / 2, k + n / 2, v)]));
     let whole = Whole::new(m.clone(), UNDAMPED, apart, vec![vec![(0, 1.0)]]).unwrap();
@@ -234,7 +238,7 @@ fn what_is_no_reduction_says_why() {
     ));
 }
 
-/// Far below the first mode the static answers will do, three of which are independent.
+/// Far below the first mode, static responses suffice; three of them are independent.
 #[test]
 fn without_modes() {
     let n = 30;
@@ -243,7 +247,7 @@ fn without_modes() {
     assert_eq!((chosen.modes.count(), chosen.reduced.dofs()), (0, 3));
 }
 
-/// What is expanded is what is seen.
+/// The expanded displacements agree with those of the ports.
 #[test]
 fn expansion() {
     let n = 30;
@@ -258,8 +262,8 @@ fn expansion() {
     }
 }
 
-/// Free motions and residual vectors of this chain with 17 more links are nearly dependent for one number of them, of which only rounding tells the
-/// last apart: others are taken.
+/// For this chain with 17 additional links and one number of vectors, the last vector is nearly
+/// dependent on free motions and the others, up to rounding. The reduction uses other numbers.
 #[test]
 fn nearly_dependent_vectors_are_passed_over() {
     let links = [
@@ -318,8 +322,8 @@ fn nearly_dependent_vectors_are_passed_over() {
 }
 
 proptest! {
-    /// Random structures, free or held, with all of their modes or with residual vectors of what is left: the chosen reduction meets its tolerance
-    /// at frequencies that it was not asked about.
+    /// Random structures, free or fixed, with all modes or with residual vectors. The selected
+    /// reduction meets its tolerance at other frequencies than the samples.
     #[test]
     fn random_structures(
         links in proptest::collection::vec((0usize..24, 0usize..24, 0.5f64..2.0), 10..50),
@@ -341,7 +345,7 @@ proptest! {
         let mut bare = chosen.reduced.clone();
         bare.damping *= 0.0;
         let exact = |omega: f64| receptance(&m, &undamped, &k, &ports, omega);
-        // at an anti-resonance nothing is left to be relative to but what is usual there
+        // at an anti-resonance, the error is relative to the typical receptance
         let mut sizes: Vec<f64> = (0..21).map(|i| exact((f64::from(i) + 0.37) / 21.0 * up_to).norm()).collect();
         sizes.sort_by(f64::total_cmp);
         let size = exact(omega).norm().max(sizes[10]);

@@ -1,4 +1,4 @@
-//! Reductions against dense solutions of small structures, and against a block of hexahedra.
+//! Compares reductions with dense solutions of small structures, and with a block of hexahedra.
 
 mod block;
 mod brick;

@@ -1,4 +1,4 @@
-//! Rings whose blades differ, in few coordinates, against all rows of all sectors.
+//! Compares reduced rings of different blades with all rows of all sectors.
 
 use crate::brick::Brick;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -7,17 +7,19 @@ use stickslip::model::{Around, Disk, DiskPart, Model, Place, Substructure, Subst
 use stickslip::structure::{Boundary, Component, Reduction, ReductionKind};
 use stickslip_numerics::sparse::{Analysis, Matrix};
 
-/// Elements of a sector along the blade, across, and through.
+/// Numbers of elements of a sector along the blade, across, and through the thickness.
 const ELEMENTS: [usize; 3] = [6, 2, 1];
-/// Nodes from the held end that are welded to the next sector, and that are the disk; the others are the blade.
+/// Number of nodes from the fixed end that are welded to the next sector, and number of nodes
+/// of the disk. The others are the blade.
 const WELDED: usize = 1;
 const DISK: usize = 2;
 /// Deviations of the blades' stiffness.
 const BLADES: [f64; 4] = [0.04, -0.02, -0.04, 0.03];
-/// The half width of a resonance that errors are said for.
+/// Half width of the resonance to which reported errors refer.
 const HALF_WIDTH: f64 = 1e-3;
 
-/// A ring of steel strips side by side, held at one end, the first nodes welded to those of the next strip.
+/// Returns a ring of adjacent steel strips that are fixed at one end. The first nodes are
+/// welded to those of the next strip.
 fn ring(reduction: Reduction, blades: &[f64]) -> System {
     let brick = Brick::new(ELEMENTS, [0.08, 0.03, 0.006], true);
     let [nx, ny, nz] = ELEMENTS;
@@ -50,7 +52,7 @@ fn ring(reduction: Reduction, blades: &[f64]) -> System {
     disk.ring(|s| sector(blades[s])).unwrap().assemble().unwrap()
 }
 
-/// Displacements of the places of all sectors under loads on all of them.
+/// Returns the displacements of the places of all sectors under loads on all of them.
 fn answers(system: &System, omega: f64) -> DVector<Complex<f64>> {
     let structure = system.structure();
     let (m, k) = (structure.mass(), structure.stiffness());
@@ -64,7 +66,7 @@ fn answers(system: &System, omega: f64) -> DVector<Complex<f64>> {
     seen * z.lu().solve(&load).unwrap()
 }
 
-/// Natural frequencies, rad/s, rising.
+/// Returns the natural frequencies, rad/s, in ascending order.
 fn resonances(system: &System) -> Vec<f64> {
     let structure = system.structure();
     let root = structure.mass().clone().cholesky().unwrap().l();
@@ -75,8 +77,9 @@ fn resonances(system: &System) -> Vec<f64> {
     all
 }
 
-/// What the waves of the tuned ring do not tell: the error that is said of a ring whose blades differ is that against the whole ring at its resonances,
-/// within a factor of two; and with a tolerance as many vectors are taken as it asks for.
+/// The waves of the tuned ring do not contain this error. The reported error of a ring with
+/// different blades agrees with that relative to the whole ring at its resonances, within a
+/// factor of two. With a tolerance, the reduction uses the required number of vectors.
 #[test]
 fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
     let whole = ring(Reduction::None { up_to: 0.0 }, &BLADES);
@@ -107,7 +110,7 @@ fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
     }
 }
 
-/// Mass and stiffness of a ring of many sectors.
+/// Returns mass and stiffness of a ring of many sectors.
 fn matrices(system: &System) -> [Matrix; 2] {
     [0, 2].map(|of| {
         let entries = system.structure().entries().map(|(i, k, values)| (i, k, values[of]));
@@ -115,7 +118,8 @@ fn matrices(system: &System) -> [Matrix; 2] {
     })
 }
 
-/// Displacements of the places of all sectors, one after the other, at these frequencies, rad/s.
+/// Returns the displacements of the places of all sectors, one after the other, at these
+/// frequencies, rad/s.
 fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>>> {
     let [mass, stiffness] = matrices(system);
     let analysis = Analysis::new(&[&stiffness, &mass]);
@@ -132,8 +136,9 @@ fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>
     frequencies.iter().map(one).collect()
 }
 
-/// Sixty blades: frequencies by Lanczos' process on all rows of all sectors, answers by the factor of these. What is said of the error is that of the
-/// answers at resonances.
+/// Sixty blades: reference frequencies from the Lanczos process on all rows of all sectors,
+/// reference responses from their factorization. The reported error agrees with that of the
+/// responses at resonances.
 #[test]
 fn sixty_blades_have_the_frequencies_and_answers_of_all_rows() {
     let blades: Vec<f64> = (0..60).map(|s| 0.04 * (2.3 * f64::from(s * s)).sin()).collect();

@@ -1,15 +1,22 @@
-//! Stick or slip, open or closed: which pattern begins at an instant.
+//! Transitions between stick and slip, open and closed: determines the pattern that begins at
+//! an instant.
 //!
-//! Sliders with relative velocity slip on. For the rigid ones at rest the accelerations and friction forces solve a box
-//! complementarity problem (all of them together, so the order of listing plays no part): an acceleration means slip, a force
-//! inside its limit means stick. Where a force is exactly at its limit and the acceleration is zero, which is the rule when stick
-//! ends, the same problem for the next derivative decides, and so on.
+//! Sliders with a relative velocity continue to slip. For rigid sliders at zero velocity,
+//! accelerations and friction forces solve a box complementarity problem for all of them
+//! together. The result does not depend on their order. A nonzero acceleration means slip; a
+//! force inside its limit means stick. At the end of stick, the force is usually exactly at its
+//! limit and the acceleration is zero. Then the same problem for the next derivative decides,
+//! and so on.
 //!
-//! A slider whose static limit lies above its dynamic one loses force when it lets go, so that it may be able both to rest and to slide. What rests
-//! holds as long as it can: the problem is solved with static limits first, those that it lets go slide with their dynamic limits from then on,
-//! all together, and the others are asked again under the forces that this leaves to them. One that would then be driven back rests again.
+//! A slider whose static limit exceeds its dynamic one loses force at the onset of slip, so
+//! that both stick and slip can be possible. Sliders stick as long as possible. The problem is
+//! first solved with static limits. Sliders that slip in this solution receive their dynamic
+//! limits, all at once. The problem is then solved again for the others. A slider that the new
+//! forces drive backwards sticks again.
 //!
-//! Springs and stops carry forces that do not jump: what they do next is asked of the first derivative that does not vanish.
+//! Forces of springs and stops are continuous. The first nonzero derivative decides on their
+//! next contact state.
+//!
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
 use super::mechanics::{Kind, Mechanics, Part, REST};
@@ -18,38 +25,41 @@ use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 
-/// A force within this fraction of its limit is at the limit, for the same reason.
+/// A force within this fraction of its limit counts as at the limit. The reason is that of
+/// [`REST`].
 pub(crate) const AT_LIMIT: f64 = 1e-10;
-/// An acceleration (or a higher derivative) below this fraction of the terms that it is the sum of is zero.
+/// An acceleration or higher derivative below this fraction of its terms counts as zero.
 const BALANCED: f64 = 1e-9;
-/// Derivatives tried before contacts that stay exactly at the border are left in stick.
+/// Number of derivatives after which contacts exactly at the border remain in stick.
 const LEVELS: u32 = 4;
 
-/// The decision, and the accelerations that go with it.
+/// The contacts after a transition, with the accelerations.
 #[derive(Debug, Clone)]
 pub(crate) struct Decision {
     pub contacts: Vec<Contact>,
     /// Acceleration right after the instant, length n, m/s².
     pub acceleration: DVector<f64>,
-    /// Largest force on a mass without those of rigid sliders at rest, N.
+    /// Largest force on a mass without those of rigid sliders at zero velocity, N.
     pushed: f64,
-    /// Accelerations that unit forces of the sliders cause, `M⁻¹ W`, n × sliders, and the relative ones, `Wᵀ M⁻¹ W`.
+    /// Accelerations due to unit forces of the sliders, `M⁻¹ W`, n × sliders. `delassus`
+    /// contains the relative accelerations, `Wᵀ M⁻¹ W`.
     response: DMatrix<f64>,
     delassus: DMatrix<f64>,
     free: DVector<f64>,
     at_rest: Vec<usize>,
-    /// Rigid sliders without velocity that have not let go; of those that have, the ones whose force dropped.
+    /// Rigid sliders at zero velocity whose force has not dropped. `dropped` contains those
+    /// whose force has dropped.
     resting: Vec<usize>,
     dropped: Vec<usize>,
-    /// Sliders that are not decided yet, with the sign of their force.
+    /// Undecided sliders, with the sign of their force.
     undecided: Vec<(usize, f64)>,
     problem: Problem,
-    /// x, v, a, jerk, …: each is the derivative of the one before.
+    /// x, v, a, jerk, …: each is the derivative of the previous one.
     derivatives: Vec<DVector<f64>>,
 }
 
-/// The terms of accelerations: the largest force on a mass (N), the imposed accelerations (m/s²), and the rates (rad/s) with which they change, for
-/// each part.
+/// Magnitude of the terms of accelerations: the largest force on a mass (N), the imposed
+/// accelerations (m/s²), and their rates of change (rad/s) for each part.
 struct Terms<'a> {
     force: f64,
     imposed: f64,
@@ -58,15 +68,16 @@ struct Terms<'a> {
 }
 
 impl Terms<'_> {
-    /// The size of those that the derivative of this order (2: acceleration) of the motion along a part is the sum of; `response` are the accelerations
-    /// that a unit force of the part causes.
+    /// Returns the magnitude of the terms in the derivative of this order (2: acceleration) of
+    /// the motion along a part. `response` contains the accelerations due to a unit force of
+    /// the part.
     fn size(&self, part: usize, response: &DMatrix<f64>, order: u32) -> f64 {
         let acceleration = response.column(part).amax() * self.force + self.imposed;
         acceleration * self.omega.max(self.fastest[part]).powi(order as i32 - 2)
     }
 }
 
-/// The complementarity problem of the sliders at rest, with its solution.
+/// The complementarity problem of the sliders at zero velocity, with its solution.
 #[derive(Debug, Clone, Default)]
 struct Problem {
     /// `Wᵀ M⁻¹ W`
@@ -75,9 +86,9 @@ struct Problem {
     low: DVector<f64>,
     high: DVector<f64>,
     lambda: DVector<f64>,
-    /// What the forces `lambda` leave of `push`.
+    /// Relative acceleration: `push` minus the effect of the forces `lambda`.
     relative: DVector<f64>,
-    /// What the forces `lambda` do.
+    /// Effect of the forces `lambda`.
     held: DVector<f64>,
 }
 
@@ -129,9 +140,12 @@ impl Decision {
         }
     }
 
-    /// Decides at `time` for `state`; `velocity_scale` is the largest relative velocity of the motion (m/s).
-    /// Returns false if the complementarity problem has no solution, which needs an indefinite mass matrix, or if sliders that lose force when they
-    /// let go drive each other back.
+    /// Determines the contacts at `time` for `state`. `velocity_scale` is the largest relative
+    /// velocity of the motion (m/s).
+    ///
+    /// Returns false if the complementarity problem has no solution, which requires an
+    /// indefinite mass matrix. It also returns false if sliders with dropping forces drive each
+    /// other back and forth.
     pub fn decide(
         &mut self,
         mechanics: &Mechanics,
@@ -178,7 +192,7 @@ impl Decision {
                 }
             };
         }
-        // each round lets sliders go or takes one back
+        // each round releases sliders or returns one to stick
         for _ in 0..=2 * self.resting.len() {
             self.accelerate(mechanics, drive, time, state);
             self.at_rest.clone_from(&self.resting);
@@ -195,7 +209,7 @@ impl Decision {
         false
     }
 
-    /// Accelerations without the forces of the rigid sliders that rest.
+    /// Computes the accelerations without the forces of rigid sliders at zero velocity.
     fn accelerate(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
         let n = mechanics.n;
         let (x, v) = (&state[..n], &state[n..2 * n]);
@@ -219,7 +233,8 @@ impl Decision {
         self.pushed = self.free.amax();
     }
 
-    /// Those that rest no longer and lose force by that, and those that lost it and are driven back; whether there are any.
+    /// Moves sliders whose force drops from `resting` to `dropped`, or returns one slider that
+    /// is driven backwards. Returns whether anything changed.
     fn let_go(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64) -> bool {
         let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].drops();
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
@@ -253,7 +268,8 @@ impl Decision {
         again
     }
 
-    /// Rigid sliders at rest: accelerations first, then higher derivatives for those at their limit.
+    /// Decides on rigid sliders at zero velocity: by accelerations first, then by higher
+    /// derivatives for those at their limit.
     fn settle_rigid(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) -> bool {
         if self.at_rest.is_empty() {
             return true;
@@ -270,12 +286,14 @@ impl Decision {
         self.undecided.clear();
         for (k, &i) in self.at_rest.iter().enumerate() {
             let (relative, lambda) = (problem.relative[k], problem.lambda[k]);
-            // with what the limits can do to it: that of its own masses, as another joint may join far lighter ones
+            // relative to the effect of the limits at its own masses, because another joint can
+            // connect much lighter masses
             let own = problem.delassus.column(k);
             let held: f64 = own.iter().zip(&problem.high).map(|(d, limit)| d.abs() * limit).sum();
             let size = problem.push[k].abs() + held;
             if relative.abs() > BALANCED * size {
-                self.contacts[i] = Contact::slip(relative); // a joint that is only moved has no force here
+                // a joint that only imposed motion moves has no force here
+                self.contacts[i] = Contact::slip(relative);
             } else if lambda.abs() >= problem.high[k] * (1.0 - AT_LIMIT) {
                 self.undecided.push((i, lambda.signum()));
             }
@@ -287,7 +305,7 @@ impl Decision {
         true
     }
 
-    /// What accelerations are the sums of, of all parts together.
+    /// Returns the magnitude of the terms of accelerations, for all parts together.
     fn terms<'a>(&self, mechanics: &'a Mechanics, drive: &Drive) -> Terms<'a> {
         let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(Part::holds).fold(0.0, f64::max);
         let imposed = drive
@@ -303,8 +321,11 @@ impl Decision {
         }
     }
 
-    /// Poses the problem of the sliders at rest but for its bounds: their relative acceleration (`order` 2) or a higher derivative, that
-    /// of the motion at `derivative`, or the acceleration, with the imposed motion.
+    /// Sets up the problem of the sliders at zero velocity, without its bounds.
+    ///
+    /// The unknown is their relative acceleration (`order` 2) or a higher derivative. It comes
+    /// from the derivative with index `derivative`, or from the acceleration, plus the imposed
+    /// motion.
     fn pose(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, order: u32, derivative: Option<usize>) {
         let problem = &mut self.problem;
         problem.resize(self.at_rest.len());
@@ -317,14 +338,15 @@ impl Decision {
         }
     }
 
-    /// Displacement, velocity and acceleration into the list of derivatives.
+    /// Stores displacement, velocity and acceleration in the list of derivatives.
     fn begin_derivatives(&mut self, n: usize, state: &[f64]) {
         self.derivatives[0].copy_from_slice(&state[..n]);
         self.derivatives[1].copy_from_slice(&state[n..2 * n]);
         self.derivatives[2].copy_from(&self.acceleration);
     }
 
-    /// Sliders exactly at their limit with zero acceleration: `undecided` holds them with the sign of their force.
+    /// Decides on sliders exactly at their limit with zero acceleration. `undecided` contains
+    /// them with the sign of their force.
     fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
         self.begin_derivatives(mechanics.n, state);
         let terms = self.terms(mechanics, drive);
@@ -336,7 +358,7 @@ impl Decision {
             self.pose(mechanics, drive, time, level + 2, Some(next));
             let problem = &mut self.problem;
             for (k, i) in self.at_rest.iter().enumerate() {
-                // a force at its limit can only recede
+                // a force at its limit can only decrease
                 let sign = self.undecided.iter().find(|(s, _)| s == i).map_or(0.0, |(_, sign)| *sign);
                 problem.low[k] = if sign < 0.0 { 0.0 } else { f64::NEG_INFINITY };
                 problem.high[k] = if sign > 0.0 { 0.0 } else { f64::INFINITY };
@@ -363,7 +385,8 @@ impl Decision {
         }
     }
 
-    /// The `level`-th derivative of the forces other than those of rigid sliders at rest, into `self.free`.
+    /// Computes the `level`-th derivative of all forces except those of rigid sliders at zero
+    /// velocity, in `self.free`.
     fn free_derivative(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, level: u32) {
         let (l, derivatives) = (level as usize, &self.derivatives);
         self.free.fill(0.0);
@@ -378,7 +401,8 @@ impl Decision {
         }
     }
 
-    /// Sliders behind springs at their limit and stops at their gap, with zero relative velocity: its first derivative that does not vanish decides.
+    /// Decides on sliders in series with springs at their limit and on stops at their gap, for
+    /// zero relative velocity. The first nonzero derivative decides.
     fn settle_springs(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64], velocity_scale: f64) {
         let n = mechanics.n;
         let still = REST * velocity_scale;
@@ -419,7 +443,8 @@ impl Decision {
             if undecided.is_empty() || level == LEVELS {
                 return;
             }
-            // the next derivative with the contacts as they stand: rigid sliders at rest hold
+            // the next derivative with the present contacts: rigid sliders at zero velocity
+            // stick
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
             self.free_derivative(mechanics, drive, time, level);
             let next = level as usize + 2;
@@ -439,7 +464,7 @@ impl Decision {
     }
 }
 
-/// A stop by the sign of its depth.
+/// Returns the contact state of a stop from the sign of its depth.
 fn closed(depth: f64) -> Contact {
     if depth > 0.0 { Contact::Stick } else { Contact::Open }
 }
@@ -463,7 +488,9 @@ mod tests {
     use crate::model::{Force, GROUND, Joint, Mass, Model};
     use std::sync::Arc;
 
-    /// Two masses at rest of 1 kg under constant forces (N); the first rubs on the ground and on the second, each with (dynamic, static limit).
+    /// Returns the contacts and accelerations of two masses of 1 kg at rest under constant
+    /// forces (N). The first mass has friction with the ground and with the second mass, each
+    /// with (dynamic, static limit).
     fn decided(forces: [f64; 2], limits: [(f64, f64); 2]) -> (Vec<Contact>, [f64; 2]) {
         let law = |(limit, static_limit): (f64, f64)| Arc::new(Stribeck { limit, static_limit, velocity: 0.0 });
         let joint = |name: &str, other: &str, limits| Joint {
@@ -494,13 +521,15 @@ mod tests {
             assert_eq!(found, contacts, "{forces:?}");
             assert!((0..2).all(|i| (motion[i] - acceleration[i]).abs() < 1e-12), "{motion:?}");
         };
-        // between both limits it could slide, and rests
+        // between both limits, the slider could slip, but it sticks
         check([3.0, 0.0], [(1.0, 5.0), (0.5, 1.0)], [Stick, Stick], [0.0, 0.0]);
-        // above its static limit it slides with the dynamic one: together, 4 N on 2 kg, or apart
+        // above the static limit, it slips with the dynamic one: both masses together, 4 N on 2
+        // kg, or separately
         check([6.0, 0.0], [(2.0, 5.0), (1.0, 3.0)], [SlipForward, Stick], [2.0, 2.0]);
         check([6.0, 0.0], [(2.0, 5.0), (0.5, 1.0)], [SlipForward, SlipForward], [3.5, 0.5]);
         check([0.0, 6.0], [(0.5, 9.0), (1.0, 2.0)], [Stick, SlipBackward], [0.0, 5.0]);
-        // the second lets go backward as long as the floor holds the first with 5 N; the 1 N left of them drive it forward: it rests again
+        // the second slips backwards as long as the ground holds the first with 5 N; the
+        // remaining 1 N drives it forwards, so that it sticks again
         check([10.0, 8.0], [(1.0, 5.0), (0.5, 1.0)], [SlipForward, Stick], [8.5, 8.5]);
     }
 }

@@ -1,4 +1,5 @@
-//! The motion over a stretch of time: closed-form segments joined at the switches, with its exact sensitivity.
+//! The motion over a time interval: closed-form segments joined at the switches, with exact
+//! sensitivity.
 
 use super::decide::{AT_LIMIT, Decision};
 use super::mechanics::{Kind, Mechanics, Part, REST};
@@ -16,57 +17,59 @@ use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Switches in one stretch beyond which the motion counts as chatter. Den Hartog's oscillator at a fiftieth of its natural
-/// frequency has some 200.
+/// Number of switches in one run above which the motion counts as chatter. Den Hartog's
+/// oscillator at a fiftieth of its natural frequency has about 200.
 pub(crate) const SWITCH_LIMIT: usize = 20_000;
-/// Bytes of segments in one stretch beyond which it counts as chatter too: a return of a ring of 48 blades has a few hundred switches, and a
-/// segment a tenth of a megabyte.
+/// Memory of the segments of one run, bytes, above which the motion also counts as chatter. A
+/// return of a ring of 48 blades has a few hundred switches, and a segment takes a tenth of a
+/// megabyte.
 const SEGMENT_LIMIT: usize = 256 << 20;
-/// Switches without motion between them, per part, after which decision and signals are taken to contradict each other within rounding: a motion
-/// that creeps towards a border for ever, and is there to all digits.
+/// Number of switches without motion, per part, after which rounding makes the decision and the
+/// signals contradict each other. This occurs for a motion that creeps towards a border and has
+/// reached it up to rounding.
 const EASED_AFTER: usize = 2;
-/// Switches at one and the same instant beyond which the decision is going round in circles: every part may change once
-/// per derivative that decides.
+/// Number of switches at the same instant, per part, above which the decision cycles. Every
+/// part can change once per derivative that decides.
 const AT_ONCE_LIMIT: usize = 8;
 
-/// One closed-form stretch of the motion.
+/// One closed-form segment of the motion.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Segment {
     /// Start, s.
     pub start: f64,
     /// Length, s.
     pub length: f64,
-    /// What sticks or is closed, and which way the others slip.
+    /// Contact states.
     pub contacts: Vec<Contact>,
-    /// The response to the drive of its pattern, with the basis of its signals.
+    /// Response of its pattern to the excitation, with the basis of its signals.
     pub driven: Arc<Driven>,
-    /// Coefficients of the displacements, n × basis, row after row.
+    /// Coefficients of the displacements, n × basis, row by row.
     pub displacement: Vec<Complex64>,
-    /// Forces of the parts of joints, parts × basis, row after row.
+    /// Forces of the parts of joints, parts × basis, row by row.
     pub force: Vec<Complex64>,
     /// The basis functions at its end.
     pub at_end: Vec<Complex64>,
 }
 
 impl Segment {
-    /// Memory that its signals take, bytes.
+    /// Returns the memory of its signals, bytes.
     fn bytes(&self) -> usize {
         16 * (self.displacement.len() + self.force.len() + self.at_end.len())
     }
 
-    /// The basis of its signals.
+    /// Returns the basis of its signals.
     pub fn basis(&self) -> &Basis {
         &self.driven.basis
     }
 }
 
-/// Runs the motion; keeps patterns, memory and the last run's segments.
+/// Computes the motion; stores patterns, scratch memory and the segments of the last run.
 pub(crate) struct SegmentedMotion {
     pub mechanics: Mechanics,
     pub drive: Drive,
-    /// Square root of an energy that the loads can give, √J.
+    /// Square root of an energy that the loads can cause, √J.
     pub energy_scale: f64,
-    /// A velocity well below those of the moving structure, m/s: the scale of velocities near rest.
+    /// A velocity well below those of the moving structure, m/s: the velocity scale near rest.
     moving: f64,
     memory: Memory,
     segments: Vec<Segment>,
@@ -83,7 +86,8 @@ pub(crate) struct SegmentedMotion {
     signals: Vec<Complex64>,
     begins: Vec<Begin>,
     watched: Vec<usize>,
-    /// Of every part, whether it is watched for what ends its pattern forward and backward.
+    /// Marks parts that are monitored for a switch in the forward and in the backward
+    /// direction.
     nearest: Vec<[bool; 2]>,
     before: DVector<f64>,
     after: DVector<f64>,
@@ -93,7 +97,8 @@ pub(crate) struct SegmentedMotion {
     rate: Vec<Complex64>,
 }
 
-/// What springs before sliders can hold counts up to this multiple of what the loads can give: structures that slip at all have it below 10.
+/// Upper bound of the energy scale of springs in series with sliders, as a multiple of that of
+/// the loads. Structures that slip at all have a ratio below 10.
 const PRELOADED: f64 = 10.0;
 
 impl SegmentedMotion {
@@ -127,13 +132,14 @@ impl SegmentedMotion {
         }
     }
 
-    /// The segments of the last run.
+    /// Returns the segments of the last run.
     pub fn segments(&self) -> &[Segment] {
         &self.segments[..self.used]
     }
 
-    /// Runs from `state` (changed to the end state) over `[start, start + duration]`. `sensitivity`, if given, is multiplied
-    /// from the left by the derivative of the end state with respect to the initial state.
+    /// Computes the motion from `state`, which becomes the end state, over
+    /// `[start, start + duration]`. `sensitivity`, if given, is multiplied from the left by the
+    /// derivative of the end state with respect to the initial state.
     pub fn run(
         &mut self,
         state: &mut [f64],
@@ -203,35 +209,36 @@ impl SegmentedMotion {
         }
     }
 
-    /// How far the state has come since the segment began, as a velocity, m/s.
+    /// Returns the change of the state since the start of the segment, as a velocity, m/s.
     fn moved(&self, state: &[f64]) -> f64 {
         let n = self.mechanics.n;
         let far = |range: std::ops::Range<usize>| range.map(|i| (state[i] - self.from[i]).abs()).fold(0.0, f64::max);
         far(n..2 * n).max(far(0..n) * self.drive.omega.max(self.mechanics.fastest))
     }
 
-    /// The largest relative velocity to be expected: from the state, the imposed motion and the loads.
+    /// Returns the largest expected relative velocity, from the state, the imposed motion and
+    /// the loads.
     fn velocity_scale(&self, state: &[f64]) -> f64 {
         let n = self.mechanics.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
-        // displacements count with a frequency, so that a start at a reversal has a scale too
+        // displacements count times a frequency, so that a start at a reversal has a scale too
         let widest =
             state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega.max(self.mechanics.fastest);
         fastest.max(widest).max(self.moving).max(f64::MIN_POSITIVE)
     }
 
-    /// Changes the drive; patterns stay.
+    /// Changes the excitation; patterns stay.
     pub fn set_drive(&mut self, drive: Drive) {
         self.work.set_harmonics(drive.rates.len());
         let mechanics = &self.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
             Kind::Rigid { .. } => None,
             Kind::Elastic { stiffness, limit, .. } => Some(limit / stiffness.sqrt()),
-            // what it presses with at rest
+            // its force in the initial position
             Kind::Stop { stiffness, gap } => Some((-gap).max(0.0) * stiffness.sqrt()),
         });
         let loads = drive.energy_scale(&mechanics.mass, &mechanics.stiffness);
-        // a limit that the loads never reach says nothing of the motion
+        // a limit that the loads never reach does not affect the motion
         let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
         self.energy_scale = loads + springs.map(|energy| energy.min(most)).sum::<f64>();
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
@@ -263,7 +270,7 @@ impl SegmentedMotion {
         self.forces(time, shape, state);
     }
 
-    /// Forces of all parts as signals.
+    /// Computes the forces of all parts as signals.
     fn forces(&mut self, time: f64, shape: &Pattern, state: &[f64]) {
         let Segment { force, displacement, contacts, driven, .. } = &mut self.segments[self.used];
         let (n, basis) = (self.mechanics.n, &driven.basis);
@@ -291,7 +298,8 @@ impl SegmentedMotion {
                 }
             }
         }
-        // the held ones: λ = multiplier (F - C v - K x - other parts) + inverse_delassus g''
+        // stuck rigid sliders: λ = multiplier (F - C v - K x - other parts) + inverse_delassus
+        // g''
         for (s, &held) in shape.held.iter().enumerate() {
             let (before, rest) = force.split_at_mut(held * nb);
             let (row, after) = rest.split_at_mut(nb);
@@ -305,7 +313,7 @@ impl SegmentedMotion {
             }
             for (i, contact) in contacts.iter().enumerate() {
                 if shape.held.contains(&i) {
-                    continue; // the multipliers themselves
+                    continue; // the multipliers are computed here
                 }
                 let (factor, elastic) = (-shape.held_by_parts[(s, i)], *contact == Contact::Stick);
                 let other = if i < held { &before[i * nb..] } else { &after[(i - held - 1) * nb..] };
@@ -318,8 +326,12 @@ impl SegmentedMotion {
         }
     }
 
-    /// The signals whose zeros are switches: `static limit ∓ f` in stick, the velocity in slip direction in slip, the depth of a stop or what is
-    /// missing of it. If `eased`, those that begin at zero may pass it by as much as counts as zero.
+    /// Builds the signals whose zeros are switches.
+    ///
+    /// For sliders, the signal is `static limit ∓ f` in stick, and the velocity in slip
+    /// direction in slip. For stops, it is the depth of a closed one or the remaining gap of an
+    /// open one. If `eased`, signals that begin at zero may change sign within the tolerance of
+    /// zero.
     fn watch(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
         nearest(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
@@ -335,7 +347,7 @@ impl SegmentedMotion {
             let contact = segment.contacts[i];
             if part.is_slider() && contact == Contact::Stick {
                 if shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
-                    continue; // its force is constant, whatever rounding says
+                    continue; // its force is constant; rounding must not cause a switch
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
                 let (now, limit) = (real_dot(force, &self.values), part.holds());
@@ -354,12 +366,12 @@ impl SegmentedMotion {
                 continue;
             }
             if !self.nearest[i][usize::from(contact == Contact::SlipBackward)] {
-                continue; // it stops with another one of its joint
+                continue; // it stops together with another part of its joint
             }
             let at = self.signals.len();
             self.signals.resize(at + nb, ZERO);
             let signal = &mut self.signals[at..];
-            // how often the displacement is differentiated, and what counts as zero
+            // signal, sign, order of the derivative, and tolerance for zero
             let (motion, sign, order, zero) = match part.kind {
                 Kind::Stop { gap, .. } => {
                     let sign = if contact == Contact::Stick { 1.0 } else { -1.0 };
@@ -381,7 +393,7 @@ impl SegmentedMotion {
         }
     }
 
-    /// Ends the current segment: end state, sensitivity.
+    /// Ends the current segment: computes the end state and the sensitivity.
     fn finish_segment(
         &mut self,
         shape: &Pattern,
@@ -413,7 +425,7 @@ impl SegmentedMotion {
         }
     }
 
-    /// A spring force that reached its limit is set exactly there.
+    /// Sets a spring force that reached its limit exactly to the limit.
     fn snap(&self, part: usize, state: &mut [f64]) {
         let old = self.segments[self.used - 1].contacts[part];
         if let (Kind::Elastic { limit, state: s, .. }, Contact::Stick) = (self.mechanics.parts[part].kind, old) {
@@ -422,14 +434,17 @@ impl SegmentedMotion {
         }
     }
 
-    /// The jump of the sensitivity at a switch of `part`, which ends a stretch with the pattern `shape` (saltation): `S = I + (F⁺ - F⁻) ∇g / g'`.
-    /// Source: Leine and Nijmeijer (2004), Sec. 7.
+    /// Applies the saltation matrix at a switch of `part` to the sensitivity:
+    /// `S = I + (F⁺ - F⁻) ∇g / g'`.
+    ///
+    /// `shape` is the pattern of the segment that ends. Source: Leine and Nijmeijer (2004),
+    /// Sec. 7.
     fn jump(&mut self, part: usize, shape: &Pattern, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
         let n = self.mechanics.n;
         let segment = &self.segments[self.used - 1];
         let contacts = &segment.contacts;
         let body = &self.mechanics.parts[part];
-        // rates of the state before and after: displacements go on smoothly
+        // rates of the state before and after; displacements are continuously differentiable
         for row in 0..n {
             self.after[n + row] = self.decision.acceleration[row];
             (self.before[row], self.after[row]) = (0.0, 0.0);
@@ -450,11 +465,11 @@ impl SegmentedMotion {
                 self.row[2 * n + s] = 1.0;
                 self.before[2 * n + s]
             }
-            // a rigid slider lets go with continuous forces: nothing jumps
+            // a rigid slider begins to slip with continuous forces, so that there is no jump
             (Contact::Stick, Kind::Rigid { .. }) if !body.drops() => return,
             (Contact::Stick, Kind::Rigid { .. }) => {
                 let Some(held) = shape.held.iter().position(|&h| h == part) else { return };
-                // the force that it holds with: λ = multiplier (F - C v - K x - other parts) + …
+                // the stick force: λ = multiplier (F - C v - K x - other parts) + …
                 for k in 0..n {
                     self.row[k] = -shape.held_by_displacement[(held, k)];
                     self.row[n + k] = -shape.held_by_velocity[(held, k)];
@@ -483,7 +498,8 @@ impl SegmentedMotion {
             }
         };
         if slope == 0.0 {
-            return; // grazing: the derivative does not exist, the one-sided one of "no switch" is taken
+            // grazing: the derivative does not exist; take the one-sided one without a switch
+            return;
         }
         self.after -= &self.before;
         for mut column in sensitivity.column_iter_mut() {
@@ -493,8 +509,11 @@ impl SegmentedMotion {
     }
 }
 
-/// Which parts are watched, forward and backward, where the sliders behind springs have the forces `springs`. Those of one joint share its
-/// displacement: of the ones that stick only that is watched which reaches its limit first, of the ones that slip only one.
+/// Selects the parts that are monitored, forward and backward. `springs` are the forces of
+/// sliders in series with springs.
+///
+/// The parts of one joint share its displacement. Of the stuck ones, only the part that reaches
+/// its limit first is monitored; of the slipping ones, only one.
 fn nearest(parts: &[Part], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
     out.clear();
     out.resize(parts.len(), [true; 2]);
@@ -532,7 +551,8 @@ fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
     }
 }
 
-/// How a signal with this constant part begins, from its value there and what counts as zero; if `eased`, one that begins at zero is lifted above it.
+/// Returns the initial sign of a signal, from its value and the tolerance for zero. If `eased`,
+/// a signal that begins at zero is raised above zero through its constant part.
 fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Begin {
     if value > zero {
         Begin::Positive
@@ -551,7 +571,8 @@ mod tests {
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
-    /// Two masses with a law each to the ground and one between them, driven by the first and third harmonic.
+    /// Two masses with a law each to the ground and one between them, excited by the first and
+    /// third harmonic.
     fn flow(laws: [SharedLaw; 3]) -> SegmentedMotion {
         let between = [["a", GROUND], ["b", GROUND], ["a", "b"]].map(|pair| pair.map(str::to_owned));
         let joints = between.iter().zip(laws).enumerate();
@@ -577,8 +598,8 @@ mod tests {
         flow
     }
 
-    /// Many sliders side by side, beside few: the derivative of the motion is what a small change of the start does to the end, and what those
-    /// that are not watched do is what the force of each says.
+    /// With many parallel sliders, the sensitivity equals the effect of a small change of the
+    /// initial state on the end state. Parts that are not monitored follow their own force.
     #[test]
     fn sensitivities_pass_many_sliders() {
         let many: SharedLaw = Arc::new(Iwan { stiffness: 2.0, limit: 0.6, chi: -0.5, beta: 0.3, elements: 24 });
@@ -616,8 +637,9 @@ mod tests {
         }
     }
 
-    /// The derivative of the motion through stops that open and close and through sliders that drop their force, behind held ones, springs and
-    /// stops, is what a small change of the start does to the end.
+    /// The sensitivity equals the effect of a small change of the initial state on the end
+    /// state. The motion passes stops that open and close, and sliders with a drop of force
+    /// after stuck sliders, springs and stops.
     #[test]
     fn sensitivities_pass_stops_and_drops() {
         let stop: SharedLaw = Arc::new(Gap { gap: 0.1, stiffness: 3.0 });

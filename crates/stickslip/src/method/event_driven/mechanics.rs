@@ -1,8 +1,10 @@
-//! The system as the event-driven method sees it: masses, springs, ideal parts of joints, one drive frequency.
+//! The system in the form of the event-driven method: masses, springs and ideal parts of
+//! joints.
 //!
-//! Rigid sliders along one line have one relative motion, and begin to slip and come to rest together. They are one part with the sums of their
-//! limits, so that rounding cannot decide otherwise for one of them than for the next, and no problem is posed whose solution is not unique.
-//! What each carries of the part's force is its [`Share`].
+//! Rigid sliders along one line have the same relative motion, and they start and stop to slip
+//! together. They form one part with the sum of their limits. Otherwise rounding could give
+//! them different contacts, and the friction problem would not have a unique solution. Each
+//! joint receives a [`Share`] of the part's force.
 
 use crate::law::{Contact, Law, Piece};
 use crate::method::{MethodError, Refusal};
@@ -12,29 +14,32 @@ use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A relative velocity below this fraction of the largest one is rest. Switch instants are found to 1e-15 of the velocity scale;
-/// joints that switch together by symmetry differ by the rounding of the whole orbit, about 1e-12.
+/// Relative velocity, as a fraction of the largest one, that counts as zero. Switch times are
+/// accurate to 1e-15 of the velocity scale. Joints that switch together by symmetry differ by
+/// the rounding of the whole orbit, about 1e-12.
 pub(crate) const REST: f64 = 1e-10;
 
-/// How many times lighter than what it rubs on a place between rigid sliders may be. Accelerations below 1e-9 of what the limits do to the lightest mass of
-/// a slider count as none, which is a tenth of what they do to the heaviest one then. Measured: right to 1e8, chatter from 1e9, other orbits from 1e12.
+/// Largest mass ratio at a place between rigid sliders. Accelerations below 1e-9 of those that
+/// the limits cause at the lightest mass count as zero. At this ratio, that is a tenth of those
+/// at the heaviest mass. Measured: correct up to 1e8, chatter from 1e9, wrong orbits from 1e12.
 const LIGHTEST: f64 = 1e8;
 
-/// What a part of a joint does.
+/// The kind of a part of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Kind {
-    /// A rigid slider: moves with the force `limit`, and once it rests holds up to `static_limit`, N.
+    /// A rigid slider. It slips with the force `limit` and sticks up to `static_limit`, N.
     Rigid { limit: f64, static_limit: f64 },
-    /// A slider behind a spring (N/m) with its limit (N), and the index of its force among the states.
+    /// A slider in series with a spring (N/m): its limit (N), and the index of its force among
+    /// the states.
     Elastic { stiffness: f64, limit: f64, state: usize },
-    /// A spring (N/m) beyond a gap (m), constant imposed motion counted in.
+    /// A spring (N/m) behind a gap (m). The gap includes constant imposed motion.
     Stop { stiffness: f64, gap: f64 },
 }
 
 /// One ideal part of a joint, or several rigid sliders along one line.
 #[derive(Debug, Clone)]
 pub(crate) struct Part {
-    /// The joint it belongs to; of several, the first.
+    /// Index of its joint; for several sliders, the first.
     pub joint: usize,
     /// Direction, length n.
     pub direction: DVector<f64>,
@@ -42,7 +47,7 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// The spring in it, N/m.
+    /// Returns the stiffness of its spring, N/m.
     pub fn stiffness(&self) -> Option<f64> {
         match self.kind {
             Kind::Rigid { .. } => None,
@@ -50,7 +55,7 @@ impl Part {
         }
     }
 
-    /// Force while it slips, N; a stop never does.
+    /// Returns the force during slip, N; zero for a stop, which never slips.
     pub fn limit(&self) -> f64 {
         match self.kind {
             Kind::Rigid { limit, .. } | Kind::Elastic { limit, .. } => limit,
@@ -58,7 +63,7 @@ impl Part {
         }
     }
 
-    /// The largest force with which it rests, N.
+    /// Returns the largest force in stick, N.
     pub fn holds(&self) -> f64 {
         match self.kind {
             Kind::Rigid { static_limit, .. } => static_limit,
@@ -67,7 +72,7 @@ impl Part {
         }
     }
 
-    /// Index of its force among the states, for a slider behind a spring.
+    /// Returns the index of its force among the states, for a slider in series with a spring.
     pub fn state(&self) -> Option<usize> {
         match self.kind {
             Kind::Elastic { state, .. } => Some(state),
@@ -75,27 +80,28 @@ impl Part {
         }
     }
 
-    /// Whether it is a slider.
+    /// Returns whether it is a slider.
     pub fn is_slider(&self) -> bool {
         !matches!(self.kind, Kind::Stop { .. })
     }
 
-    /// Whether its force drops when it begins to slip.
+    /// Returns whether its force drops at the onset of slip.
     pub fn drops(&self) -> bool {
         self.holds() > self.limit() && self.is_slider()
     }
 
-    /// The rows that it acts on.
+    /// Iterates over the rows on which it acts.
     fn rows(&self) -> impl Iterator<Item = usize> + '_ {
         self.direction.iter().enumerate().filter(|(_, weight)| **weight != 0.0).map(|(row, _)| row)
     }
 
-    /// What displacements or velocities are along it, without imposed motion.
+    /// Returns the component of displacements or velocities along its direction, without
+    /// imposed motion.
     pub fn along(&self, values: &[f64]) -> f64 {
         self.direction.iter().zip(values).map(|(w, x)| w * x).sum()
     }
 
-    /// What of the force is the same as long as a contact lasts, N.
+    /// Returns the constant part of the force in a contact state, N.
     pub fn constant_force(&self, contact: Contact) -> f64 {
         match (self.kind, contact) {
             (Kind::Stop { stiffness, gap }, Contact::Stick) => -stiffness * gap,
@@ -105,13 +111,15 @@ impl Part {
     }
 }
 
-/// What a joint has of a part: the whole, or its share of several rigid sliders along one line.
+/// A joint's share of a part: the whole part, or a fraction of several rigid sliders along one
+/// line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Share {
     pub joint: usize,
     pub part: usize,
-    /// Force of the joint per force of the part while it slips and while it rests, by the limits of each. Negative in joints that point the other
-    /// way.
+    /// Force of the joint per force of the part during slip, by the dynamic limits. Negative
+    /// for joints of opposite direction. `resting` is the corresponding ratio in stick, by the
+    /// static limits.
     slipping: f64,
     resting: f64,
 }
@@ -121,18 +129,18 @@ impl Share {
         Share { joint, part, slipping: 1.0, resting: 1.0 }
     }
 
-    /// Force of the joint per force of the part in this contact.
+    /// Returns the force of the joint per force of the part in this contact state.
     pub fn of(&self, contact: Contact) -> f64 {
         if contact.slips() { self.slipping } else { self.resting }
     }
 
-    /// The joint's contact, from its part's.
+    /// Returns the contact state of the joint from that of its part.
     pub fn contact(&self, contact: Contact) -> Contact {
         if self.resting < 0.0 { contact.mirrored() } else { contact }
     }
 }
 
-/// A rigid slider of a joint, before those along one line are one part.
+/// A rigid slider of a joint, before those along one line are combined.
 struct Slider {
     joint: usize,
     line: Line,
@@ -141,25 +149,25 @@ struct Slider {
     static_limit: f64,
 }
 
-/// Rigid sliders along one line: the part that they are, and all of them.
+/// Rigid sliders along one line, with their common part.
 struct Group {
     part: usize,
     line: Line,
     members: Vec<Member>,
 }
 
-/// One of them.
+/// One slider of a group.
 struct Member {
-    /// Which of the shares is its.
+    /// Index of its share.
     share: usize,
-    /// Its relative motion per that of the first.
+    /// Its relative motion divided by that of the first slider.
     factor: f64,
-    /// Limit and static limit, N.
+    /// Dynamic and static limit, N.
     limits: (f64, f64),
 }
 
 impl Group {
-    /// Limit and static limit of all together, along the first, N.
+    /// Returns the sums of dynamic and static limits along the first slider, N.
     fn limits(&self) -> (f64, f64) {
         let add = |sum: (f64, f64), Member { factor, limits, .. }: &Member| {
             (sum.0 + factor.abs() * limits.0, sum.1 + factor.abs() * limits.1)
@@ -168,7 +176,7 @@ impl Group {
     }
 }
 
-/// Parts and shares as they are gathered, joint after joint.
+/// Parts and shares during collection, joint by joint.
 #[derive(Default)]
 struct Gathered {
     parts: Vec<Part>,
@@ -197,14 +205,14 @@ impl Gathered {
         self.groups[group].members.push(Member { share, factor, limits });
     }
 
-    /// Gives the parts of several the sums of their limits, and each joint its share.
+    /// Sets the limits of combined parts to the sums, and computes the share of each joint.
     fn finish(mut self) -> (Arc<[Part]>, Arc<[Share]>) {
         for group in self.groups.iter().filter(|group| group.members.len() > 1) {
             let (limit, static_limit) = group.limits();
             self.parts[group.part].kind = Kind::Rigid { limit, static_limit };
             for Member { share, factor, limits } in &group.members {
                 let share = &mut self.shares[*share];
-                // without any force in slip there is nothing to share
+                // without a slip force, there is nothing to share
                 share.slipping = if limit > 0.0 { factor.signum() * limits.0 / limit } else { 0.0 };
                 share.resting = factor.signum() * limits.1 / static_limit;
             }
@@ -213,7 +221,7 @@ impl Gathered {
     }
 }
 
-/// Why the method cannot take a law: what it misses.
+/// Returns the reason why the method does not support a law.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
     let Some(pieces) = law.pieces() else { return Some("it is not made of ideal sliders, springs and stops") };
     let drops = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
@@ -226,33 +234,35 @@ fn refusal(law: &dyn Law) -> Option<&'static str> {
     }
 }
 
-/// Whether the method can follow a law.
+/// Returns whether the method supports a law.
 pub(crate) fn takes(law: &dyn Law) -> bool {
     refusal(law).is_none()
 }
 
-/// Matrices and parts of joints; independent of the drive frequency.
+/// Matrices and parts of joints, independent of the excitation frequency.
 #[derive(Debug, Clone)]
 pub(crate) struct Mechanics {
     pub n: usize,
-    /// Of the structure, shared with it.
+    /// Matrices of the structure, shared with it.
     matrices: Arc<Matrices>,
     pub inverse_mass: DMatrix<f64>,
-    /// Sliders and stops of all joints, those that carry nothing left out, rigid ones along one line as one.
+    /// Sliders and stops of all joints, without those of zero force. Rigid sliders along one
+    /// line are combined.
     pub parts: Arc<[Part]>,
-    /// What the joints have of them, joint after joint.
+    /// Shares of the joints, joint by joint.
     pub shares: Arc<[Share]>,
     /// Names of the joints, for errors.
     pub names: Arc<[String]>,
-    /// Number of sliders behind springs.
+    /// Number of sliders in series with springs.
     pub elastic: usize,
-    /// Estimate of the fastest natural frequency, rad/s.
+    /// Estimate of the highest natural frequency, rad/s.
     pub fastest: f64,
-    /// The same of the masses that each part acts on.
+    /// This estimate for the masses of each part.
     pub fastest_along: Arc<[f64]>,
 }
 
-/// A place between several rigid sliders that is too light beside what one of them joins it to.
+/// Returns an error if a place between several rigid sliders is too light compared with an
+/// adjacent mass.
 fn light(system: &System, parts: &[Part], method: &'static str) -> Option<MethodError> {
     let rigid = || parts.iter().filter(|part| matches!(part.kind, Kind::Rigid { .. }));
     let mass = |row: usize| system.structure().own_mass(row);
@@ -268,7 +278,7 @@ fn light(system: &System, parts: &[Part], method: &'static str) -> Option<Method
     })
 }
 
-/// Mass, damping and stiffness are read as its own.
+/// Gives direct access to mass, damping and stiffness.
 impl Deref for Mechanics {
     type Target = Matrices;
     fn deref(&self) -> &Matrices {
@@ -292,10 +302,10 @@ impl Mechanics {
         self.parts = parts.into();
     }
 
-    /// For `method`, which names itself where it refuses.
+    /// Creates it for `method`, which error messages name.
     ///
     /// # Errors
-    /// A joint whose law has no exact view, or none that can be followed ([`refusal`]); a place without mass.
+    /// A law that the method does not support (see [`refusal`]), or a place without mass.
     pub fn new(system: &System, method: &'static str) -> Result<Self, MethodError> {
         let n = system.dofs();
         if let Some(error) = MethodError::too_large(method, system) {
@@ -328,7 +338,7 @@ impl Mechanics {
                             Kind::Elastic { stiffness, limit: slider.limit, state: elastic - 1 }
                         }
                     },
-                    // a stop knows where it is: imposed motion counts with its mean
+                    // the position of a stop includes the mean of the imposed motion
                     Piece::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
                 };
                 gathered.push(Part { joint: j, direction, kind });
@@ -362,7 +372,8 @@ impl Mechanics {
         })
     }
 
-    /// A stop is at its gap within this distance, m. `velocity_scale` is the largest relative velocity of the motion, m/s.
+    /// Returns the distance within which a stop counts as touching, m. `velocity_scale` is the
+    /// largest relative velocity of the motion, m/s.
     pub fn touch(&self, stop: &Part, omega: f64, velocity_scale: f64) -> f64 {
         let Kind::Stop { stiffness, gap } = stop.kind else { return 0.0 };
         let own = || (stiffness * self.inverse_mass.amax()).sqrt();
@@ -370,17 +381,18 @@ impl Mechanics {
         REST * (velocity_scale / rate).max(gap.abs())
     }
 
-    /// The joint of every part; of several along one line, the first.
+    /// Returns the joint of every part; for several sliders along one line, the first.
     pub fn owners(&self) -> Vec<usize> {
         self.parts.iter().map(|part| part.joint).collect()
     }
 
-    /// Length of the state `(x, v, forces of sliders behind springs)`.
+    /// Returns the length of the state `(x, v, forces of sliders in series with springs)`.
     pub fn states(&self) -> usize {
         2 * self.n + self.elastic
     }
 
-    /// Weights of the energy norm: each displacement with the larger of its stiffness and its inertia.
+    /// Returns the weights of the energy norm. The weight of a displacement uses the larger of
+    /// its stiffness and its inertia.
     pub fn weights(&self, omega: f64) -> Vec<f64> {
         let mut weights = vec![1.0; self.states()];
         for i in 0..self.n {

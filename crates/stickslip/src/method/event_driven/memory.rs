@@ -1,8 +1,9 @@
-//! The patterns that a motion has met, kept up to a number of bytes.
+//! Cache of the patterns of a motion, with a memory limit.
 //!
-//! A structure with `s` sliders has `2^s` patterns, and each takes some multiples of n² numbers. A return meets few of them, and the next one
-//! mostly the same: those that were not used for longest go first. A pattern that is made again has the same bits, so that nothing
-//! but time depends on what was kept.
+//! A structure with `s` sliders has `2^s` patterns, and each takes some multiples of n²
+//! numbers. One return uses few of them, and the next return uses mostly the same ones.
+//! Therefore the cache drops the least recently used patterns first. A recomputed pattern has
+//! the same bits, so that the cache affects computing time only.
 
 use super::mechanics::Mechanics;
 use super::pattern::{Driven, Pattern};
@@ -12,26 +13,26 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::modes::Defective;
 
-/// Bytes up to which patterns are kept, for each of the flows that run side by side. A return of a ring of 48 blades meets one to two hundred
-/// patterns of a quarter of a megabyte.
+/// Memory limit of the cache, bytes, for each of the flows that run in parallel. A return of a
+/// ring of 48 blades uses one to two hundred patterns of a quarter of a megabyte.
 const LIMIT: usize = 64 << 20;
 
 struct Slot {
     pattern: Arc<Pattern>,
-    /// Made for the present drive when the pattern first occurs under it.
+    /// Response to the present excitation, computed at the first use of the pattern under it.
     driven: Option<Arc<Driven>>,
-    /// When it was last used, counted in uses of all.
+    /// Time of the last use, as a counter of all uses.
     used: u64,
     bytes: usize,
 }
 
-/// Patterns by what sticks.
+/// Patterns by their stuck parts.
 pub(super) struct Memory {
     slots: BTreeMap<Vec<bool>, Slot>,
     bytes: usize,
     limit: usize,
     uses: u64,
-    /// The pattern that is asked for.
+    /// Key of the requested pattern.
     stuck: Vec<bool>,
 }
 
@@ -42,7 +43,7 @@ impl Default for Memory {
 }
 
 impl Memory {
-    /// The pattern of these contacts, with its response to the drive.
+    /// Returns the pattern of these contacts, with its response to the excitation.
     pub fn pattern(
         &mut self,
         mechanics: &Mechanics,
@@ -75,12 +76,12 @@ impl Memory {
         Ok((pattern, driven))
     }
 
-    /// Forgets what belongs to one drive only.
+    /// Drops all data that depend on the excitation.
     pub fn change_drive(&mut self) {
         self.slots.values_mut().for_each(|slot| slot.driven = None);
     }
 
-    /// Lets those go that were not used for longest, until the others take no more than `bytes`.
+    /// Drops the least recently used patterns until the others use at most `bytes`.
     fn forget(&mut self, bytes: usize) {
         let mut uses: Vec<(u64, usize)> = self.slots.values().map(|slot| (slot.used, slot.bytes)).collect();
         uses.sort_unstable();
@@ -132,8 +133,9 @@ mod tests {
         (0..n).map(|i| if number >> i & 1 == 1 { Contact::SlipForward } else { Contact::Stick }).collect()
     }
 
-    /// More patterns than there is room for: the bytes stay below the limit and are those of what is kept, the last ones are at hand, and one
-    /// that was forgotten comes back with the same numbers.
+    /// With more patterns than fit, the memory stays below the limit and equals that of the
+    /// stored patterns. The most recent ones remain available, and a dropped pattern is
+    /// recomputed with the same numbers.
     #[test]
     fn memory_stays_below_its_limit() {
         let n = 8;
@@ -158,7 +160,8 @@ mod tests {
         assert_eq!(again.shape, first.shape);
     }
 
-    /// Slip directions share a pattern; another drive makes only the response anew.
+    /// Slip directions share a pattern. A change of the excitation recomputes only the
+    /// response.
     #[test]
     fn directions_share_a_pattern() {
         let (mechanics, drive) = chain(3);

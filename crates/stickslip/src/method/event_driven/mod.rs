@@ -1,15 +1,17 @@
-//! The exact method: between switches the motion is a closed form, and switches are zeros of analytic signals.
+//! The exact event-driven method: closed-form motion between switches, which are zeros of
+//! analytic signals.
 //!
-//! - `mechanics`: the system as masses, springs, ideal sliders and stops;
-//! - `pattern`: the linear motion while a pattern of stick and slip, open and closed lasts;
-//! - `memory`: the patterns that were met, up to a number of bytes;
-//! - `decide`: which pattern begins at an instant;
-//! - `flow`: segments joined at the switches, with the exact derivative of the motion;
-//! - `path`: the orbit's numbers from its segments;
-//! - `work`: what an orbit costs, by counting.
+//! - `mechanics`: the system as masses, springs, ideal sliders and stops
+//! - `pattern`: the linear motion in one pattern of stick and slip, open and closed
+//! - `memory`: cache of patterns with a memory limit
+//! - `decide`: transition to the next pattern at a switch
+//! - `flow`: segments joined at the switches, with exact sensitivities
+//! - `path`: results of an orbit from its segments
+//! - `work`: cost estimate of an orbit
 //!
-//! The periodic orbit is found by Newton's method on the return map. If the excitation has only odd harmonics the half period
-//! `x(t + T/2) = -x(t)` is solved: half the work, and regular also where a joint sticks for the whole period.
+//! Newton's method on the return map finds the periodic orbit. If the excitation has only odd
+//! harmonics, the solver uses the half period `x(t + T/2) = -x(t)`. This halves the work, and
+//! the map stays regular if a joint sticks for the whole period.
 
 mod decide;
 mod flow;
@@ -42,7 +44,7 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
 
-/// The row of this method in [`super::TABLE`].
+/// The entry of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
     summary: "exact: closed-form motion between switches, Newton on the period",
@@ -53,14 +55,17 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     },
 };
 
-/// Estimated distance to the orbit, relative to its state, above which a closed one takes one more step: near a resonance it is dozens of times the
-/// residual. Amplitudes of the couple err by 3e-11 at most, by 6e-11 without it; one orbit in fifty takes that step.
+/// Estimated distance to the orbit, relative to its state, above which a converged orbit
+/// receives one more Newton step. Near a resonance, the distance is dozens of times the
+/// residual. Measured amplitude errors of the couple: at most 3e-11 with this step, 6e-11
+/// without it. One orbit in fifty takes the step.
 const NEAREST: f64 = 7e-12;
-/// Springs below this fraction of the stiffest hold nothing, and a force that they leave below this fraction of itself is held: rounding of a
-/// stiffness matrix with some digits lost in its assembly.
+/// Relative stiffness below which a direction counts as unsupported, and relative residual force
+/// below which a load counts as supported. It covers rounding of a stiffness matrix that lost
+/// some digits in its assembly.
 const UNHELD: f64 = 1e-12;
 
-/// The exact method.
+/// The exact event-driven method.
 ///
 /// # Example
 /// ```
@@ -82,10 +87,10 @@ impl Method for EventDriven {
     }
 }
 
-/// The exact method for motions that repeat after several periods of the drive.
+/// The exact method for orbits that repeat after several periods of the excitation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subharmonic {
-    /// Periods of the drive after which the motion repeats.
+    /// Number of periods of the excitation after which the orbit repeats.
     pub period: usize,
 }
 
@@ -98,21 +103,21 @@ impl Method for Subharmonic {
     }
 }
 
-/// Finds orbits by exact motion, with either search.
+/// Solver for orbits by exact motion, with Newton's method or by waiting.
 pub(crate) struct Exact<'a> {
     system: &'a System,
-    /// The same, for the orbits to keep.
+    /// The system, shared with the returned orbits.
     shared: Arc<System>,
-    /// The method that it works for.
+    /// Name of the calling method.
     name: &'static str,
     search: Search,
     flow: SegmentedMotion,
     weights: Vec<f64>,
     duration: f64,
-    /// Periods of the drive after which the motion repeats.
+    /// Number of periods of the excitation after which the orbit repeats.
     periods: usize,
     contracts: bool,
-    /// Where a motion begins; none where no constant load acts.
+    /// Static equilibrium as the initial guess; `None` without constant loads.
     equilibrium: Option<StaticEquilibrium>,
 }
 
@@ -149,7 +154,8 @@ impl Closing for Exact<'_> {
         }
         mechanics.parts = parts.into();
     }
-    /// The last run of the iteration was that of the closed state: its segments are the orbit.
+    /// Creates the orbit from the segments of the last run, which started from the converged
+    /// state.
     fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
         let omega = self.flow.drive.omega;
         let symmetry = self.search.symmetry(self.system, self.periods);
@@ -161,6 +167,8 @@ impl Closing for Exact<'_> {
 }
 
 impl<'a> Exact<'a> {
+    /// Creates a solver for a system.
+    ///
     /// # Errors
     /// See [`Mechanics::new`].
     pub fn new(system: &'a System, name: &'static str, search: Search, periods: usize) -> Result<Self, MethodError> {
@@ -181,7 +189,7 @@ impl<'a> Exact<'a> {
         })
     }
 
-    /// Whether nothing but friction holds the structure against the constant forces.
+    /// Returns whether only friction balances the constant forces.
     fn drifts(&self) -> bool {
         let (mechanics, force) = (&self.flow.mechanics, &self.flow.drive.constant);
         if force.amax() == 0.0 || mechanics.parts.iter().any(|part| !part.is_slider()) {
@@ -192,12 +200,13 @@ impl<'a> Exact<'a> {
         at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > UNHELD * force.amax())
     }
 
-    /// The orbit that a search finds.
+    /// Runs a search and returns its orbit.
     fn found(&mut self, start: Option<&[f64]>, search: Search, aim: Aim) -> Result<Orbit, OrbitError> {
         let Aim { method, omega, .. } = aim;
         let closed = match search.find(self, start, |exact| exact.first_state(omega), aim) {
             Err(OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. }) if self.drifts() => {
-                // friction that holds is loaded by the way from rest: a guess knows no mean that it carries
+                // the friction forces depend on the history, so that a guess does not contain
+                // their mean; start from rest
                 let rest = vec![0.0; self.weights.len()];
                 let near = approached(self, rest, aim.sign);
                 search.close(self, &near, aim).map_err(|_| OrbitError::drift(method, omega))?
@@ -247,7 +256,8 @@ impl Solver for Exact<'_> {
             let equilibrium = self.equilibrium.clone();
             orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
         } else {
-            // closed forms have all digits of a vibration, and only whoever waits must know how large it is
+            // only a waiting search must know the amplitude of the vibration; closed forms are
+            // accurate to all digits
             let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
             let (mut taken, at) = (1.0, (symmetry, orbit.period()));
             let share = |exact: &Self, orbit: &Orbit| {
@@ -258,7 +268,7 @@ impl Solver for Exact<'_> {
                 orbit = self.found(Some(&orbit.start), search.of_share(share), aim)?;
             }
         }
-        // a motion that has settled but for an estimated rest is out of balance by that rest
+        // an estimated distance from the settled motion causes a proportional energy gap
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });
@@ -274,8 +284,9 @@ mod tests {
     use crate::method::transient::Transient;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
 
-    /// The return at 8 N begins in stick, and that of the neighbour's state in slip: one step goes across the kink between them, and the orbit is
-    /// the same as from below, from above and from a guess.
+    /// At 8 N the return starts in stick, but that of the adjacent frequency's state starts in
+    /// slip. One Newton step crosses the kink between them. The orbit is the same from below,
+    /// from above and without an initial guess.
     #[test]
     fn orbits_do_not_go_with_the_way_to_them() {
         let mut model = example::blade_couple();
@@ -295,9 +306,12 @@ mod tests {
         }
     }
 
-    /// Driven at its undamped resonance by more than its friction, but by less than `4/π` of it, a mass slips a little in each half period and gets no
-    /// farther: 0.1618 mm, as from rest in small steps of an own integration. The linear guess is of any size there. What friction cannot hold
-    /// has no orbit, however little a return changes of so large a motion.
+    /// An undamped resonance with a force above the slip limit but below `4/π` of it. The mass
+    /// slips a little in each half period with a bounded amplitude: 0.1618 mm, as in an
+    /// independent time integration from rest with small steps.
+    ///
+    /// The amplitude of the linear guess is arbitrary here. If friction cannot bound the
+    /// motion, no orbit exists, even if a return changes such a large motion only slightly.
     #[test]
     fn friction_holds_an_undamped_resonance() {
         let between = || ["m".to_owned(), GROUND.to_owned()];
@@ -325,7 +339,8 @@ mod tests {
         }
     }
 
-    /// A mass of 1 kg on 10 N/mm that rubs with 1 N, driven near its resonance, and another one with these ends of a second rigid joint.
+    /// A mass of 1 kg on 10 N/mm with friction of 1 N, excited near its resonance, and a second
+    /// mass. `ends` are the places of a second rigid joint.
     fn with_another(mass: f64, ends: [&str; 2], stiffness: f64) -> Model {
         let joint = |name: &str, between: [&str; 2], limit| Joint {
             name: name.into(),
@@ -342,7 +357,8 @@ mod tests {
         }
     }
 
-    /// What counts as no acceleration of a joint goes by its own masses: a body far away, however light, changes nothing.
+    /// The threshold for zero acceleration of a joint depends on its own masses: an uncoupled
+    /// body, however light, changes nothing.
     #[test]
     fn a_light_body_beside_it_changes_no_orbit() {
         let amplitude = |mass: f64| {
@@ -356,7 +372,8 @@ mod tests {
         }
     }
 
-    /// Of rigid joints in series the weaker one slips, whatever is between them, as long as its inertia has digits; it is refused where it has none.
+    /// The weaker of two rigid joints in series slips. The method solves this as long as
+    /// the inertia between them has significant digits, and rejects it otherwise.
     #[test]
     fn a_shoe_between_two_joints_is_light_or_refused() {
         let orbit = |mass: f64| -> Result<f64, String> {
@@ -377,8 +394,9 @@ mod tests {
         }
     }
 
-    /// A load whose peak passes the slip limit shifts a mass on rigid friction until a spring takes the rest: it creeps towards that place, slower and
-    /// slower, and the orbit is one that sticks between `(peak - limit) / k` and `(trough + limit) / k`.
+    /// A load whose peak exceeds the slip limit shifts a mass on rigid friction until a spring
+    /// carries the excess. The mass creeps to that position at a decreasing rate, and the orbit
+    /// sticks between `(peak - limit) / k` and `(trough + limit) / k`.
     #[test]
     fn what_creeps_until_it_sticks_sticks() {
         let (stiffness, limit) = (1e4, 3.7);
@@ -403,9 +421,10 @@ mod tests {
         }
     }
 
-    /// Without damper and joint nothing works over a period, so that a gap relative to the work would be one rounding over another: the orbits
-    /// come all the same, up to 1e-7 beside the resonance, where mode and drive are a resonant pair, and have the amplitude `F / |k - m ω²|` of
-    /// the closed form, at any phase.
+    /// Without damper and joint, no work is done over a period, so that an energy gap relative
+    /// to the work would be rounding. The orbits converge nevertheless, up to a relative
+    /// distance of 1e-7 from the resonance, where mode and excitation form a resonant pair.
+    /// Their amplitude is `F / |k - m ω²|`, at any phase.
     #[test]
     fn orbits_without_any_loss_balance() {
         let (mass, stiffness, amplitude) = (0.182, 105_103.0, 10.0);
@@ -424,7 +443,8 @@ mod tests {
                 let orbit = solver.orbit(omega, None).unwrap_or_else(|error| panic!("{omega}: {error}"));
                 let expected = amplitude / (stiffness - mass * omega * omega).abs();
                 let error = (orbit.places[0].amplitude() / expected - 1.0).abs();
-                // the denominator loses as many digits as the resonance is near
+                // cancellation in the denominator loses as many digits as the relative distance
+                // to the resonance
                 assert!(error < 1e-14 * 10f64.powf(0.25 * f64::from(exponent)) * 100.0, "{omega}: {error:e}");
                 assert!(orbit.evidence.energy_gap < ENERGY_GAP, "{omega}: {:e}", orbit.evidence.energy_gap);
             }

@@ -1,4 +1,4 @@
-//! The orbit's numbers from its closed-form segments.
+//! Results of an orbit from its closed-form segments.
 
 use super::flow::{Segment, SegmentedMotion};
 use super::mechanics::{Part, Share};
@@ -18,18 +18,19 @@ use stickslip_numerics::signal::{Basis, FourierIntegrals, Products, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Work below this fraction of the stored energy is no yardstick for the energy gap: an orbit that is closed to `CLOSED` of its state may have
-/// gained or lost that much, and the gap that this makes must stay below what is allowed.
+/// Fraction of the stored energy below which the work is not a suitable reference for the
+/// energy gap. An orbit with a residual of `CLOSED` can have gained or lost that much energy,
+/// and the resulting gap must stay below the tolerance.
 const STORED: f64 = CLOSED / ENERGY_GAP;
 
-/// The closed-form segments of one return, with all that is needed to evaluate them.
+/// The closed-form segments of one return, with the data for their evaluation.
 #[derive(Debug, Clone)]
 pub(crate) struct ExactPath {
     system: Arc<System>,
     pieces: Vec<Piece>,
     /// Ideal parts of the joints.
     parts: Arc<[Part]>,
-    /// What the joints have of them.
+    /// Shares of the joints in these parts.
     shares: Arc<[Share]>,
     symmetry: Symmetry,
     period: f64,
@@ -43,7 +44,8 @@ struct Piece {
     velocity: Vec<Complex64>,
 }
 
-/// Makes the orbit of the flow's last run, which began at the state `closed`; states are measured by `weights`.
+/// Creates the orbit from the last run of the flow, which started from the state `closed`.
+/// `weights` define the norm of states.
 pub(super) fn orbit(
     system: &Arc<System>,
     contracts: bool,
@@ -91,7 +93,9 @@ pub(super) fn orbit(
 }
 
 impl ExactPath {
-    /// The segments of the flow's last run; `period` is the time after which they repeat (or, by symmetry, repeat mirrored twice).
+    /// Creates a path from the segments of the last run. `period` is the time after which they
+    /// repeat, or with half-period symmetry, twice the time after which they repeat with
+    /// opposite sign.
     pub fn new(system: Arc<System>, flow: &SegmentedMotion, symmetry: Symmetry, period: f64) -> Self {
         let pieces = flow
             .segments()
@@ -106,13 +110,14 @@ impl ExactPath {
         ExactPath { system, pieces, parts, shares, symmetry, period, rates, omega }
     }
 
-    /// What a joint has of the parts.
+    /// Iterates over the shares of a joint in the parts.
     fn of_joint(&self, joint: usize) -> impl Iterator<Item = &Share> {
         self.shares.iter().filter(move |share| share.joint == joint)
     }
 
-    /// What the faces of a joint do in a segment: they slip if a slider of it does, rest if one does, touch if a stop does, and else are open.
-    /// `None` of a joint that holds nothing.
+    /// Returns the contact state of a joint in a segment: slip if a slider slips, else stick if
+    /// one sticks, else touch if a stop touches, else open. Returns `None` for a joint without
+    /// force.
     fn contact_of(&self, joint: usize, segment: &Segment) -> Option<Contact> {
         let of_part = |share: &Share| match segment.contacts[share.part] {
             Contact::Stick if !self.parts[share.part].is_slider() => Contact::Touch,
@@ -122,7 +127,7 @@ impl ExactPath {
         of_parts().find(|contact| contact.slips()).or_else(|| of_parts().min())
     }
 
-    /// What the contact at the end of the return goes on as after it.
+    /// Returns the continuation after the return of the contact at its end.
     fn next_of(&self, last: Contact) -> Contact {
         if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last }
     }
@@ -141,7 +146,7 @@ impl ExactPath {
             return;
         }
         let Some(h) = self.rates.iter().position(|r| (r - rate).abs() < 0.5 * self.omega) else {
-            return; // without a drive nothing moves the place
+            return; // without excitation, the place does not move
         };
         signal[piece.segment.driven.modes + h] += amplitude * Complex64::new(0.0, rate * piece.segment.start).exp();
     }
@@ -156,7 +161,7 @@ impl ExactPath {
         self.add_imposed(piece, axis.imposed(), signal);
     }
 
-    /// Displacement and velocity of a moved place as signals.
+    /// Returns displacement and velocity of a moved place as signals.
     fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
         let mut motion = vec![ZERO; piece.basis().len()];
         self.add_imposed(piece, &self.system.moved()[m].motion, &mut motion);
@@ -165,7 +170,7 @@ impl ExactPath {
         (motion, speed)
     }
 
-    /// The force that moves a place, as a signal.
+    /// Returns the force that moves a place, as a signal.
     fn reaction(&self, piece: &Piece, m: usize) -> Vec<Complex64> {
         let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved()[m]);
         let mut force = vec![ZERO; nb];
@@ -205,7 +210,7 @@ impl ExactPath {
         force
     }
 
-    /// The piece at a time within the first return, and the time since its start.
+    /// Returns the piece at a time within the first return, and the time since its start.
     fn piece(&self, time: f64) -> (&Piece, f64) {
         let index = self.pieces.partition_point(|piece| piece.segment.start <= time).max(1) - 1;
         let piece = &self.pieces[index];
@@ -213,14 +218,15 @@ impl ExactPath {
     }
 }
 
-/// A path that is measured: with what the integrals of all its signals share.
+/// A path during measurement, with the shared data of all integrals.
 struct Measuring<'a> {
     path: &'a ExactPath,
     axes: Vec<&'a Axis>,
-    /// Where the coefficients of each piece begin in a signal, and where the last one's end.
+    /// First index of each piece's coefficients in a signal, and the total length.
     cuts: Vec<usize>,
     products: Vec<Products>,
-    /// By frequency, rad/s: what it has turned by the start of each piece, and the integrals over it.
+    /// Entries by frequency, rad/s: the phase factor at the start of each piece, and the
+    /// integrals over it.
     fourier: RefCell<Vec<(f64, Turning)>>,
     memory: RefCell<Extremes>,
 }
@@ -252,28 +258,28 @@ impl<'a> Measuring<'a> {
         self.path.pieces.iter().map(of).collect()
     }
 
-    /// The pieces with the range of their coefficients in a signal.
+    /// Iterates over the pieces, with the range of their coefficients in a signal.
     fn pieces(&self) -> impl Iterator<Item = (&'a Piece, std::ops::Range<usize>)> {
         self.path.pieces.iter().zip(self.cuts.windows(2)).map(|(piece, cut)| (piece, cut[0]..cut[1]))
     }
 
-    /// A signal that is made piece by piece.
+    /// Builds a signal piece by piece.
     fn made(&self, mut make: impl FnMut(&Piece, &mut [Complex64])) -> Vec<Complex64> {
         let mut signal = vec![ZERO; self.cuts[self.cuts.len() - 1]];
         self.pieces().for_each(|(piece, range)| make(piece, &mut signal[range]));
         signal
     }
 
-    /// A row of coefficients that the pieces keep.
+    /// Copies a row of coefficients from the pieces.
     fn kept(&self, row: usize, of: impl Fn(&Piece) -> &[Complex64]) -> Vec<Complex64> {
         self.made(|piece, out| out.copy_from_slice(&of(piece)[row * out.len()..(row + 1) * out.len()]))
     }
 
-    /// Least and largest value of a signal.
+    /// Returns the least and the largest value of a signal.
     fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), Breakdown> {
         let mut memory = self.memory.borrow_mut();
         let mut range = Range::new(self.path.symmetry == Symmetry::HalfPeriod);
-        // what all pieces are known to reach is sought in none of them
+        // values known from all pieces reduce the search in each of them
         for (piece, coefficients) in self.pieces() {
             range.take(piece.basis().beginning(&signal[coefficients]));
         }
@@ -298,7 +304,8 @@ impl<'a> Measuring<'a> {
     }
 }
 
-/// Signals are their coefficients, piece after piece. Laws act along one axis each, so that axes count like joints.
+/// A signal is the list of its coefficients, piece by piece. Each law acts along one axis, so
+/// that axes and joints have the same indices.
 impl Signals for Measuring<'_> {
     type Signal = Vec<Complex64>;
     type Error = Breakdown;
@@ -352,7 +359,8 @@ impl Signals for Measuring<'_> {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
         self.range_of(&self.relative(axis))
     }
-    /// The sliders' alone: springs and stops give back what they take, to the last digit.
+    /// Returns the dissipation of the sliders alone, because springs and stops return all their
+    /// energy.
     fn dissipation(&self, axis: usize, _force: &Vec<Complex64>) -> f64 {
         let u = self.relative(axis);
         let mut sum = 0.0;
@@ -369,7 +377,7 @@ impl Signals for Measuring<'_> {
     fn faces(&self, joint: usize) -> Faces {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
-            // a joint that holds nothing slips all the time
+            // a joint without force slips all the time
             return Faces { shares: Shares { slip: 1.0, ..Shares::default() }, switches: 0, rests: false };
         }
         let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
@@ -387,7 +395,7 @@ impl Signals for Measuring<'_> {
     }
 }
 
-/// Derivatives of signals that follow each other.
+/// Returns the derivatives of consecutive signals.
 fn derivative(basis: &Basis, signals: &[Complex64]) -> Vec<Complex64> {
     let mut out = vec![ZERO; signals.len()];
     for (signal, out) in signals.chunks_exact(basis.len()).zip(out.chunks_exact_mut(basis.len())) {
@@ -452,7 +460,7 @@ impl Path for ExactPath {
 
     fn switch_times(&self) -> Vec<f64> {
         let inner = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
-        // a switch may also fall on the instant at which the return is cut
+        // a switch can also coincide with the start of the return
         let at_cut = self.pieces.first().zip(self.pieces.last()).is_some_and(|(first, last)| {
             first.segment.contacts.iter().zip(&last.segment.contacts).any(|(f, l)| self.next_of(*l) != *f)
         });

@@ -1,10 +1,13 @@
-//! The linear motion while a pattern of stick and slip lasts.
+//! The linear motion in one pattern of stick and slip.
 //!
-//! In a pattern the rigid sliders that stick hold `Wₛᵀx + g(t) = c`; those that slip, the springs in front of sliders, and stops are
-//! forces that are constant or linear in `x`. With `N` an M-orthonormal basis of the directions that are left free and
-//! `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`, the motion is `x = N q + S (c - g)` and `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the modes of
-//! [`stickslip_numerics::modes`] solve in closed form. Nothing here depends on time, drive frequency or slip direction:
-//! a pattern is known by what sticks and what is closed.
+//! In a pattern, stuck rigid sliders are constraints `Wₛᵀx + g(t) = c`. Slipping sliders,
+//! springs in series with sliders, and stops are forces that are constant or linear in `x`. Let
+//! `N` be an M-orthonormal basis of the remaining free directions and `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`.
+//! The motion is `x = N q + S (c - g)` with `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the
+//! modes of [`stickslip_numerics::modes`] solve in closed form.
+//!
+//! A pattern does not depend on time, excitation frequency or slip direction. Its key is the
+//! set of stuck and closed parts.
 
 use super::mechanics::{Kind, Mechanics};
 use crate::law::Contact;
@@ -18,64 +21,75 @@ use stickslip_numerics::signal::Basis;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Directions of stuck sliders are redundant below this fraction of the largest eigenvalue of their Delassus matrix.
+/// Relative eigenvalue of the Delassus matrix below which directions of stuck sliders are
+/// redundant.
 const REDUNDANT: f64 = 1e-11;
-/// A mode slower than this fraction of the fastest is taken to be exactly at zero: the rounding of `Modes`.
+/// Relative eigenvalue below which a mode has frequency zero: the rounding of `Modes`.
 const STILL: f64 = 1e-13;
-/// A harmonic this close to a mode (relative) is integrated as a resonant pair; nearer than this the plain particular solution
-/// would lose more than the last five digits.
+/// Relative distance of a harmonic to a mode below which they are integrated as a resonant
+/// pair. At smaller distances, the ordinary particular solution would lose more than five
+/// digits.
 const RESONANT: f64 = 1e-5;
-/// States from which the derivative is carried joint by joint, in a product that is cut for the cache.
+/// Number of states from which the sensitivity is carried joint by joint, in a product that is
+/// blocked for the cache.
 const LARGE: usize = 24;
 
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
 pub(crate) struct Pattern {
-    /// Which sliders stick, and which stops are closed.
+    /// Marks stuck sliders and closed stops.
     pub stuck: Vec<bool>,
-    /// Rigid sliders that stick.
+    /// Indices of the stuck rigid sliders.
     pub held: Vec<usize>,
-    /// Whether fewer of them would hold the same motion, so that their forces are not unique.
+    /// True if fewer of them would constrain the same motion, so that their forces are not
+    /// unique.
     pub redundant: bool,
-    /// Springs, in front of sliders and of stops, that the held sliders keep from moving.
+    /// Marks springs, in series with sliders or in stops, that the stuck rigid sliders keep
+    /// from moving.
     pub frozen: Vec<bool>,
-    /// Exponents.
+    /// Exponents of the modes.
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
     pub shape: DMatrix<Complex64>,
-    /// Modal coordinates of a state, less those at which the forces that come with it would hold them, modes × states.
+    /// Modal coordinates of a state, minus their static values under the forces of that state,
+    /// modes × states.
     start: DMatrix<Complex64>,
-    /// Besides the modes a state moves on by `place + drift τ + fall τ²/2`, n × states each.
+    /// In addition to the modes, a state moves by `place + drift τ + fall τ²/2`, n × states
+    /// each.
     place: DMatrix<f64>,
     drift: DMatrix<f64>,
     fall: DMatrix<f64>,
-    /// Modal force of a unit force, modes × n; a constant one moves the coordinate by `-1/λ` of it.
+    /// Modal force of a unit force, modes × n. A constant force shifts the modal coordinate by
+    /// `-1/λ` times its modal force.
     input: DMatrix<Complex64>,
-    /// Modes exactly at λ = 0: they drift under a constant force.
+    /// Modes with λ = 0, which drift under a constant force.
     drifting: Vec<usize>,
-    /// Free directions: x part, n × r; coordinate and modal force, r × n.
+    /// Free directions: displacements, n × r; coordinate and modal force, r × n.
     free: DMatrix<f64>,
     free_coordinate: DMatrix<f64>,
     free_input: DMatrix<f64>,
     /// S, n × held.
     hold: DMatrix<f64>,
-    /// Stiffness with the springs of stuck sliders and closed stops, n × n.
+    /// Stiffness including the springs of stuck sliders and closed stops, n × n.
     pub stiffness: DMatrix<f64>,
-    /// Forces of the held sliders: `multiplier (F - C v - K x - other parts) + inverse_delassus g''`. Held × n, held × held.
+    /// Forces of the stuck rigid sliders:
+    /// `multiplier (F - C v - K x - other parts) + inverse_delassus g''`. Sizes held × n and
+    /// held × held.
     multiplier: DMatrix<f64>,
     inverse_delassus: DMatrix<f64>,
-    /// `multiplier` times C, K, and the directions of the parts: held × n, held × n, held × parts.
+    /// `multiplier` times C, K, and the directions of the parts: held × n, held × n,
+    /// held × parts.
     pub held_by_velocity: DMatrix<f64>,
     pub held_by_displacement: DMatrix<f64>,
     pub held_by_parts: DMatrix<f64>,
 }
 
-/// Where a stretch of motion begins.
+/// Initial data of a segment.
 #[derive(Clone, Copy)]
 pub(crate) struct Beginning<'a> {
-    /// The pattern's response to the drive.
+    /// Response of the pattern to the excitation.
     pub driven: &'a Driven,
-    /// What sticks, and which way the others slip.
+    /// Contact states.
     pub contacts: &'a [Contact],
     /// Time, s.
     pub time: f64,
@@ -83,18 +97,19 @@ pub(crate) struct Beginning<'a> {
     pub state: &'a [f64],
 }
 
-/// What a pattern adds at one drive frequency; the motion's segments share it.
+/// Data of a pattern at one excitation frequency, shared by the segments of the motion.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Driven {
     pub basis: Basis,
-    /// Exponents of the basis that are modes; those of the drive follow.
+    /// Number of exponents of the basis that are modes; those of the excitation follow.
     pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
     steady: Vec<DVector<Complex64>>,
-    /// Modal coordinates of the steady motion, parts that turn with `e^{jhΩt}` and with `e^{-jhΩt}`: harmonic after harmonic. What a resonant
-    /// pair does instead is left out: it begins at zero.
+    /// Modal coordinates of the steady motion, as parts with `e^{jhΩt}` and `e^{-jhΩt}`, one
+    /// harmonic after the other. Resonant pairs are excluded, because they start at zero.
     steady_start: Vec<(Complex64, Complex64)>,
-    /// Forces of the held sliders that the drive causes by itself: complex per harmonic, and constant.
+    /// Forces of the stuck rigid sliders due to the excitation alone: complex per harmonic, and
+    /// constant.
     pub held: Vec<DVector<Complex64>>,
     pub held_constant: DVector<f64>,
     /// Resonant pairs: mode, harmonic, modal force amplitude.
@@ -104,7 +119,7 @@ pub(crate) struct Driven {
 }
 
 impl Driven {
-    /// Memory that it takes, bytes.
+    /// Returns its memory, bytes.
     pub fn bytes(&self) -> usize {
         let steady = self.steady.iter().chain(&self.free_steady).map(|x| x.len()).sum::<usize>();
         let held = self.held.iter().map(|x| x.len()).sum::<usize>() + self.held_constant.len();
@@ -166,7 +181,7 @@ impl Pattern {
                 part.stiffness().is_some() && moves <= REDUNDANT.sqrt() * basis.amax() * part.direction.amax()
             })
             .collect();
-        let project = basis.transpose(); // forces to modal
+        let project = basis.transpose(); // forces to modal forces
         let coordinates = &project * &mechanics.mass; // displacements to q
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
         let count = modes.lambda.len();
@@ -182,7 +197,7 @@ impl Pattern {
         let free_coordinate = modes.free.transpose() * &coordinates;
         let free_input = modes.free.transpose() * &project;
         let shape = complex(&basis) * &modes.shape;
-        // what a state does by itself, with the constant forces that it brings
+        // free response to the state, including the constant forces of that state
         let pushed = &input * complex(&force_from_state);
         let mut start = DMatrix::from_element(count, states, ZERO);
         start.columns_mut(0, n).copy_from(&(&modes.from_displacement * complex(&coordinates)));
@@ -231,22 +246,23 @@ impl Pattern {
         })
     }
 
-    /// Whether anything but modes moves.
+    /// Returns whether motion other than exponentials exists.
     fn drifts(&self) -> bool {
         !self.drifting.is_empty() || self.free.ncols() > 0
     }
 
-    /// Modal force of a force, length n.
+    /// Returns the modal force of a force, length n.
     fn push(&self, k: usize, force: &[f64]) -> Complex64 {
         force.iter().enumerate().map(|(i, f)| self.input[(k, i)] * f).sum()
     }
 
-    /// Where a constant force moves modal coordinate `k`; a mode at λ = 0 drifts instead.
+    /// Returns the static value of modal coordinate `k` under a constant force; zero for λ = 0,
+    /// because that mode drifts.
     fn fixed(&self, k: usize, force: &[f64]) -> Complex64 {
         if self.lambda[k] == ZERO { ZERO } else { -self.push(k, force) / self.lambda[k] }
     }
 
-    /// Memory that it takes, bytes: matrices of some multiples of n² numbers.
+    /// Returns its memory, bytes: matrices of some multiples of n² numbers.
     pub fn bytes(&self) -> usize {
         let complex = self.lambda.len() + self.shape.len() + self.start.len() + self.input.len();
         let real = 3 * self.place.len()
@@ -262,7 +278,7 @@ impl Pattern {
         size_of::<Self>() + 16 * complex + 8 * real + 16 * self.stuck.len()
     }
 
-    /// Steady response and basis at one drive frequency.
+    /// Computes the steady response and the basis at one excitation frequency.
     pub fn drive(&self, mechanics: &Mechanics, drive: &Drive) -> Driven {
         let n = mechanics.n;
         let mut driven = Driven { modes: self.lambda.len(), ..Driven::default() };
@@ -273,7 +289,7 @@ impl Pattern {
         for (h, &rate) in drive.rates.iter().enumerate() {
             let s = Complex64::new(0.0, rate);
             let held = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]]);
-            let moved = complex(&self.hold) * held; // S g: the stuck part moves with -S g
+            let moved = complex(&self.hold) * held; // S g: the constrained part moves with -S g
             let mut force =
                 drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
             for (i, part) in mechanics.parts.iter().enumerate() {
@@ -310,7 +326,8 @@ impl Pattern {
         driven
     }
 
-    /// Coefficients of the displacements (n × basis, one row after the other) for the motion that starts at `time` from `state`.
+    /// Computes the coefficients of the displacements (n × basis, row by row) of the motion
+    /// that starts at `time` from `state`.
     pub fn displacement(
         &self,
         mechanics: &Mechanics,
@@ -322,7 +339,8 @@ impl Pattern {
         let (n, nb, count) = (mechanics.n, driven.basis.len(), self.lambda.len());
         let constant = driven.basis.constant();
         out[..n * nb].fill(ZERO);
-        // constant force that does not come from the state: loads, slip, imposed motion at the start
+        // constant forces that do not depend on the state: loads, slip, imposed motion at the
+        // start
         work.force.clear();
         work.force.extend(drive.constant.iter());
         work.held.clear();
@@ -338,7 +356,8 @@ impl Pattern {
             }
         }
         for row in 0..n {
-            // displacement S c with the part of c that imposed motion gives; the part from x0 is in `place`
+            // displacement S c with the part of c due to imposed motion; `place` contains the
+            // part due to x0
             let shift: f64 = (0..self.held.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
             out[row * nb + constant].re += shift;
             work.shift[row] = shift;
@@ -392,7 +411,7 @@ impl Pattern {
         self.add_polynomials(mechanics, drive, driven, state, work, out);
     }
 
-    /// Free directions and drifting modes: 1, τ, τ²/2.
+    /// Adds free directions and drifting modes: 1, τ, τ²/2.
     fn add_polynomials(
         &self,
         mechanics: &Mechanics,
@@ -434,7 +453,8 @@ impl Pattern {
         }
     }
 
-    /// Carries the columns of `sensitivity` (states × columns) over a stretch whose exponentials at its end are `values`.
+    /// Multiplies the columns of `sensitivity` (states × columns) by the derivative over a
+    /// segment. `values` are the exponentials at its end.
     pub fn carry(
         &self,
         mechanics: &Mechanics,
@@ -460,7 +480,7 @@ impl Pattern {
             self.carry_by_joints(mechanics, length, sensitivity, work);
             return;
         }
-        // one column of the derivative of the end state with respect to the initial one after the other
+        // derivative of the end state with respect to the initial state, column by column
         for (j, column) in work.transition.chunks_exact_mut(states).enumerate() {
             let (motion, springs) = column.split_at_mut(2 * n);
             self.moved_by(j, length, &work.moved, motion);
@@ -495,7 +515,8 @@ impl Pattern {
         }
     }
 
-    /// Displacements and velocities at the end of a stretch per unit of state `j` at its start, into `motion` (2n).
+    /// Computes displacements and velocities at the end of a segment per unit of state `j` at
+    /// its start, in `motion` (2n).
     fn moved_by(&self, j: usize, length: f64, moved: &[f64], motion: &mut [f64]) {
         let (n, count) = (motion.len() / 2, self.lambda.len());
         motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
@@ -523,11 +544,15 @@ impl Pattern {
         }
     }
 
-    /// [`Pattern::carry`] of many states: the springs of one joint that stick push together and are stretched together, so that the motion
-    /// depends on them by one number, and they on the motion by another.
+    /// Carries the sensitivity as in [`Pattern::carry`] for many states, joint by joint.
+    ///
+    /// The stuck springs of one joint exert one total force and have one elongation. Therefore
+    /// the motion depends on them through one number, and they depend on the motion through
+    /// another.
     fn carry_by_joints(&self, mechanics: &Mechanics, length: f64, sensitivity: &mut DMatrix<f64>, work: &mut Work) {
         let (n, states) = (mechanics.n, mechanics.states());
-        // springs of one joint have their states side by side; those that slip count with a stiffness of zero, and are forgotten
+        // the states of one joint's springs are adjacent; slipping springs have zero stiffness,
+        // and their states are dropped
         work.springs.clear();
         work.stiffness.clear();
         work.kept.clear();
@@ -580,7 +605,7 @@ impl Pattern {
     }
 }
 
-/// Multiplies the `columns` of a sensitivity by a `transition`, column after column, in registers.
+/// Multiplies the `columns` of a sensitivity by a `transition`, column by column, in registers.
 fn carry_columns<const STATES: usize>(transition: &[f64], columns: &mut [f64]) {
     for column in columns.as_chunks_mut::<STATES>().0 {
         let mut sum = [0.0; STATES];
@@ -591,7 +616,8 @@ fn carry_columns<const STATES: usize>(transition: &[f64], columns: &mut [f64]) {
     }
 }
 
-/// Adds what the modes move by from `starts` to the displacements and velocities `motion`, in registers.
+/// Adds the modal motion from `starts` to the displacements and velocities `motion`, in
+/// registers.
 fn add_modes<const MOTIONS: usize>(starts: &[Complex64], moved: &[f64], motion: &mut [f64]) {
     let mut sum = [0.0; MOTIONS];
     sum.copy_from_slice(motion);
@@ -602,7 +628,7 @@ fn add_modes<const MOTIONS: usize>(starts: &[Complex64], moved: &[f64], motion: 
     motion.copy_from_slice(&sum);
 }
 
-/// `Σ a b`, in four sums side by side.
+/// Returns `Σ a b`, with four parallel sums.
 fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (whole, rest) = (a.chunks_exact(4).zip(b.chunks_exact(4)), a.len() - a.len() % 4);
@@ -623,27 +649,30 @@ pub(crate) struct Work {
     pub turn: Vec<Complex64>,
     eta: Vec<Complex64>,
     fixed: Vec<Complex64>,
-    /// Displacements and velocities at the end of a stretch per unit of a modal coordinate: 2n real parts and 2n imaginary parts of every mode.
+    /// Displacements and velocities at the end of a segment per unit modal coordinate: for
+    /// every mode, 2n real parts and 2n imaginary parts.
     moved: Vec<f64>,
-    /// Derivative of the end of a stretch by its start, column after column, and what becomes of the sensitivity.
+    /// Derivative of the end state with respect to the initial state, column by column, and its
+    /// product with the sensitivity.
     transition: Vec<f64>,
     product: Vec<f64>,
-    /// Of [`Pattern::carry_by_joints`]: the springs of each joint, with stiffness and whether they stick (1 or 0); what the sensitivity moves and
-    /// pushes by.
+    /// Data of [`Pattern::carry_by_joints`]: the springs of each joint, their stiffness,
+    /// whether they stick (1 or 0), and the rows of motion and total spring force in the
+    /// sensitivity.
     springs: Vec<Springs>,
     stiffness: Vec<f64>,
     kept: Vec<f64>,
     rows: Vec<f64>,
 }
 
-/// The springs before the sliders of one joint.
+/// The springs in series with the sliders of one joint.
 #[derive(Debug, Clone)]
 struct Springs {
-    /// The first part.
+    /// Index of the first part.
     part: usize,
-    /// Their forces among those of all springs.
+    /// Indices of their forces among those of all springs.
     states: std::ops::Range<usize>,
-    /// The first that sticks.
+    /// The first stuck one.
     sticking: Option<usize>,
 }
 
@@ -668,7 +697,7 @@ impl Work {
         }
     }
 
-    /// Another number of harmonics.
+    /// Sets the number of harmonics.
     pub fn set_harmonics(&mut self, harmonics: usize) {
         self.turn.resize(harmonics, ZERO);
     }
@@ -678,7 +707,7 @@ fn complex_vector(v: &DVector<f64>) -> DVector<Complex64> {
     v.map(|x| Complex64::new(x, 0.0))
 }
 
-/// M-orthonormal basis of the displacements that `Wᵀ` maps to zero.
+/// Returns an M-orthonormal basis of the null space of `Wᵀ`.
 fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = mass.nrows();
     if n == 0 {
@@ -695,7 +724,8 @@ fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> Option<DMatrix<f64>
     Some(l_inverse.transpose() * eigen.eigenvectors.select_columns(&null))
 }
 
-/// Inverse of the Delassus matrix; where stuck contacts are redundant, the one that loads them in proportion to their limits.
+/// Returns the inverse of the Delassus matrix. If stuck contacts are redundant, it distributes
+/// the load in proportion to their limits.
 fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> Option<DMatrix<f64>> {
     let s = delassus.nrows();
     if s == 0 {
@@ -723,12 +753,14 @@ mod tests {
     const LOAD: f64 = 1.7;
     const MEAN: f64 = 0.3;
     const OMEGA: f64 = 1.3;
-    /// Where the stretch begins and how long it is, s.
+    /// Start and length of the segment, s.
     const TIME: f64 = 0.4;
     const LENGTH: f64 = 2.1;
 
-    /// A mass of 1 kg on a spring and a damper under a harmonic and a constant force, with a law to what moves by `0.2 cos(ωt)`: displacement and velocity
-    /// at the end of the stretch, and the derivative of the whole state by that at its start.
+    /// A mass of 1 kg on a spring and a damper, under a harmonic and a constant force. A law
+    /// connects it to a floor that moves by `0.2 cos(ωt)`. Returns displacement and velocity at
+    /// the end of the segment, and the derivative of the whole end state with respect to the
+    /// initial state.
     fn after(law: SharedLaw, contact: Contact, state: &[f64]) -> ([f64; 2], DMatrix<f64>) {
         let between = |other: &str| ["m".to_owned(), other.to_owned()];
         let force = |amplitude: f64, harmonic: u32| Force { on: "m".into(), amplitude, phase: 0.0, harmonic };
@@ -758,8 +790,9 @@ mod tests {
         ([real_dot(&signal, &values), real_dot(&speed, &values)], derivative)
     }
 
-    /// Displacement and velocity at the end of the stretch of `x'' + c x' + k x = Re(load e^{iωt}) + constant` from these, and their derivative:
-    /// steady motion, and the exponential of the matrix for what is left.
+    /// Returns displacement and velocity at the end of the segment of
+    /// `x'' + c x' + k x = Re(load e^{iωt}) + constant`, and their derivative: the steady
+    /// motion plus the matrix exponential of the remainder.
     fn closed_form(k: f64, load: Complex64, constant: f64, start: [f64; 2]) -> ([f64; 2], Matrix2<f64>) {
         let s = Complex64::new(0.0, OMEGA);
         let steady = |time: f64| {
@@ -775,7 +808,7 @@ mod tests {
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13), "{found:?} {expected:?}");
     }
 
-    /// A rigid slider that slips is a constant force against the motion.
+    /// A slipping rigid slider is a constant force against the motion.
     #[test]
     fn a_slipping_slider_is_a_constant_force() {
         let start = [0.7, -0.2];
@@ -787,7 +820,8 @@ mod tests {
         }
     }
 
-    /// A rigid slider that sticks keeps its place on what it rubs on, `x = x₀ + g₀ - g`, and no derivative of its velocity is left.
+    /// A stuck rigid slider follows its counterpart, `x = x₀ + g₀ - g`, and the derivative with
+    /// respect to the velocity is zero.
     #[test]
     fn a_sticking_slider_follows_the_floor() {
         let floor = |t: f64| 0.2 * (OMEGA * t).cos();
@@ -798,18 +832,20 @@ mod tests {
         assert!((derivative - DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0])).amax() < 1e-13);
     }
 
-    /// A slider that sticks behind a spring is that spring, stretched from where it was: `f = f₀ + kt (x - x₀ - (g - g₀))`. Its force is a state too.
+    /// A stuck slider in series with a spring acts as that spring:
+    /// `f = f₀ + kt (x - x₀ - (g - g₀))`. Its force is also a state.
     #[test]
     fn a_sticking_spring_is_a_spring() {
         let (kt, force) = (2.5, 0.1);
         let law = Arc::new(Jenkins { stiffness: kt, limit: LIMIT });
         let (place, floor) = (0.7, 0.2 * (OMEGA * TIME).cos());
         let (found, derivative) = after(law, Contact::Stick, &[place, -0.2, force]);
-        // kt (x - g) on the side of the structure, the rest constant
+        // kt (x - g) on the side of the structure, the other terms are constant
         let constant = MEAN - force + kt * (place - floor);
         let (expected, moved) = closed_form(STIFFNESS + kt, (LOAD + 0.2 * kt).into(), constant, [place, -0.2]);
         alike(found, expected);
-        // by the start: the place also moves the centre, the force pushes by itself
+        // derivatives with respect to the initial state: the displacement also shifts the
+        // centre, the force acts directly
         let centre = |push: f64| {
             let shift = push / (STIFFNESS + kt);
             Vector2::new(shift * (1.0 - moved[(0, 0)]), -shift * moved[(1, 0)])

@@ -1,24 +1,30 @@
-//! What an orbit costs, by counting: known before anything is computed.
+//! Cost estimate of an orbit, before any computation.
 
 use super::mechanics::takes;
 use crate::law::Piece;
 use crate::model::System;
 
-/// Multiplications to decompose a pattern, per cube of the degrees of freedom: without sliders and stops there is one. Measured: 8 and 29 ms for 60 and
+/// Multiplications for the decomposition of a pattern, per cube of the number of degrees of
+/// freedom. Without sliders and stops, there is one pattern. Measured: 8 and 29 ms for 60 and
 /// 100 masses, 13 s and more for 900.
 const DECOMPOSED: f64 = 100.0;
-/// Multiplications for every slider behind a spring, and for every rigid one and every stop, per place and pair of states: each ends patterns some times in
-/// each of some returns, new ones are decomposed, and the derivative is carried through all. What sticks rigidly leaves less to decompose. Measured in
-/// sweeps of rings with joints between neighbours: `jenkins` 11, 97 and 440 ms for 12, 24 and 36 masses, `iwan` of six sliders 67 and 490 ms for 8 and 16,
-/// `coulomb` 19, 68 and 800 ms for 24, 36 and 60.
+/// Multiplications for every slider in series with a spring, per place and pair of states;
+/// `RIGID` is that of every rigid slider and stop.
+///
+/// Each switches some times in each of several returns. New patterns are decomposed, and the
+/// sensitivity is carried through all of them. Rigid sticking reduces the size of the
+/// decomposition. Measured in sweeps of rings with joints between adjacent masses: `jenkins`
+/// 11, 97 and 440 ms for 12, 24 and 36 masses, `iwan` with six sliders 67 and 490 ms for 8 and
+/// 16, `coulomb` 19, 68 and 800 ms for 24, 36 and 60.
 const BEHIND_SPRING: f64 = 150.0;
 const RIGID: f64 = 50.0;
 
-/// How many times as much an orbit takes of which no near neighbour is known. Measured in the same rings of `coulomb`: 57 ms, 0.34 s and 4.8 s; 36 sectors of
-/// two masses 1.8 s, 100 of one 6 to 17 s.
+/// Cost factor of an orbit without a warm start. Measured in the same rings of `coulomb`: 57
+/// ms, 0.34 s and 4.8 s; 36 sectors of two masses 1.8 s, 100 of one 6 to 17 s.
 pub const ALONE: f64 = 3.0;
 
-/// Multiplications for an orbit whose neighbour is near; `None` where a law is not made of sliders and stops.
+/// Returns the number of multiplications for an orbit with a warm start; `None` if a law does
+/// not consist of sliders and stops.
 ///
 /// # Example
 /// ```
@@ -59,7 +65,8 @@ mod tests {
         orbit_work(&model.assemble().unwrap())
     }
 
-    /// A spring makes a slider dearer, one that holds nothing costs nothing, and what is not followed from event to event has no cost.
+    /// A slider in series with a spring costs more, a slider without force costs nothing, and
+    /// an unsupported law has no cost.
     #[test]
     fn what_switches_is_counted() {
         let rigid = work(Arc::new(Coulomb { limit: 1.0 })).unwrap();

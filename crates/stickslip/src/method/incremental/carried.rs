@@ -1,7 +1,8 @@
-//! The derivatives of a run by its start, carried over one step after the other.
+//! Sensitivities of a run with respect to its initial state, carried over step by step.
 //!
-//! A step is linear in them: what the start of the step does by itself, and what the velocities of the axes at its end do through the laws. Every
-//! derivative of a coordinate is one stretch of memory with an entry for each column, so that all columns are carried at once.
+//! A step is linear in them: the direct effect of the start of the step, and the effect of the
+//! axis velocities at its end through the laws. Each derivative of a coordinate is contiguous
+//! in memory, with one entry per column, so that all columns are carried at once.
 
 use super::law::Follower;
 use super::step::Eliminated;
@@ -9,24 +10,26 @@ use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::DMatrix;
 use stickslip_numerics::lu::Lu;
 
-/// Derivatives by the state at the start of a run, one column of each matrix for a coordinate.
+/// Derivatives with respect to the initial state of a run. Each matrix has one column per
+/// coordinate.
 pub(super) struct Carried {
-    /// Of the state, columns × states.
+    /// Derivatives of the state, columns × states.
     state: DMatrix<f64>,
-    /// Of the forces along the axes, N, columns × axes.
+    /// Derivatives of the forces along the axes, N, columns × axes.
     force: DMatrix<f64>,
-    /// Of the velocities at the end of the step, columns × n.
+    /// Derivatives of the velocities at the end of the step, columns × n.
     velocity: DMatrix<f64>,
-    /// Of displacements and then of velocities along the axes at the start of the step, of what they do to the forces, and of the velocities along the
-    /// axes at the end: one row after the other.
+    /// Derivatives of displacements and then velocities along the axes at the start of the
+    /// step. `direct` contains their effect on the forces, `unknown` the derivatives of the
+    /// velocities along the axes at the end. Stored row by row.
     along: Vec<f64>,
     direct: Vec<f64>,
     unknown: Vec<f64>,
-    /// Of the laws' states at the end.
+    /// Derivatives of the laws' states at the end.
     internal: Vec<f64>,
 }
 
-/// `out += factor · column`.
+/// Computes `out += factor · column`.
 fn add(out: &mut [f64], factor: f64, column: &[f64]) {
     if factor != 0.0 {
         out.iter_mut().zip(column).for_each(|(out, value)| *out += factor * value);
@@ -34,7 +37,7 @@ fn add(out: &mut [f64], factor: f64, column: &[f64]) {
 }
 
 impl Carried {
-    /// At the start of a run, where the laws have answered to a step that goes nowhere.
+    /// Starts a run after the laws were evaluated for a step of zero length.
     pub fn new(assembly: &Assembly, laws: &[Follower], sensitivity: &DMatrix<f64>) -> Self {
         let (n, axes, columns) = (assembly.n, assembly.axes.len(), sensitivity.ncols());
         let mut carried = Carried {
@@ -50,7 +53,7 @@ impl Carried {
         for (joint, law) in assembly.joints.iter().zip(laws) {
             for (d, axis) in joint.axes().enumerate() {
                 let out = &mut carried.force.as_mut_slice()[axis * columns..(axis + 1) * columns];
-                // a step of no length begins where it ends
+                // start and end of a step of zero length coincide
                 known(out, law.force_slope(d), (joint, axes), (&carried.along, &carried.state, 2 * n), 0.0);
                 let (after, width) = (2 * joint.directions + joint.states, joint.directions);
                 for (e, other) in joint.axes().enumerate() {
@@ -66,12 +69,12 @@ impl Carried {
         self.state.transpose_to(sensitivity);
     }
 
-    /// Over the step that the laws were followed over last, whose equations are factored.
+    /// Carries the derivatives over the last step of the laws, whose equations are factored.
     pub fn advance(&mut self, assembly: &Assembly, eliminated: &Eliminated, laws: &[Follower], lu: &Lu) {
         let (n, axes, h) = (assembly.n, assembly.axes.len(), eliminated.length);
         let columns = self.state.nrows();
         if columns == 0 {
-            return; // a joint that is only moved, without states
+            return; // a joint with imposed motion only, without states
         }
         self.velocity.gemm(1.0, &self.state.columns(0, 2 * n), &eliminated.from_state_transposed, 0.0);
         self.velocity.gemm(1.0, &self.force, &eliminated.from_force_transposed, 1.0);
@@ -120,7 +123,7 @@ impl Carried {
         internal.copy_from_slice(&self.internal);
     }
 
-    /// Displacements and velocities along the axes.
+    /// Computes displacements and velocities along the axes.
     fn read_along(&mut self, assembly: &Assembly) {
         let (n, axes, columns) = (assembly.n, assembly.axes.len(), self.state.nrows());
         self.along.fill(0.0);
@@ -136,13 +139,16 @@ impl Carried {
     }
 }
 
-/// One of rows that stand one after the other.
+/// Returns one of several consecutive rows.
 fn row(rows: &[f64], index: usize, columns: usize) -> &[f64] {
     &rows[index * columns..(index + 1) * columns]
 }
 
-/// Adds what all but the velocities at the end of a step of length `h` does to an answer of a law with these slopes: motion along the axes, of which there
-/// are so many, and states, the first of them a column of the state's derivatives.
+/// Adds the effect of all quantities except the end velocities of a step of size `h` on a
+/// result of a law with these slopes.
+///
+/// These are the motion along the `axes` and the states of the law. `first` is the column of
+/// the first law state in the derivatives of the state.
 fn known(
     out: &mut [f64],
     slope: &[f64],

@@ -1,4 +1,4 @@
-//! Equal steps over a stretch of time, as many as the estimated error asks for.
+//! Equal steps over a time interval, with their number controlled by the estimated error.
 
 use super::carried::Carried;
 use super::law;
@@ -17,46 +17,53 @@ use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Steps of a stretch at first.
+/// Initial number of steps of an interval.
 pub(crate) const FIRST: usize = 256;
-/// Steps of a stretch at most: linear motion is then within 1e-9 of the truth, and a run takes about 0.1 s for one joint.
+/// Largest number of steps of an interval. Linear motion then has an error below 1e-9, and a
+/// run takes about 0.1 s for one joint.
 pub(crate) const MOST: usize = 1 << 16;
-/// Error of a stretch of a transient, relative to its motion: by how much the limit that two step lengths promise changes when both are halved.
+/// Relative error of an interval of a transient: the change of the extrapolated limit from two
+/// step sizes when both are halved.
 const TOLERANCE: f64 = 1e-6;
-/// Steps are doubled only where they must be: the next stretch tries half as many when the error is below this share of the tolerance, which
-/// without kinks falls to a sixteenth and at kinks to a quarter.
+/// Fraction of the tolerance below which the next interval tries half as many steps. Halving
+/// the steps reduces the error to a sixteenth without kinks, and to a quarter with kinks.
 const EASY: f64 = 0.05;
-/// Steps of a stretch of a transient at least.
+/// Smallest number of steps of an interval of a transient.
 const FIRST_FOLLOWED: usize = 64;
 
-/// What is missed in a law of which no smooth neighbour is left either.
+/// Reason for rejecting a law without a smooth approximation.
 const DROPS: &str = "its friction drops at once when slip begins; that of a law that falls over a `velocity` above zero can be smoothed";
 
-/// Runs the motion of a structure with any laws but rigid sliders.
+/// Flow of a structure with any laws except rigid sliders.
 pub(crate) struct IncrementalFlow {
     pub assembly: Assembly,
     pub drive: Drive,
-    /// Steps of a run, of which it takes this share.
+    /// Number of steps of a run; the run uses the fraction `share` of it.
     pub count: usize,
     share: f64,
     keep: bool,
     steps: Steps,
     step: Step,
     eliminated: Option<Eliminated>,
-    /// Memory: the loads at an instant.
+    /// Scratch memory: the loads at an instant.
     load: Vec<f64>,
 }
 
-/// Estimated error of the finer of two solutions that differ by `last`, where the coarser one and the one before it differ by `earlier`:
-/// what all further halvings will do if the differences fall on as they fell. Never less than a third of the difference, as at second order.
+/// Returns the estimated error of the finer of two solutions.
+///
+/// `last` is the difference of both solutions, and `earlier` that of the coarser one and its
+/// predecessor. The estimate sums all further differences, with the same ratio of decrease. It
+/// is at least a third of `last`, as at second order.
 pub(crate) fn estimate(earlier: Option<f64>, last: f64) -> f64 {
     let ratio = earlier.map_or(2.0, |earlier| earlier / last.max(f64::MIN_POSITIVE)).clamp(1.25, 4.0);
     last / (ratio - 1.0)
 }
 
 impl IncrementalFlow {
+    /// Creates the flow of a system.
+    ///
     /// # Errors
-    /// A law that knows neither steps nor rates, or a rigid slider; a place without mass.
+    /// A law with neither a step nor a rate view, a rigid slider, or a place without mass.
     pub fn new(system: &System, width: Option<f64>, method: &'static str) -> Result<Self, MethodError> {
         let assembly = Assembly::new(system, method, |joint| {
             let regular = width.and_then(|width| joint.regularised(width));
@@ -81,7 +88,7 @@ impl IncrementalFlow {
         })
     }
 
-    /// The sliders behind springs whose forces are among the states.
+    /// Returns the sliders in series with springs, whose forces are among the states.
     pub fn springs(&self) -> Vec<ElasticSlider> {
         let mut springs = Vec::new();
         for (joint, placed) in self.assembly.joints.iter().enumerate() {
@@ -97,13 +104,13 @@ impl IncrementalFlow {
         springs
     }
 
-    /// Gives all of [`IncrementalFlow::springs`] the limits that these state.
+    /// Sets the limits of all sliders of [`IncrementalFlow::springs`].
     pub fn limit(&mut self, springs: &[ElasticSlider]) {
         let mut limits = springs.iter().map(|spring| spring.limit);
         self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
     }
 
-    /// The end of a run from `state` with its record.
+    /// Runs from `state` and returns the end state with the record of the run.
     fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), Breakdown> {
         let mut end = state.to_vec();
         self.run(&mut end, duration, None)?;
@@ -131,7 +138,7 @@ impl IncrementalFlow {
         self.keep_instant(state, time + h);
     }
 
-    /// The motion of the last kept run, which repeats after `period`.
+    /// Returns the path of the last stored run, which repeats after `period`.
     pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
         SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
     }
@@ -174,7 +181,7 @@ impl Flow for IncrementalFlow {
         self.step.start(&self.assembly, state, &self.drive);
         let mut carried =
             sensitivity.as_deref().map(|sensitivity| Carried::new(&self.assembly, &self.step.laws, sensitivity));
-        // joints that are pressed at rest set in motion what neither moves nor is loaded
+        // a preloaded joint can start the motion of a system at rest without loads
         let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
         let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
         if self.keep {
@@ -209,7 +216,7 @@ impl Flow for IncrementalFlow {
         let (weights, rest) = (self.weights(), NEAR_REST * self.energy_scale());
         let mut coarse = loop {
             match self.tried(state, duration) {
-                // steps that are too long for a law's states are no reason to give up
+                // steps that are too large for the states of a law are halved
                 Err(Breakdown::Stalled { .. } | Breakdown::NoNumber { .. }) if self.count < MOST => self.count *= 2,
                 found => break found?,
             }
@@ -227,7 +234,8 @@ impl Flow for IncrementalFlow {
                 if error <= TOLERANCE {
                     state.copy_from_slice(&end);
                     self.steps = coarse.1.extrapolated(&fine.1);
-                    // the next stretch begins as this one did, or with half as many
+                    // the next interval begins with the same number of steps, or with half of
+                    // it
                     self.count = (self.count / if error < EASY * TOLERANCE { 8 } else { 4 }).max(FIRST_FOLLOWED);
                     return Ok(());
                 }

@@ -1,14 +1,16 @@
-//! What a law answers to a step: the force and its states at the end, with derivatives by everything before and after.
+//! Evaluation of a law over a step: the force and the states at its end, with all derivatives.
 //!
-//! Laws with a step view answer by it. In a plane a step knows the direction of slip to first order only, so that there two halves of it are
-//! taken, and the answer is extrapolated: `2 (two halves) - (whole)`. Ideal sliders behind springs move their force with the displacement up to their limit, and stops know
-//! where they are. Laws with a rate view are integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
+//! A law with a step view is evaluated by it. In a plane, a step resolves the direction of slip
+//! only to first order. Therefore it is also evaluated in two halves and extrapolated:
+//! `2 (two halves) - (whole)`. The force of an ideal slider in series with a spring follows the
+//! displacement up to its limit; a stop depends on the displacement alone. A law with a rate
+//! view is integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
 
 use crate::law::{Contact, MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, StepPoint};
 use crate::method::assembly::PlacedLaw;
 use stickslip_numerics::lu::Lu;
 
-/// The view by which a law is asked.
+/// The view used to evaluate a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum View {
     Pieces,
@@ -16,7 +18,7 @@ enum View {
     Rate,
 }
 
-/// The view, if there is one: pieces without rigid sliders, a step, a rate.
+/// Returns the view of a law, if it has one: pieces without rigid sliders, a step, or a rate.
 fn view(law: &SharedLaw) -> Option<View> {
     let steps = |piece: &Piece| match piece {
         Piece::Slider(slider) => {
@@ -34,13 +36,14 @@ fn view(law: &SharedLaw) -> Option<View> {
     }
 }
 
-/// The pieces that carry a force.
+/// Returns the pieces with a nonzero force.
 fn pieces(law: &SharedLaw) -> Vec<Piece> {
     let carries = |piece: &Piece| !matches!(piece, Piece::Slider(slider) if slider.static_limit == 0.0);
     law.pieces().unwrap_or_default().into_iter().filter(carries).collect()
 }
 
-/// Stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law that is asked by its pieces, in their order.
+/// Returns stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law
+/// evaluated by its pieces, in their order.
 pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
     if view(law) != Some(View::Pieces) {
         return Vec::new();
@@ -52,8 +55,10 @@ pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
     pieces(law).into_iter().filter_map(slider).collect()
 }
 
-/// The states of a law that is moved slowly along a straight way, within a second: a step of a law whose way alone counts, as
-/// many small ones of one that knows rates. They stay as they were where a step has no solution.
+/// Returns the states of a law after a slow straight motion within one second.
+///
+/// A law that depends on the path alone takes one step; a law with a rate view takes many small
+/// ones. The states are unchanged if a step has no solution.
 pub(crate) fn moved(
     law: &SharedLaw,
     (directions, state_scale): (usize, f64),
@@ -87,10 +92,11 @@ pub(crate) fn moved(
     z
 }
 
-/// Steps of a slow way of a law that knows rates: the trapezoidal rule then errs by less than 1e-6 of its reach.
+/// Number of steps of a slow motion for a law with a rate view. The trapezoidal rule then has a
+/// relative error below 1e-6.
 const SLOW_STEPS: usize = 2000;
 
-/// States that a law has here, and their size.
+/// Returns the number of states of a law in this method, and their scale.
 pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     match view(law)? {
         View::Pieces => {
@@ -103,14 +109,14 @@ pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     }
 }
 
-/// A law at one instant.
+/// Motion and states of a law at one instant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct At<'a> {
     pub motion: Relative<f64>,
     pub z: &'a [f64],
 }
 
-/// Follows one law, in memory of its own.
+/// Integrates one law, with its scratch memory.
 #[derive(Debug, Clone)]
 pub(super) struct Follower {
     view: View,
@@ -121,7 +127,7 @@ pub(super) struct Follower {
     /// Force (N) and states at the end of the step.
     pub force: [f64; MOST_DIRECTIONS],
     pub state: Vec<f64>,
-    /// Derivatives of the forces, then of the states, by (u₀, u₀', z₀, u₁, u₁').
+    /// Derivatives of the forces, then of the states, with respect to (u₀, u₀', z₀, u₁, u₁').
     slopes: Vec<f64>,
     slipping: Option<f64>,
     /// The whole step, and its halves.
@@ -133,17 +139,18 @@ pub(super) struct Follower {
     change: Vec<f64>,
 }
 
-/// Newton iterations for the states at the end of a step.
+/// Largest number of Newton iterations for the states at the end of a step.
 const ITERATIONS: usize = 60;
-/// The most that an iteration may change a state, in sizes of states: laws that are exponential in them would be thrown far away.
+/// Largest change of a state per iteration, in units of its scale. Without this limit, a law
+/// that is exponential in its states would diverge.
 const STRIDE: f64 = 2.0;
-/// A change below this fraction of the size of the states ends the iteration.
+/// Relative change of the states that ends the iteration.
 const SMALL: f64 = 1e-13;
-/// One below this is good enough where rounding keeps the iteration from coming closer.
+/// Relative change that is accepted if rounding prevents further convergence.
 const ENOUGH: f64 = 1e-9;
 
 impl Follower {
-    /// Of a law that has [`states`].
+    /// Creates it for a law with [`states`].
     pub fn new(joint: &PlacedLaw) -> Self {
         let (directions, states) = (joint.directions, joint.states);
         Follower {
@@ -165,7 +172,7 @@ impl Follower {
         }
     }
 
-    /// Gives its sliders the next of these limits, N.
+    /// Sets the limits of its sliders from the next values of the iterator, N.
     pub fn limit(&mut self, limits: &mut impl Iterator<Item = f64>) {
         for piece in &mut self.pieces {
             if let (View::Pieces, Piece::Slider(slider)) = (self.view, piece)
@@ -176,33 +183,34 @@ impl Follower {
         }
     }
 
-    /// Number of arguments of an answer.
+    /// Returns the number of arguments of a result.
     fn arguments(&self) -> usize {
         4 * self.directions + self.states
     }
 
-    /// Derivatives of force `d`, in the order u₀, u₀', z₀, u₁, u₁'.
+    /// Returns the derivatives of force `d`, in the order u₀, u₀', z₀, u₁, u₁'.
     pub fn force_slope(&self, d: usize) -> &[f64] {
         let width = self.arguments();
         &self.slopes[d * width..(d + 1) * width]
     }
 
-    /// Derivatives of state `s`.
+    /// Returns the derivatives of state `s`.
     pub fn state_slope(&self, s: usize) -> &[f64] {
         self.force_slope(self.directions + s)
     }
 
-    /// What the faces do at the end of the step.
+    /// Returns the contact state at the end of the step.
     pub fn contact(&self, law: &SharedLaw, velocity: &[f64]) -> Contact {
         match self.slipping {
             Some(sign) => Contact::slip(sign),
-            // below its limit a slider holds
+            // a slider below its limit sticks
             None if self.view == View::Pieces && self.states > 0 => Contact::Stick,
             None => law.contact(velocity, &self.force[..self.directions]),
         }
     }
 
-    /// The force of a state, as the answer to a step that goes nowhere; derivatives by its motion stand with u₁ and u₁'.
+    /// Evaluates the force of a state, as a step of zero length. The derivatives with respect
+    /// to the motion are stored at u₁ and u₁'.
     pub fn rest(&mut self, law: &SharedLaw, at: At) {
         if self.view == View::Rate {
             self.slopes.fill(0.0);
@@ -224,7 +232,7 @@ impl Follower {
         self.advance(law, at, &at.motion, 0.0);
     }
 
-    /// Prepares for a step from here.
+    /// Prepares for a step from this instant.
     pub fn begin(&mut self, law: &SharedLaw, from: At) {
         self.state.copy_from_slice(from.z);
         if let (View::Rate, Some(rate)) = (self.view, law.rate()) {
@@ -232,7 +240,8 @@ impl Follower {
         }
     }
 
-    /// Answers the step of length `h` (s) `from` where it began `to` its end; false if the states at its end are not found.
+    /// Evaluates the step of size `h` (s) from `from` to `to`. Returns false if the states at
+    /// its end are not found.
     pub fn advance(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>, h: f64) -> bool {
         self.slopes.fill(0.0);
         match self.view {
@@ -248,7 +257,7 @@ impl Follower {
         }
     }
 
-    /// One step of a law that knows steps; in a plane also in two halves.
+    /// Evaluates one step of a law with a step view; in a plane, also two half steps.
     fn step_over(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>) {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(step) = law.step() else { return };
@@ -282,7 +291,7 @@ impl Follower {
         }
         for row in 0..directions + states {
             let out = &mut self.slopes[row * width..(row + 1) * width];
-            // through the state in the middle
+            // chain rule through the state in the middle
             let through = |argument: usize| -> f64 {
                 (0..states).map(|s| row_of(second, row, z + s) * first.state_slope(s)[argument]).sum()
             };
@@ -298,7 +307,7 @@ impl Follower {
         }
     }
 
-    /// Ideal sliders behind springs, whose forces are the states, and stops.
+    /// Evaluates stops and ideal sliders in series with springs, whose forces are the states.
     fn slide(&mut self, from: At, to: &Relative<f64>) {
         let (states, width) = (self.states, self.arguments());
         let (u0, u1) = (from.motion.displacement[0], to.displacement[0]);
@@ -336,7 +345,7 @@ impl Follower {
         }
     }
 
-    /// `z₁ = z₀ + h/2 (g₀ + g₁)` by Newton's method, and its derivatives.
+    /// Solves `z₁ = z₀ + h/2 (g₀ + g₁)` by Newton's method, and computes the derivatives.
     fn integrate(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>, h: f64) -> bool {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(rate) = law.rate() else { return false };

@@ -1,12 +1,14 @@
-//! Motion in equal, implicit steps, for laws that know steps of a displacement and no rates, and for mixtures of all laws.
+//! Time integration with equal implicit steps, for laws with a step view only and for mixtures
+//! of all laws.
 //!
-//! - `law`: what any law answers to a step, with its derivative;
-//! - `step`: one step of average acceleration (Newmark 1959, β = ¼, γ = ½), the structure eliminated onto the joints' axes;
-//! - `carried`: the derivatives of a run, carried over its steps;
-//! - `flow`: as many equal steps as the estimated error asks for.
+//! - `law`: evaluation of any law over a step, with derivatives
+//! - `step`: one step of average acceleration (Newmark 1959, β = ¼, γ = ½), with the
+//!   structure eliminated onto the joints' axes
+//! - `carried`: sensitivities of a run
+//! - `flow`: the number of equal steps according to the estimated error
 //!
-//! The steps are of second order, also across kinks of the force, and neither lose nor give energy in the structure. Their error is estimated by
-//! halving them (Richardson).
+//! The steps are of second order, also across kinks of the force, and conserve the energy of
+//! the structure. Richardson extrapolation with halved steps estimates their error.
 
 mod carried;
 pub(crate) mod flow;

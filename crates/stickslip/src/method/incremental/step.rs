@@ -1,7 +1,9 @@
 //! One step of average acceleration for a linear structure with joints.
 //!
-//! `M (v₁ - v₀) = h/2 (r₀ + r₁)`, `x₁ = x₀ + h/2 (v₀ + v₁)`, with the forces `r = F - C v - K x - W f`. The velocities of the axes at the end are
-//! `w = (linear in the state and the loads) - h/2 G (f₀ + f₁)`: Newton's method runs on one unknown per axis, however many masses there are.
+//! `M (v₁ - v₀) = h/2 (r₀ + r₁)`, `x₁ = x₀ + h/2 (v₀ + v₁)`, with the forces
+//! `r = F - C v - K x - W f`. The velocities of the axes at the end are
+//! `w = (linear in the state and the loads) - h/2 G (f₀ + f₁)`. Newton's method has one unknown
+//! per axis, for any number of masses.
 
 use super::law::{At, Follower};
 use crate::law::Relative;
@@ -11,24 +13,25 @@ use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
 use stickslip_numerics::lu::Lu;
 
-/// The structure eliminated for one step length.
+/// The eliminated structure for one step size.
 #[derive(Debug, Clone)]
 pub(super) struct Eliminated {
     pub length: f64,
-    /// Velocities at the end from displacements and velocities at the start (n × 2n), from loads at both instants added (n × n), from forces at
-    /// both instants added (n × axes).
+    /// Matrices of the velocities at the end, as a function of displacements and velocities at
+    /// the start (n × 2n). `from_load` multiplies the sum of the loads at start and end
+    /// (n × n), `from_force` the sum of the forces (n × axes).
     from_state: DMatrix<f64>,
     from_load: DMatrix<f64>,
     from_force: DMatrix<f64>,
-    /// The last along the axes, axes × axes: `-h/2 G`.
+    /// The effect of forces along the axes, axes × axes: `-h/2 G`.
     pub along_from_force: DMatrix<f64>,
-    /// For derivatives, 2n × n and axes × n.
+    /// Transposed matrices for sensitivities, 2n × n and axes × n.
     pub from_state_transposed: DMatrix<f64>,
     pub from_force_transposed: DMatrix<f64>,
 }
 
 impl Eliminated {
-    /// `None` if the numbers are out of range.
+    /// Eliminates the structure. Returns `None` if the matrix is singular.
     pub fn new(assembly: &Assembly, h: f64) -> Option<Self> {
         let n = assembly.n;
         let (c, k) = (&assembly.damping * (0.5 * h), &assembly.stiffness * (0.25 * h * h));
@@ -54,10 +57,10 @@ impl Eliminated {
 /// The motion along the axes at an instant.
 type Relatives = Vec<Relative<f64>>;
 
-/// Memory and result of a step.
+/// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
-    /// What the laws answer, one for each joint.
+    /// Evaluated laws, one per joint.
     pub laws: Vec<Follower>,
     /// Forces along the axes at the start and at the end, N.
     pub before: DVector<f64>,
@@ -72,18 +75,20 @@ pub(super) struct Step {
     load: DVector<f64>,
     sum: DVector<f64>,
     residual: Vec<f64>,
-    /// The equations at the end.
+    /// The factored equations at the end.
     pub lu: Lu,
     z: Vec<f64>,
 }
 
-/// Newton iterations of a step; 2 to 5 are usual, kinks take some more.
+/// Largest number of Newton iterations of a step; 2 to 5 are typical, kinks need a few more.
 const ITERATIONS: usize = 60;
-/// Iterations after which only half a step is taken: a cycle between two sides of a kink ends so.
+/// Number of iterations after which the Newton step is halved, which ends a cycle between two
+/// sides of a kink.
 const PATIENCE: usize = 20;
-/// A correction below this fraction of the velocity's scale ends the iteration: it is rounding.
+/// Correction relative to the velocity scale that ends the iteration: it is at the level of
+/// rounding.
 const SMALL: f64 = 1e-13;
-/// One below this is good enough where rounding keeps the iteration from coming closer.
+/// Relative correction that is accepted if rounding prevents further convergence.
 const ENOUGH: f64 = 1e-9;
 
 impl Step {
@@ -107,7 +112,7 @@ impl Step {
         }
     }
 
-    /// Begins a run: the forces of the state.
+    /// Starts a run with the forces of the initial state.
     pub fn start(&mut self, assembly: &Assembly, state: &[f64], drive: &Drive) {
         let n = assembly.n;
         drive.load(0.0, &mut self.loads[1]);
@@ -121,7 +126,8 @@ impl Step {
         }
     }
 
-    /// Steps from `state` at `time`, which becomes the state at the end; false if Newton's method does not converge.
+    /// Advances `state` at `time` by one step. Returns false if Newton's method does not
+    /// converge.
     pub fn advance(
         &mut self,
         assembly: &Assembly,
@@ -187,13 +193,14 @@ impl Step {
         true
     }
 
-    /// The joint whose law answered the last attempt by what is no number.
+    /// Returns the joint whose law returned NaN in the last attempt.
     pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a PlacedLaw> {
         let broken = |law: &Follower| law.force.iter().chain(&law.state).any(|value| value.is_nan());
         assembly.joints.iter().zip(&self.laws).find_map(|(joint, law)| broken(law).then_some(joint))
     }
 
-    /// Residual and its derivative at the present unknowns, from the velocities `v` at the start.
+    /// Computes the residual and its derivative at the present unknowns, from the velocities
+    /// `v` at the start.
     fn evaluate(
         &mut self,
         assembly: &Assembly,
@@ -235,7 +242,7 @@ impl Step {
     }
 }
 
-/// The motion of a joint in a state.
+/// Returns the motion of a joint in a state.
 fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f64) -> Relative<f64> {
     let mut motion = Relative::along(0.0, 0.0);
     for (d, axis) in assembly.joints[q].axes().enumerate() {
@@ -255,7 +262,8 @@ mod tests {
     use nalgebra::{Matrix2, Vector2};
     use std::sync::Arc;
 
-    /// Places of 1 kg on springs (N/m) and dampers (kg/s), as many as the law has directions, with the law to the ground.
+    /// Places of 1 kg on springs (N/m) and dampers (kg/s), one per direction of the law, with
+    /// the law to the ground.
     fn held(stiffness: f64, damping: f64, law: Option<SharedLaw>) -> (System, Assembly) {
         let n = law.as_ref().map_or(1, |law| law.directions());
         let each = |value: f64| DMatrix::identity(n, n) * value;
@@ -270,7 +278,8 @@ mod tests {
         (system, flow.assembly)
     }
 
-    /// The state after so many steps of length `h`, with its derivative by the start.
+    /// Returns the state after `count` steps of size `h`, with its derivative with respect to
+    /// the initial state.
     fn stepped(
         (system, assembly): &(System, Assembly),
         (h, count): (f64, usize),
@@ -289,7 +298,8 @@ mod tests {
         (state, derivative)
     }
 
-    /// Of a linear motion `y' = J y` a step is the trapezoidal rule, `(1 - hJ/2) y₁ = (1 + hJ/2) y₀`, which keeps the energy of one without damping.
+    /// For a linear motion `y' = J y`, a step is the trapezoidal rule,
+    /// `(1 - hJ/2) y₁ = (1 + hJ/2) y₀`, which conserves the energy of an undamped motion.
     #[test]
     fn a_linear_step_is_the_trapezoidal_rule() {
         for (k, c, h) in [(4.0, 0.6, 0.7), (4.0, 0.0, 3.0)] {
@@ -307,7 +317,7 @@ mod tests {
         }
     }
 
-    /// On a cubic spring halved steps come closer by `2²`.
+    /// With a cubic spring, halving the steps reduces the error by `2²`.
     #[test]
     fn steps_are_of_order_two() {
         let system = held(4.0, 0.6, Some(Arc::new(Cubic { stiffness: 3.0 })));
@@ -318,12 +328,14 @@ mod tests {
         assert!((order - 2.0).abs() < 0.02, "{order}");
     }
 
-    /// The derivative of the end by the start, of motion and of the forces of a contact that slips, against differences.
+    /// Compares the derivative of the end state with respect to the initial state with
+    /// differences, for the motion and the forces of a slipping contact.
     #[test]
     fn the_derivative_is_that_of_the_step() {
         let law = Jenkins2d { stiffness: 5.0, limit: 0.7 };
         let system = held(4.0, 0.6, Some(Arc::new(law)));
-        // in motion, the forces near their limit: it sticks at first, then slips on a curve
+        // in motion, with forces near their limit: the contact sticks at first, then slips
+        // along a curve
         let start = [0.1, -0.2, 1.2, 0.8, 0.5, 0.2];
         let run = |start: &[f64]| stepped(&system, (0.05, 4), start);
         let (end, derivative) = run(&start);

@@ -1,7 +1,8 @@
-//! Steps of controlled length over a stretch of time.
+//! Step size control for the smooth flow.
 //!
-//! Step lengths are powers of two of a tick and start at multiples of themselves, so that every step of one length shares one
-//! elimination of the structure and every run over the same stretch ends exactly at its end.
+//! A step size is a power of two times a tick, and a step starts at a multiple of its size.
+//! Therefore all steps of one size share one elimination of the structure, and every run over
+//! the same interval ends exactly at its end.
 
 use super::step::{Eliminated, StageLoads, Step, points};
 use crate::law::{RatePoint, Relative};
@@ -17,36 +18,43 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::radau::{A, C, ERROR, ESTIMATE, REAL, STAGES};
 
-/// A stretch has `2^LEVELS` ticks; the finest layers of the arctan law need about `2^20` of half a period.
+/// The time interval has `2^LEVELS` ticks. The finest layers of the arctan law need about
+/// `2^20` steps per half period.
 const LEVELS: usize = 44;
-/// The longest step is the stretch divided by `2^COARSEST`.
+/// The largest step is the interval divided by `2^COARSEST`.
 const COARSEST: usize = 4;
-/// The first step of a run is the stretch divided by `2^FIRST_LEVEL`; the control corrects it at once.
+/// The first step of a run is the interval divided by `2^FIRST_LEVEL`. The step size control
+/// corrects it at once.
 const FIRST_LEVEL: usize = 12;
-/// Steps of one run, tried ones too, beyond which it stalls. The returns of the verification tests take 300 on average, at most 6900; these
-/// take a second for one mass.
+/// Largest number of steps of one run, including rejected ones. The returns of the verification
+/// tests take 300 on average, at most 6900. This limit takes a second for one mass.
 const STEP_LIMIT: usize = 200_000;
-/// A motion in which no step is short enough escapes to infinity if it is so many times as fast as the scale that the stretch began with: errors
-/// are measured by that scale, and drown in rounding at 1e7 times. Contacts too stiff to be followed stall at a few.
+/// Ratio of the velocity to the initial scale above which a motion without an acceptable step
+/// size counts as unbounded. Errors are relative to the initial scale and vanish in rounding at
+/// a ratio of 1e7. Contacts that are too stiff fail at ratios of a few.
 const ESCAPED: f64 = 1e5;
-/// The new step aims at this share of the tolerance.
+/// Fraction of the tolerance for the error of the next step.
 const SAFETY: f64 = 0.8;
-/// Steps that are only ever halved are chosen anew when they are so many times as many: layers move on and leave short steps behind.
+/// Growth of the number of steps at which halved steps are replaced by newly chosen ones.
+/// Layers move and leave short steps behind.
 const GROWN: usize = 2;
 
-/// Where the steps of a run have their lengths from.
+/// The source of the step sizes of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Lengths {
-    /// From the error of each.
+    /// The error estimate of each step.
     Chosen,
-    /// From the last run, halved where the error asks for it. Runs from neighbouring states go in the same steps, where those of chosen length
-    /// differ by up to their error, and none of them errs by more than a chosen one.
+    /// The steps of the last run, halved where the error requires it.
+    ///
+    /// Runs from nearby states then use the same steps, whereas chosen steps would differ by up
+    /// to their error. The error of a halved step does not exceed that of a chosen one.
     Halved,
-    /// From the last run as they are: the end state is a smooth function of the start.
+    /// The steps of the last run, unchanged. The end state is then a smooth function of the
+    /// initial state.
     Repeated,
 }
 
-/// Runs the motion of a structure with smooth laws.
+/// Flow of a structure with smooth laws.
 pub(crate) struct SmoothFlow {
     pub assembly: Assembly,
     pub drive: Drive,
@@ -55,16 +63,19 @@ pub(crate) struct SmoothFlow {
     keep: bool,
     steps: Steps,
     pub lengths: Lengths,
-    /// Levels of the accepted steps of the last run, in order, and how many they were when they were chosen.
+    /// Levels of the accepted steps of the last run, in order. `chosen` is their number when
+    /// they were chosen.
     mesh: Vec<usize>,
     chosen: usize,
-    /// Accepted and rejected steps of the last run, and whether the next attempt is the first one or one after a rejected one.
+    /// Numbers of accepted and rejected steps of the last run. `again` marks the first attempt
+    /// and an attempt after a rejection.
     accepted: usize,
     rejected: usize,
     again: bool,
     stretch: f64,
     eliminated: Vec<Option<Eliminated>>,
-    /// What continues a step by the stages of the next one, whose level is so much less or more.
+    /// Extrapolation weights from the stages of one step to those of the next one, by the
+    /// difference of their levels.
     onward: Vec<Option<[[f64; STAGES]; STAGES]>>,
     step: Step,
     loads: StageLoads,
@@ -74,9 +85,10 @@ pub(crate) struct SmoothFlow {
     slope: Vec<f64>,
     next: Vec<f64>,
     next_slope: Vec<f64>,
-    /// The derivative that a run carries, row after row.
+    /// The sensitivity of a run, row by row.
     derivative: Vec<f64>,
-    /// Memory: the unknowns of the last step; an error estimate and a second one; loads and forces at an instant.
+    /// Scratch memory: unknowns of the last step, two error estimates, loads and forces at an
+    /// instant.
     previous: Vec<f64>,
     error: Vec<f64>,
     second: Vec<f64>,
@@ -119,7 +131,7 @@ impl SmoothFlow {
         }
     }
 
-    /// Scales of displacement and velocity for the error norm.
+    /// Returns the scales of displacement and velocity for the error norm.
     fn scales(&self, state: &[f64]) -> (f64, f64) {
         self.assembly.scales(state, &self.drive)
     }
@@ -139,7 +151,8 @@ impl SmoothFlow {
         }
     }
 
-    /// First guess of the step's unknowns: the last step's collocation polynomial continued, or the state held.
+    /// Sets the initial guess of the step's unknowns: the extrapolated collocation polynomial
+    /// of the last step, or the constant state.
     fn predict(&mut self, state: &[f64], h: f64, last: Option<(usize, f64)>, time: f64) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         let unknown = &mut self.step.unknown;
@@ -165,7 +178,7 @@ impl SmoothFlow {
         }
     }
 
-    /// The laws at a state, into `laws`.
+    /// Evaluates the laws at a state, in `laws`.
     fn set_laws(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (joint, point) in self.assembly.joints.iter().zip(&mut self.laws) {
@@ -180,8 +193,12 @@ impl SmoothFlow {
         }
     }
 
-    /// Error of the step relative to the tolerance: the embedded estimate, filtered so that stiff components do not dominate it. A step out of a layer
-    /// or into one is stiff at one of its ends only, where a filter would hide what it jumps over: the larger of both counts.
+    /// Returns the error of the step relative to the tolerance: the embedded estimate with a
+    /// filter, so that stiff components do not dominate.
+    ///
+    /// A step at the border of a layer is stiff at only one end. A filter from the stiff end
+    /// would hide an error at the layer. Therefore the larger of both filtered estimates
+    /// counts.
     fn error(&mut self, state: &[f64], time: f64, scale: (f64, f64)) -> f64 {
         if self.assembly.states() == 0 {
             return self.error_of_work(time, scale.0);
@@ -197,7 +214,7 @@ impl SmoothFlow {
         if !self.step.prepare_filter(assembly, eliminated, &self.laws) {
             return f64::INFINITY;
         }
-        // what the second filter begins with
+        // initial value of the second filter
         for ((second, raw), slope) in self.second.iter_mut().zip(&self.error).zip(&self.slope) {
             *second = raw - slope;
         }
@@ -206,7 +223,7 @@ impl SmoothFlow {
         if size < 1.0 || !self.again {
             return size;
         }
-        // Hairer and Wanner's second filter, for first steps and those after a rejected one
+        // Hairer and Wanner's second filter, for first steps and those after a rejection
         for (shifted, (z, error)) in self.next.iter_mut().zip(state.iter().zip(&self.error)) {
             *shifted = z + error;
         }
@@ -229,7 +246,7 @@ impl SmoothFlow {
         self.size(&self.second, state, scale).min(size)
     }
 
-    /// Size of an error estimate relative to the tolerance.
+    /// Returns the size of an error estimate relative to the tolerance.
     fn size(&self, error: &[f64], state: &[f64], scale: (f64, f64)) -> f64 {
         let n = self.assembly.n;
         let mut largest = 0.0f64;
@@ -244,7 +261,8 @@ impl SmoothFlow {
         if error.iter().all(|e| e.is_finite()) { largest / self.tolerance } else { f64::INFINITY }
     }
 
-    /// The same for joints that are only moved: nothing is integrated there but their work, so its estimate chooses the steps.
+    /// Returns the error for joints with imposed motion only. Only their work is integrated
+    /// there, and its estimate controls the steps.
     fn error_of_work(&self, time: f64, travel: f64) -> f64 {
         let j = self.assembly.axes.len();
         let h = self.eliminated[self.level].as_ref().map_or(0.0, |eliminated| eliminated.length);
@@ -256,7 +274,7 @@ impl SmoothFlow {
                 for (weight, row) in ERROR.iter().zip(A) {
                     raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
                 }
-                // a law that nothing bounds is compared with the force that it has
+                // the reference of an unbounded law is its present force
                 let limit = joint.law.scale();
                 let force = if limit.is_finite() { limit } else { self.step.force.amax().max(point.force[d].abs()) };
                 if raw != 0.0 {
@@ -290,13 +308,16 @@ impl SmoothFlow {
         }
     }
 
-    /// Length of a step of the level, s.
+    /// Returns the size of a step of the present level, s.
     fn length(&self, tick: f64) -> f64 {
         (1u64 << (LEVELS - self.level)) as f64 * tick
     }
 
-    /// Why no step is short enough any more: the motion is on its way to infinity, which it reaches in finite time where a force grows faster than
-    /// the distance, or a law gives no number, or the equations are too stiff. `speed` is the scale of velocities at the start, m/s.
+    /// Returns the reason why no step is small enough.
+    ///
+    /// The motion diverges (in finite time if a force grows faster than the displacement), a
+    /// law returns NaN, or the equations are too stiff. `speed` is the velocity scale at the
+    /// start, m/s.
     fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> Breakdown {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
@@ -309,10 +330,11 @@ impl SmoothFlow {
         }
     }
 
-    /// The length of the next attempt (s), if it may be made; chooses the level where the mesh is given.
+    /// Returns the size of the next attempt (s), or `None` at the step limit. Sets the level if
+    /// the mesh is given.
     fn attempt(&mut self, lengths: Lengths, tick: f64) -> Option<f64> {
         if lengths != Lengths::Chosen {
-            // the mesh covers the stretch exactly
+            // the mesh covers the interval exactly
             self.level = self.mesh[self.accepted];
         }
         let h = self.length(tick);
@@ -325,11 +347,12 @@ impl SmoothFlow {
         Some(h)
     }
 
-    /// Shortens the step after a failed one.
+    /// Reduces the step after a failed attempt. Returns false if it is already the smallest.
     fn shorten(&mut self, lengths: Lengths, error: f64) -> bool {
         self.rejected += 1;
         if lengths != Lengths::Chosen {
-            // a layer has moved out of its fine steps: from now on the mesh has two halves here
+            // a layer has moved out of its small steps; split this step of the mesh into two
+            // halves
             if self.level == LEVELS {
                 return false;
             }
@@ -337,7 +360,7 @@ impl SmoothFlow {
             self.mesh.insert(self.accepted, self.level + 1);
             return true;
         }
-        // how many halvings bring it below one
+        // number of halvings that bring the error below one
         let halvings = if error.is_finite() {
             ((error / SAFETY).log2() / f64::from(ESTIMATE)).ceil().clamp(1.0, 4.0) as usize
         } else {
@@ -348,19 +371,20 @@ impl SmoothFlow {
     }
 }
 
-/// Weights of the stages of a step in the value of its collocation polynomial at `s`, in lengths of the step from its start.
+/// Returns the weights of the stages in the collocation polynomial of a step at `s`, where `s`
+/// is relative to the step size.
 pub(in crate::method) fn onward(s: f64) -> [f64; STAGES] {
     std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - C[r]) / (C[q] - C[r])).product())
 }
 
-/// Forces along the axes.
+/// Collects the forces along the axes.
 fn forces(assembly: &Assembly, laws: &[RatePoint], force: &mut [f64]) {
     for (joint, point) in assembly.joints.iter().zip(laws) {
         force[joint.axes()].copy_from_slice(&point.force[..joint.directions]);
     }
 }
 
-/// Time derivative of a state, where the laws are these.
+/// Computes the time derivative of a state for evaluated laws.
 pub(in crate::method) fn slope(
     assembly: &Assembly,
     (state, load, force): (&[f64], &mut [f64], &mut [f64]),
@@ -419,7 +443,8 @@ impl Flow for SmoothFlow {
         let scale = self.scales(state);
         let total = 1u64 << LEVELS;
         let mut position = 0u64;
-        // level: the step is 2^(LEVELS - level) ticks; a run starts like every run of the same stretch does, for equal bits
+        // a step has 2^(LEVELS - level) ticks; all runs over the same interval start at the
+        // same level, for equal bits
         self.level = FIRST_LEVEL;
         let lengths = match self.lengths {
             Lengths::Halved if self.mesh.len() > GROWN * self.chosen => Lengths::Chosen,
@@ -474,7 +499,7 @@ impl Flow for SmoothFlow {
             if let Some(sensitivity) = sensitivity.as_deref() {
                 self.step.carry(&self.assembly, eliminated, &mut self.derivative, sensitivity.ncols());
             }
-            // the last stage is the end
+            // the last stage is the end of the step
             self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
             if lengths != Lengths::Repeated {
                 let work = (self.next.as_slice(), self.load.as_mut_slice(), self.force.as_mut_slice());
@@ -494,7 +519,8 @@ impl Flow for SmoothFlow {
                 self.mesh.push(self.level);
             }
             position += ticks;
-            // a longer step only where it starts at a multiple of itself and its error is expected to pass
+            // double the step only if it starts at a multiple of its size and its expected
+            // error passes
             if self.level > COARSEST
                 && position.is_multiple_of(1u64 << (LEVELS - self.level + 1))
                 && error * 2f64.powi(ESTIMATE) < SAFETY
@@ -524,7 +550,7 @@ impl Flow for SmoothFlow {
 }
 
 impl SmoothFlow {
-    /// The motion of the last kept run, which repeats after `period`.
+    /// Returns the path of the last stored run, which repeats after `period`.
     pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
         SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
     }

@@ -1,7 +1,8 @@
-//! Stiff integration of smooth laws with exact sensitivities, for `shooting` and for transients.
+//! Stiff integration of smooth laws with exact sensitivities, for `shooting` and for
+//! transients.
 //!
-//! - `step`: one step of Radau IIA-9, the structure eliminated onto the joints' axes;
-//! - `flow`: steps of controlled length over a stretch of time.
+//! - `step`: one step of Radau IIA-9, with the structure eliminated onto the joints' axes
+//! - `flow`: step size control over a time interval
 
 pub(crate) mod flow;
 pub(crate) mod step;
@@ -11,10 +12,11 @@ use super::assembly::Assembly;
 use super::assembly::carries_nothing;
 use crate::model::System;
 
-/// A system as this integration sees it; `width` (m/s) smooths laws that can be smoothed.
+/// Creates the assembly of a system for this integration. `width` (m/s) regularizes laws that
+/// support it.
 ///
 /// # Errors
-/// A joint whose law has no rate view and is not smoothed, a place without mass.
+/// A joint whose law has no rate view and is not regularized, or a place without mass.
 pub(crate) fn assembly(system: &System, width: Option<f64>, method: &'static str) -> Result<Assembly, MethodError> {
     Assembly::new(system, method, |law| {
         let law = width.and_then(|width| law.regularised(width)).unwrap_or_else(|| law.clone());

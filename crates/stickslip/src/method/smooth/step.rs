@@ -1,9 +1,11 @@
 //! One step of Radau IIA-9 for a linear structure with smooth joints.
 //!
-//! Only the joints are non-linear, so the structure is eliminated once per step length: the stage velocities along the joints' axes are
-//! `u'ᵢ = (linear in the state and the loads) + Σ G fₖ`, and Newton's method runs on five unknowns per axis (and per internal
-//! state of a law), however many masses there are. Step lengths are powers of two times a tick, so that a few eliminations serve
-//! a whole orbit. The filter of the error estimate is eliminated in the same way.
+//! Only the joints are nonlinear. Therefore the structure is eliminated once per step size: the
+//! stage velocities along the joints' axes are
+//! `u'ᵢ = (linear in the state and the loads) + Σ G fₖ`. Newton's method has five unknowns per
+//! axis and per internal state of a law, for any number of masses. Step sizes are powers of two
+//! times a tick, so that a few eliminations serve a whole orbit. The filter of the error
+//! estimate is eliminated in the same way.
 
 use crate::law::{RatePoint, Relative};
 use crate::method::assembly::{Assembly, PlacedLaw};
@@ -13,23 +15,26 @@ use stickslip_numerics::lu::Lu;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
 use stickslip_numerics::short::{add, add_product, add_product_of_rows};
 
-/// The eliminated structure for one step length.
+/// The eliminated structure for one step size.
 #[derive(Debug, Clone)]
 pub(crate) struct Eliminated {
     pub length: f64,
-    /// The matrix of the method times the length.
+    /// The Runge-Kutta matrix times the step size.
     weights: [[f64; STAGES]; STAGES],
-    /// Stage velocities of the axes from the state, stage loads, stage forces: (5 axes) × 2n, 5n, 5 axes.
+    /// Stage velocities of the axes as functions of the state, the stage loads and the stage
+    /// forces: (5 axes) × 2n, 5n, 5 axes.
     velocity_from_state: DMatrix<f64>,
     velocity_from_load: DMatrix<f64>,
     velocity_from_force: DMatrix<f64>,
-    /// All stage displacements and velocities (10n: X₁…X₅V₁…V₅) from the state, stage loads, stage forces.
+    /// All stage displacements and velocities (10n: X₁…X₅V₁…V₅) as functions of the state, the
+    /// stage loads and the stage forces.
     stage_from_state: DMatrix<f64>,
     stage_from_load: DMatrix<f64>,
     stage_from_force: DMatrix<f64>,
-    /// The same for the state at the end, 2n.
+    /// The state at the end as a function of the state, the stage loads and the stage forces,
+    /// 2n rows.
     end: [DMatrix<f64>; 3],
-    /// The same for the weighted increments of the error estimate, 2n.
+    /// The weighted increments of the error estimate, in the same form, 2n rows.
     increments: [DMatrix<f64>; 3],
     /// `P = (γM + C + K/γ)⁻¹` of the filter, with `γ = REAL/h`; `P W` and `Wᵀ P W`.
     filter: [DMatrix<f64>; 3],
@@ -120,56 +125,63 @@ impl Eliminated {
     }
 }
 
-/// The inverse; a structure without masses has no rows, and one out of range is found by the numbers that come out.
+/// Returns the inverse. A structure without masses has no rows. A singular matrix yields NaN,
+/// which later checks detect.
 fn inverted(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     if n == 0 { matrix } else { matrix.try_inverse().unwrap_or_else(|| DMatrix::from_element(n, n, f64::NAN)) }
 }
 
-/// The loads on one step: forces on the masses and imposed relative motion along the axes, at its stages.
+/// The loads on one step, at its stages: forces on the masses and imposed relative motion along
+/// the axes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct StageLoads {
-    /// 5n.
+    /// Forces on the masses, length 5n.
     pub force: DVector<f64>,
-    /// Imposed relative displacement and velocity along the axes, stage after stage.
+    /// Imposed relative displacement and velocity along the axes, stage by stage.
     pub stage: Vec<(f64, f64)>,
 }
 
-/// Memory and result of a step.
+/// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
-    /// Unknowns: stage velocities along the axes (stage after stage), then internal states (stage after stage).
+    /// Unknowns: stage velocities along the axes (stage by stage), then internal states (stage
+    /// by stage).
     pub unknown: Vec<f64>,
-    /// Axes along which nothing moves: there the unknown is no velocity, and the law makes the force of it that keeps the
-    /// velocity at zero.
+    /// Marks axes at rest. Their unknown is not a velocity but an argument of the law: the law
+    /// converts it to the force that keeps the velocity at zero.
     pub held: Vec<bool>,
     /// Stage forces along the axes.
     pub force: DVector<f64>,
-    /// The laws at the stages, stage after stage; those of the last stage are those of the end.
+    /// The laws at the stages, stage by stage. The last stage is the end of the step.
     pub points: Vec<RatePoint>,
     /// Displacements and velocities at the start.
     linear: DVector<f64>,
-    /// All stage displacements and velocities, X₁…X₅V₁…V₅, where they were asked for.
+    /// All stage displacements and velocities, X₁…X₅V₁…V₅, valid after [`Step::set_stages`].
     pub stages: DVector<f64>,
     free: DVector<f64>,
     structural: Vec<f64>,
-    /// Stage velocities without the imposed ones, axis after axis.
+    /// Structural stage velocities without the imposed ones, axis by axis.
     moving: Vec<[f64; STAGES]>,
     residual: Vec<f64>,
     lu: Lu,
-    /// Of a derivative that is carried: stage velocities and internal states, forces of the laws, the end of the step.
+    /// Scratch memory for a sensitivity: stage velocities and internal states, forces of the
+    /// laws, end of the step.
     right: Vec<f64>,
     answer: Vec<f64>,
     carried: Vec<f64>,
     filter: Filter,
 }
 
-/// Newton iterations per step; from the extrapolated start 2 to 4 are usual, a step that needs more is halved.
+/// Largest number of Newton iterations per step. With the extrapolated initial guess, 2 to 4
+/// are typical; a step that needs more is halved.
 const ITERATIONS: usize = 12;
-/// A correction of the unknowns below this fraction of their scale ends the iteration: the next one would be at rounding.
+/// Relative correction of the unknowns that ends the iteration: the next correction would be at
+/// the level of rounding.
 const SMALL: f64 = 1e-9;
 
-/// Subtracts what `by` makes of the gains from the first rows of a column of a matrix, row after row.
+/// Subtracts `by(gain)` for each gain from the first rows of one column of a matrix, row by
+/// row.
 fn subtract(matrix: &mut [f64], columns: usize, column: usize, gains: &[f64], by: impl Fn(f64) -> f64) {
     let mut at = column;
     for gain in gains {
@@ -178,7 +190,7 @@ fn subtract(matrix: &mut [f64], columns: usize, column: usize, gains: &[f64], by
     }
 }
 
-/// Index of a stage's internal state among the unknowns.
+/// Returns the index of a stage's internal state among the unknowns.
 fn at_state(assembly: &Assembly, stage: usize, s: usize) -> usize {
     STAGES * assembly.axes.len() + stage * assembly.internal + s
 }
@@ -205,8 +217,10 @@ impl Step {
         }
     }
 
-    /// Solves the step from `state`, with `self.unknown` as the start of the iteration; with derivatives at the end for [`Step::carry`] if
-    /// `derivatives`. Returns false if it does not converge.
+    /// Solves the step from `state`, with `self.unknown` as the initial guess.
+    ///
+    /// `derivatives` requests the factors at the solution for [`Step::carry`]. Returns false if
+    /// the iteration does not converge.
     pub fn solve(
         &mut self,
         assembly: &Assembly,
@@ -249,7 +263,7 @@ impl Step {
                     }
                 }
             }
-            // maximum skips what is no number
+            // max ignores NaN
             if !size.is_finite() || self.residual.iter().any(|r| !r.is_finite()) {
                 return false;
             }
@@ -269,14 +283,14 @@ impl Step {
         false
     }
 
-    /// The joint whose law answered the last attempt by what is no number.
+    /// Returns the joint whose law returned NaN in the last attempt.
     pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a PlacedLaw> {
         let broken = |point: &RatePoint| point.force.iter().chain(&point.rate).any(|value| value.is_nan());
         let joints = assembly.joints.iter().cycle();
         joints.zip(&self.points).find_map(|(joint, point)| broken(point).then_some(joint))
     }
 
-    /// The laws at the present unknowns.
+    /// Evaluates the laws at the present unknowns.
     fn evaluate(&mut self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads) {
         let j = assembly.axes.len();
         let (unknown, stages) = (&self.unknown[..STAGES * j], &loads.stage[..STAGES * j]);
@@ -287,7 +301,8 @@ impl Step {
             for (q, joint) in assembly.joints.iter().enumerate() {
                 let mut motion = Relative::along(0.0, 0.0);
                 for (d, axis) in joint.axes().enumerate() {
-                    // structural displacement from the collocation of structural velocities, imposed motion apart
+                    // structural displacement from the collocation of structural velocities,
+                    // without imposed motion
                     let mut u = self.structural[axis] + loads.stage[stage * j + axis].0;
                     let moving = eliminated.weights[stage].iter().zip(&self.moving[axis]);
                     moving.for_each(|(weight, velocity)| u += weight * velocity);
@@ -307,9 +322,9 @@ impl Step {
         }
     }
 
-    /// Residual and Jacobian from the laws at the present unknowns.
+    /// Computes residual and Jacobian from the laws at the present unknowns.
     fn linearise(&mut self, assembly: &Assembly, eliminated: &Eliminated, state: &[f64]) {
-        // lengths that the compiler knows: one axis, without states
+        // constant sizes for the compiler: one axis, without states
         match (assembly.axes.len(), self.unknown.len()) {
             (1, STAGES) => self.differentiate(assembly, eliminated, state, (1, STAGES)),
             lengths => self.differentiate(assembly, eliminated, state, lengths),
@@ -334,7 +349,7 @@ impl Step {
             jacobian[at * unknowns + at] = 0.0;
         }
         // velocities
-        let g = eliminated.velocity_from_force.as_slice(); // column after column
+        let g = eliminated.velocity_from_force.as_slice(); // column by column
         for row in 0..STAGES * j {
             self.residual[row] = if held(row) { -self.free[row] } else { self.unknown[row] - self.free[row] };
         }
@@ -396,7 +411,7 @@ impl Step {
         }
     }
 
-    /// The state at the end of the step that was solved last.
+    /// Computes the state at the end of the last solved step.
     pub fn end(&self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads, out: &mut [f64]) {
         let n = assembly.n;
         self.combine(&eliminated.end, loads, &mut out[..2 * n]);
@@ -404,7 +419,7 @@ impl Step {
         out[2 * n..].copy_from_slice(&self.unknown[last..last + assembly.internal]);
     }
 
-    /// Sets the displacements and velocities at all stages of it.
+    /// Computes the displacements and velocities at all stages of the last solved step.
     pub fn set_stages(&mut self, eliminated: &Eliminated, loads: &StageLoads) {
         let out = &mut self.stages;
         out.gemv(1.0, &eliminated.stage_from_state, &self.linear, 0.0);
@@ -419,11 +434,12 @@ impl Step {
         add_product(force.as_slice(), self.force.as_slice(), out);
     }
 
-    /// Carries a derivative over the step that was solved last: row after row, states × columns. Whole rows are added to each other, since these
-    /// matrices are small and rows are all that is long in them.
+    /// Carries a sensitivity over the last solved step: row by row, states × columns. The
+    /// operations act on whole rows, because these matrices are small and only the rows are
+    /// long.
     pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, derivative: &mut [f64], columns: usize) {
         if derivative.is_empty() {
-            return; // a joint that is only moved, without states
+            return; // a joint with imposed motion only, without states
         }
         let (n, velocities, internal) = (assembly.n, STAGES * assembly.axes.len(), assembly.internal);
         for (memory, rows) in
@@ -445,8 +461,8 @@ impl Step {
         inside.copy_from_slice(&self.right[last..last + internal * columns]);
     }
 
-    /// What the displacements and internal states at the start of a step do through the laws: the forces into `answer`, the internal states
-    /// into `right`.
+    /// Computes the effect of the displacements and internal states at the start of a step
+    /// through the laws: forces in `answer`, internal states in `right`.
     fn answer_to_start(&mut self, assembly: &Assembly, h: f64, start: &[f64], columns: usize) {
         let (n, j, joints) = (assembly.n, assembly.axes.len(), assembly.joints.len());
         for (q, joint) in assembly.joints.iter().enumerate() {
@@ -476,7 +492,7 @@ impl Step {
         }
     }
 
-    /// Adds to `answer` what the stages in `right` do through the laws.
+    /// Adds to `answer` the effect of the stages in `right` through the laws.
     fn answer_to_stages(&mut self, assembly: &Assembly, h: f64, columns: usize) {
         let (j, joints) = (assembly.axes.len(), assembly.joints.len());
         for stage in 0..STAGES {
@@ -501,8 +517,8 @@ impl Step {
         }
     }
 
-    /// The embedded estimate of the error of the step that was solved last, before its filter: `slope` is the time derivative of the state at
-    /// its start.
+    /// Computes the embedded error estimate of the last solved step, before its filter. `slope`
+    /// is the time derivative of the state at its start.
     pub fn raw_error(
         &self,
         assembly: &Assembly,
@@ -522,17 +538,19 @@ impl Step {
         out.iter_mut().zip(slope).for_each(|(o, s)| *o += s);
     }
 
-    /// Makes the filter for the laws `at` the start of the step; false if it is singular.
+    /// Prepares the filter for the laws `at` the start of the step. Returns false if it is
+    /// singular.
     pub fn prepare_filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint]) -> bool {
         self.filter.prepare(assembly, eliminated, at, &self.held)
     }
 
-    /// Replaces an error estimate by the filtered one, so that stiff components do not dominate it.
+    /// Applies the filter to an error estimate, so that stiff components do not dominate.
     pub fn filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
         self.filter.apply(assembly, eliminated, at, error);
     }
 
-    /// The same by the laws at the end of the step that was solved last; false if that filter is singular.
+    /// Applies the filter with the laws at the end of the last solved step. Returns false if
+    /// that filter is singular.
     pub fn filter_at_end(&mut self, assembly: &Assembly, eliminated: &Eliminated, error: &mut [f64]) -> bool {
         let at = &self.points[(STAGES - 1) * assembly.joints.len()..];
         let regular = self.filter.prepare(assembly, eliminated, at, &self.held);
@@ -551,23 +569,25 @@ fn row_mut(matrix: &mut [f64], at: usize, columns: usize) -> &mut [f64] {
     &mut matrix[at * columns..(at + 1) * columns]
 }
 
-/// Adds `matrix x` to the first rows of `out`; `x` and `out` row after row.
+/// Adds `matrix x` to the first rows of `out`; `x` and `out` are stored row by row.
 fn add_rows(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
     add_product_of_rows(matrix.as_slice(), matrix.nrows(), x, out, columns);
 }
 
-/// A point for every law.
+/// Creates one evaluation point per law.
 pub(crate) fn points(assembly: &Assembly) -> Vec<RatePoint> {
     assembly.joints.iter().map(|joint| RatePoint::new(joint.directions, joint.states)).collect()
 }
 
-/// `(γ - J)⁻¹` with the Jacobian `J` of the motion, eliminated onto the axes: their velocities `w` satisfy `(1 + G T) w = Wᵀ P b - G t`, with
-/// the forces `T w + t` that the laws answer.
+/// The operator `(γ - J)⁻¹` with the Jacobian `J` of the motion, eliminated onto the axes.
+///
+/// Their velocities `w` satisfy `(1 + G T) w = Wᵀ P b - G t`, with the forces `T w + t` of the
+/// laws.
 #[derive(Debug, Clone)]
 struct Filter {
-    /// Of every law: the elimination of its internal states.
+    /// Elimination of the internal states of every law.
     states: Vec<Lu>,
-    /// Of every law: `T`, directions × directions.
+    /// The matrix `T` of every law, directions × directions.
     answers: Vec<Vec<f64>>,
     axes: Lu,
     rate: f64,
@@ -645,7 +665,7 @@ impl Filter {
             self.b[i] = (0..n).map(|k| assembly.mass[(i, k)] * v[k] - assembly.stiffness[(i, k)] * x[k] / rate).sum();
         }
         self.v.gemv(1.0, p, &self.b, 0.0);
-        // the forces that the laws answer while the axes do not move: t
+        // the forces t of the laws at zero velocity of the axes
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
             let (directions, states) = (joint.directions, joint.states);
             let mut u = [0.0; crate::law::MOST_DIRECTIONS];
@@ -708,7 +728,8 @@ mod tests {
         super::super::assembly(&builder.build().unwrap(), None, "test").unwrap()
     }
 
-    /// The state after so many steps of length `h` from the loads at their stages, with the derivative by `start` row after row.
+    /// Returns the state after `count` steps of size `h` under a load, and the derivative with
+    /// respect to `start`, row by row.
     fn stepped(
         assembly: &Assembly,
         (h, count): (f64, usize),
@@ -737,8 +758,11 @@ mod tests {
         0.0
     }
 
-    /// Of a linear motion `y' = J y` a step of Radau IIA of order 9 is `y₁ = Q(hJ)⁻¹ P(hJ) y₀`, the (4,5) Padé approximation of the exponential.
-    /// Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.3 and IV.5.
+    /// For a linear motion `y' = J y`, a step of Radau IIA of order 9 is
+    /// `y₁ = Q(hJ)⁻¹ P(hJ) y₀`, the (4,5) Padé approximation of the exponential.
+    ///
+    /// Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996),
+    /// Sec. IV.3 and IV.5.
     #[test]
     fn a_linear_step_is_the_pade_approximation() {
         let (k, c, h) = (4.0, 0.6, 0.7);
@@ -757,7 +781,8 @@ mod tests {
         }
     }
 
-    /// A force that is a polynomial in time of degree 7 moves a free mass exactly: `x = Σ aₙ hⁿ⁺²/((n+1)(n+2))`; one of degree 8 still in its velocity.
+    /// A force that is a polynomial of degree 7 in time moves a free mass exactly:
+    /// `x = Σ aₙ hⁿ⁺²/((n+1)(n+2))`. For degree 8, only the velocity is exact.
     #[test]
     fn polynomial_loads_are_exact() {
         let h = 1.3f64;
@@ -771,7 +796,7 @@ mod tests {
         }
     }
 
-    /// On a cubic spring halved steps come closer by `2⁹`.
+    /// With a cubic spring, halving the steps reduces the error by `2⁹`.
     #[test]
     fn steps_are_of_order_nine() {
         let assembly = oscillator(4.0, 0.6, &[Arc::new(Cubic { stiffness: 3.0 })]);
@@ -782,7 +807,8 @@ mod tests {
         assert!((order - 9.0).abs() < 0.2, "{order}");
     }
 
-    /// The derivative of the end by the start, of motion and internal state, against differences.
+    /// Compares the derivative of the end state with respect to the initial state with
+    /// differences, for motion and internal state.
     #[test]
     fn the_derivative_is_that_of_the_step() {
         let laws: [SharedLaw; 2] =

@@ -1,10 +1,13 @@
-//! Steps of controlled length between located switches.
+//! Step size control between located switches.
 //!
-//! While no joint changes between rest and slip the motion is smooth, and steps go on as they do for smooth laws: their
-//! lengths are powers of two of a tick, so that steps of one length share one elimination of the structure. What would end
-//! the mode of a joint is looked for in every step on its collocation polynomial: the velocity of a joint that slips, the
-//! distance of the force of one that rests from its limit. The step is then shortened to that zero, by Newton's method on its
-//! end, which is of order 9, and the motion goes on in the modes that follow; steps after a switch first come back to the
+//! The motion is smooth while no joint changes between stick and slip. The steps are then those
+//! of smooth laws: powers of two of a tick, so that steps of one size share one elimination of
+//! the structure.
+//!
+//! Every step is searched, on its collocation polynomial, for the event that ends the mode of a
+//! joint: the zero of the velocity of a slipping joint, or the force of a stuck joint at its
+//! limit. Newton's method on the end of the step then shortens the step to that zero, with
+//! order 9. The motion continues in the new modes. The first steps after a switch return to the
 //! ticks.
 
 use super::mode::{Mode, in_mode};
@@ -24,36 +27,38 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::radau::{A, C, ESTIMATE, STAGES};
 
-/// A stretch has `2^LEVELS` ticks.
+/// The time interval has `2^LEVELS` ticks.
 const LEVELS: usize = 40;
-/// The longest step is the stretch divided by `2^COARSEST`, the first one by `2^FIRST_LEVEL`.
+/// The largest step is the interval divided by `2^COARSEST`, the first one by `2^FIRST_LEVEL`.
 const COARSEST: usize = 3;
 const FIRST_LEVEL: usize = 7;
-/// Steps of one run, tried ones too, and switches, beyond which it stalls or chatters.
+/// Largest number of steps of one run, including rejected ones, and of switches. Beyond them,
+/// the run stalls or chatters.
 const STEP_LIMIT: usize = 100_000;
 const SWITCH_LIMIT: usize = 10_000;
-/// The new step aims at this share of the tolerance.
+/// Fraction of the tolerance for the error of the next step.
 const SAFETY: f64 = 0.8;
-/// Velocities and forces beyond zero by this share of their scale are rounding.
+/// Relative velocities and forces that count as rounding.
 const ROUNDING: f64 = 1e-12;
-/// A share of the stretch that is no step: a switch so near to its end is at its end.
+/// Fraction of the interval that counts as zero: a switch this close to the end is at the end.
 const LEFT: f64 = 16.0 * f64::EPSILON;
-/// Instants of a step at which a switch is looked for, beside its end.
+/// Number of instants of a step at which switches are searched, including its end.
 const LOOKS: usize = 8;
-/// Newton steps to a switch; two are usual.
+/// Largest number of Newton iterations for a switch; two are typical.
 const LOCATED: usize = 12;
 
-/// A joint that slides.
+/// A joint with set-valued friction.
 struct Friction {
     joint: usize,
     axis: usize,
     law: SharedLaw,
-    /// Force at which it lets go, N.
+    /// Static limit of the force, N.
     limit: f64,
     mode: Mode,
-    /// Its law in each mode, for the present velocity scale: held, forwards, backwards.
+    /// Its law in each mode, for the present velocity scale: stuck, forward slip, backward
+    /// slip.
     laws: [SharedLaw; 3],
-    /// N s/m, see [`in_mode`].
+    /// Force per unknown, N s/m; see [`in_mode`].
     unit: f64,
 }
 
@@ -70,26 +75,27 @@ impl Friction {
     }
 }
 
-/// Where the present step begins, s, and its place among the ticks.
+/// Start of the present step, s, and its tick.
 #[derive(Clone, Copy)]
 struct Begin {
     time: f64,
-    /// Of the stretch, a time on the ticks; after a switch the motion is between two.
+    /// Number of the tick; `None` after a switch, when the time is between two ticks.
     tick: Option<u64>,
 }
 
-/// A switch in a step: the friction that switches, and when, in shares of the step.
+/// A switch in a step: the index of the joint in `frictions`, and the time as a fraction of the
+/// step.
 #[derive(Clone, Copy)]
 struct Switch {
     friction: usize,
     at: f64,
 }
 
-/// Runs the motion of a structure with joints that slide and smooth laws.
+/// Flow of a structure with set-valued friction and smooth laws.
 pub(crate) struct SwitchedFlow {
-    /// Its laws are those of the present modes.
+    /// The assembly with the laws of the present modes.
     pub assembly: Assembly,
-    /// With the laws as they are.
+    /// The assembly with the original laws.
     plain: Assembly,
     pub drive: Drive,
     /// Relative error per step.
@@ -116,6 +122,8 @@ pub(crate) struct SwitchedFlow {
 }
 
 impl SwitchedFlow {
+    /// Creates the flow of a system.
+    ///
     /// # Errors
     /// See [`super::assembly`].
     pub fn new(system: &System, tolerance: f64, method: &'static str) -> Result<Self, MethodError> {
@@ -156,17 +164,17 @@ impl SwitchedFlow {
         })
     }
 
-    /// The motion of the last kept run, which repeats after `period`.
+    /// Returns the path of the last stored run, which repeats after `period`.
     pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
         SteppedPath::new((system, &self.plain), &self.drive, &self.steps, (symmetry, period))
     }
 
-    /// Relative velocity along an axis.
+    /// Returns the relative velocity along an axis.
     fn velocity(&self, axis: usize, state: &[f64], time: f64) -> f64 {
         self.assembly.relative(axis, state, &self.drive, time).1
     }
 
-    /// Relative acceleration along an axis in the present slope, m/s².
+    /// Returns the relative acceleration along an axis for the present time derivative, m/s².
     fn acceleration(&self, axis: usize, time: f64) -> f64 {
         let n = self.assembly.n;
         self.assembly.axes[axis].along(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
@@ -176,7 +184,7 @@ impl SwitchedFlow {
         self.frictions.iter().filter(|friction| friction.mode == Mode::Held)
     }
 
-    /// Every joint has the law of its mode.
+    /// Sets the law of every joint to that of its mode.
     fn enter_modes(&mut self) {
         self.step.held.fill(false);
         for friction in &self.frictions {
@@ -185,15 +193,16 @@ impl SwitchedFlow {
         }
     }
 
-    /// Laws, forces and the time derivative of a state in the present modes; those that hold carry what keeps them at rest.
-    /// False if their forces are not unique.
+    /// Computes laws, forces and the time derivative of a state in the present modes. Stuck
+    /// joints carry the force that keeps them at rest. Returns false if these forces are not
+    /// unique.
     fn set_slope(&mut self, state: &[f64], time: f64) -> bool {
         self.answer(state, time);
         let held: Vec<usize> = self.held().map(|friction| friction.axis).collect();
         if held.is_empty() {
             return true;
         }
-        // so far they carry nothing
+        // accelerations without the forces of the stuck joints
         let free: Vec<f64> = held.iter().map(|&axis| self.acceleration(axis, time)).collect();
         let Some(force) = mobility(&self.assembly, &held).lu().solve(&DVector::from_vec(free)) else { return false };
         let each: Vec<(usize, f64)> = self.held().zip(force.iter()).map(|(own, f)| (own.joint, f / own.unit)).collect();
@@ -207,7 +216,8 @@ impl SwitchedFlow {
         true
     }
 
-    /// The laws at a state, those that hold without a force, and the time derivative.
+    /// Evaluates the laws at a state, with zero force for stuck joints, and the time
+    /// derivative.
     fn answer(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (q, (joint, point)) in self.assembly.joints.iter().zip(&mut self.laws).enumerate() {
@@ -227,13 +237,14 @@ impl SwitchedFlow {
         self.set_motion(state, time);
     }
 
-    /// The time derivative of a state under the present forces of the laws.
+    /// Computes the time derivative of a state under the present forces of the laws.
     fn set_motion(&mut self, state: &[f64], time: f64) {
         let work = (state, self.load.as_mut_slice(), self.force.as_mut_slice());
         slope(&self.assembly, work, &self.laws, &self.drive, time, &mut self.slope);
     }
 
-    /// The modes in which a run begins: what moves slips, and what is at rest is decided.
+    /// Determines the modes at the start of a run: moving joints slip, and joints at rest are
+    /// decided.
     fn begin(&mut self, state: &mut [f64], scale: f64) -> Result<(), Breakdown> {
         let mut resting = Vec::new();
         for k in 0..self.frictions.len() {
@@ -250,7 +261,7 @@ impl SwitchedFlow {
         self.rest(&resting, state, 0.0)
     }
 
-    /// Decides about faces at rest, of which those that hold are stopped to the last digit.
+    /// Decides on joints at rest. Sets the velocity of stuck ones exactly to zero.
     fn rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), Breakdown> {
         if !resting.is_empty() {
             let axes: Vec<usize> = resting.iter().map(|&k| self.frictions[k].axis).collect();
@@ -276,7 +287,7 @@ impl SwitchedFlow {
         Breakdown::Redundant { time, joint: self.assembly.joints[joint].joint.clone() }
     }
 
-    /// The derivative by the start, of velocities that stop at once.
+    /// Projects the sensitivity at a stop of velocities.
     fn project(&mut self, columns: usize) {
         let n = self.assembly.n;
         let held: Vec<usize> = self.held().map(|friction| friction.axis).collect();
@@ -299,7 +310,8 @@ impl SwitchedFlow {
         }
     }
 
-    /// First guess of the step's unknowns: the last step's collocation polynomial continued, or the start.
+    /// Sets the initial guess of the step's unknowns: the extrapolated collocation polynomial
+    /// of the last step, or the initial state.
     fn predict(&mut self, state: &[f64], (time, h): (f64, f64), last: Option<f64>) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         if let Some(length) = last {
@@ -325,7 +337,7 @@ impl SwitchedFlow {
         }
     }
 
-    /// Solves a step; false if that does not converge.
+    /// Solves a step. Returns false if the iteration does not converge.
     fn attempt(
         &mut self,
         eliminated: &Eliminated,
@@ -343,7 +355,8 @@ impl SwitchedFlow {
         solved && self.next.iter().all(|z| z.is_finite())
     }
 
-    /// Error of the step relative to the tolerance: the embedded estimate, filtered at both of its ends.
+    /// Returns the error of the step relative to the tolerance: the embedded estimate, filtered
+    /// at both ends.
     fn error(&mut self, eliminated: &Eliminated, state: &[f64], scale: (f64, f64)) -> f64 {
         let assembly = &self.assembly;
         self.step.raw_error(assembly, eliminated, &self.loads, (state, &self.slope), &mut self.error);
@@ -359,7 +372,7 @@ impl SwitchedFlow {
         at_end.max(self.size(&self.error, state, scale))
     }
 
-    /// Size of an error estimate relative to the tolerance.
+    /// Returns the size of an error estimate relative to the tolerance.
     fn size(&self, error: &[f64], state: &[f64], scale: (f64, f64)) -> f64 {
         let n = self.assembly.n;
         let moving = (0..n).map(|i| (error[i].abs() / scale.0).max(error[n + i].abs() / scale.1));
@@ -371,8 +384,8 @@ impl SwitchedFlow {
         if error.iter().all(|e| e.is_finite()) { largest / self.tolerance } else { f64::INFINITY }
     }
 
-    /// What ends the mode of a friction, at `s` in [0, 1] of the step that was solved last, in shares of its scale: positive
-    /// while the mode lasts.
+    /// Returns the margin of a joint's mode at `s` in [0, 1] of the last solved step, relative
+    /// to its scale. It is positive while the mode lasts.
     fn margin(&self, friction: &Friction, start: f64, s: f64, scale: f64) -> f64 {
         let j = self.assembly.axes.len();
         // the polynomial through the start and the stages
@@ -385,12 +398,12 @@ impl SwitchedFlow {
         let now: f64 = (0..=STAGES).map(|i| weight(i) * value(i)).sum();
         match friction.mode {
             Mode::Slip(sign) => sign * now / scale,
-            // its unknown has the unit of its limit over the scale of velocities
+            // the unit of the unknown is the limit divided by the velocity scale
             Mode::Held => 1.0 - (now * friction.unit / friction.limit).abs(),
         }
     }
 
-    /// The first switch in the step that was solved last.
+    /// Returns the first switch in the last solved step.
     fn switch(&self, state: &[f64], time: f64, scale: f64) -> Option<Switch> {
         let mut first: Option<Switch> = None;
         for (k, friction) in self.frictions.iter().enumerate() {
@@ -423,8 +436,8 @@ impl SwitchedFlow {
         first
     }
 
-    /// What ends the mode of a friction, and its rate (1/s), at the end of the step that was solved last, of which `slope` is
-    /// taken there.
+    /// Returns the margin of a joint's mode and its rate (1/s) at the end of the last solved
+    /// step. Sets `slope` to the time derivative there.
     fn at_end(&mut self, switch: Switch, time: f64, (h, scale): (f64, f64)) -> Option<(f64, f64)> {
         let next = self.next.clone();
         if !self.set_slope(&next, time) {
@@ -451,7 +464,8 @@ impl SwitchedFlow {
         }
     }
 
-    /// Shortens the step to a switch in it. The step is solved, and `slope` is that at its end; `None` if that fails.
+    /// Shortens the step to a switch in it. Afterwards the step is solved, and `slope` is the
+    /// time derivative at its end. Returns `None` on failure.
     fn locate(
         &mut self,
         switch: Switch,
@@ -462,7 +476,7 @@ impl SwitchedFlow {
         let mut h = switch.at * longest;
         for _ in 0..LOCATED {
             let eliminated = Eliminated::new(&self.assembly, h);
-            // the start of the step has its slope for the guess
+            // the initial guess needs the time derivative at the start of the step
             if !self.set_slope(state, begin.time)
                 || !self.attempt(&eliminated, state, (begin, None), (scale, derivatives))
             {
@@ -470,7 +484,7 @@ impl SwitchedFlow {
             }
             let (margin, rate) = self.at_end(switch, begin.time + h, (h, scale))?;
             let change = -margin / rate;
-            // rounding of the time, and of what is zero there
+            // rounding of the time, and of the zero
             if margin.abs() <= ROUNDING || change.abs() <= f64::EPSILON * self.stretch {
                 return Some(eliminated);
             }
@@ -482,8 +496,8 @@ impl SwitchedFlow {
         None
     }
 
-    /// The modes after a switch at the present state, whose slope before it is known; derivatives are multiplied by its
-    /// saltation matrix.
+    /// Determines the modes after a switch at the present state, for which the time derivative
+    /// before the switch is known. Multiplies the sensitivity by the saltation matrix.
     fn switched(
         &mut self,
         switch: Switch,
@@ -493,7 +507,7 @@ impl SwitchedFlow {
     ) -> Result<(), Breakdown> {
         let friction = &mut self.frictions[switch.friction];
         if friction.mode == Mode::Held {
-            // the force is continuous, and so is everything else
+            // the force and all other quantities are continuous
             friction.mode = Mode::Slip(self.laws[friction.joint].force[0].signum());
             self.enter_modes();
             return if self.set_slope(state, time) { Ok(()) } else { Err(self.redundant(time)) };
@@ -510,7 +524,7 @@ impl SwitchedFlow {
             if columns > 0 {
                 saltate(&self.assembly, (axis, rate), (&before, &self.slope), (&mut self.derivative, columns));
             }
-            // others that stop at the same instant: bodies that move alike
+            // other joints that stop at the same instant, because their bodies move alike
             next = (0..self.frictions.len()).filter(|i| !stopped.contains(i)).find(|&i| {
                 let own = &self.frictions[i];
                 let Mode::Slip(sign) = own.mode else { return false };
@@ -554,13 +568,13 @@ impl SwitchedFlow {
         }
     }
 
-    /// The length of the next step, and the tick at which it ends.
+    /// Returns the size of the next step, and the tick at its end.
     fn length(&self, begin: Begin) -> (f64, u64) {
         let (tick, ticks) = (self.stretch / (1u64 << LEVELS) as f64, 1u64 << (LEVELS - self.level));
         if let Some(at) = begin.tick {
             return (ticks as f64 * tick, at + ticks);
         }
-        // to the next tick of the level, and not by a small rest
+        // to the next tick of the level, but not by a tiny step
         let end = ((begin.time / tick / ticks as f64 + 0.1).floor() as u64 + 1) * ticks;
         let end = end.min(1 << LEVELS);
         (end as f64 * tick - begin.time, end)
@@ -573,7 +587,8 @@ impl SwitchedFlow {
         }
     }
 
-    /// The eliminated structure for a step; of one to or from a switch it is made for it alone.
+    /// Returns the eliminated structure for a step. Steps to or from a switch have a separate
+    /// elimination.
     fn elimination(&mut self, begin: Begin, h: f64) -> Eliminated {
         let kept = begin.tick.and_then(|_| self.eliminated[self.level].take());
         kept.unwrap_or_else(|| Eliminated::new(&self.assembly, h))
@@ -585,8 +600,10 @@ impl SwitchedFlow {
         }
     }
 
-    /// One step from `begin`, to its end or to the first switch in it. Returns where the next one begins, and its length
-    /// if that continues this one.
+    /// Performs one step from `begin`, to its end or to the first switch in it.
+    ///
+    /// Returns the start of the next step, the size of this step if the next one can
+    /// extrapolate it, and whether the interval ends here.
     fn advance(
         &mut self,
         state: &mut [f64],
@@ -622,7 +639,7 @@ impl SwitchedFlow {
             self.give_back(begin, eliminated, level);
             let located = self.locate(switch, state, (begin, h), (scale.1, columns > 0));
             let Some(eliminated) = located else {
-                // a shorter step tells more of it
+                // a smaller step locates the switch better
                 self.level += 1;
                 if !self.set_slope(state, begin.time) {
                     return Err(self.redundant(begin.time));
@@ -637,7 +654,7 @@ impl SwitchedFlow {
         }
     }
 
-    /// Takes the step that was solved last.
+    /// Accepts the last solved step.
     fn accept(
         &mut self,
         eliminated: &Eliminated,

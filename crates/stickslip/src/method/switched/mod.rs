@@ -1,8 +1,10 @@
-//! Set-valued friction with a smooth slip curve beside smooth laws: stiff integration between located switches.
+//! Flow of set-valued friction with a smooth slip curve, together with smooth laws: stiff
+//! integration between located switches.
 //!
-//! - `mode`: a joint that rests, as a constraint, or slips in one direction;
-//! - `flow`: steps of controlled length between switches, which are located as zeros of the motion in a step;
-//! - `switch`: what rests and slips from a switch on, and what it does to derivatives.
+//! - `mode`: a joint that sticks, as a constraint, or slips in one direction
+//! - `flow`: step size control between switches, which are zeros on the collocation
+//!   polynomial
+//! - `switch`: stick or slip after a switch, and the saltation of sensitivities
 
 pub(crate) mod flow;
 mod mode;
@@ -15,11 +17,12 @@ use super::assembly::{Assembly, carries_nothing};
 use crate::law::Law;
 use crate::model::System;
 
-/// Whether this integration follows a system: all joints are smooth or slide along a smooth curve, and one of them does.
+/// Returns whether this integration supports a system: all joints are smooth or have a smooth
+/// slip curve, and at least one has a slip curve.
 pub(crate) fn takes(system: &System) -> bool {
     let slides = |law: &dyn Law| law.sliding().is_some() && law.scale() > 0.0;
     let joints = || system.joints().iter();
-    // a joint between places that both are moved cannot be held
+    // a joint between two moved places cannot stick
     let moves = |axes: &[crate::model::Axis]| axes.iter().all(|axis| !axis.rows().is_empty());
     joints().any(|joint| slides(&**joint.law()))
         && joints().all(|joint| match slides(&**joint.law()) {
@@ -28,10 +31,10 @@ pub(crate) fn takes(system: &System) -> bool {
         })
 }
 
-/// A system as this integration sees it.
+/// Creates the assembly of a system for this integration.
 ///
 /// # Errors
-/// A joint whose law is neither smooth nor slides along a smooth curve, a place without mass.
+/// A joint whose law is neither smooth nor has a smooth slip curve, or a place without mass.
 fn assembly(system: &System, method: &'static str) -> Result<Assembly, MethodError> {
     Assembly::new(system, method, |law| {
         let nothing = carries_nothing(law).then_some((0, 1.0));

@@ -1,15 +1,15 @@
-//! A joint that rests, or slips in one direction: a smooth law each.
+//! A joint in one mode, as a smooth law: it sticks, or it slips in one direction.
 
 use crate::law::{Contact, Law, LawInfo, MOST_DIRECTIONS, Rate, RateLaw, Relative, SharedLaw};
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// What the faces of a joint do until the next switch.
+/// The mode of a joint until the next switch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mode {
-    /// They rest on each other: their relative velocity is zero, and the force is what that takes.
+    /// The joint sticks: its relative velocity is zero, and the force is the reaction.
     Held,
-    /// They slip in the direction of this sign.
+    /// The joint slips in the direction of this sign.
     Slip(f64),
 }
 
@@ -22,17 +22,18 @@ impl Mode {
     }
 }
 
-/// A law of friction in one mode. What is held has its force as the unknown in the place of the velocity: as a damper of
-/// unit size that knows no velocity.
+/// A law of friction in one mode. In stick, the unknown is the force instead of the velocity,
+/// scaled like a damper with coefficient `unit`.
 #[derive(Debug, Clone)]
 struct InMode {
     law: SharedLaw,
     mode: Mode,
-    /// Force per unknown of a joint that is held, N s/m: makes its size that of a velocity.
+    /// Force per unknown of a stuck joint, N s/m. It gives the unknown the magnitude of a
+    /// velocity.
     unit: f64,
 }
 
-/// The law of a joint that slides, in a mode.
+/// Returns the law of a joint in a mode.
 pub(super) fn in_mode(law: &SharedLaw, mode: Mode, unit: f64) -> SharedLaw {
     Arc::new(InMode { law: law.clone(), mode, unit })
 }

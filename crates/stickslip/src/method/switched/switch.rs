@@ -1,17 +1,21 @@
-//! What happens at a switch: which faces rest and which slip from there on, and what the switch does to derivatives.
+//! Transition at a switch: stick or slip of the joints afterwards, and the effect on
+//! sensitivities.
 //!
-//! Faces that rest, or that come to rest, hold if forces within their limits keep their accelerations at zero: a linear
-//! complementarity problem in the box of the limits, for all of them together. At a switch of the time τ, which is a zero of
-//! `n(z, t)`, a derivative by the start is multiplied by the saltation matrix `I + (f⁺ - f⁻) nᵀ/(nᵀ f⁻ + ∂n/∂t)`, with
-//! the time derivatives f⁻ and f⁺ of the state before and after.
-//! Source: Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems" (2004), Ch. 7.
+//! Joints at rest stick if forces within their limits keep their accelerations at zero. This is
+//! a linear complementarity problem in the box of the limits, for all of them together. A
+//! switch at time τ is a zero of `n(z, t)`. There the sensitivity is multiplied by the
+//! saltation matrix `I + (f⁺ - f⁻) nᵀ/(nᵀ f⁻ + ∂n/∂t)`, with the time derivatives f⁻ and f⁺ of
+//! the state before and after.
+//!
+//! Source: Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems"
+//! (2004), Ch. 7.
 
 use super::mode::Mode;
 use crate::method::assembly::Assembly;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 
-/// `Wᵀ M⁻¹ W` between some axes.
+/// Returns `Wᵀ M⁻¹ W` for some axes.
 pub(super) fn mobility(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(axes.len(), axes.len());
     for (b, &other) in axes.iter().enumerate() {
@@ -23,8 +27,9 @@ pub(super) fn mobility(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
     out
 }
 
-/// The modes of faces at rest whose relative accelerations would be these without their forces, and whose limits are these;
-/// `None` if no forces decide them.
+/// Returns the modes of joints at rest. `free` are the relative accelerations without their
+/// forces, and `limits` the limits of these forces. Returns `None` if the problem has no
+/// solution.
 pub(super) fn decide(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> Option<Vec<Mode>> {
     let high = DVector::from_column_slice(limits);
     let free = DVector::from_column_slice(free);
@@ -35,9 +40,12 @@ pub(super) fn decide(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> O
     Some(force.iter().zip(limits).map(mode).collect())
 }
 
-/// Takes the velocities along these axes out of those of the structure: as the impulse does that stops them. `columns` vectors
-/// of length n, row after row, less the velocities that are `imposed` on the axes, which only the motion itself has.
-/// False if the axes are not independent.
+/// Removes the velocities along these axes from those of the structure, like the impulse that
+/// stops them.
+///
+/// `velocity` contains `columns` vectors of length n, row by row. `imposed` are the imposed
+/// velocities of the axes; they are zero for sensitivities. Returns false if the axes are not
+/// independent.
 pub(super) fn stop(
     assembly: &Assembly,
     axes: &[usize],
@@ -67,8 +75,9 @@ pub(super) fn stop(
     true
 }
 
-/// Multiplies a derivative of the state, row after row, by the saltation matrix of a switch at which the velocity along an
-/// axis passes zero at this `rate` (m/s²), from the time derivatives `before` and `after` it.
+/// Multiplies a sensitivity, stored row by row, by the saltation matrix of a switch. There the
+/// velocity along an axis passes zero at this `rate` (m/s²); `before` and `after` are the time
+/// derivatives of the state.
 pub(super) fn saltate(
     assembly: &Assembly,
     (axis, rate): (usize, f64),
@@ -91,7 +100,8 @@ pub(super) fn saltate(
 mod tests {
     use super::*;
 
-    /// Two masses that rub on each other and on the ground: one that is pushed beyond its limit takes the other along, or not.
+    /// Two masses with friction to each other and to the ground. A mass that is pushed beyond
+    /// its limit may or may not move the other.
     #[test]
     fn faces_hold_what_their_limits_allow() {
         // joint 1: mass 1 to ground, joint 2: mass 2 to mass 1; both of 1 kg

@@ -1,4 +1,5 @@
-//! Orbits and derivatives between located switches against closed forms, integrations from outside, and differences.
+//! Compares orbits and sensitivities between located switches with closed forms, independent
+//! integrations, and differences.
 
 use super::flow::SwitchedFlow;
 use crate::law::{Coulomb, Cubic, SharedLaw, Stribeck};
@@ -31,13 +32,15 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// A law that makes no force, so that friction beside it is followed by integration.
+/// A law without force. It forces the use of time integration for the friction next to it.
 fn nothing() -> SharedLaw {
     Arc::new(Cubic { stiffness: 0.0 })
 }
 
-/// 1e4 N/m, 3 N s/m, 6 N, friction from 3 N down to 2 N over 20 mm/s: frequency (Hz), amplitude (m) and the largest modulus of the multipliers of half a
-/// period, by SciPy's DOP853 with its own location of events at 1e-13 and differences of the return.
+/// Reference for 1e4 N/m, 3 N s/m, 6 N, and friction that decreases from 3 N to 2 N over 20
+/// mm/s. Columns: frequency (Hz), amplitude (m), largest modulus of the multipliers of half a
+/// period. Computed by SciPy's DOP853 with separate event location at 1e-13 and differences of
+/// the return map.
 const STRIBECK: [(f64, f64, f64); 7] = [
     (4.0, 5.012_554_110_668_944e-4, 0.708_411_65),
     (8.0, 8.617_465_690_777_892e-4, 0.989_911_39),
@@ -66,7 +69,8 @@ fn falling_friction_has_its_orbits() {
     assert!((waited.places[0].amplitude() / STRIBECK[1].1 - 1.0).abs() < 1e-7, "{:?}", waited.evidence);
 }
 
-/// Den Hartog's closed form (1931) of an undamped mass under constant friction, and the product of the multipliers of half a period, whose square is that of a period.
+/// Den Hartog's closed form (1931) of an undamped mass under constant friction, and the product
+/// of the multipliers of half a period. Its square is that of a period.
 #[test]
 fn constant_friction_has_den_hartogs_orbit() {
     for (share, ratio, amplitude) in
@@ -101,7 +105,8 @@ fn pair(laws: [SharedLaw; 2], more: Option<SharedLaw>) -> System {
     builder.force(0, 1, Complex64::new(2.0, 0.0)).force(1, 1, Complex64::new(0.5, -1.0)).build().unwrap()
 }
 
-/// Sticking, slipping and turning are those of the closed forms from event to event, with the derivative of a period.
+/// Stick, slip and reversals agree with the event-driven closed forms, and so does the
+/// derivative of a period.
 #[test]
 fn constant_friction_moves_as_from_event_to_event() {
     let coulomb = |limit: f64| -> SharedLaw { Arc::new(Coulomb { limit }) };
@@ -123,7 +128,8 @@ fn constant_friction_moves_as_from_event_to_event() {
     }
 }
 
-/// The derivative of a run through rest and slip is what a small change of its start does to its end.
+/// The sensitivity of a run through stick and slip equals the effect of a small change of the
+/// initial state on the end state.
 #[test]
 fn derivatives_go_through_switches() {
     let stribeck = |limit: f64| -> SharedLaw { Arc::new(Stribeck { limit, static_limit: 1.4 * limit, velocity: 0.2 }) };

@@ -1,31 +1,32 @@
-//! How a joint holds while its sliders stand.
+//! Stiffness, limit and damping of a joint whose sliders do not slip.
 
 use super::super::SystemJoint;
 use super::linear::Link;
 use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 
-/// A joint while its sliders stand.
+/// One axis of a joint whose sliders do not slip.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stuck {
-    /// Which joint of the system, and which of its axes.
+    /// Index of the joint in the system.
     pub(super) joint: usize,
     pub(super) axis: usize,
     pub(super) name: String,
-    /// `W`, by its entries.
+    /// The direction `W`, as its entries.
     pub(super) at: Vec<(usize, f64)>,
     pub(super) hold: Hold,
-    /// The spring of faces that are apart at rest, once they are closed and stick, N/m; zero of all others.
+    /// Stiffness of open faces after they close and stick, N/m; zero for all other joints.
     pub(super) closed: f64,
-    /// The force that presses the faces at rest, N, of a normal direction.
+    /// For a normal direction: the force that presses the faces together at zero displacement,
+    /// N.
     pub(super) pressed: Option<f64>,
-    /// Viscous damping in small motion, free of friction and as it holds, kg/s.
+    /// Viscous damping in small motion, without friction and in the stuck state, kg/s.
     pub(super) damping: [f64; 2],
-    /// Whether it slips little by little, and `hold` has the limit at which all of it does.
+    /// True if the joint slips gradually. `hold` then contains the limit of complete slip.
     pub(super) gradual: bool,
 }
 
 impl Stuck {
-    /// One for each axis of a joint, which is this law in small motion.
+    /// Returns one entry per axis of a joint. `law` describes the joint in small motion.
     pub(super) fn of_joint((index, joint): (usize, &SystemJoint), law: &dyn Law) -> Vec<Self> {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
@@ -45,14 +46,14 @@ impl Stuck {
 }
 
 impl Stuck {
-    /// The spring and damper that it is while it holds, if it is any.
+    /// Returns the spring and damper of the stuck joint, if it has any.
     pub(super) fn held(&self) -> Option<Link> {
         let stiffness = if let Hold::Spring { stiffness, .. } = self.hold { stiffness } else { 0.0 };
         let damping = self.damping[1];
         (stiffness > 0.0 || damping > 0.0).then(|| Link { at: self.at.clone(), stiffness, damping })
     }
 
-    /// The damper that it is free of friction, if it is any.
+    /// Returns the damper of the joint without friction, if it has one.
     pub(super) fn free(&self) -> Option<Link> {
         let damping = self.damping[0];
         (damping > 0.0).then(|| Link { at: self.at.clone(), stiffness: 0.0, damping })
@@ -61,9 +62,9 @@ impl Stuck {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Hold {
-    /// It carries nothing.
+    /// The joint carries no force.
     Nothing,
-    /// The sum of its springs, N/m; the limit and the displacement of the slider that gives way first.
+    /// The sum of its springs, N/m; limit and displacement of the slider that slips first.
     Spring {
         stiffness: f64,
         limit: f64,
@@ -75,7 +76,7 @@ pub(super) enum Hold {
 }
 
 impl Hold {
-    /// Along one of the law's axes.
+    /// Returns the stuck state along one axis of the law.
     fn of(law: &dyn Law, axis: usize) -> Hold {
         if let Some(displacement) = law.macro_slip() {
             return Hold::Spring { stiffness: small_stiffness(law, axis), limit: law.scale(), displacement };
@@ -92,7 +93,8 @@ impl Hold {
         first.map_or(Hold::Nothing, |(k, limit)| Hold::Spring { stiffness, limit, displacement: limit / k })
     }
 
-    /// Faces pressed on each other by this force (N) at rest: the spring that they are then, which no load makes slip. Faces that only touch hold nothing.
+    /// Returns the spring of faces that this force (N) presses together. No load makes them
+    /// slip. Faces that only touch carry no force.
     fn pressed(law: &dyn Law, axis: usize, force: f64) -> Hold {
         let stiffness = small_stiffness(law, axis);
         if force > 0.0 && stiffness > 0.0 {
@@ -102,13 +104,13 @@ impl Hold {
         }
     }
 
-    /// A smooth law: the spring that it is in small motion, or rigid where its resistance is viscous. The steeper its
-    /// slope, the nearer it is to that.
+    /// Returns the stuck state of a smooth law: its spring in small motion, or rigid if its
+    /// resistance is viscous. The approximation improves with the slope of the law.
     fn smooth(law: &dyn Law, axis: usize) -> Hold {
         let (limit, stiffness) = (law.scale(), small_stiffness(law, axis));
         match (limit > 0.0, stiffness > 0.0) {
             (false, _) => Hold::Nothing,
-            // a law of displacement alone holds as the spring that it is, and never gives way
+            // a law of displacement alone acts as its spring and never slips
             (true, false) if limit.is_infinite() => Hold::Nothing,
             (true, true) => Hold::Spring { stiffness, limit, displacement: limit / stiffness },
             (true, false) => Hold::Rigid { limit },
@@ -116,9 +118,10 @@ impl Hold {
     }
 }
 
-/// Stiffness in motion that is small in every direction, N/m.
+/// Returns the stiffness in motion that is small in every direction, N/m.
 fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
-    // what velocity alone decides is as stiff as the spring before it, however it is regularised
+    // a law of velocity alone is as stiff as the spring in series with it, for any
+    // regularization
     if let Some(prox) = law.prox() {
         return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
     }
@@ -133,7 +136,7 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
         return point.force_slope(axis)[count + axis];
     }
     let Some(rate) = law.rate() else { return 0.0 };
-    // with what the states do at once: f_u + f_z z_v
+    // includes the immediate response of the states: f_u + f_z z_v
     let z = vec![0.0; rate.states()];
     let mut point = RatePoint::new(count, z.len());
     rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
@@ -141,7 +144,8 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
     point.force_slope(axis)[axis] + by_states.sum::<f64>()
 }
 
-/// Viscous damping in motion that is small in every direction, kg/s: what velocity alone makes of the force, states standing.
+/// Returns the viscous damping in motion that is small in every direction, kg/s: the slope of
+/// the force over velocity at constant states.
 fn small_damping(law: &dyn Law, axis: usize) -> f64 {
     let Some(rate) = law.rate() else { return 0.0 };
     let (count, rest, z) = (law.directions(), [0.0; MOST_DIRECTIONS], vec![0.0; rate.states()]);
@@ -150,7 +154,7 @@ fn small_damping(law: &dyn Law, axis: usize) -> f64 {
     point.force_slope(axis)[count + axis]
 }
 
-/// The force along an axis of a law that has not moved, N.
+/// Returns the force of a law along an axis at zero displacement, N.
 fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
     let rest = [0.0; MOST_DIRECTIONS];
     match (law.step(), law.rate()) {
@@ -163,7 +167,7 @@ fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
     }
 }
 
-/// An amplitude (m) so small that no law slips, whose square is still a normal number.
+/// An amplitude (m) at which no law slips. Its square is still a normal number.
 const SMALL: f64 = 1e-150;
 
 #[cfg(test)]
@@ -176,21 +180,22 @@ mod tests {
         let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
         assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
         assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
-        // micro-slip from the first movement on is no limit: all of it slips at FS (1 + β)/(KT (β + (χ + 1)/(χ + 2)))
+        // micro-slip from the first motion is not the limit: complete slip begins at FS (1 +
+        // β)/(KT (β + (χ + 1)/(χ + 2)))
         let iwan = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
         let Hold::Spring { stiffness, limit, displacement } = Hold::of(&iwan, 0) else { panic!("{iwan:?}") };
         let macro_slip = 2.0 * 1.3 / (1e4 * (0.3 + 0.5 / 1.5));
         assert!(stiffness == 1e4 && limit == 2.0 && (displacement / macro_slip - 1.0).abs() < 1e-12, "{displacement}");
         assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
         assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
-        // a stop holds once it is pressed, and not where it only touches
+        // a stop carries force when it is pressed, but not when it only touches
         let stop = |gap: f64| {
             let law = Gap { gap, stiffness: 1e4 };
             Hold::pressed(&law, 0, force_at_rest(&law, 0))
         };
         assert!(matches!(stop(-1e-3), Hold::Spring { stiffness: 1e4, .. }), "{:?}", stop(-1e-3));
         assert_eq!([0.0, 1e-3].map(stop), [Hold::Nothing; 2]);
-        // without a limit a joint is a free reference
+        // without a limit, the joint is free
         assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }, 0), Hold::Nothing);
         assert_eq!(Hold::of(&Coulomb { limit: 0.0 }, 0), Hold::Nothing);
     }

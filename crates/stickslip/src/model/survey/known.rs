@@ -1,79 +1,89 @@
-//! What a survey tells of a model.
+//! Results of a survey of a model.
 
 /// A mode of the linear structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearMode {
-    /// Undamped natural frequency, rad/s; where the damping has a gyroscopic part that of free vibration, `Im λ`.
+    /// Undamped natural frequency, rad/s. If the damping has a gyroscopic part, the frequency
+    /// of free vibration, `Im λ`.
     pub omega: f64,
-    /// Damping ratio `φᵀCφ / (2ω φᵀMφ)`: exact where damping does not couple the modes, and to first order where it is
-    /// light. Where the damping has a gyroscopic part, `-Re λ / |λ|`.
+    /// Damping ratio `φᵀCφ / (2ω φᵀMφ)`.
+    ///
+    /// It is exact if damping does not couple the modes, and correct to first order for light
+    /// damping. If the damping has a gyroscopic part, `-Re λ / |λ|`.
     pub damping: f64,
 }
 
 /// The modes of a linear structure.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Modes {
-    /// Those with a frequency, rising.
+    /// Modes with a nonzero frequency, in ascending order.
     pub elastic: Vec<LinearMode>,
-    /// Motions that no spring resists.
+    /// Number of motions without a restoring spring.
     pub rigid: usize,
-    /// Modes whose frequency is lost in rounding beside stiffnesses many orders higher.
+    /// Number of modes whose frequency is lost in rounding, because other stiffnesses are many
+    /// orders of magnitude higher.
     pub lost: usize,
 }
 
-/// How a joint holds while it is stuck, and when it lets go.
+/// The stuck state of a joint, and the load at which it slips.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstSlip {
     /// Name of the joint.
     pub joint: String,
-    /// Limit of the slider that gives way first, N; zero if the joint carries nothing. Of a joint that slips little by little the one at which all of
-    /// it slips.
+    /// Limit of the slider that slips first, N; zero if the joint carries no force. For a joint
+    /// that slips gradually, the limit of complete slip.
     pub limit: f64,
-    /// Relative displacement from the unloaded state at which it gives way, m; `None` if it holds rigidly until the
-    /// limit.
+    /// Relative displacement from the unloaded state at which slip begins, m. `None` if the
+    /// joint is rigid up to the limit.
     pub displacement: Option<f64>,
-    /// Whether it slips little by little before that: micro-slip at every load.
+    /// True if the joint slips gradually, with micro-slip at every load.
     pub gradual: bool,
-    /// Of the direction along which faces press on each other, which opens and closes and never slips: the force with
-    /// which they do where nothing gives way, N, zero if they are apart. `None` along the others.
+    /// For a normal direction, which opens and closes but never slips: the force that presses
+    /// the faces together at zero displacement, N; zero if they are apart. `None` for other
+    /// directions.
     pub pressed: Option<f64>,
-    /// What is left of it at rest, under the constant forces, after the structure has given way, N: not positive where it takes all. `None` where
-    /// nobody knows: without a preload, beside rigid friction, or in models too large for a quick answer.
+    /// Contact force in static equilibrium under the constant forces, N, with the deformation
+    /// of the structure. It is zero or negative if the contact opens.
+    ///
+    /// `None` if it is unknown: without preload, in models with rigid friction, or in models
+    /// too large for a quick answer.
     pub at_rest: Option<f64>,
 }
 
-/// How much of its limit a stuck joint needs under the model's excitation, over a range of drive frequencies.
+/// Load of a stuck joint relative to its limit under the model's excitation, over a range of
+/// excitation frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Onset {
-    /// Largest amplitude of the joint's load over its limit. The joint slips where it is above 1; the excitation times
-    /// `1 / largest` is the smallest that makes it slip.
+    /// Largest amplitude of the joint's load divided by its limit. The joint slips where this
+    /// is above 1. The excitation times `1 / largest` is the smallest one that makes it slip.
     pub largest: f64,
-    /// Where that is, rad/s.
+    /// Frequency of the largest load, rad/s.
     pub at: f64,
-    /// The stretches of the range in which it is above 1, rad/s. They hold for a joint that slips first: what the
-    /// others do after it has slipped changes the structure.
+    /// Intervals of the range with a load above 1, rad/s. They are valid for the joint that
+    /// slips first: after that, the slip of other joints changes the structure.
     pub slips: Vec<(f64, f64)>,
 }
 
-/// Masses that no spring holds, as one body that can drift.
+/// Places of a body that no spring holds, so that it can drift.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loose {
-    /// Their names.
+    /// Names of the places.
     pub masses: Vec<String>,
-    /// Whether joints that are stuck hold it.
+    /// True if stuck joints hold the body.
     pub held_by_friction: bool,
-    /// Whether joints hold it whose force nothing bounds, and which have no stiffness at rest.
+    /// True if joints of unbounded force without stiffness in static equilibrium hold the body.
     pub held_in_motion: bool,
-    /// The joints with faces that press on it, which hold it while they do.
+    /// Joints with faces that press on the body and hold it as long as they do.
     pub contacts: Vec<String>,
-    /// The joints with faces that nothing presses, which may touch it.
+    /// Joints with faces without pressure that can touch the body.
     pub faces: Vec<String>,
 }
 
-/// Contacts that are pressed before anything is loaded, and carry nothing at rest: their preload has pushed away a body that nothing else holds.
+/// Contacts with a preload that carry no force in static equilibrium. Their preload moves a
+/// body that nothing else holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unpressed {
-    /// The joints.
+    /// Names of the joints.
     pub joints: Vec<String>,
     /// The sum of their preloads, N.
     pub preload: f64,

@@ -1,5 +1,7 @@
-//! Modes of masses on springs and rigid constraints. Stiffnesses too far apart for one eigenvalue problem are told
-//! apart by levels: for the modes below, the stiffest springs count as rigid.
+//! Modes of masses with springs and rigid constraints.
+//!
+//! A single eigenvalue problem cannot resolve stiffnesses of very different magnitude. They are
+//! split into levels: for the lower modes, the stiffest springs count as rigid.
 
 use super::loose::Groups;
 use super::{LinearMode, Modes};
@@ -15,38 +17,42 @@ pub(super) struct Link {
     pub(super) damping: f64,
 }
 
-/// A linear structure in modal coordinates.
+/// The modes of a linear structure, with their shapes.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
     pub(super) modes: Modes,
-    /// Shapes of the elastic modes with `φᵀMφ = 1`, one column each; none if some stiffnesses had to count as rigid.
+    /// Shapes of the elastic modes with `φᵀMφ = 1`, one per column. `None` if some stiffnesses
+    /// had to count as rigid.
     pub(super) shapes: Option<DMatrix<f64>>,
-    /// Whether the damping has a gyroscopic part: modes are then those of free vibration, and shapes those without it.
+    /// True if the damping has a gyroscopic part. Modes are then those of free vibration;
+    /// shapes are those without that part.
     pub(super) turning: bool,
 }
 
-/// An eigenvalue below this share of the largest has fewer than six digits left; then the stiffest springs count as
-/// rigid for the modes below. Symmetric QR errs by some 1e-15 of the largest.
+/// Relative eigenvalue below which fewer than six digits are significant. For modes below it,
+/// the stiffest springs count as rigid. Symmetric QR has errors of about 1e-15 of the largest
+/// eigenvalue.
 const FEW_DIGITS: f64 = 1e-9;
-/// An eigenvalue below this share of the largest is rounding.
+/// Relative eigenvalue below which the value is rounding.
 const ROUNDING: f64 = 1e-13;
-/// Springs above this share of the stiffest make the modes at the top of the spectrum.
+/// Springs above this fraction of the stiffest spring determine the highest modes.
 const STIFFEST: f64 = 1e-4;
-/// Of a structure by its matrices: eigenvalues below this share of the middle one are free motions, in matrices of ten digits.
+/// For matrix structures: eigenvalues below this fraction of the median are free motions. This
+/// suits matrices with ten digits.
 const FREE: f64 = 1e-10;
-/// Levels of stiffness that are told apart.
+/// Number of stiffness levels.
 const LEVELS: usize = 4;
-/// A pivot below this share of what it came from is zero.
+/// A pivot below this fraction of its original value is zero.
 const ZERO: f64 = 1e-12;
-/// Degrees of freedom beyond which modes are not computed: they would take longer than a second. Measured: 0.35 s at
-/// 500, with the third power.
+/// Largest number of degrees of freedom for which modes are computed; more would take longer
+/// than a second. Measured: 0.35 s at 500, growing with the third power.
 pub(super) const LARGEST: usize = 700;
 
-/// A structure in its modes without damping, `q'' + D q' + Λ q`.
+/// A structure in its undamped modes, `q'' + D q' + Λ q`.
 struct Modal {
-    /// Λ, squares of frequencies, rising.
+    /// Λ, squared frequencies in ascending order.
     squares: Vec<f64>,
-    /// Of which so many are free motions.
+    /// Number of free motions among them.
     free: usize,
     shapes: DMatrix<f64>,
     damping: DMatrix<f64>,
@@ -68,7 +74,7 @@ impl Modal {
         links.iter().for_each(|link| add(&mut damping, &link.at, link.damping));
         let (mass, damping, stiffness) = (part(&full.mass), part(&damping), part(&stiffness));
         let (mut squares, shapes) = natural(&mass, &stiffness)?;
-        // what has no mass follows the rest, and has no mode
+        // a coordinate without mass follows the others and has no mode
         squares.truncate(squares.partition_point(|value| value.is_finite()));
         let usual = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
         let free = squares.partition_point(|value| *value < FREE * usual);
@@ -81,7 +87,7 @@ impl Modal {
         self.shapes.columns(self.free, self.squares.len() - self.free).into_owned()
     }
 
-    /// Without what turns velocities.
+    /// Returns a mode without the gyroscopic part of the damping.
     fn mode(&self, k: usize) -> LinearMode {
         let omega = self.squares[k].max(0.0).sqrt();
         LinearMode { omega, damping: self.damping[(k, k)] / (2.0 * omega) }
@@ -93,7 +99,8 @@ impl Modal {
         Linear { modes, shapes: Some(self.elastic_shapes()), turning: false }
     }
 
-    /// Free vibration where the damping has a gyroscopic part; `None` if it has none. Beyond the 200 lowest modes that part is left out.
+    /// Returns the modes of free vibration if the damping has a gyroscopic part, otherwise
+    /// `None`. Only the 200 lowest modes include that part.
     fn turning(&self) -> Option<Vec<LinearMode>> {
         let n = self.squares.len().min(200);
         let found = free_vibrations(&self.squares[..n], &self.damping.view((0, 0), (n, n)).into_owned())?;
@@ -105,7 +112,8 @@ impl Modal {
 }
 
 impl Linear {
-    /// The modes of a structure with springs at joints, and constraints `Σ w x = 0`: of one with a gyroscopic matrix those of free vibration.
+    /// Returns the modes of a structure with springs at joints and constraints `Σ w x = 0`.
+    /// With a gyroscopic matrix, they are the modes of free vibration.
     pub(super) fn of_matrices(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
         let Some(modal) = Modal::new(full, links, rigid) else { return Linear::unknown(full) };
         match modal.turning() {
@@ -117,7 +125,8 @@ impl Linear {
         }
     }
 
-    /// The same of a structure in a travelling wave, twice its size, without what turns velocities.
+    /// Returns the modes of a structure in a travelling wave, which has twice the size.
+    /// Gyroscopic damping is not included.
     pub(super) fn of_wave(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
         Modal::new(full, links, rigid).map_or_else(|| Linear::unknown(full), |modal| modal.linear())
     }
@@ -126,7 +135,8 @@ impl Linear {
         Linear { modes: Modes { lost: full.mass.nrows(), ..Modes::default() }, shapes: None, turning: false }
     }
 
-    /// The modes of masses (zero where a place has none) on links, with constraints `Σ w x = 0`.
+    /// Returns the modes of masses with springs and constraints `Σ w x = 0`. A place without
+    /// mass has zero in `mass`.
     pub(super) fn new(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
         let total = reduced(mass, links, rigid);
         let (elastic, rigid_motions) = (total.elastic(), rigid_motions(mass, links, rigid));
@@ -134,11 +144,12 @@ impl Linear {
         let expected = dofs - rigid_motions.min(dofs);
         if elastic.len() >= expected {
             let shapes = total.shapes(expected);
-            let lowest = elastic.len() - expected; // rounding may give a rigid motion a frequency
+            let lowest = elastic.len() - expected; // rounding can give a rigid motion a frequency
             let modes = Modes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, lost: 0 };
             return Linear { modes, shapes: Some(shapes), turning: false };
         }
-        // some modes are too far below the stiffest springs: those springs count as rigid for them
+        // some modes are too far below the stiffest springs; those springs count as rigid for
+        // these modes
         let mut high = elastic;
         let (mut links, mut rigid) = (links.to_vec(), rigid.to_vec());
         for _ in 0..LEVELS {
@@ -152,7 +163,7 @@ impl Linear {
             links = below;
             let lower = reduced(mass, &links, &rigid);
             if lower.frequencies.len() + high.len() != dofs {
-                break; // the gap does not come from these springs
+                break; // these springs do not cause the gap
             }
             let mut elastic = lower.elastic();
             elastic.extend(high);
@@ -163,7 +174,7 @@ impl Linear {
         }
         high.drain(..high.len().saturating_sub(expected));
         if high.len() < expected {
-            // what is above rounding, with the digits that it has
+            // take all eigenvalues above rounding, with the digits that they have
             let mut all = total.above(ROUNDING);
             all.drain(..all.len().saturating_sub(expected));
             if all.len() > high.len() {
@@ -175,11 +186,12 @@ impl Linear {
     }
 }
 
-/// Modes of the places with mass: squared frequencies, rising, may be rounding around zero.
+/// Modes of the places with mass. Squared frequencies are in ascending order and can be
+/// rounding errors around zero.
 struct Reduced {
     frequencies: Vec<f64>,
     damping: Vec<f64>,
-    /// `φᵀMφ = 1`, in the places of the model, one column each.
+    /// Shapes with `φᵀMφ = 1` at the places of the model, one per column.
     vectors: DMatrix<f64>,
 }
 
@@ -199,17 +211,17 @@ impl Reduced {
     }
 }
 
-/// Motions with mass that neither a spring nor a constraint resists.
+/// Returns the number of motions with mass that neither a spring nor a constraint resists.
 fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> usize {
     let n = mass.len();
     let held = links.iter().filter(|link| link.stiffness > 0.0).map(|link| link.at.as_slice());
     let held: Vec<&[(usize, f64)]> = held.chain(rigid.iter().copied()).collect();
-    let mut groups = Groups::new(n + 1); // place n stands for the ground
+    let mut groups = Groups::new(n + 1); // place n is the ground
     for at in &held {
         match at {
             [(a, _)] => groups.join((*a, n)),
             [(a, p), (b, q)] if a != b && p + q == 0.0 => groups.join((*a, *b)),
-            // along a direction of a node, or in a wave: what it resists is a matter of all others
+            // along an oblique direction or in a wave, the rank of all directions decides
             _ => return unresisted(mass, &held),
         }
     }
@@ -220,17 +232,20 @@ fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> us
     bodies.into_iter().filter(|body| *body != ground).count()
 }
 
-/// The same of any directions: as many as these leave free, less those of places without mass alone.
+/// Returns this number for arbitrary directions: the dimension that they leave free, minus that
+/// of the places without mass alone.
 fn unresisted(mass: &[f64], held: &[&[(usize, f64)]]) -> usize {
     let (light, heavy): (Vec<usize>, Vec<usize>) = (0..mass.len()).partition(|i| mass[*i] == 0.0);
     let all = [light.as_slice(), &heavy].concat();
     Basis::new(mass.len(), &all, held).kept.len() - Basis::new(mass.len(), &light, held).kept.len()
 }
 
-/// Eliminates constraints and places without mass, and solves for the modes of the remaining places.
+/// Eliminates constraints and places without mass, and solves for the modes of the remaining
+/// places.
 fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced {
     let n = mass.len();
-    // places without mass come first: constraints are to remove these, and the masses that remain stay positive
+    // places without mass come first, so that constraints eliminate them and the remaining mass
+    // matrix stays positive definite
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by_key(|i| mass[*i] > 0.0);
     let basis = Basis::new(n, &order, rigid);
@@ -250,13 +265,13 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
     let heavy = r - light;
     let part = |matrix: &DMatrix<f64>| matrix.view((light, light), (heavy, heavy)).into_owned();
     let (m, c, k) = (part(&m), part(&c), part(&k));
-    // without an answer every mode is lost
+    // without a solution, every mode is lost
     let unknown =
         || Reduced { frequencies: vec![0.0; heavy], damping: vec![0.0; heavy], vectors: DMatrix::zeros(n, heavy) };
     if heavy == 0 {
         return unknown();
     }
-    // L with M = L Lᵀ; its inverse turns the modes into a standard problem
+    // M = L Lᵀ; the inverse of L transforms to a standard eigenvalue problem
     let Some(inverse) = inverse_root(&m) else { return unknown() };
     let standard = &inverse * k * inverse.transpose();
     let standard = (&standard + standard.transpose()) * 0.5;
@@ -269,7 +284,7 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
         let shape = modal.column(mode);
         frequencies.push(eigen.eigenvalues[mode]);
         damping.push(shape.dot(&(&c * shape)));
-        // places without mass follow from the last to the first
+        // back substitution for the places without mass
         let mut y = DVector::zeros(r);
         y.rows_mut(light, heavy).copy_from(&shape);
         for p in (0..light).rev() {
@@ -282,7 +297,7 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
     Reduced { frequencies, damping, vectors }
 }
 
-/// `matrix += value · row rowᵀ`
+/// Computes `matrix += value · row rowᵀ`.
 fn add(matrix: &mut DMatrix<f64>, row: &[(usize, f64)], value: f64) {
     for (i, a) in row {
         for (j, b) in row {
@@ -291,9 +306,10 @@ fn add(matrix: &mut DMatrix<f64>, row: &[(usize, f64)], value: f64) {
     }
 }
 
-/// Removes the first `light` coordinates, which have no mass, from damping and stiffness: they move so that their
-/// springs balance. Returns their rows `x_p = -Σ follow[p, j] x_j`, j > p. A coordinate without a spring follows its
-/// dampers.
+/// Eliminates the first `light` coordinates, which have no mass, from damping and stiffness.
+///
+/// They move so that their springs balance. A coordinate without a spring follows its dampers.
+/// Returns their rows `x_p = -Σ follow[p, j] x_j`, j > p.
 fn condense(light: usize, c: &mut DMatrix<f64>, k: &mut DMatrix<f64>) -> DMatrix<f64> {
     let r = k.nrows();
     let mut follow = DMatrix::zeros(light, r);
@@ -312,7 +328,7 @@ fn condense(light: usize, c: &mut DMatrix<f64>, k: &mut DMatrix<f64>) -> DMatrix
             follow[(p, *j)] = *g;
         }
         let pivot: Vec<(f64, f64)> = (0..r).map(|j| (k[(p, j)], c[(p, j)])).collect();
-        // congruence with x_p = -Σ g_j x_j: only rows and columns that p is tied to change
+        // congruence with x_p = -Σ g_j x_j changes only rows and columns coupled to p
         let tied: Vec<usize> = (p + 1..r).filter(|&j| pivot[j] != (0.0, 0.0)).collect();
         for &i in &tied {
             for &j in &tied {
@@ -325,7 +341,7 @@ fn condense(light: usize, c: &mut DMatrix<f64>, k: &mut DMatrix<f64>) -> DMatrix
     follow
 }
 
-/// `L⁻¹` of `M = L Lᵀ`.
+/// Returns `L⁻¹` of `M = L Lᵀ`.
 fn inverse_root(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = m.nrows();
     let diagonal = (0..n).all(|i| (0..n).all(|j| i == j || m[(i, j)] == 0.0));
@@ -335,11 +351,11 @@ fn inverse_root(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Cholesky::new(m.clone())?.l().solve_lower_triangular(&DMatrix::identity(n, n))
 }
 
-/// Coordinates that fulfil constraints: every place as a sum of the places that are kept.
+/// Coordinates that satisfy constraints: every place as a sum of the kept places.
 struct Basis {
-    /// The places that are kept, in the order in which they were offered.
+    /// The kept places, in the order of the input.
     kept: Vec<usize>,
-    /// For every place its (coordinate, factor).
+    /// Pairs (coordinate, factor) of every place.
     rows: Vec<Vec<(usize, f64)>>,
 }
 
@@ -349,7 +365,7 @@ impl Basis {
         for (row, at) in rigid.iter().enumerate() {
             at.iter().for_each(|(place, w)| a[(row, *place)] += w);
         }
-        // Gauss and Jordan; a constraint that follows from others leaves a row of zeros
+        // Gauss-Jordan elimination; a redundant constraint leaves a row of zeros
         let mut pivots: Vec<usize> = Vec::new();
         for &column in order {
             let next = pivots.len();
@@ -381,7 +397,7 @@ impl Basis {
         Basis { kept, rows }
     }
 
-    /// A direction of the places in the coordinates.
+    /// Returns a direction of the places in the coordinates.
     fn along(&self, at: &[(usize, f64)]) -> Vec<(usize, f64)> {
         let mut sum: Vec<(usize, f64)> = Vec::new();
         for (place, w) in at {
@@ -403,7 +419,7 @@ mod tests {
 
     #[test]
     fn constraints_remove_places_without_mass_first() {
-        // place 1 has no mass; 0 = 1, and the same once more
+        // place 1 has no mass; the constraint 0 = 1 occurs twice
         let at = [(0, 1.0), (1, -1.0)];
         let basis = Basis::new(3, &[1, 0, 2], &[&at, &at]);
         assert_eq!(basis.kept, [0, 2]);
@@ -411,8 +427,8 @@ mod tests {
         assert!(basis.along(&at).is_empty());
     }
 
-    /// A mass that moves in a plane: one inclined spring leaves a motion, two that are not parallel leave none, parallel ones do; a place without
-    /// mass is no motion of its own.
+    /// A mass in a plane: one inclined spring leaves one motion, two springs leave none unless
+    /// they are parallel. A place without mass adds no motion.
     #[test]
     fn inclined_springs_resist_what_they_span() {
         let link = |at: &[(usize, f64)]| Link { at: at.to_vec(), stiffness: 1.0, damping: 0.0 };

@@ -1,4 +1,4 @@
-//! Bodies that no spring holds.
+//! Detects bodies that no spring holds.
 
 use super::super::{Body, GROUND, Mass, Model, Place, System};
 use super::Loose;
@@ -6,13 +6,13 @@ use super::hold::{Hold, Stuck};
 use std::collections::{BTreeSet, HashMap};
 
 impl Model {
-    /// Bodies of masses that no spring holds to the ground or to a moved place.
+    /// Returns the bodies that no spring connects to the ground or to a moved place.
     pub(super) fn loose(&self, system: &System, joints: &[Stuck]) -> Vec<Loose> {
         let mut index: HashMap<String, usize> = HashMap::from([(GROUND.to_owned(), 0)]);
         for motion in &self.motions {
-            index.insert(motion.on.clone(), 0); // moved places are held as the ground is
+            index.insert(motion.on.clone(), 0); // moved places count as fixed, like the ground
         }
-        // a component is one body, which is held if it has no free motion of its own
+        // a component is one body, which is held if it has no free motion
         let held = system.reduced().is_none_or(|component| component.free() == 0);
         let own = self.places.iter().filter(|place| place.of.is_none());
         let of_component: Vec<String> = own.flat_map(Place::places).collect();
@@ -33,7 +33,7 @@ impl Model {
             body.windows(2).for_each(|pair| bodies.join((index[&pair[0]], index[&pair[1]])));
         }
         for place in &self.places {
-            // another view of a node takes hold of the node
+            // a second view of a node belongs to the body of the node
             let mass = self.masses.iter().find(|mass| place.of.as_ref() == Some(&mass.name)).map(Mass::places);
             let body = || self.bodies.iter().find(|body| place.of.as_ref() == Some(&body.name)).map(Body::places);
             let node = mass.or_else(body);
@@ -48,10 +48,10 @@ impl Model {
         let (mut gripped, mut held) = (bodies.clone(), bodies.clone());
         let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();
         let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
-        // by which joints with faces bodies are touched, pressed on each other or not
+        // joints with faces at each body: with contact force (touched) and without
         let (mut touched, mut beside) = (Vec::<(usize, &str)>::new(), Vec::<(usize, &str)>::new());
         for (number, (joint, labels)) in self.joints.iter().zip(self.joint_labels()).enumerate() {
-            // of nodes, each direction
+            // joints between nodes act along each direction
             let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
                 Some(rest) if !rest.is_empty() && name != GROUND => format!("{name}{rest}"),
                 _ => name.clone(),
@@ -110,7 +110,7 @@ impl Model {
     }
 }
 
-/// Which of some things hang together.
+/// Disjoint sets of connected items.
 #[derive(Debug, Clone)]
 pub(super) struct Groups {
     parent: Vec<usize>,
@@ -121,7 +121,7 @@ impl Groups {
         Groups { parent: (0..count).collect() }
     }
 
-    /// The lowest member of the group of `i`, or of a group that stands for it.
+    /// Returns the lowest member of the group of `i`.
     pub(super) fn of(&self, mut i: usize) -> usize {
         while self.parent[i] != i {
             i = self.parent[i];

@@ -1,9 +1,12 @@
-//! What is known of a model before anything is computed: its linear modes with all joints free and with all joints
-//! stuck, the motion at which each joint begins to slip, the masses that nothing holds.
+//! Survey of a model before any computation of orbits.
 //!
-//! Free: no joint carries a force. Stuck: every slider stands, so that a joint is its springs, or a constraint if it
-//! is rigid. Between the two lie the resonances of the model with friction: springs and constraints only raise the
-//! frequency of every mode (Courant, Fischer).
+//! A survey contains the linear modes with all joints free and with all joints stuck. It also
+//! contains the motion at which each joint begins to slip, and the bodies that nothing holds.
+//!
+//! Free: no joint carries a force. Stuck: no slider slips, so that a joint is a set of springs,
+//! or a constraint if it is rigid. The resonances of the model with friction lie between the
+//! two, because springs and constraints only raise the frequency of every mode (Courant,
+//! Fischer).
 
 mod hold;
 mod known;
@@ -22,26 +25,27 @@ use hold::{Hold, Stuck};
 use linear::{LARGEST, Linear, Link};
 use std::collections::HashMap;
 
-/// What is known of a model before anything is computed.
+/// Linear properties of a model: modes, onset of slip, loose bodies, preload.
 #[derive(Debug, Clone)]
 pub struct Survey {
     system: System,
     joints: Vec<Stuck>,
     free: Linear,
     stuck: Linear,
-    /// The same with the faces closed that are apart at rest, if there are any.
+    /// Modes with open faces closed, if any faces are apart in static equilibrium.
     closed: Option<Linear>,
-    /// What contacts carry at rest where no friction is rigid, N, see [`FirstSlip::at_rest`].
+    /// Contact forces in static equilibrium without rigid friction, N; see
+    /// [`FirstSlip::at_rest`].
     at_rest: Vec<Option<f64>>,
     loose: Vec<Loose>,
     unpressed: Option<Unpressed>,
 }
 
 impl Model {
-    /// Surveys the model; the cost is that of two symmetric eigenvalue problems.
+    /// Surveys the model, at the cost of two symmetric eigenvalue problems.
     ///
     /// # Errors
-    /// [`ModelError`] as [`Model::assemble`].
+    /// See [`Model::assemble`].
     ///
     /// # Example
     /// ```
@@ -57,11 +61,14 @@ impl Model {
         self.survey_under_load(&|_| None)
     }
 
-    /// The same, with the forces (N) of all joints along their directions in static equilibrium: faces without a preload that
-    /// constant loads press on each other are pressed, not apart.
+    /// Surveys the model with the joint forces (N) of static equilibrium, along the directions
+    /// of each joint.
+    ///
+    /// Faces without preload then count as pressed, not as apart, if constant loads press them
+    /// together.
     ///
     /// # Errors
-    /// [`ModelError`] as [`Model::assemble`].
+    /// See [`Model::assemble`].
     ///
     /// # Example
     /// A block of 1 kg lies on a contact and is pressed by 20 N.
@@ -88,7 +95,8 @@ impl Model {
     ) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
         let forces = if system.dofs() > LARGEST { None } else { forces(&system) };
-        // of each joint the force that presses its faces, where it has no preload
+        // contact force and law of joints without preload that the constant loads press
+        // together
         let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {
             let force = forces.as_ref()?.get(index)?[joint.law().normal()?];
             (force > 0.0).then(|| Some((force, joint.law().pressed_by(force)?)))?
@@ -155,7 +163,8 @@ impl Model {
     }
 }
 
-/// The structure as its joints hold it at rest, and with the faces closed that are apart, if there are any.
+/// Returns the linear structure with the joints of the stuck state, and the structure with
+/// closed faces if some faces are apart.
 fn with_faces(held: &[Link], faces: &[Link], linear: &dyn Fn(&[&Link]) -> Linear) -> (Linear, Option<Linear>) {
     let at_rest: Vec<&Link> = held.iter().collect();
     let closed: Vec<&Link> = held.iter().chain(faces).collect();
@@ -163,42 +172,45 @@ fn with_faces(held: &[Link], faces: &[Link], linear: &dyn Fn(&[&Link]) -> Linear
 }
 
 impl Survey {
-    /// Degrees of freedom.
+    /// Returns the number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.system.dofs()
     }
 
-    /// The assembled model.
+    /// Returns the assembled model.
     pub fn system(&self) -> &System {
         &self.system
     }
 
-    /// Whether the model has too many degrees of freedom for its modes, which then count as lost.
+    /// Returns whether the model has too many degrees of freedom for its modes. All modes then
+    /// count as lost.
     pub fn is_too_large(&self) -> bool {
         self.dofs() > LARGEST
     }
 
-    /// Modes with all joints free.
+    /// Returns the modes with all joints free.
     pub fn free(&self) -> &Modes {
         &self.free.modes
     }
 
-    /// Modes with all joints stuck: none slips, and faces stay closed, those too that are apart at rest.
+    /// Returns the modes with all joints stuck. All faces are closed, including those that are
+    /// apart in static equilibrium.
     pub fn stuck(&self) -> &Modes {
         &self.closed.as_ref().unwrap_or(&self.stuck).modes
     }
 
-    /// Bodies that no spring holds.
+    /// Returns the bodies that no spring holds.
     pub fn loose(&self) -> &[Loose] {
         &self.loose
     }
 
-    /// Contacts of bodies that no spring holds which carry nothing at rest, though they have a preload: no constant force balances it.
+    /// Returns preloaded contacts that carry no force in static equilibrium, if a body is
+    /// loose. No constant force balances their preload.
     pub fn unpressed(&self) -> Option<&Unpressed> {
         self.unpressed.as_ref()
     }
 
-    /// When each joint begins to slip, in the order of the model.
+    /// Returns the onset of slip of each joint, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
         let rigid = self.joints.iter().any(|joint| matches!(joint.hold, Hold::Rigid { .. }));
         let one = |(joint, carried): (&Stuck, &Option<f64>)| {

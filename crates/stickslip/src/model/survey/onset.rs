@@ -1,4 +1,4 @@
-//! The loads of stuck joints under the excitation, and the motion at which they let go.
+//! Loads of stuck joints under the excitation, and the motion at which they begin to slip.
 
 use super::hold::{Hold, Stuck};
 use super::linear::Link;
@@ -8,44 +8,53 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::maximum::maximum;
 
-/// Complex multiplications that an estimate of first slip may take: about 0.1 s.
+/// Limit of complex multiplications for an estimate of first slip: about 0.1 s.
 const WORK: f64 = 2.5e7;
-/// Frequencies of a range that are looked at, beside those around the modes in it.
+/// Number of frequencies sampled in a range, in addition to those around its modes.
 const FREQUENCIES: usize = 200;
-/// Fewer than this many would miss what lies between modes.
+/// Smallest number of frequencies; fewer would miss maxima between modes.
 const FEWEST: usize = 24;
-/// Points around a mode, in half its width at half its power.
+/// Sample points around a mode, in units of its damping ratio times its frequency.
 const AROUND: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// Instants per period of the highest harmonic, where there are several: the largest value is met to (π/64)²/2, about
-/// 0.1 %.
+/// Instants per period of the highest harmonic, if there are several harmonics. The largest
+/// value has a relative error of (π/64)²/2, about 0.1 %.
 const INSTANTS: usize = 64;
-/// Most instants; harmonics up to 64 have all of theirs.
+/// Largest number of instants; harmonics up to 64 have the full number.
 const MOST_INSTANTS: usize = 4096;
-/// Halvings with which a border between stick and slip is found: a millionth of a millionth of the step.
+/// Bisections that locate a border between stick and slip: the final interval is 1e-12 of the
+/// step.
 const HALVINGS: usize = 40;
-/// Share of two steps to which the place of the largest load is found: the load is flat there.
+/// Tolerance for the frequency of the largest load, relative to two steps. The load is flat
+/// there.
 const LOCATED: f64 = 1e-5;
-/// Compliance of a rigid joint, as a share of that of the structure: joints that hold in a ring, or side by side, share the load by it.
+/// Compliance of a rigid joint, relative to that of the structure. It distributes the load over
+/// redundant joints.
 const COMPLIANCE: f64 = 1e-10;
-/// The least share of that which a joint has whose limit is larger than that of others: it carries the more of a load that they share, as those along
-/// one line carry it by their limits, and slip together.
+/// Lower bound of the factor on that compliance for joints with larger limits. A joint with a
+/// larger limit carries a larger part of a shared load. Joints along one line carry the load in
+/// proportion to their limits and slip together.
 const STIFFEST: f64 = 1e-3;
-/// Relative distance of frequencies up to which two modes are a pair.
+/// Relative distance of frequencies up to which two modes form a pair.
 const EQUAL: f64 = 1e-9;
 
-/// A damping ratio that is rounding, and the share of its parts to which the work of an excitation on a mode cancels by rounding.
+/// Damping ratio that counts as zero, and relative work of an excitation on a mode that counts
+/// as zero. Both are rounding errors.
 const UNDAMPED: f64 = 1e-12;
 const UNDRIVEN: f64 = 1e-9;
 
-/// Degrees of freedom and joints up to which borders are refined.
+/// Largest number of degrees of freedom and joints for which borders are refined.
 const REFINED: usize = 40;
 
 impl Survey {
-    /// The loads of the stuck joints under the model's excitation, as shares of their limits, over drive frequencies
-    /// from `from` to `to` (rad/s), which may be the same. Constant forces are left out: how joints share these
-    /// depends on what was before.
+    /// Returns the loads of the stuck joints under the model's excitation, relative to their
+    /// limits.
     ///
-    /// `None`: the model is so large that this would take long, or it has no linear response there.
+    /// The excitation frequencies are from `from` to `to` (rad/s), which may be equal. Constant
+    /// forces are not included, because their distribution over the joints depends on the
+    /// history.
+    ///
+    /// Returns `None` if the model is too large for a quick answer, or if it has no linear
+    /// response in the range.
     pub fn onset(&self, from: f64, to: f64) -> Option<Vec<Onset>> {
         let omegas = self.frequencies(from, to)?;
         if self.joints.is_empty() {
@@ -58,8 +67,10 @@ impl Survey {
         (0..self.joints.len()).map(|joint| self.onset_of(joint, &omegas, &shares)).collect()
     }
 
-    /// Frequencies (rad/s) of the modes without any damping that the excitation drives at their resonance in a range of drive frequencies, all joints
-    /// free: linear motion has no bound there.
+    /// Returns the frequencies (rad/s) of undamped modes that the excitation drives at
+    /// resonance, with all joints free.
+    ///
+    /// Linear motion is unbounded there. The range applies to the excitation frequency.
     pub fn undamped(&self, from: f64, to: f64) -> Vec<f64> {
         let Some(shapes) = &self.free.shapes else { return Vec::new() };
         let driven = |index: usize, omega: f64| {
@@ -79,8 +90,11 @@ impl Survey {
         bare.filter(|(index, mode)| driven(*index, mode.omega)).map(|(_, mode)| mode.omega).collect()
     }
 
-    /// The modal amplitude (m √kg) at which the first joint slips in mode `index` (from 0) of the stuck structure, of two modes of one
-    /// frequency in their waves, `(φ₁ ± jφ₂)/√2`; `None` if it has no such mode or no joint is loaded in it.
+    /// Returns the modal amplitude (m √kg) at which the first joint slips in a mode of the stuck
+    /// structure. `index` counts the modes from 0.
+    ///
+    /// For two modes of equal frequency, it applies to their waves, `(φ₁ ± jφ₂)/√2`. Returns
+    /// `None` if the mode does not exist or loads no joint.
     pub fn slip_amplitude(&self, index: usize) -> Option<f64> {
         let modes = &self.stuck.modes.elastic;
         let omega = modes.get(index)?.omega;
@@ -96,15 +110,16 @@ impl Survey {
         (largest > 0.0).then(|| 1.0 / largest)
     }
 
-    /// The loads of all joints in mode `index` of a modal amplitude of one, as shares of what they stick up to.
+    /// Returns the loads of all joints in mode `index` at a modal amplitude of one, relative to
+    /// their stick limits.
     fn mode_shares(&self, index: usize) -> Option<Vec<f64>> {
-        // shapes of free vibration are others where the structure turns velocities
+        // with gyroscopic damping, the shapes of free vibration differ from these
         let shapes = self.stuck.shapes.as_ref().filter(|_| !self.stuck.turning)?;
         let omega = self.stuck.modes.elastic.get(index)?.omega;
         let shape = shapes.column(index).into_owned();
         let motion = |joint: &Stuck| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
         let (n, rigid) = (self.dofs(), self.rigid());
-        // the constraint forces balance what springs and inertia leave: W f = ω²Mφ - Kφ - W k u
+        // the constraint forces balance springs and inertia: W f = ω²Mφ - Kφ - W k u
         let mut rest =
             self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
         for joint in &self.joints {
@@ -121,7 +136,7 @@ impl Survey {
         let forces = Cholesky::new(normal)?.solve(&(w.transpose() * rest));
         let share = |(index, joint): (usize, &Stuck)| match joint.hold {
             Hold::Nothing => 0.0,
-            // any motion makes a part of it slip
+            // any motion causes partial slip
             Hold::Spring { .. } if joint.gradual => {
                 if motion(joint) == 0.0 {
                     0.0
@@ -137,7 +152,7 @@ impl Survey {
         Some(self.joints.iter().enumerate().map(share).collect())
     }
 
-    /// Of rigid joints, as shares of the structure's.
+    /// Returns the compliances of rigid joints, relative to that of the structure.
     fn compliances(&self, rigid: &[usize]) -> Vec<f64> {
         let limit = |joint: &usize| match self.joints[*joint].hold {
             Hold::Rigid { limit } => limit,
@@ -152,10 +167,10 @@ impl Survey {
         (0..self.joints.len()).filter(|j| rigid(&self.joints[*j])).collect()
     }
 
-    /// Drive frequencies that show the loads of stuck joints: evenly over the range, and around the modes that a
-    /// harmonic of the excitation meets in it.
+    /// Returns excitation frequencies that resolve the loads of stuck joints: uniform over the
+    /// range, and denser around modes that a harmonic of the excitation meets.
     fn frequencies(&self, from: f64, to: f64) -> Option<Vec<f64>> {
-        // stiffnesses that had to count as rigid leave no digits for a response
+        // without shapes, the stiffnesses are too different to compute a response
         self.stuck.shapes.as_ref()?;
         if !(from > 0.0 && from <= to && to.is_finite()) {
             return None;
@@ -188,7 +203,8 @@ impl Survey {
         Some(omegas)
     }
 
-    /// Harmonics of the excitation that are not zero, each once, rising, without the constant part.
+    /// Returns the nonzero harmonics of the excitation without the constant part, ascending and
+    /// without duplicates.
     pub fn harmonics(&self) -> Vec<u32> {
         let mut harmonics = self.system.harmonics_of_excitation(|z| z != Complex64::ZERO);
         harmonics.retain(|h| *h > 0);
@@ -197,7 +213,8 @@ impl Survey {
         harmonics
     }
 
-    /// Largest load over limit of every joint in one period at the drive frequency `omega`, all joints stuck.
+    /// Returns the largest load over limit of every joint in one period at the excitation
+    /// frequency `omega`, all joints stuck.
     fn shares(&self, omega: f64) -> Option<Vec<f64>> {
         let harmonics = self.harmonics();
         let loads = harmonics.iter().map(|h| self.joint_loads(*h, omega)).collect::<Option<Vec<_>>>()?;
@@ -218,7 +235,8 @@ impl Survey {
         Some((0..self.joints.len()).map(largest).collect())
     }
 
-    /// Complex load over limit of every stuck joint at harmonic `h`: `Z x + W f = F`, `Wᵀx + g = 0` for rigid joints.
+    /// Returns the complex load over limit of every stuck joint at harmonic `h`:
+    /// `Z x + W f = F`, `Wᵀx + g = 0` for rigid joints.
     fn joint_loads(&self, h: u32, omega: f64) -> Option<Vec<Complex64>> {
         let (n, rigid, system) = (self.dofs(), self.rigid(), &self.system);
         let w = f64::from(h) * omega;
@@ -267,7 +285,8 @@ impl Survey {
             }
             Hold::Rigid { limit } => match rigid.iter().position(|r| *r == index) {
                 Some(row) => Some(x[n + row] / limit),
-                // a moved place against the ground or another moved place cannot stick
+                // a joint between a moved place and the ground or another moved place cannot
+                // stick
                 None if imposed(index) != Complex64::ZERO => Some(Complex64::new(f64::INFINITY, 0.0)),
                 None => Some(Complex64::ZERO),
             },
@@ -275,13 +294,14 @@ impl Survey {
         self.joints.iter().enumerate().map(share).collect()
     }
 
-    /// What the samples say of one joint, its largest load and the borders refined.
+    /// Returns the onset of one joint from the samples, with refined maximum and borders.
     fn onset_of(&self, joint: usize, omegas: &[f64], shares: &[Vec<f64>]) -> Option<Onset> {
         let at = |omega: f64| Some(self.shares(omega)?[joint]);
         let value = |i: usize| shares[i][joint];
         let top = (0..omegas.len()).max_by(|&a, &b| value(a).total_cmp(&value(b)))?;
         let mut best = (omegas[top], value(top));
-        // a few joints are refined; of hundreds the samples are good enough
+        // refinement is limited to models with few joints; for large ones the samples are
+        // accurate enough
         let refined = (self.dofs() + self.joints.len()) <= REFINED;
         if refined && omegas.len() > 1 && best.1.is_finite() {
             let (low, high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
@@ -299,7 +319,7 @@ impl Survey {
             }
             Some(inside)
         };
-        // the refined top may be a peak that the samples only see from below
+        // the refined maximum can be a peak between the samples
         let mut points: Vec<(f64, f64)> = omegas.iter().copied().zip((0..omegas.len()).map(value)).collect();
         points.push(best);
         points.sort_by(|a, b| a.0.total_cmp(&b.0));

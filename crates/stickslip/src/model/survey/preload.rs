@@ -1,4 +1,7 @@
-//! What preloaded contacts carry before anything moves: `(K + W k Wᵀ) x = F - W f₀`, with the springs `k` of closed contacts that stick and their forces `f₀`.
+//! Contact forces of preloaded contacts in static equilibrium.
+//!
+//! `(K + W k Wᵀ) x = F - W f₀`, with the springs `k` of closed stuck contacts and their forces
+//! `f₀`.
 
 use super::super::System;
 use super::Unpressed;
@@ -6,13 +9,19 @@ use super::hold::{Hold, Stuck};
 use super::linear::LARGEST;
 use nalgebra::{DMatrix, DVector};
 
-/// Share of the preload below which a contact carries nothing: that of the directions that nothing holds is rounding.
+/// Fraction of the preload below which a contact force is zero. In directions that nothing
+/// holds, it is rounding.
 const NOTHING: f64 = 1e-6;
-/// Stiffness of directions that nothing holds, relative to the stiffest contact: they move, and no force counts on them.
+/// Stiffness of directions that nothing holds, relative to the stiffest contact. It lets them
+/// move without a significant force.
 const SOFT: f64 = 1e-12;
 
-/// What each contact with a preload carries at rest, N, if all stay closed and stick on the way to rest: negative where they do not; `None` of the
-/// others, and of all where none has a preload, or beyond [`LARGEST`]. Rigid friction is left out, whose share nothing tells.
+/// Returns the force of each preloaded contact in static equilibrium, N, if all contacts stay
+/// closed and stuck.
+///
+/// A negative force means that the contact opens. Entries are `None` for other joints, and for
+/// all joints without any preload or beyond [`LARGEST`]. Rigid friction is not included,
+/// because its share is undetermined.
 pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
     let n = system.dofs();
     let unknown = || vec![None; joints.len()];
@@ -40,7 +49,7 @@ pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
         }
     }
     (0..n).for_each(|i| stiffness[(i, i)] += SOFT * stiffest);
-    // where every place is moved nothing gives way
+    // without free coordinates nothing deforms
     let solved = if n == 0 { Some(load) } else { stiffness.lu().solve(&load) };
     let Some(x) = solved else { return unknown() };
     let carried = |joint: &Stuck| {
@@ -51,7 +60,7 @@ pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
     joints.iter().map(carried).collect()
 }
 
-/// Contacts with a preload that carry nothing; `None` if each carries something.
+/// Returns the preloaded contacts that carry no force; `None` if each carries some.
 pub(super) fn unpressed(system: &System, joints: &[Stuck], carried: &[Option<f64>]) -> Option<Unpressed> {
     let mut found = Unpressed { joints: Vec::new(), preload: 0.0 };
     for (joint, _) in joints.iter().zip(carried).filter(|(_, carried)| carried.is_some_and(|force| force <= 0.0)) {

@@ -1,7 +1,10 @@
-//! The modes of a disk of equal sectors by their nodal diameters, with all joints free and with all of them stuck.
+//! Modes of a disk of equal sectors by nodal diameter, with all joints free and with all joints
+//! stuck.
 //!
-//! In a wave a neighbour's displacement is that of the sector itself, turned: `x e^{jφ}`. With `x = (a, b)` in the complex plane a spring between
-//! both is two, one along the real and one along the imaginary part of what it is stretched by, and the modes come in pairs, a wave either way.
+//! In a wave, the displacement of the next sector is that of the sector itself times a phase
+//! factor: `x e^{jφ}`. With `x = a + jb` and the real vector `(a, b)`, a spring between both
+//! sectors becomes two springs: one along the real part and one along the imaginary part of its
+//! elongation. The modes then occur in pairs, one for each direction of travel.
 
 use super::hold::{Hold, Stuck};
 use super::linear::{LARGEST, Linear, Link};
@@ -19,21 +22,27 @@ use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
 pub struct WaveModes {
     /// The nodal diameter, from 0 to half the number of sectors.
     pub diameter: usize,
-    /// With all joints free. Of a wave that travels either way each mode stands once.
+    /// Modes with all joints free. Modes of travelling waves occur in pairs; each pair is
+    /// listed once.
     pub free: Modes,
-    /// With all joints stuck.
+    /// Modes with all joints stuck.
     pub stuck: Modes,
-    /// Of every mode of `free` its shape, [mode][place of the sector] in the order of [`Model::sector_places`], 1/√kg: in sector n of N the
-    /// displacement of a wave that stands is the real part of `shape · e^{j 2π diameter n/N}`, and `φᵀMφ = 1` of the whole disk. The place of
-    /// the first sector that moves most is real and positive. Empty where stiffnesses are too far apart for one eigenvalue problem.
+    /// Shapes of the modes of `free`, [mode][place of the sector] in the order of
+    /// [`Model::sector_places`], 1/√kg.
+    ///
+    /// In sector n of N, the displacement of a standing wave is the real part of
+    /// `shape · e^{j 2π diameter n/N}`, with `φᵀMφ = 1` for the whole disk. The place with the
+    /// largest motion in the first sector is real and positive. Empty if the stiffnesses are
+    /// too different for one eigenvalue problem.
     pub free_shapes: Vec<Vec<Complex64>>,
-    /// The same of `stuck`.
+    /// Shapes of the modes of `stuck`, in the same form.
     pub stuck_shapes: Vec<Vec<Complex64>>,
 }
 
 type Row = Vec<(usize, f64)>;
 
-/// A direction over the ring as it acts in a wave: along the real and, if the wave has one, the imaginary part.
+/// Converts a direction over the ring into its form in a wave: the real part and, for a complex
+/// wave, the imaginary part.
 struct Turned {
     dofs: usize,
     sectors: usize,
@@ -61,7 +70,7 @@ impl Turned {
         parts.into_iter().take(copies).map(row).filter(|row| !row.is_empty()).collect()
     }
 
-    /// What both states of the joints have, at the places.
+    /// Combines the modes of both joint states, with shapes at the places.
     fn modes(&self, free: Once, stuck: Once, places: &[Row]) -> WaveModes {
         let at_places = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.seen(shape, places)).collect();
         WaveModes {
@@ -73,10 +82,12 @@ impl Turned {
         }
     }
 
-    /// Each mode of a wave that travels either way once, and the lowest of them. `weigh` is the product with the mass matrix of `(a, b)`.
+    /// Selects the lowest modes, one from each pair of travelling waves. `weigh` is the product
+    /// with the mass matrix of `(a, b)`.
     ///
-    /// A mode `x` of such a wave comes with `jx`, and what is found of both are two directions of their plane, of equal modes of a larger space:
-    /// that is split into complex shapes, orthogonal to each other.
+    /// A mode `x` of a travelling wave has the partner `jx`. The eigenvalue solution returns
+    /// two directions of their plane. For several equal modes, it returns directions of a
+    /// larger space. This function splits that space into orthogonal complex shapes.
     fn once(
         &self,
         mut modes: Modes,
@@ -99,7 +110,8 @@ impl Turned {
         Once { modes, shapes }
     }
 
-    /// `most` complex shapes among twice as many real ones: which these are, and orthogonal `(a, b)`.
+    /// Selects `most` complex shapes from twice as many real ones. Returns their indices and
+    /// orthogonal vectors `(a, b)`.
     fn split(
         &self,
         elastic: &[LinearMode],
@@ -108,7 +120,7 @@ impl Turned {
         weigh: &dyn Fn(&DVector<f64>) -> DVector<f64>,
     ) -> Option<(Vec<usize>, Vec<DVector<f64>>)> {
         let mut kept: Vec<usize> = Vec::new();
-        // each with M times itself and times `j` of itself
+        // each shape x, with M x, j x and j M x
         let mut found: Vec<[DVector<f64>; 4]> = Vec::new();
         for (column, mode) in elastic.iter().enumerate() {
             if kept.len() == most {
@@ -135,17 +147,19 @@ impl Turned {
         (kept.len() == most).then(|| (kept, found.into_iter().map(|[shape, ..]| shape).collect()))
     }
 
-    /// `j (a + jb)`, a quarter of the period earlier. The mass matrix of the wave does not care when.
+    /// Returns `j (a + jb)`, the same motion a quarter of a period earlier. The mass matrix of
+    /// the wave is invariant under this shift.
     fn quarter(&self, shape: &DVector<f64>) -> DVector<f64> {
         let n = self.dofs;
         DVector::from_fn(2 * n, |i, _| if i < n { -shape[n + i] } else { shape[i - n] })
     }
 
-    /// A shape with `aᵀMa + bᵀMb = 1` of one sector at the places, as [`WaveModes`] says.
+    /// Returns a sector's shape with `aᵀMa + bᵀMb = 1` at the places, normalized as in
+    /// [`WaveModes`].
     fn seen(&self, shape: &DVector<f64>, places: &[Row]) -> Vec<Complex64> {
         let n = self.dofs;
         let whole = |i: usize| Complex64::new(shape[i], if self.double { shape[n + i] } else { 0.0 });
-        // half of the sectors' sum of squares is that of a cosine
+        // the squares of a cosine over the sectors sum to half their number
         let scale = (if self.double { 2.0 } else { 1.0 } / self.sectors as f64).sqrt();
         let at = |place: &Row| -> Complex64 {
             let term = |(row, weight): &(usize, f64)| {
@@ -161,25 +175,29 @@ impl Turned {
     }
 }
 
-/// The modes of a wave, each once, and their shapes `(a, b)` if they are known.
+/// The modes of a wave, each once, with their shapes `(a, b)` if they are known.
 struct Once {
     modes: Modes,
     shapes: Vec<DVector<f64>>,
 }
 
-/// Share of a frequency within which modes may be of one space. Modes further apart are orthogonal to rounding, whether they are looked at
-/// or not; those of one pair differ by 1e-6 at most where frequencies have their last digits.
+/// Relative frequency distance within which modes can share an eigenspace. More distant modes
+/// are orthogonal up to rounding. Modes of one pair differ by at most 1e-6, even where
+/// frequencies have few significant digits.
 const NEAR: f64 = 1e-3;
-/// Part of a shape's square that is left beside those already found, from which on it is another one: of a pair nothing is left but rounding,
-/// and of up to six equal modes some shape always has more.
+/// Fraction of a shape's square that remains after projection on the earlier shapes and marks a
+/// new shape. For the partner in a pair, only rounding remains. Of up to six equal modes, some
+/// shape always has more.
 const APART: f64 = 0.25;
 
 impl Model {
-    /// The `lowest` modes of a ring of equal sectors by nodal diameter; `None` if the model is none, or if its sectors are too large. Sectors by
-    /// their matrices may be large, if no joint is rigid.
+    /// Returns the `lowest` modes of a ring of equal sectors by nodal diameter.
+    ///
+    /// Returns `None` if the model is not a ring of equal sectors, or if its sectors are too
+    /// large. Sectors given by matrices may be large if no joint is rigid.
     ///
     /// # Errors
-    /// [`ModelError`] as [`Model::assemble`].
+    /// See [`Model::assemble`].
     ///
     /// # Example
     /// Blades on springs of 1 N/m, and of 0.2 N/m between them: `ω² = k + 2 kc (1 - cos θ)`.
@@ -250,7 +268,8 @@ impl Model {
         Ok(Some((0..=sectors / 2).map(wave).collect()))
     }
 
-    /// The places of the first sector of a disk, as they are called in the ring; none of a model that is no disk.
+    /// Returns the places of the first sector of a disk, with their names in the ring. Empty if
+    /// the model is not a disk.
     pub fn sector_places(&self) -> Vec<String> {
         let Some(ring) = self.ring else { return Vec::new() };
         let own = |all: usize| all / ring.sectors.max(1);
@@ -259,7 +278,7 @@ impl Model {
         places.chain(masses).chain(self.bodies[..own(self.bodies.len())].iter().flat_map(Body::places)).collect()
     }
 
-    /// How these follow from the coordinates of the ring.
+    /// Returns the places of the first sector as weighted sums of the ring's coordinates.
     fn sector_axes(&self, system: &System) -> Vec<Row> {
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let seen = |name: String| index.get(name.as_str()).map_or_else(Vec::new, |i| system.seen()[*i].rows().to_vec());
@@ -267,7 +286,7 @@ impl Model {
     }
 }
 
-/// The modes of the waves of equal sectors that are stated by their matrices.
+/// Returns the modes of the waves of equal sectors given by matrices.
 fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -> Option<Vec<WaveModes>> {
     let sector = Sector::of(system.structure(), sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
@@ -309,7 +328,8 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
     (0..=sectors / 2).map(wave).collect()
 }
 
-/// The mass matrix and the lowest modes of a large structure, each of a pair among them, with their shapes.
+/// Returns the mass matrix and the lowest modes of a large structure, with both modes of each
+/// pair and their shapes.
 fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
     let n = structure.dofs();
     let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
@@ -325,7 +345,7 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matr
     };
     let mass = part(0, Vec::new())?;
     let (damping, stiffness) = (part(1, along(|link| link.damping))?, part(2, along(|link| link.stiffness))?);
-    // free motions are none of the elastic ones that are asked for
+    // free motions come on top of the requested elastic modes
     let wanted = Wanted::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
     let found = NaturalModes::new(&Analysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
     let free = found.free();
@@ -340,7 +360,7 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matr
     Some((mass, modes, shapes))
 }
 
-/// Free motions of a body, twice: a wave either way.
+/// Largest number of free motions: six of a body, twice for both directions of travel.
 const FREE_AT_MOST: usize = 12;
 
 #[cfg(test)]
@@ -362,8 +382,9 @@ mod tests {
         }
     }
 
-    /// All modes of the ring, each diameter between the first and the last counted twice, and no others; with springs and with rigid friction, and
-    /// with a disk that is free to turn.
+    /// The waves have all modes of the ring and no others. Each diameter between the first and
+    /// the last counts twice. The test covers springs, rigid friction, and a disk that is free
+    /// to rotate.
     #[test]
     fn waves_are_the_modes_of_the_ring() {
         for law in [Arc::new(Jenkins { stiffness: 2.0, limit: 1.0 }) as SharedLaw, Arc::new(Coulomb { limit: 1.0 })] {
@@ -396,7 +417,8 @@ mod tests {
         }
     }
 
-    /// Of a chain around a ring the shapes are cosines, `√(2/(N m)) cos(2π d n/N)`, and `√(1/(N m))` where the wave does not travel.
+    /// The shapes of a chain around a ring are cosines, `√(2/(N m)) cos(2π d n/N)`, and
+    /// `√(1/(N m))` if the wave does not travel.
     #[test]
     fn shapes_of_a_chain_are_cosines() {
         let between = |other: &str| ["blade".to_owned(), other.to_owned()];
@@ -415,9 +437,12 @@ mod tests {
         }
     }
 
-    /// Of every frequency of the ring, the sum of `φφᵀ` over what an eigenvalue solution of the whole ring has there is the same as over the
-    /// waves that stand, `Re(X e^{j 2π d n/N})` and a quarter of a wave further: shapes, phases and `φᵀMφ = 1` in one. Two blades of a sector
-    /// that know nothing of each other make pairs of pairs, which must be told apart.
+    /// Compares the sums of `φφᵀ` for every frequency of the ring. The first is over the
+    /// eigenvectors of the whole ring. The second is over the standing waves,
+    /// `Re(X e^{j 2π d n/N})` and the wave shifted by a quarter.
+    ///
+    /// This checks shapes, phases and `φᵀMφ = 1` together. Two uncoupled blades in a sector
+    /// form pairs of pairs, which the solver must separate.
     #[test]
     fn shapes_are_those_of_the_ring() {
         let between = |a: &str, b: &str| [a.to_owned(), b.to_owned()];
@@ -439,7 +464,7 @@ mod tests {
             [(sector(Arc::new(Jenkins { stiffness: 2.0, limit: 1.0 })), 9), (twins.clone(), 6), (twins, 7)]
         {
             let ring = Disk { sectors, ..Disk::default() }.ring(|_| sector.clone()).unwrap();
-            // stuck, the joint is a spring
+            // in the stuck state, the joint is a spring
             let mut stuck = ring.clone();
             stuck.springs.extend(stuck.joints.drain(..).map(|joint| Spring {
                 between: joint.between,

@@ -1,35 +1,40 @@
-//! One set of few coordinates for a structure, for the same with another stiffness, and for all between, `K + s (K₁ - K)` with s from 0 to 1: at rest, and
-//! as rotation stiffens it.
+//! One reduction basis for a structure, the same structure with another stiffness, and all
+//! between: `K + s (K₁ - K)` with s from 0 to 1.
 //!
-//! The columns of the reductions at both ends make one basis. It is held against the whole at both ends and between, and where that is farther off than
-//! the error asks for, the columns of a reduction there join it.
+//! An example is a rotor at standstill and with the stiffness of rotation. The columns of the
+//! reductions at both ends form one basis. It is compared with the whole structure at both ends
+//! and between. Where the error is too large, the basis receives the columns of a reduction at
+//! that point.
 //!
-//! Source: Balmès (1996), "Parametric families of reduced finite element models: theory and applications", Mech. Syst. Signal Process. 10, 381-394.
+//! Source: Balmès (1996), "Parametric families of reduced finite element models: theory and
+//! applications", Mech. Syst. Signal Process. 10, 381-394.
 
 use super::free::independent;
 use super::{Deviation, Reduced, ReductionError, Reference, Whole};
 use nalgebra::DMatrix;
 use stickslip_numerics::sparse::{Matrix, columns};
 
-/// Shares at which a basis is held against the whole.
+/// Values of s at which a basis is compared with the whole structure.
 const HELD: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// A structure at both ends in the same coordinates.
+/// A structure with both stiffnesses in the same coordinates.
 #[derive(Debug, Clone)]
 pub(in crate::structure) struct Between {
     /// With its own stiffness.
     pub rest: Reduced,
-    /// With the other.
+    /// With the other stiffness.
     pub there: Reduced,
-    /// The largest error at both ends and between, and its frequency.
+    /// Largest error at both ends and between, and its frequency.
     pub deviation: Deviation,
-    /// The error holds up to there, rad/s.
+    /// Upper end of the frequency range in which the error holds, rad/s.
     pub up_to: f64,
 }
 
 impl Whole {
-    /// In coordinates that also serve this structure with another stiffness, and all between, by reductions each with the frequency (rad/s) that it
-    /// serves up to; with an error of at most `tolerance`.
+    /// Reduces the structure with a basis that also serves another stiffness and all between,
+    /// with an error of at most `tolerance`.
+    ///
+    /// `reduce` returns a reduction and the frequency (rad/s) up to which it is intended.
     pub(in crate::structure) fn between(
         &self,
         there: &Matrix,
@@ -80,7 +85,7 @@ impl Whole {
         }
     }
 
-    /// With a share of the difference to another stiffness.
+    /// Returns the structure with a fraction of the difference to another stiffness.
     fn with_share(&self, there: &Matrix, share: f64) -> Result<Whole, ReductionError> {
         let own = self.stiffness.entries().map(|(row, column, value)| (row, column, (1.0 - share) * value));
         let other = there.entries().map(|(row, column, value)| (row, column, share * value));
@@ -88,11 +93,11 @@ impl Whole {
         Whole::new((*self.mass).clone(), self.damping.clone(), stiffness, self.ports.clone())
     }
 
-    /// Independent combinations of columns.
+    /// Returns independent combinations of columns.
     fn common(&self, vectors: &[f64], up_to: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.dofs();
         let mut energies = columns::products(n, vectors, &self.stiffness.times_columns(vectors));
-        // free motions have no other
+        // free motions have kinetic energy only
         energies += columns::products(n, vectors, &self.mass.times_columns(vectors)) * (up_to * up_to);
         let all = energies.ncols();
         let weights = independent(&DMatrix::identity(all, all), &energies).ok_or(ReductionError::OutOfRange)?;

@@ -1,32 +1,36 @@
-//! The smallest reduction of a given error.
+//! Selects the smallest reduction with a given error.
 
 use super::{Deviation, Free, Reduced, ReductionError, ReductionKind, Reference, Whole};
 use std::ops::RangeInclusive;
 use stickslip_numerics::sparse::{ModesError, NaturalModes};
 
-/// Modes are computed up to these multiples of the frequency of interest, one after the other until a reduction is close enough.
+/// Modes are computed up to these multiples of the frequency of interest, one after the other,
+/// until a reduction reaches the tolerance.
 const EXTENTS: [f64; 2] = [1.5, 3.0];
-/// The same before all others where there are many ports: an order of residual vectors has a coordinate for every port, and the modes up to these are fewer.
+/// Multiples that are tried first if there are many ports. One order of residual vectors adds a
+/// coordinate per port, more than the modes up to these multiples.
 const EXTENTS_OF_MANY: [f64; 2] = [3.0, 6.0];
-/// How often the last multiple is doubled for Craig-Bampton where it is asked for, until 600 modes or all are taken: its error falls slowly. Measured
-/// on bricks of 144 rows up to 5 kHz: 2e-3 at 48 times that, with 53 modes.
+/// Number of times that the last multiple is doubled for a requested Craig-Bampton reduction,
+/// up to 600 modes or all modes. Its error decreases slowly. Measured on bricks of 144 rows up
+/// to 5 kHz: 2e-3 at 48 times that frequency, with 53 modes.
 const DOUBLED: i32 = 12;
-/// Of these, up to these shares are tried.
+/// Fractions of each multiple that are tried.
 const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
-/// Ports beyond which more modes are tried before more orders, and all modes are taken at once: beside hundreds of residual vectors some modes fewer are
-/// no gain.
+/// Number of ports above which more modes are tried before more orders, and all modes are used
+/// at once. Compared with hundreds of residual vectors, fewer modes save little.
 const MANY: usize = 96;
-/// Orders of residual vectors that are tried.
+/// Largest order of residual vectors.
 const ORDERS: usize = 3;
-/// Numbers of all residual vectors that are held at once: 1 GB.
+/// Limit on the numbers in all residual vectors: 1 GB.
 const NUMBERS: usize = 1 << 27;
 
-/// Orders of residual vectors, fewer where many ports of a large structure would fill the memory with them.
+/// Returns the largest order of residual vectors, reduced for large structures with many ports
+/// to limit memory.
 fn orders(whole: &Whole) -> usize {
     (NUMBERS / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, ORDERS)
 }
 
-/// What is asked of a reduction.
+/// Parameters of an automatic reduction.
 ///
 /// # Example
 /// ```
@@ -49,39 +53,43 @@ fn orders(whole: &Whole) -> usize {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reduce {
-    /// The largest frequency of interest, rad/s: of the drive with all harmonics that count.
+    /// Highest frequency of interest, rad/s, including all significant harmonics of the
+    /// excitation.
     pub up_to: f64,
-    /// The largest error of the ports' receptance up to there, relative.
+    /// Largest relative error of the ports' receptance up to this frequency.
     pub tolerance: f64,
-    /// Of one kind only, if it is named.
+    /// Kind of reduction; `None` allows all.
     pub kind: Option<ReductionKind>,
 }
 
-/// Modes up to a multiple of the frequency of interest, and the orders of residual vectors that are tried with them.
+/// Modes up to a multiple of the frequency of interest, with the orders of residual vectors to
+/// try.
 struct Attempt {
     extent: f64,
     orders: RangeInclusive<usize>,
-    /// Whether more follow that try other ways than still more modes.
+    /// True if later attempts use other options than more modes.
     early: bool,
 }
 
 /// A reduction with its error.
 #[derive(Debug, Clone)]
 pub struct Chosen {
-    /// The structure in few coordinates.
+    /// The reduced structure.
     pub reduced: Reduced,
-    /// How far it is from the whole.
+    /// Its error relative to the whole structure.
     pub deviation: Deviation,
     /// Modes of the whole structure.
     pub modes: NaturalModes,
 }
 
 impl Reduce {
-    /// The smallest of the reductions tried whose error is small enough: free modes with residual vectors of one to three orders, and if
-    /// none of them will do, Craig-Bampton.
+    /// Returns the smallest of the tried reductions whose error is within the tolerance.
+    ///
+    /// It tries free modes with residual vectors of one to three orders, then Craig-Bampton.
     ///
     /// # Errors
-    /// [`ReductionError::OutOfReach`] with the best error, or whatever keeps modes from being computed.
+    /// [`ReductionError::OutOfReach`] with the smallest error, or the error of the mode
+    /// computation.
     pub fn of(self, whole: &Whole) -> Result<Chosen, ReductionError> {
         for (what, value) in
             [("the largest frequency of a reduction (rad/s)", self.up_to), ("its tolerance", self.tolerance)]
@@ -94,7 +102,7 @@ impl Reduce {
         let (mut reference, mut last) = (None, None);
         for Attempt { extent, orders, early } in self.attempts(whole) {
             let modes = match whole.modes(extent * self.up_to) {
-                // more than are ever taken: fewer modes with more orders
+                // too many modes; a later attempt uses fewer modes with more orders
                 Err(ReductionError::Modes(ModesError::TooMany { .. })) if early => continue,
                 modes => modes?,
             };
@@ -114,7 +122,8 @@ impl Reduce {
                 for (count, order) in self.sizes(&modes, (extent, orders.clone()), whole) {
                     let reduced = match free.reduced(count, order) {
                         Ok(reduced) => reduced,
-                        // vectors of which only rounding tells the last apart: other numbers of them have no such one
+                        // rounding dominates the last vectors; another number of vectors can
+                        // avoid this
                         Err(ReductionError::OutOfRange) => continue,
                         Err(other) => return Err(other),
                     };
@@ -132,7 +141,7 @@ impl Reduce {
                         return Ok(Chosen { reduced, deviation, modes });
                     }
                 }
-                // ports that do not hold the structure leave the free modes
+                // if the fixed ports leave free motions, only free modes remain
                 Err(ReductionError::NotHeld { .. }) if self.kind.is_none() => {}
                 Err(other) => return Err(other),
             }
@@ -143,7 +152,7 @@ impl Reduce {
                 let extent = EXTENTS[EXTENTS.len() - 1] * 2.0f64.powi(doubled);
                 let reduced = match whole.craig_bampton(extent * self.up_to) {
                     Ok(reduced) => reduced,
-                    // more than are ever taken
+                    // too many modes
                     Err(ReductionError::Modes(ModesError::TooMany { .. })) => break,
                     Err(other) => return Err(other),
                 };
@@ -163,7 +172,7 @@ impl Reduce {
         Err(ReductionError::OutOfReach { best: least.error, at: least.omega, dofs, tolerance: self.tolerance })
     }
 
-    /// What is tried, the cheapest first.
+    /// Returns the attempts, the cheapest first.
     fn attempts(self, whole: &Whole) -> Vec<Attempt> {
         let all = orders(whole);
         let many = whole.ports().len() > MANY && self.kind != Some(ReductionKind::CraigBampton);
@@ -172,7 +181,8 @@ impl Reduce {
         first.chain(usual).map(|(extent, orders, early)| Attempt { extent, orders, early }).collect()
     }
 
-    /// Numbers of modes and orders of residual vectors to try, the smallest first.
+    /// Returns the numbers of modes and orders of residual vectors to try, the smallest total
+    /// first.
     fn sizes(
         self,
         modes: &NaturalModes,

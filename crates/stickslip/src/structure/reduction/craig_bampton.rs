@@ -1,7 +1,9 @@
-//! Modes with the ports held, and static answers to unit motions of the ports.
+//! Craig-Bampton reduction: modes with fixed ports, and static responses to unit displacements
+//! of the ports.
 //!
-//! The degrees of freedom that ports see stay themselves (`b`); the others (`i`) are `x_i = Φ q + Ψ x_b` with the modes Φ of `(K_ii, M_ii)` and
-//! `Ψ = -K_ii⁻¹ K_ib`. Exact at rest, whatever the modes.
+//! The degrees of freedom of the ports (`b`) are retained. The others (`i`) are
+//! `x_i = Φ q + Ψ x_b` with the modes Φ of `(K_ii, M_ii)` and `Ψ = -K_ii⁻¹ K_ib`. The static
+//! response is exact for any number of modes.
 //!
 //! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
 
@@ -9,21 +11,22 @@ use super::{MOST_MODES, Reduced, ReductionError, Whole};
 use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
 
 impl Whole {
-    /// The structure in the degrees of freedom that its ports see and all modes up to `omega` (rad/s) with these held.
+    /// Reduces the structure to the degrees of freedom of its ports and all fixed-interface
+    /// modes up to `omega` (rad/s).
     ///
     /// # Errors
-    /// [`ReductionError`]: ports that do not hold the structure, or no modes.
+    /// [`ReductionError`]: free motions remain with fixed ports, or the mode computation fails.
     pub fn craig_bampton(&self, omega: f64) -> Result<Reduced, ReductionError> {
         self.held(Wanted::UpTo { value: omega * omega, most: MOST_MODES })
     }
 
-    /// The same with the modes that are wanted.
+    /// Reduces the structure with the modes that `wanted` specifies.
     pub(in crate::structure) fn held(&self, wanted: Wanted) -> Result<Reduced, ReductionError> {
         let n = self.dofs();
         let mut boundary: Vec<usize> = self.ports.iter().flatten().map(|(at, _)| *at).collect();
         boundary.sort_unstable();
         boundary.dedup();
-        // the new row of every degree of freedom, with the interior first
+        // row numbers with the interior first
         let interior: Vec<usize> = (0..n).filter(|i| boundary.binary_search(i).is_err()).collect();
         let mut row = vec![usize::MAX; n];
         interior.iter().enumerate().for_each(|(at, &i)| row[i] = at);

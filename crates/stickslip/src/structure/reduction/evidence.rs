@@ -1,75 +1,81 @@
-//! How far a reduction is from the whole structure: receptances of the ports at sample frequencies.
+//! Error of a reduction: compares receptances of the ports at sample frequencies.
 //!
-//! Samples stand in the middle between modes, where anti-resonances are, next to modes, where a shifted frequency shows, and at the end of
-//! the range. Modal and
-//! Rayleigh damping are the same function of mass and stiffness before and after the reduction and add no error of their own, so that both
-//! are compared
-//! without: the whole takes real factors then, a fourth of the memory. With a damping matrix both are compared with it.
-//! The error at a frequency is the norm of the difference relative to the norm, each port scaled by its usual receptance, so that units do
-//! not count.
+//! Samples are in the middle between modes (anti-resonances), next to modes (where a frequency
+//! shift is visible), and at the end of the range.
+//!
+//! Modal and Rayleigh damping are the same function of mass and stiffness before and after the
+//! reduction and add no error. Therefore both structures are compared without damping; real
+//! factors then need a quarter of the memory. A damping matrix is included in the comparison.
+//!
+//! The error at a frequency is the norm of the difference relative to the norm. Each port is
+//! scaled by its typical receptance, so that units do not matter.
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};
 use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes};
 
-/// Samples at most: each takes a factor of the whole structure.
+/// Largest number of samples; each needs a factorization of the whole structure.
 const SAMPLES: usize = 9;
-/// Distance of a sample from a mode, relative to its frequency, if damping does not say more: a resonance of this half width.
+/// Distance of a sample from a mode, relative to its frequency, unless the damping is larger:
+/// the half width of a resonance.
 const BESIDE: f64 = 1e-3;
-/// Samples closer than this, relative to the frequency, are one.
+/// Samples closer than this, relative to the frequency, are merged.
 const SAME: f64 = 1e-4;
-/// A sample at a mode of the whole structure moves by this share.
+/// Relative shift of a sample that coincides with a mode of the whole structure.
 const NUDGE: f64 = 3e-5;
-/// Attempts to sample beside a mode.
+/// Attempts to shift a sample away from a mode.
 const ATTEMPTS: usize = 5;
 
-/// Ports beyond which not each is loaded alone, but all together in as many ways as [`PROBES`]: each loaded alone would take as many solutions, for
-/// every sample. The norm of what loads of random signs do is on the average that of the matrix, here to a tenth of it.
+/// Number of ports up to which each port is loaded separately. More ports are loaded all
+/// together, with [`PROBES`] vectors of random signs. Separate loads would need one solution
+/// per port and sample. The norm of the response to random signs is on average that of the
+/// matrix, here within a tenth.
 const ALONE: usize = 96;
 const PROBES: usize = 48;
 
-/// ω, and displacements of the ports under the loads, rad/s and m.
+/// ω in rad/s, and displacements of the ports under the loads in m.
 type Sample = (f64, DMatrix<Complex<f64>>);
 
 /// Receptances of the whole structure.
 #[derive(Debug, Clone)]
 pub struct Reference {
     samples: Vec<Sample>,
-    /// Forces on the ports, side by side.
+    /// Forces on the ports, one column per load.
     loads: DMatrix<f64>,
     damped: bool,
-    /// One by the usual size of every port, √(N/m), and the same of the loads.
+    /// Reciprocal of the typical size of every port, √(N/m), and of the loads.
     scales: Vec<f64>,
     of_loads: Vec<f64>,
 }
 
-/// How far a reduction is from the whole.
+/// Error of a reduction relative to the whole structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// The largest relative error among the samples.
+    /// Largest relative error of the samples.
     pub error: f64,
-    /// Where, rad/s.
+    /// Frequency of this error, rad/s.
     pub omega: f64,
 }
 
 impl Reference {
-    /// Samples up to `up_to` (rad/s), placed by `modes` of the whole structure.
+    /// Computes samples up to `up_to` (rad/s), at frequencies derived from `modes` of the whole
+    /// structure.
     ///
     /// # Errors
-    /// [`ReductionError::Singular`] if a sample stays at a mode.
+    /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn new(whole: &Whole, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
         Self::few(whole, modes, up_to, SAMPLES)
     }
 
-    /// The same of so many samples at most.
+    /// Computes at most `most` samples.
     pub(super) fn few(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Result<Self, ReductionError> {
         Self::at(whole, &frequencies(whole, modes, up_to, most))
     }
 
-    /// Samples at these frequencies, rad/s.
+    /// Computes samples at these frequencies, rad/s.
     ///
     /// # Errors
-    /// [`ReductionError::Singular`] if a sample stays at a mode.
+    /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn at(whole: &Whole, frequencies: &[f64]) -> Result<Self, ReductionError> {
         let ports = whole.ports.len();
         let alone = ports <= ALONE;
@@ -93,19 +99,19 @@ impl Reference {
         Ok(Reference { samples, loads, damped: matches!(whole.damping, Damping::Matrix(_)), scales, of_loads })
     }
 
-    /// Frequencies of the samples, rad/s.
+    /// Returns the frequencies of the samples, rad/s.
     pub fn frequencies(&self) -> impl Iterator<Item = f64> + '_ {
         self.samples.iter().map(|(omega, _)| *omega)
     }
 
-    /// How far a reduced structure is from the whole; infinite where it is singular.
+    /// Returns the error of a reduced structure; infinite where it is singular.
     pub fn deviation(&self, reduced: &Reduced) -> Deviation {
         let bare = Reduced { damping: &reduced.damping * 0.0, ..reduced.clone() };
         let reduced = if self.damped { reduced } else { &bare };
         self.worst(|omega| reduced.answers(omega, &self.loads).ok())
     }
 
-    /// How far a series is from the whole.
+    /// Returns the error of a series.
     pub fn deviation_of_series(&self, series: &Series) -> Deviation {
         let loads = self.loads.map(|v| Complex::new(v, 0.0));
         self.worst(|omega| Some(series.undamped(omega) * &loads))
@@ -120,7 +126,7 @@ impl Reference {
                 columns.map(|(i, k)| scaled(i, k)).sum::<f64>().sqrt()
             };
             let error = receptance(*omega).map_or(f64::INFINITY, |r| norm(&(r - whole)) / norm(whole));
-            // what is no number is no small error
+            // NaN counts as an infinite error
             let error = if error.is_nan() { f64::INFINITY } else { error };
             if error > worst.error {
                 worst = Deviation { error, omega: *omega };
@@ -130,15 +136,16 @@ impl Reference {
     }
 }
 
-/// Factors of the whole structure, one after the other.
+/// Successive factors of the whole structure.
 struct Factors<'a> {
     whole: &'a Whole,
-    /// Its memory is that of the next.
+    /// The last factor, whose memory the next one reuses.
     last: Option<Factor>,
 }
 
 impl Factors<'_> {
-    /// Receptance of the whole structure at ω, or a little further where that is a mode: under loads on all ports together, or each loaded alone.
+    /// Computes the receptance of the whole structure at ω, or slightly above if ω is at a
+    /// mode. `together` contains loads on all ports; `None` loads each port separately.
     fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<Sample, ReductionError> {
         let mut failed = ReductionError::OutOfRange;
         for attempt in 0..ATTEMPTS {
@@ -188,7 +195,7 @@ impl Factors<'_> {
     }
 }
 
-/// Forces on all rows under loads of the ports, or under each of them alone.
+/// Returns forces on all rows under the loads of the ports, or under a unit load on each port.
 fn forces(whole: &Whole, together: Option<&DMatrix<f64>>) -> Vec<f64> {
     let Some(loads) = together else { return whole.forces(0..whole.ports.len()) };
     let n = whole.dofs();
@@ -199,23 +206,25 @@ fn forces(whole: &Whole, together: Option<&DMatrix<f64>>) -> Vec<f64> {
     forces
 }
 
-/// Compliances that the ports would have if every row stood on its own stiffness alone, m/N: the order of their receptances, in their units.
+/// Returns the compliances of the ports from the diagonal stiffness alone, m/N. They give the
+/// magnitude and the units of the receptances.
 fn local_sizes(whole: &Whole) -> Vec<f64> {
     let own = |at: usize| whole.stiffness.get(at, at);
     let size = |row: &super::Row| row.iter().filter(|(at, _)| own(*at) > 0.0).map(|(at, w)| w * w / own(*at)).sum();
     whole.ports.iter().map(size).map(|size: f64| if size > 0.0 { size } else { 1.0 }).collect()
 }
 
-/// ±1 without a pattern, the same everywhere.
+/// Returns a reproducible pseudo-random sign ±1.
 pub(super) fn sign(number: usize) -> f64 {
-    // by the mixing of splitmix64: Steele, Lea, Flood (2014)
+    // mixing function of splitmix64: Steele, Lea, Flood (2014)
     let mut z = (number as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
 }
 
-/// Where to sample: beside modes and between them by turns, from the first elastic mode to the end of the range.
+/// Returns sample frequencies, alternately next to modes and between them, from the first
+/// elastic mode to the end of the range.
 fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
     let beside = match whole.damping {
         Damping::Ratio { ratio, .. } => ratio.max(BESIDE),
@@ -233,12 +242,13 @@ fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> 
         all.extend([omega * (1.0 + beside), 0.5 * (omega + next)]);
     }
     all.push(0.5 * inside.first().copied().unwrap_or(up_to));
-    // between equal modes, as those of a square section, there is no middle: at a mode rounding would be the error
+    // equal modes, as in a square section, have no middle; at a mode, rounding would dominate
+    // the error
     all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= SAME * mode));
     all.push(up_to);
     all.sort_by(f64::total_cmp);
     all.dedup_by(|next, kept| *next - *kept < SAME * *kept);
-    // not of one parity, so that both sorts remain
+    // evenly spaced indices of mixed parity keep both kinds of samples
     let last = all.len() - 1;
     let mut at: Vec<usize> = (0..most.min(all.len())).map(|i| i * last / (most - 1).min(last).max(1)).collect();
     at.dedup();

@@ -1,12 +1,18 @@
-//! Free modes with residual vectors at the ports: Rubin's method, with vectors of higher order if asked for.
+//! Rubin's reduction: free modes with residual vectors at the ports, of higher order on
+//! request.
 //!
-//! One set of modes and residual vectors makes reductions of any smaller size: a mode that is left out goes back into the residual
-//! vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. Coordinates are the natural modes of the structure in modes and residual vectors together (Ritz vectors), which
-//! neither mass nor stiffness couples: first those of the structure itself, then what stands for all others.
-//! MacNeal's method is Rubin's without the mass of the residual vectors; here they keep it.
-//! Of order J the receptance agrees with that of the whole structure at σ in the first 2 J terms of its series, beside the modes.
+//! One set of modes and residual vectors yields reductions of any smaller size: an omitted mode
+//! returns to the residual vectors, `Xⱼ + φ φᵀF / (λ - σ)ʲ⁺¹`. The coordinates are Ritz
+//! vectors, the natural modes of the structure in the space of modes and residual vectors. Mass
+//! and stiffness are diagonal: first the modes of the structure itself, then those that
+//! represent all others.
 //!
-//! Sources: as in `residual`; Craig and Chang (1977), "On the use of attachment modes in substructure coupling for dynamic analysis".
+//! MacNeal's method is Rubin's without the mass of the residual vectors; this implementation
+//! retains it. With order J, the receptance agrees with that of the whole structure at σ in the
+//! first 2 J terms of its series, in addition to the modes.
+//!
+//! Sources: as in `residual`; Craig and Chang (1977), "On the use of attachment modes in
+//! substructure coupling for dynamic analysis".
 
 use super::{AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual, symmetric};
 use nalgebra::{DMatrix, DVector};
@@ -15,11 +21,12 @@ use stickslip_numerics::dense::{cholesky_in_blocks, solve_lower_in_blocks};
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 
-/// Residual vectors whose stiffness is below this share of the others', each of unit size, depend on them: ports that see the same motion, and what rounding
-/// makes of it. A port whose residual flexibility is below this share of its whole has none but rounding.
+/// Relative stiffness below which residual vectors of unit size are linearly dependent. This
+/// occurs for ports that observe the same motion, up to rounding. A port whose residual
+/// flexibility is below this fraction of its total flexibility has only rounding there.
 pub(super) const DEPENDENT: f64 = 1e-11;
 
-/// Modes and residual vectors, from which reductions are made.
+/// Modes and residual vectors, the source of reductions.
 #[derive(Debug, Clone)]
 pub struct Free<'a> {
     whole: &'a Whole,
@@ -27,11 +34,11 @@ pub struct Free<'a> {
     pub(super) values: Vec<f64>,
     /// Expansion point of the residual vectors, rad²/s².
     pub(super) shift: f64,
-    /// Ports, orders of the residual vectors.
+    /// Numbers of ports and of orders of the residual vectors.
     pub(super) counts: (usize, usize),
     /// Modes, then the residual vectors order by order: n × (k + p J).
     basis: Arc<Vec<f64>>,
-    /// `Bᵀ M B`, `Bᵀ K B`, of a damping matrix `Bᵀ C B`, and the ports' rows over B.
+    /// `Bᵀ M B`, `Bᵀ K B`, `Bᵀ C B` for a damping matrix, and the rows of the ports over B.
     pub(super) mass: DMatrix<f64>,
     stiffness: DMatrix<f64>,
     damping: Option<DMatrix<f64>>,
@@ -39,11 +46,12 @@ pub struct Free<'a> {
 }
 
 impl<'a> Free<'a> {
-    /// Of complete modes from the lowest on and residual vectors of orders below `order`, around `shift` (rad²/s²): zero, or anywhere but
-    /// at an eigenvalue.
+    /// Computes residual vectors of orders below `order`, around `shift` (rad²/s²), for all
+    /// lowest modes without gaps. The shift is zero, or any value that is not an eigenvalue.
     ///
     /// # Errors
-    /// [`ReductionError::Singular`] if the modes lack a free motion, or the shift stays at an eigenvalue.
+    /// [`ReductionError::Singular`] if `modes` lacks a free motion, or if the shift remains at
+    /// an eigenvalue.
     pub fn new(whole: &'a Whole, modes: &NaturalModes, shift: f64, order: usize) -> Result<Self, ReductionError> {
         let n = whole.dofs();
         let (basis, shift) = residual::basis(whole, modes, shift, order)?;
@@ -55,28 +63,29 @@ impl<'a> Free<'a> {
         let ports = whole.rows_of(&basis);
         let counts = (whole.ports().len(), order);
         let stiffness = square(&whole.stiffness, &basis);
-        // rounding would hold a free motion, and a constant load find its balance kilometres away
+        // a nonzero value from rounding would restrain the free motion, and a constant load
+        // would displace it by kilometres
         let mut values = modes.values.clone();
         values[..modes.free()].fill(0.0);
         Ok(Free { whole, values, shift, counts, basis: Arc::new(basis), mass, stiffness, damping: own, ports })
     }
 
-    /// The whole structure.
+    /// Returns the whole structure.
     pub(super) fn whole(&self) -> &Whole {
         self.whole
     }
 
-    /// All modes and residual vectors, by columns.
+    /// Returns all modes and residual vectors, by columns.
     pub(super) fn into_basis(self) -> Vec<f64> {
         Arc::unwrap_or_clone(self.basis)
     }
 
-    /// How many modes there are.
+    /// Returns the number of modes.
     pub fn modes(&self) -> usize {
         self.values.len()
     }
 
-    /// `Xⱼ` of fewer modes as a combination of the basis.
+    /// Returns `Xⱼ` for fewer modes, as a combination of the basis.
     pub(super) fn block(&self, modes: usize, order: usize) -> DMatrix<f64> {
         let (k, p) = (self.modes(), self.counts.0);
         let mut combination = DMatrix::zeros(self.mass.nrows(), p);
@@ -90,16 +99,17 @@ impl<'a> Free<'a> {
         combination
     }
 
-    /// The structure in its first `modes` modes and residual vectors of orders below `order`.
+    /// Returns the structure reduced to its first `modes` modes and residual vectors of orders
+    /// below `order`.
     ///
     /// # Errors
     /// [`ReductionError::OutOfRange`].
     ///
     /// # Panics
-    /// If there are fewer modes or orders.
+    /// If fewer modes or orders are available.
     pub fn reduced(&self, modes: usize, order: usize) -> Result<Reduced, ReductionError> {
         assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
-        // all modes leave nothing to the residual vectors but rounding
+        // with all modes, the residual vectors contain only rounding
         let order = if modes < self.whole.dofs() { order } else { 0 };
         let (small, own) = self.combination(modes, order).ok_or(ReductionError::OutOfRange)?;
         let diagonal =
@@ -125,8 +135,9 @@ impl<'a> Free<'a> {
         Ok(Reduced { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
     }
 
-    /// The natural modes of the structure in its first modes and independent residual vectors, with the mass and the stiffness of each: of unit mass, or
-    /// of unit stiffness where they have none.
+    /// Returns the natural modes in the space of the first modes and independent residual
+    /// vectors, with the mass and stiffness of each. They have unit mass, or unit stiffness if
+    /// they have no mass.
     fn combination(&self, modes: usize, order: usize) -> Option<(DMatrix<f64>, Vec<[f64; 2]>)> {
         let all = self.mass.nrows();
         let along = |a: &DMatrix<f64>, matrix: &DMatrix<f64>, b: &DMatrix<f64>| {
@@ -135,7 +146,7 @@ impl<'a> Free<'a> {
         let mut vectors = DMatrix::zeros(all, 0);
         for order in 0..order {
             let mut block = self.block(modes, order);
-            // twice: the second time rounding of the first is projected out
+            // twice: the second pass removes the rounding of the first
             for _ in 0..if vectors.is_empty() { 1 } else { 2 } {
                 block -= product(&vectors, &along(&vectors, &self.stiffness, &block));
                 block = independent(&block, &self.stiffness)?;
@@ -152,7 +163,7 @@ impl<'a> Free<'a> {
     }
 }
 
-/// `Bᵀ A B` of a symmetric matrix, some columns at a time.
+/// Returns `Bᵀ A B` of a symmetric matrix, computed in blocks of columns.
 fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
     let n = matrix.n().max(1);
     let all = basis.len() / n;
@@ -179,7 +190,8 @@ fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     )
 }
 
-/// Combinations of columns that `stiffness` makes orthonormal, without those that depend on the others.
+/// Returns combinations of columns that are orthonormal in `stiffness`, without linearly
+/// dependent ones.
 pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let energies = columns::products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
     let energies = symmetric(energies);
@@ -201,8 +213,10 @@ pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> O
     Some(product(&vectors.select_columns(&moving), &weights))
 }
 
-/// `L⁻ᵀ` of `A = L Lᵀ` with ones on its diagonal, if none of its eigenvalues can be below the share of the largest at which vectors depend on each other: the
-/// largest is n at most, and the least no smaller than one by the trace of `A⁻¹`.
+/// Returns `L⁻ᵀ` of `A = L Lᵀ` with a unit diagonal, if the vectors are certainly independent.
+///
+/// The largest eigenvalue is at most n, and the smallest is at least the reciprocal of the
+/// trace of `A⁻¹`. `None` means that their ratio could be below [`DEPENDENT`].
 fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = unit.nrows();
     let mut lower = unit.clone();
@@ -214,7 +228,8 @@ fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     (DEPENDENT * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
 }
 
-/// Eigenvectors of the eigenvalues that are not rounding, divided by their roots: combinations of vectors with these products that are independent.
+/// Returns eigenvectors divided by the square roots of their eigenvalues, without those at the
+/// level of rounding. They are independent combinations of vectors with these products.
 pub(super) fn leading(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (values, vectors) = eigen::symmetric_in_blocks(products)?;
     let least = DEPENDENT * values.last().copied().unwrap_or(0.0);

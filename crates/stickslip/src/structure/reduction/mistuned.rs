@@ -1,16 +1,21 @@
-//! How far a reduced ring whose blades differ is from the whole one, all rows of all sectors.
+//! Error of a reduced ring with different blades, relative to all rows of all sectors.
 //!
-//! A mode of the reduced ring, `x = V p` with λ, leaves the residual `ρ = (K + ΔK - λM) x`, which no column of `V` sees. The whole ring answers it, and
-//! its eigenvalue is lower by `ρᵀ K⁻¹ ρ` (of unit mass; Lehmann's and Temple's bounds are of this order). With `A = K + σM` only what the coordinates
-//! cannot state of `λ + σ` times the inertia and of the forces of the blades is left of it,
+//! A mode of the reduced ring, `x = V p` with λ, has the residual `ρ = (K + ΔK - λM) x`, which
+//! is orthogonal to all columns of `V`. The eigenvalue of the whole ring is lower by `ρᵀ K⁻¹ ρ`
+//! for unit mass (the bounds of Lehmann and Temple are of this order). With `A = K + σM`, only
+//! those parts of `λ + σ` times the inertia and of the blade forces contribute that the
+//! coordinates cannot represent:
 //!
-//! `ρᵀ A⁻¹ ρ = gᵀ (A⁻¹ - V (VᵀAV)⁻¹ Vᵀ) g`, `g = ΔK V p - (λ + σ) M V p`,
+//! `ρᵀ A⁻¹ ρ = gᵀ (A⁻¹ - V (VᵀAV)⁻¹ Vᵀ) g`, `g = ΔK V p - (λ + σ) M V p`.
 //!
-//! and with A of the tuned ring that is a sum over its waves, of each a quadratic form in as many numbers as a sector has coordinates: the forms of a few
-//! nodal diameters are computed once, and serve their neighbours and every pattern of deviations. Every mode of every pattern is asked.
+//! With A of the tuned ring, this is a sum over its waves. Each term is a quadratic form whose
+//! size is the number of coordinates of a sector. The forms of a few nodal diameters are
+//! computed once. They serve the adjacent diameters and every pattern of deviations. The
+//! estimate covers every mode of every pattern.
 //!
-//! Motions beyond the coordinates are taken as if at rest, which is right to the square of the ratio of the frequencies, and as stiff as those of the tuned
-//! ring, right to a deviation.
+//! Motions outside the coordinates are approximated as static, with an error of the square of
+//! the frequency ratio. Their stiffness is that of the tuned ring, with an error of the order
+//! of the deviation.
 //!
 //! Source: Parlett, "The Symmetric Eigenvalue Problem" (1998), Sec. 10.5 and 11.7.
 
@@ -23,32 +28,35 @@ use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::columns;
 
-/// Level of the nodal diameters whose forms are computed.
+/// Refinement level of the nodal diameters whose forms are computed.
 const LEVEL: usize = 1;
-/// Frequencies below this share of the range are those of free motions, which no blade's stiffness moves.
+/// Frequencies below this fraction of the range are free motions, which blade stiffness does
+/// not affect.
 pub(super) const FREE: f64 = 1e-4;
-/// σ by the square of the range: free motions have a factor, and others hardly feel it.
+/// σ relative to the squared range: it makes A nonsingular for free motions and hardly affects
+/// other modes.
 const SHIFT: f64 = 1e-3;
-/// Energy beyond the coordinates, relative to that of the forces, below which it is rounding.
+/// Energy outside the coordinates, relative to that of the forces, below which it is rounding.
 const ROUNDED: f64 = 1e-15;
 
-/// σ, rad²/s², of a range up to `up_to`, rad/s.
+/// Returns σ, rad²/s², for a range up to `up_to`, rad/s.
 pub(super) fn shift(up_to: f64) -> f64 {
     SHIFT * up_to * up_to
 }
 
-/// What the coordinates of a sector cannot state, wave by wave.
+/// The forces that the coordinates of a sector cannot represent, wave by wave.
 #[derive(Debug)]
 pub(in crate::structure) struct Lacking {
     sectors: usize,
     dofs: usize,
-    /// Modes are asked up to there, rad/s.
+    /// Highest frequency of the estimated modes, rad/s.
     up_to: f64,
     forms: Vec<Form>,
 }
 
-/// Rows `L` of which `|L z|²` is the energy beyond the coordinates, `z` first the inertia by `up_to²`, then the forces of the blades, of each the
-/// real part and, if the wave has one, the imaginary part.
+/// Rows `L` such that `|L z|²` is the energy outside the coordinates. `z` contains the inertia
+/// divided by `up_to²`, then the blade forces; each has a real part and, for a complex wave, an
+/// imaginary part.
 #[derive(Debug)]
 struct Form {
     diameter: usize,
@@ -56,7 +64,8 @@ struct Form {
 }
 
 impl Lacking {
-    /// Of a sector in few coordinates with this blade, up to `up_to`, rad/s.
+    /// Creates the estimate from a reduced sector with this blade, for frequencies up to
+    /// `up_to`, rad/s.
     pub fn new(
         (sector, seen): (&CyclicSector, &[Row]),
         blade: &Blade,
@@ -69,8 +78,11 @@ impl Lacking {
         Ok(Lacking { sectors: sector.sectors, dofs: reduced.dofs(), up_to, forms })
     }
 
-    /// The largest error at a resonance of the reduced ring with these deviations of its blades, of modes of unit mass that have these eigenvalues, rising:
-    /// a relative shift of the frequency by the half width of errors is one.
+    /// Returns the largest error at a resonance of the reduced ring with these blade
+    /// deviations.
+    ///
+    /// The modes have unit mass and these eigenvalues, ascending. An error of one is a relative
+    /// frequency shift by the half width [`HALF_WIDTH`].
     pub fn deviation(&self, (values, shapes): (&[f64], &[f64]), deviations: &[f64]) -> Deviation {
         let (r, sectors) = (self.dofs, self.sectors);
         let phases = self.phases(deviations);
@@ -89,7 +101,7 @@ impl Lacking {
                 beyond += self.nearest(diameter).energy(parts, inertia);
             }
             let error = 0.5 * beyond / value / HALF_WIDTH;
-            // what is no number is no small error
+            // NaN counts as an infinite error
             let error = if error.is_nan() { f64::INFINITY } else { error };
             if error > worst.error {
                 worst = Deviation { error, omega: value.sqrt() };
@@ -98,7 +110,9 @@ impl Lacking {
         worst
     }
 
-    /// The waves of displacements and of these by the deviations, real and imaginary parts: weights of the sectors, columns for every nodal diameter.
+    /// Returns the sector weights that split displacements, and displacements times deviations,
+    /// into the real and imaginary parts of the waves. Four columns belong to each nodal
+    /// diameter.
     fn phases(&self, deviations: &[f64]) -> DMatrix<f64> {
         let sectors = self.sectors;
         DMatrix::from_fn(sectors, 4 * (sectors / 2 + 1), |s, column| {
@@ -144,7 +158,7 @@ impl Form {
         factor.solve(&mut moved);
         let tall = copies * n;
         let size = columns::products(tall, &moved, &forces).diagonal().amax();
-        // without what the coordinates answer
+        // subtract the part that the coordinates represent
         let mut own = columns::products(tall, &basis, &whole.stiffness.times_columns(&basis));
         own += columns::products(tall, &basis, &whole.mass.times_columns(&basis)) * shift(up_to);
         let own = ((&own + own.transpose()) * 0.5).cholesky().ok_or(ReductionError::OutOfRange)?;
@@ -157,7 +171,8 @@ impl Form {
         Ok(Form { diameter, rows: DMatrix::from_fn(kept.len(), energy.nrows(), row) })
     }
 
-    /// Of the real and imaginary parts of displacements and of forces; the former by the factor `inertia`.
+    /// Returns the energy for the real and imaginary parts of displacements and of forces; the
+    /// displacements are multiplied by `inertia`.
     fn energy(&self, [moved, pushed]: [(&[f64], &[f64]); 2], inertia: f64) -> f64 {
         let r = moved.0.len();
         let real = self.rows.ncols() == 2 * r;

@@ -1,22 +1,29 @@
-//! Large structures in a few coordinates `x = T q`, and how far their receptance is from that of the whole.
+//! Reduced models of large structures, `x = T q`, with the error of their receptance.
 //!
-//! A finite-element model moves in thousands of degrees of freedom and is touched in a few: at joints, where forces act, where one looks. These are
-//! its *ports*, weighted sums of rows. `M̂ = Tᵀ M T`, `Ĉ = Tᵀ C T`, `K̂ = Tᵀ K T` keep its symmetry and its signs, whatever the columns of `T` are:
+//! A finite-element model has thousands of degrees of freedom, but joints, forces and observers
+//! use only a few displacements. These are its *ports*, weighted sums of rows. `M̂ = Tᵀ M T`,
+//! `Ĉ = Tᵀ C T`, `K̂ = Tᵀ K T` preserve symmetry and definiteness for any columns of `T`:
 //!
-//! | kind | columns of T | file |
-//! | --- | --- | --- |
-//! | Rubin, MacNeal | free modes, and what the others add to the static answer at the ports | `free` |
-//! | Craig-Bampton | modes with the ports held, and static answers to unit motions of the ports | `craig_bampton` |
+//! - Rubin, MacNeal (`free`): free modes, and the static response of the omitted modes at the
+//!   ports.
+//! - Craig-Bampton (`craig_bampton`): modes with fixed ports, and static responses to unit
+//!   displacements of the ports.
 //!
-//! and harmonic balance, which wants receptances only, may take modes and a series of residuals (`series`), of which residual vectors of J orders make the
-//! first 2 J terms exact in any method. Every reduction can be held against the
-//! whole structure (`evidence`; `mistuned` for a ring whose blades differ), and [`Reduce`] takes as many modes as a given error asks for. A sector of a ring is reduced for all its waves at once
-//! (`ring`). One basis may serve two
-//! stiffnesses and all between (`between`). A ring whose blades differ is brought into its own modes (`nominal`).
+//! Harmonic balance needs receptances only and can also use modes and a series of residuals
+//! (`series`). Residual vectors of J orders make the first 2 J terms of this series exact in
+//! any method.
 //!
-//! Damping is a part of the whole structure and is reduced like the other matrices; [`Damping`] says what a modal damping ratio means
-//! beyond the modes that
-//! are kept.
+//! The other files:
+//!
+//! - `evidence` compares a reduction with the whole structure; `mistuned` does this for a
+//!   ring with different blades.
+//! - `choice`: [`Reduce`] uses as many modes as a given error requires.
+//! - `ring` reduces a sector for all waves of its ring at once.
+//! - `between` builds one basis for two stiffnesses and all between them.
+//! - `nominal` transforms a ring with different blades to its own modes.
+//!
+//! Damping is a part of the whole structure and is reduced like the other matrices. [`Damping`]
+//! defines a modal damping ratio beyond the retained modes.
 
 mod between;
 mod choice;
@@ -51,36 +58,43 @@ use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Sin
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
 pub type Row = Vec<(usize, f64)>;
 
-/// Frequencies above so many times the highest `√(k_ii/m_ii)` are no frequencies of interest, but mistaken ones: no mode is near.
+/// Ratio of a frequency to the highest `√(k_ii/m_ii)` above which the frequency is a mistake:
+/// no mode is near.
 const ABOVE_ALL: f64 = 100.0;
-/// Modes beyond these are refused: as many numbers as degrees of freedom for each.
+/// Largest number of modes; each needs one number per degree of freedom.
 const MOST_MODES: usize = 600;
-/// Columns as long as the structure that are worked on at once: more would fill the memory where there are thousands.
+/// Number of columns of full length processed at once. More would exhaust the memory for
+/// thousands of columns.
 const AT_ONCE: usize = 64;
-/// Kinetic energy of a reduced mode relative to its stiffness, in the units of the largest, below which it has no frequency.
+/// Kinetic energy of a reduced mode relative to its stiffness, in units of the largest, below
+/// which the mode has no frequency.
 const MASSLESS: f64 = 1e-14;
-/// A negative shift, relative to the ratio of stiffness and mass, by which free motions have a factor.
+/// Negative shift, relative to the ratio of stiffness to mass, that makes the matrix of a
+/// structure with free motions nonsingular.
 const SHIFT: f64 = 1e-6;
-/// Eigenvalues below this share of the shift are the rounding of the stiffness, and the motion is free: its root would damp it by a ratio of nothing.
+/// Eigenvalues below this fraction of the shift are rounding of the stiffness, and the motion
+/// is free. A nonzero frequency would damp the free motion by a meaningless ratio.
 const FREE: f64 = 1e-9;
 
 /// Damping of the whole structure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Damping {
-    /// Every mode up to a frequency has the same share of critical damping. What is above, and with it the residual and constraint vectors,
-    /// is damped in
-    /// proportion to its stiffness, continuously: `2 ratio / up_to`, so that a mode at ω has the ratio `ratio ω / up_to`.
+    /// Every mode up to a frequency has the same fraction of critical damping.
+    ///
+    /// Motion above it, and with it the residual and constraint vectors, has damping
+    /// proportional to its stiffness, `2 ratio / up_to`. The transition is continuous: a mode
+    /// at ω has the ratio `ratio ω / up_to`.
     Ratio {
-        /// Share of critical damping, 1.
+        /// Fraction of critical damping, 1.
         ratio: f64,
-        /// Upper end of the frequencies of interest, rad/s.
+        /// Upper end of the frequency range of interest, rad/s.
         up_to: f64,
     },
     /// `C = mass M + stiffness K`.
     Rayleigh {
-        /// 1/s.
+        /// Factor of the mass matrix, 1/s.
         mass: f64,
-        /// s.
+        /// Factor of the stiffness matrix, s.
         stiffness: f64,
     },
     /// `C`, kg/s; it may have a gyroscopic part.
@@ -88,7 +102,7 @@ pub enum Damping {
 }
 
 impl Damping {
-    /// That its numbers are some that damping can have.
+    /// Checks that its parameters are valid.
     fn check(&self) -> Result<(), ReductionError> {
         let number = |what, value: f64, must, holds: bool| match value.is_finite() && holds {
             true => Ok(()),
@@ -108,7 +122,8 @@ impl Damping {
         Ok(())
     }
 
-    /// `C = α M + β K` of what is not kept as a mode; none of a matrix.
+    /// Returns α and β of `C = α M + β K` for motion outside the retained modes; `None` for a
+    /// damping matrix.
     fn proportional(&self) -> Option<(f64, f64)> {
         match *self {
             Damping::Ratio { ratio, up_to } => Some((0.0, 2.0 * ratio / up_to)),
@@ -117,7 +132,7 @@ impl Damping {
         }
     }
 
-    /// `φᵀ C φ` of a mode of unit mass at ω (rad/s), in 1/s.
+    /// Returns `φᵀ C φ` of a mode of unit mass at ω (rad/s), in 1/s.
     fn of_mode(&self, omega: f64) -> Option<f64> {
         match *self {
             Damping::Ratio { ratio, up_to } if omega < up_to => Some(2.0 * ratio * omega),
@@ -136,82 +151,83 @@ pub struct Whole {
     pub(super) analysis: Arc<Analysis>,
 }
 
-/// Why a structure is not reduced.
+/// The reason why a structure cannot be reduced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReductionError {
-    /// Matrices of different sizes.
+    /// The sizes of the matrices differ.
     #[error("the {matrix} matrix has {rows} rows and the stiffness matrix {n}; they must have the same")]
     Size {
-        /// Which.
+        /// Name of the matrix.
         matrix: &'static str,
-        /// Its rows.
+        /// Its number of rows.
         rows: usize,
-        /// Rows of the stiffness.
+        /// Number of rows of the stiffness matrix.
         n: usize,
     },
-    /// A matrix that must be symmetric is not.
+    /// A matrix is not symmetric, although it must be.
     #[error("the {matrix} matrix is not symmetric: rows {row} and {column} (from 0) differ across the diagonal")]
     NotSymmetric {
-        /// Which.
+        /// Name of the matrix.
         matrix: &'static str,
         /// Row, from 0.
         row: usize,
         /// Column, from 0.
         column: usize,
     },
-    /// A port of nothing, outside, or not finite.
+    /// A port is zero, out of range, or not finite.
     #[error(
         "port {port} (from 0) is no motion of the structure: it needs finite weights, not all zero, of rows below {n}"
     )]
     Port {
-        /// Which, from 0.
+        /// Index of the port, from 0.
         port: usize,
-        /// Degrees of freedom.
+        /// Number of degrees of freedom.
         n: usize,
     },
-    /// Nothing is seen of the structure.
+    /// The structure has no ports.
     #[error("the structure has no port; name at least one joint, force or place that is observed")]
     NoPorts,
-    /// A number that makes no damping or no range.
+    /// A parameter of damping or of a range is invalid.
     #[error("{what} is {value}, and must be {must}")]
     Number {
-        /// Of what.
+        /// Name of the parameter.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Its valid range.
         must: &'static str,
     },
-    /// Modes far above all that there are: units that were mistaken, or a drive that needs no modes.
+    /// The requested frequency is far above all modes: a wrong unit, or an excitation that
+    /// needs no modes.
     #[error(
         "the reduction is to know all modes up to {:.6} Hz, and the structure has none far above {:.6} Hz",
         omega / std::f64::consts::TAU,
         highest / std::f64::consts::TAU
     )]
     AboveAll {
-        /// Up to which they were asked for, rad/s.
+        /// Upper end of the requested range, rad/s.
         omega: f64,
         /// The highest `√(k_ii/m_ii)`, rad/s.
         highest: f64,
     },
-    /// No modes.
+    /// The computation of modes failed.
     #[error(transparent)]
     Modes(#[from] ModesError),
-    /// A dynamic stiffness has no inverse.
+    /// A dynamic stiffness is singular.
     #[error("at {omega:.6e} rad/s {singular}")]
     Singular {
-        /// Where, rad/s.
+        /// Frequency, rad/s.
         omega: f64,
-        /// Why.
+        /// The singular pivot.
         singular: Singular,
     },
-    /// The ports do not hold the structure.
+    /// The structure with fixed ports has free motions.
     #[error(
         "with all ports held the structure still has {count} free motion{}, so it has no static answers to them; take free modes instead of Craig-Bampton",
         if *count == 1 { "" } else { "s" }
     )]
     NotHeld {
-        /// Free motions.
+        /// Number of free motions.
         count: usize,
     },
     /// A series needs proportional or modal damping.
@@ -219,43 +235,47 @@ pub enum ReductionError {
         "a series of residuals needs modal or Rayleigh damping, and the structure has a damping matrix; reduce it by free modes"
     )]
     SeriesDamping,
-    /// No reduction is close enough.
+    /// No reduction reaches the tolerance.
     #[error(
         "the best of the reductions tried errs by {best:.1e} at {:.7} Hz with {dofs} coordinates, and {tolerance:.1e} was \
          asked for; ask for less, for a lower frequency, or for free modes with residual vectors, which need fewer coordinates",
         at / std::f64::consts::TAU
     )]
     OutOfReach {
-        /// The least relative error.
+        /// Smallest relative error.
         best: f64,
-        /// Where, rad/s.
+        /// Frequency of that error, rad/s.
         at: f64,
-        /// Its coordinates.
+        /// Number of its coordinates.
         dofs: usize,
-        /// What was asked for.
+        /// Required tolerance.
         tolerance: f64,
     },
-    /// Numbers left the range.
+    /// Numbers overflow.
     #[error("the entries of the reduced matrices leave the range of numbers; choose other units")]
     OutOfRange,
 }
 
-/// Ports that move by less than this share of the largest displacement of a shape do not see it.
+/// A port whose displacement is below this fraction of the largest one of a shape does not
+/// observe that shape.
 const UNSEEN: f64 = 1e-9;
 
-/// Difference of an entry and its mirror image, relative to the largest, that counts as rounding of a program that wrote ten digits.
+/// Difference between an entry and its mirror image that counts as rounding of a program that
+/// writes ten digits. It is relative to the largest entry.
 const SYMMETRIC: f64 = 1e-9;
 
 impl Whole {
-    /// Of sparse symmetric matrices (kg, N/m), damping, and ports: whatever a joint, a force or an observer sees.
+    /// Creates a structure from sparse symmetric matrices (kg, N/m), damping, and ports, the
+    /// displacements that joints, forces and observers use.
     ///
     /// # Errors
-    /// [`ReductionError`]: sizes that differ, a matrix that is not symmetric, a port that is none, a negative damping ratio.
+    /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a
+    /// negative damping ratio.
     pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
         Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
     }
 
-    /// The same before anything is seen of it.
+    /// Creates a structure without ports.
     pub(super) fn unseen(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
@@ -279,10 +299,10 @@ impl Whole {
         Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
     }
 
-    /// The same structure with other ports; the matrices are shared.
+    /// Returns the same structure with other ports; the matrices are shared.
     ///
     /// # Errors
-    /// [`ReductionError`]: no port, or one that is none.
+    /// [`ReductionError`]: no port, or an invalid one.
     pub fn seen_at(&self, ports: Vec<Row>) -> Result<Self, ReductionError> {
         if ports.is_empty() {
             return Err(ReductionError::NoPorts);
@@ -298,20 +318,21 @@ impl Whole {
         Ok(Whole { ports, ..self.clone() })
     }
 
-    /// Degrees of freedom.
+    /// Returns the number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.stiffness.n()
     }
 
-    /// What is seen of the structure, p rows.
+    /// Returns the observed displacements, p rows.
     pub fn ports(&self) -> &[Row] {
         &self.ports
     }
 
-    /// All natural modes up to `omega`, rad/s.
+    /// Computes all natural modes up to `omega`, rad/s.
     ///
     /// # Errors
-    /// [`ReductionError::Modes`].
+    /// [`ReductionError::Modes`], or [`ReductionError::AboveAll`] if `omega` is far above all
+    /// modes.
     pub fn modes(&self, omega: f64) -> Result<NaturalModes, ReductionError> {
         let own = |i: usize| (self.stiffness.get(i, i), self.mass.get(i, i));
         let ratios =
@@ -324,10 +345,10 @@ impl Whole {
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
     }
 
-    /// The lowest natural modes, or all if there are fewer.
+    /// Computes the lowest natural modes, or all if there are fewer.
     ///
     /// # Errors
-    /// [`ReductionError::Modes`].
+    /// [`ReductionError::Modes`], or [`ReductionError::Number`] for an invalid count.
     pub fn lowest_modes(&self, count: usize) -> Result<NaturalModes, ReductionError> {
         if !(1..=MOST_MODES).contains(&count) {
             let must = "a whole number from 1 to 600";
@@ -336,11 +357,11 @@ impl Whole {
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
     }
 
-    /// The damping of every mode up to `up_to` (rad/s) by one share of the critical one, as in [`Damping::Ratio`], over all degrees of freedom: `β K + U Uᵀ`.
-    /// β in s, and the columns of U.
+    /// Computes the damping of [`Damping::Ratio`] over all degrees of freedom: `β K + U Uᵀ`.
+    /// Returns β in s, and the columns of U.
     ///
     /// # Errors
-    /// [`ReductionError`]: numbers that no damping has, modes that cannot be had.
+    /// [`ReductionError`]: invalid parameters of damping, or a failure of the mode computation.
     pub(super) fn modal_damping(&self, ratio: f64, up_to: f64) -> Result<(f64, Vec<f64>), ReductionError> {
         let law = Damping::Ratio { ratio, up_to };
         law.check()?;
@@ -349,7 +370,7 @@ impl Whole {
         let mut columns = Vec::new();
         for (k, value) in modes.values.iter().enumerate() {
             let omega = value.max(0.0).sqrt();
-            // none of a free motion, of which rounding would make some
+            // a free motion has none, although rounding would give it some
             let more = law.of_mode(omega).filter(|_| k >= modes.free()).map_or(0.0, |c| c - beta * omega * omega);
             if more > 0.0 {
                 columns.extend(self.mass.times(modes.shape(k)).iter().map(|u| more.sqrt() * u));
@@ -358,12 +379,12 @@ impl Whole {
         Ok((beta, columns))
     }
 
-    /// The ports' displacements over columns as long as the structure.
+    /// Returns the displacements of the ports for columns of full length.
     fn rows_of(&self, columns: &[f64]) -> DMatrix<f64> {
         seen(&self.ports, self.dofs(), columns)
     }
 
-    /// Unit forces at some of the ports, n × their number.
+    /// Returns unit forces at a range of ports, n × their number.
     fn forces(&self, ports: Range<usize>) -> Vec<f64> {
         let n = self.dofs();
         let mut forces = vec![0.0; n * ports.len()];
@@ -374,10 +395,10 @@ impl Whole {
     }
 }
 
-/// A structure in few coordinates.
+/// A reduced structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reduced {
-    /// How, for people.
+    /// Description of the reduction.
     pub kind: String,
     /// `M̂`, r × r.
     pub mass: DMatrix<f64>,
@@ -385,16 +406,16 @@ pub struct Reduced {
     pub damping: DMatrix<f64>,
     /// `K̂`, r × r.
     pub stiffness: DMatrix<f64>,
-    /// The ports' displacements as rows over the coordinates, p × r.
+    /// Displacements of the ports as rows over the coordinates, p × r.
     pub ports: DMatrix<f64>,
-    /// Columns as long as the whole structure, and T as combinations of them.
+    /// Columns of full length, and T as combinations of them.
     basis: Arc<Vec<f64>>,
     weights: DMatrix<f64>,
     n: usize,
 }
 
 impl Reduced {
-    /// Galerkin's projection on the columns of `basis`, n × r.
+    /// Computes the Galerkin projection on the columns of `basis`, n × r.
     fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
         let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
@@ -408,30 +429,33 @@ impl Reduced {
         Ok(Reduced { kind, mass, damping, stiffness, ports, basis: Arc::new(basis), weights, n })
     }
 
-    /// Coordinates, r.
+    /// Returns the number of coordinates, r.
     pub fn dofs(&self) -> usize {
         self.mass.nrows()
     }
 
-    /// The same with another damping, which is none by a matrix.
+    /// Returns this structure with another damping, which is not a matrix.
     ///
     /// # Errors
-    /// [`ReductionError`]: numbers that no damping has, or a damping matrix, which is reduced with the others.
+    /// [`ReductionError`]: invalid parameters, or a damping matrix, which must be reduced
+    /// together with the other matrices.
     pub fn damped(&self, by: &Damping) -> Result<Self, ReductionError> {
         by.check()?;
         Ok(Reduced { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })
     }
 
-    /// The same in coordinates that are displacements: each is that of the port that moves most with it, in m, or of the degree of freedom if
-    /// no port moves. What compares coordinates with each other then compares metres. The displacements of all other rows are
-    /// forgotten.
+    /// Scales the coordinates to displacements in m.
+    ///
+    /// The unit is the displacement of the port that moves most in each coordinate, or of the
+    /// largest degree of freedom if no port moves. Comparisons between coordinates then compare
+    /// metres. The displacements of all other rows are dropped.
     #[must_use]
     pub(super) fn in_metres(mut self) -> Self {
         let most = |column: &[f64]| column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let sizes: Vec<f64> = self.basis.chunks_exact(self.n.max(1)).map(most).collect();
         for k in 0..self.dofs() {
             let port = if self.ports.nrows() > 0 { self.ports.column(k).amax() } else { 0.0 };
-            // what the column cannot pass is known before the column
+            // an upper bound, which avoids the computation of the column
             let bound: f64 = self.weights.column(k).iter().zip(&sizes).map(|(w, size)| (w * size).abs()).sum();
             let size = if port > UNSEEN * bound {
                 port
@@ -450,39 +474,42 @@ impl Reduced {
                 matrix.column_mut(k).scale_mut(factor);
             }
         }
-        // as large as the whole, and whoever asks for metres asks at the ports
+        // the basis has the size of the whole structure, and only ports are needed from here on
         (self.basis, self.weights, self.n) = (Arc::default(), DMatrix::zeros(0, 0), 0);
         self
     }
 
-    /// Any weighted sums of the degrees of freedom of the whole structure, as rows over the coordinates.
+    /// Returns weighted sums of the degrees of freedom of the whole structure as rows over the
+    /// coordinates.
     ///
     /// # Panics
-    /// If a row lies outside of the whole structure.
+    /// If a row is out of range.
     pub fn rows(&self, rows: &[Row]) -> DMatrix<f64> {
         product(&seen(rows, self.n, &self.basis), &self.weights)
     }
 
-    /// All displacements of the whole structure, n × r.
+    /// Returns all displacements of the whole structure, n × r.
     fn columns(&self) -> DMatrix<f64> {
         DMatrix::from_vec(self.n, self.dofs(), columns::combination(self.n, &self.basis, &self.weights))
     }
 
-    /// All displacements of the whole structure that belong to coordinates `q`.
+    /// Returns all displacements of the whole structure for coordinates `q`.
     ///
     /// # Panics
-    /// If `q` has not r entries.
+    /// If `q` does not have r entries.
     pub fn expand(&self, q: &[f64]) -> Vec<f64> {
         let weights = product(&self.weights, &DMatrix::from_column_slice(q.len(), 1, q));
         columns::combination(self.n, &self.basis, &weights)
     }
 
-    /// Natural frequencies of the reduced structure, rad/s, rising; those of coordinates without mass are infinite.
+    /// Returns the natural frequencies of the reduced structure, rad/s, in ascending order.
+    /// They are infinite for coordinates without mass.
     pub fn frequencies(&self) -> Option<Vec<f64>> {
         Some(natural(&self.mass, &self.stiffness)?.0.iter().map(|v| v.max(0.0).sqrt()).collect())
     }
 
-    /// Receptance of the ports at ω (rad/s): displacements by unit forces, p × p, m/N.
+    /// Returns the receptance of the ports at ω (rad/s): displacements per unit force, p × p,
+    /// m/N.
     ///
     /// # Errors
     /// [`ReductionError::Singular`] at an undamped resonance.
@@ -490,7 +517,7 @@ impl Reduced {
         self.answers(omega, &DMatrix::identity(self.ports.nrows(), self.ports.nrows()))
     }
 
-    /// Displacements of the ports under forces on them, columns side by side.
+    /// Returns the displacements of the ports under forces on them, one column per load.
     fn answers(&self, omega: f64, loads: &DMatrix<f64>) -> Result<DMatrix<Complex<f64>>, ReductionError> {
         let at = |i: usize, k: usize| {
             let (m, c, s) = (self.mass[(i, k)], self.damping[(i, k)], self.stiffness[(i, k)]);
@@ -511,7 +538,8 @@ impl Reduced {
         Ok(part(|z| z.re).zip_map(&part(|z| z.im), Complex::new))
     }
 
-    /// The coordinates under forces on them, by elimination: without damping in real numbers, a fourth of the work.
+    /// Solves for the coordinates by elimination. Without damping, real numbers need a quarter
+    /// of the work.
     fn solved(&self, omega: f64, mut forces: DMatrix<f64>) -> Result<DMatrix<Complex<f64>>, usize> {
         let n = self.dofs();
         let bare = (self.stiffness.iter().zip(self.mass.iter())).map(|(k, m)| k - omega * omega * m);
@@ -526,7 +554,7 @@ impl Reduced {
     }
 }
 
-/// `A B`.
+/// Returns `A B`.
 fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     // columns of length zero cannot be counted
     if a.is_empty() || b.is_empty() {
@@ -540,19 +568,19 @@ fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
     matrix.as_slice().iter().enumerate().all(|(at, value)| *value == 0.0 || at % n == at / n)
 }
 
-/// Weighted sums of rows over columns of length `n`.
+/// Evaluates weighted sums of rows over columns of length `n`.
 fn seen(rows: &[Row], n: usize, columns: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns.len() / n.max(1), |i, k| {
         rows[i].iter().map(|(at, weight)| weight * columns[k * n + at]).sum()
     })
 }
 
-/// The mean of a matrix and its mirror image.
+/// Returns the mean of a matrix and its transpose.
 fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
     (&matrix + matrix.transpose()) * 0.5
 }
 
-/// Reduced damping: `own` if the structure has a matrix.
+/// Returns the reduced damping, or `own` if the structure has a damping matrix.
 fn damping(
     by: &Damping,
     mass: &DMatrix<f64>,
@@ -579,7 +607,10 @@ fn damping(
     Ok(c)
 }
 
-/// Eigenvalues λ (rad²/s², rising, infinite without mass) and shapes of unit mass (or unit stiffness without mass) of a small structure.
+/// Solves the eigenvalue problem of a small structure.
+///
+/// Returns eigenvalues λ (rad²/s², ascending, infinite without mass) and shapes of unit mass,
+/// or of unit stiffness for those without mass.
 pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let r = mass.nrows();
     let moves = |i: usize| mass[(i, i)] > 0.0 || (mass[(i, i)] == 0.0 && stiffness[(i, i)] > 0.0);
@@ -602,12 +633,12 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     for (mut shape, &theta) in shapes.column_iter_mut().zip(&thetas) {
         shape /= if massless(theta) { 1.0 } else { theta.sqrt() };
     }
-    // the largest has the lowest frequency
+    // the largest θ has the lowest frequency
     let order: Vec<usize> = (0..r).rev().collect();
     Some((order.iter().map(|&k| value(thetas[k])).collect(), shapes.select_columns(&order)))
 }
 
-/// The same of coordinates that do not move each other.
+/// Solves the eigenvalue problem of uncoupled coordinates.
 fn natural_by_themselves(mass: &DVector<f64>, stiffness: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let n = mass.len();
     let value = |i: usize| if mass[i] > 0.0 { stiffness[i] / mass[i] } else { f64::INFINITY };

@@ -1,14 +1,23 @@
-//! A ring whose blades differ, in its own modes.
+//! A ring with different blades, in its own modes.
 //!
-//! In few coordinates of every sector the ring has `K + ΔK`, which couples neighbours, and M. Its modes are near the space of those of the tuned ring, the
-//! nominal modes, which one sector tells wave by wave. From these a subspace iteration leads to them, `Y = A⁻¹MX` with `A = K + ΔK + σM`, and X the
-//! modes that the ring has in the space of Y, until those up to the frequency of interest stand still and are as many as there are; modes beyond that are
-//! taken along speed it up. The
-//! factor of A is one for all steps and grows with the number of sectors alone. What all other modes answer at the places are residual vectors, `A⁻¹Wᵀ`
-//! without what the modes have of it. In both together the matrices are made diagonal, so that nothing is factored at any frequency of a response.
+//! In the reduced coordinates of every sector, the ring has the mass matrix M and the stiffness
+//! `K + ΔK`, which couples adjacent sectors. Its modes are close to the space of the nominal
+//! modes, those of the tuned ring, which one sector yields wave by wave.
 //!
-//! Sources: Bathe and Wilson (1972), "Large eigenvalue problems in dynamic analysis", J. Eng. Mech. Div. ASCE 98, 1471-1485; Yang and Griffin (2001), "A
-//! reduced-order model of mistuning using a subset of nominal system modes", J. Eng. Gas Turbines Power 123, 893-900; Rubin as in `free`.
+//! A subspace iteration starts from them: `Y = A⁻¹MX` with `A = K + ΔK + σM`, where X are the
+//! modes of the ring in the space of Y. It ends when all modes up to the frequency of interest
+//! have converged and their number is correct. Additional modes above that frequency accelerate
+//! convergence. All steps use one factorization of A, whose cost grows only with the number of
+//! sectors.
+//!
+//! Residual vectors, `A⁻¹Wᵀ` without their modal part, represent all other modes at the places.
+//! Both together diagonalize the matrices, so that a response needs no factorization at any
+//! frequency.
+//!
+//! Sources: Bathe and Wilson (1972), "Large eigenvalue problems in dynamic analysis", J. Eng.
+//! Mech. Div. ASCE 98, 1471-1485; Yang and Griffin (2001), "A reduced-order model of mistuning
+//! using a subset of nominal system modes", J. Eng. Gas Turbines Power 123, 893-900; Rubin as
+//! in `free`.
 
 use super::evidence::sign;
 use super::free::{DEPENDENT, leading};
@@ -22,62 +31,69 @@ use std::sync::Arc;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{Analysis, Factor, Matrix, ModesError, columns};
 
-/// Modes of the tuned ring up to these multiples of the frequency of interest begin, as they are tried: those beyond what is of interest leave to the
-/// residual vectors what is nearly at rest. With one and a half sixty steel strips erred by 8.5e-5 at resonances, with three by 4e-6.
+/// Multiples of the frequency of interest up to which modes of the tuned ring start the
+/// iteration. Modes above that frequency leave an almost static remainder to the residual
+/// vectors. Sixty steel strips had an error of 8.5e-5 at resonances with a multiple of 1.5, and
+/// 4e-6 with 3.
 pub(in crate::structure) const EXTENTS: [f64; 2] = [3.0, 6.0];
-/// Relative change of an eigenvalue by a step at which it stands still: the next changes it by a hundredth of that, as the modes that are left out have
-/// nine times its eigenvalue, an error of 1e-7 at a resonance of the half width for which errors are said.
+/// Relative change of an eigenvalue in one step at which it counts as converged. The next step
+/// changes it by about a hundredth of that, because the omitted modes have nine times its
+/// eigenvalue. This is an error of 1e-7 at a resonance of half width [`HALF_WIDTH`].
 const SETTLED: f64 = 1e-5 * HALF_WIDTH;
-/// Steps at most: three or four are usual.
+/// Largest number of steps; three or four are typical.
 const STEPS: usize = 40;
-/// Inertia of a mode by its stiffness, relative to the largest, below which it has none.
+/// Inertia of a mode relative to its stiffness, in units of the largest, below which it has no
+/// mass.
 const MASSLESS: f64 = 1e-14;
 
-/// A ring in few coordinates of every sector, tuned, and where its modes are sought from.
+/// A tuned ring in reduced coordinates of every sector, with the start of the iteration for its
+/// modes.
 #[derive(Debug)]
 pub(in crate::structure) struct NominalRing {
     sector: Arc<ReducedSector>,
     sectors: usize,
-    /// Of interest up to there, rad/s.
+    /// Highest frequency of interest, rad/s.
     up_to: f64,
     mass: Matrix,
     damping: Option<Matrix>,
     stiffness: Matrix,
-    /// What a share of a blade's stiffness adds to its sector.
+    /// Stiffness of a sector per unit relative deviation of its blade.
     of_blade: Vec<(usize, usize, f64)>,
     analysis: Analysis,
     /// Modes of the tuned ring up to the first of [`EXTENTS`], by columns.
     nominal: Vec<f64>,
-    /// What is seen in every sector, one after the other.
+    /// Observed displacements of every sector, one sector after the other.
     seen: Vec<Row>,
 }
 
-/// The modes of the ring with its blades differing.
+/// The modes of the ring with different blades.
 pub(in crate::structure) struct Mixed {
-    /// λ, rad²/s², rising: exact in the coordinates as far as they are of interest.
+    /// λ, rad²/s², ascending. They are exact in the coordinates up to the frequency of
+    /// interest.
     pub values: Vec<f64>,
-    /// Over the coordinates of all sectors, of unit mass.
+    /// Shapes of unit mass over the coordinates of all sectors.
     pub shapes: Vec<f64>,
     factor: Factor,
-    /// At the highest frequency of interest.
+    /// Factor at the highest frequency of interest.
     at_highest: Factor,
 }
 
-/// A ring in its own modes, each of a metre where most is seen of it.
+/// A ring in its own modes, each scaled to one metre at the place that moves most.
 #[derive(Debug)]
 pub(crate) struct RingModes {
-    /// For people.
+    /// Description of the reduction.
     pub kind: String,
     /// Modal mass and stiffness.
     pub own: Vec<[f64; 2]>,
-    /// Of a damping matrix.
+    /// Modal damping from a damping matrix.
     damping: Option<DMatrix<f64>>,
-    /// What is seen in every sector, one after the other, by modes.
+    /// Observed displacements of every sector, one sector after the other, by modes.
     pub seen: DMatrix<f64>,
 }
 
 impl NominalRing {
-    /// Of a sector with a blade of this stiffness over its coordinates, up to `up_to` rad/s.
+    /// Creates the ring from a sector and the stiffness of its blade over the coordinates, for
+    /// frequencies up to `up_to` rad/s.
     pub fn new(
         sector: &Arc<ReducedSector>,
         of_blade: Vec<(usize, usize, f64)>,
@@ -102,7 +118,8 @@ impl NominalRing {
         Ok(NominalRing { sector, sectors, up_to, mass, damping, stiffness, of_blade, analysis, nominal, seen })
     }
 
-    /// The modes of the ring with these deviations of its blades, sought from those up to one of [`EXTENTS`].
+    /// Returns the modes of the ring with these blade deviations. The iteration starts from
+    /// nominal modes up to `extent`, one of [`EXTENTS`].
     pub fn mixed(&self, deviations: &[f64], extent: f64) -> Result<Mixed, ReductionError> {
         let (n, highest, shift) = (self.mass.n(), self.up_to * self.up_to, shift(self.up_to));
         let blades = all_blades(&self.of_blade, deviations, self.sector.dofs())?;
@@ -123,7 +140,7 @@ impl NominalRing {
             factor.solve(&mut moved);
             let held = columns::products(n, &moved, &forces);
             let mass = columns::products(n, &moved, &self.mass.times_columns(&moved));
-            // the largest has the lowest frequency
+            // the largest θ has the lowest frequency
             let found = eigen::symmetric_pair(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
             let rising: Vec<usize> = (0..found.0.len()).rev().collect();
             let thetas: Vec<f64> = rising.iter().map(|&k| found.0[k]).collect();
@@ -138,7 +155,7 @@ impl NominalRing {
             if !std::mem::replace(&mut begun, true) || !values.iter().zip(&before).take(inside).all(stands) {
                 continue;
             }
-            // so many eigenvalues lie below as the factor has negative pivots
+            // the number of negative pivots is the number of eigenvalues below
             let sum = [(1.0, &self.stiffness), (1.0, &blades), (-highest, &self.mass)];
             let at_highest = self.analysis.factor(&sum);
             let singular = |singular| ReductionError::Singular { omega: self.up_to, singular };
@@ -151,13 +168,15 @@ impl NominalRing {
         Err(ModesError::NotConverged { found: 0, counted: found, below: highest }.into())
     }
 
-    /// The ring in its own modes, and what residual vectors leave out: the relative error of the answer to loads on everything that is seen, where it is
-    /// largest, at the highest frequency of interest.
+    /// Returns the ring in its own modes, with the error of the residual vectors.
+    ///
+    /// The error is that of the response to loads on all observed displacements. It is
+    /// evaluated at the highest frequency of interest, where it is largest.
     pub fn modes(&self, mixed: &Mixed) -> Result<(RingModes, Deviation), ReductionError> {
         let (n, ports, shift) = (self.mass.n(), self.seen.len(), shift(self.up_to));
         let Mixed { values, shapes, factor, at_highest } = mixed;
         let low = values.len();
-        // modes of unit A, and residual vectors, free of them in A
+        // modes normalized in A, and residual vectors orthogonal to them in A
         let root: Vec<f64> = values.iter().map(|value| (value + shift).sqrt()).collect();
         let mut moved = vec![0.0; n * ports];
         for (column, row) in moved.chunks_exact_mut(n.max(1)).zip(&self.seen) {
@@ -177,7 +196,7 @@ impl NominalRing {
         columns::add(n, &mut moved, -1.0, shapes, &answered);
         let flexible = self.rows_of(&moved);
         let independent = independent(&flexible, &whole)?;
-        // inertia of both, over vectors of unit A
+        // inertia of both, over vectors normalized in A
         let heavy = self.mass.times_columns(&moved);
         let mut coupling = product(&columns::products(n, shapes, &heavy), &independent);
         for (mut row, root) in coupling.row_iter_mut().zip(&root) {
@@ -202,7 +221,7 @@ impl NominalRing {
         let mut seen = product(&seen_low, &of_modes) + product(&seen_rest, &of_rest);
         let most = thetas.last().copied().unwrap_or(0.0);
         let mut own: Vec<[f64; 2]> = thetas.iter().map(|theta| self.own(*theta, most)).collect();
-        // coordinates that are seen nowhere have the size that their coordinates may have at most
+        // unobserved modes are scaled by an upper bound of their coordinates
         let reach = |shape: &[f64]| shape.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let reach: Vec<f64> =
             shapes.chunks_exact(n.max(1)).zip(&root).map(|(shape, root)| reach(shape) / root).collect();
@@ -236,7 +255,8 @@ impl NominalRing {
         Ok((RingModes { kind, own, damping, seen }, Deviation { error, omega: self.up_to }))
     }
 
-    /// The relative error of modes and what is seen of them, under loads of random signs, each place by its flexibility.
+    /// Returns the relative error of a modal response under loads of random signs. Each place
+    /// is scaled by its flexibility.
     fn left_out(&self, (own, seen): (&[[f64; 2]], &DMatrix<f64>), flexibility: &[f64], at_highest: &Factor) -> f64 {
         let scale = |place: usize| if flexibility[place] > 0.0 { flexibility[place].sqrt().recip() } else { 0.0 };
         let loads = DVector::from_fn(self.seen.len(), |place, _| sign(place) * scale(place));
@@ -257,22 +277,23 @@ impl NominalRing {
             all += (scale(place) * exact).powi(2);
         }
         let error = if all > 0.0 { (apart / all).sqrt() } else { 0.0 };
-        // what is no number is no small error
+        // NaN counts as an infinite error
         if error.is_nan() { f64::INFINITY } else { error }
     }
 
-    /// Modal mass and stiffness of unit A, of a mode with this mass.
+    /// Returns modal mass and stiffness, normalized in A, of a mode with mass `theta`.
     fn own(&self, theta: f64, most: f64) -> [f64; 2] {
         if theta <= MASSLESS * most {
             return [0.0, 1.0];
         }
         let stiffness = 1.0 - shift(self.up_to) * theta;
-        // rounding would hold a free motion, and a constant load find its balance kilometres away
+        // a nonzero value from rounding would restrain the free motion, and a constant load
+        // would displace it by kilometres
         let free = stiffness < (FREE * self.up_to).powi(2) * theta;
         [theta, if free { 0.0 } else { stiffness }]
     }
 
-    /// What is seen of columns.
+    /// Returns the observed displacements of columns.
     fn rows_of(&self, columns: &[f64]) -> DMatrix<f64> {
         let n = self.mass.n();
         let mut rows = DMatrix::zeros(self.seen.len(), columns.len() / n.max(1));
@@ -284,7 +305,7 @@ impl NominalRing {
 }
 
 impl RingModes {
-    /// Damping between the modes, as (row, column, value).
+    /// Returns the damping between the modes, as (row, column, value).
     pub fn damped(&self, by: Option<&Damping>) -> Result<Vec<(usize, usize, f64)>, ReductionError> {
         let Some(by) = by else {
             let all = self
@@ -303,8 +324,9 @@ impl RingModes {
     }
 }
 
-/// The modes of all waves of a tuned ring up to `highest`, rad/s, over the coordinates of all sectors: `x_s = c Re(a e^{jdθs})`, `c² = 2/N`, or `1/N` of
-/// a wave that does not travel.
+/// Returns the modes of all waves of a tuned ring up to `highest`, rad/s, over the coordinates
+/// of all sectors: `x_s = c Re(a e^{jdθs})`, `c² = 2/N`, or `1/N` for a wave that does not
+/// travel.
 fn nominal_modes(sector: &ReducedSector, sectors: usize, highest: f64) -> Result<Vec<f64>, ReductionError> {
     let r = sector.dofs();
     let mut all = Vec::new();
@@ -327,7 +349,8 @@ fn nominal_modes(sector: &ReducedSector, sectors: usize, highest: f64) -> Result
     Ok(all)
 }
 
-/// Combinations of residual vectors that are independent and of unit stiffness, by their flexibility at the places and that of the whole ring.
+/// Returns independent combinations of residual vectors of unit stiffness, from their
+/// flexibility at the places and that of the whole ring.
 fn independent(flexible: &DMatrix<f64>, whole: &[f64]) -> Result<DMatrix<f64>, ReductionError> {
     let moving: Vec<usize> = (0..whole.len()).filter(|&k| flexible[(k, k)] > DEPENDENT * whole[k]).collect();
     let size: Vec<f64> = moving.iter().map(|&k| flexible[(k, k)].sqrt()).collect();
@@ -346,14 +369,14 @@ fn independent(flexible: &DMatrix<f64>, whole: &[f64]) -> Result<DMatrix<f64>, R
     Ok(weights)
 }
 
-/// Entries of all sectors, of so many rows and columns each.
+/// Returns the entries of all sectors, each of size `rows` by `of`.
 fn around(entries: &[RingEntry], [rows, of]: [usize; 2], sectors: usize) -> Vec<(usize, usize, f64)> {
     let next = |s: usize, shift: i64| (s as i64 + shift).rem_euclid(sectors as i64) as usize;
     let all = (0..sectors).flat_map(|s| entries.iter().map(move |entry| (s, entry)));
     all.map(|(s, &(row, column, shift, value))| (s * rows + row, next(s, shift) * of + column, value)).collect()
 }
 
-/// What deviations of all blades add to the stiffness.
+/// Returns the change of stiffness due to the deviations of all blades.
 fn all_blades(of_blade: &[(usize, usize, f64)], deviations: &[f64], dofs: usize) -> Result<Matrix, ReductionError> {
     let all = deviations.iter().enumerate().flat_map(|(s, deviation)| {
         of_blade.iter().map(move |&(row, column, value)| (s * dofs + row, s * dofs + column, deviation * value))

@@ -1,50 +1,56 @@
-//! What a user asks of a reduction.
+//! The user's request for a reduction.
 
-/// How a component is brought into few coordinates.
+/// The method of reduction of a component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reduction {
-    /// Not at all: all its rows are degrees of freedom, and its dynamic stiffness is factored at every frequency.
+    /// No reduction: all rows are degrees of freedom, and the dynamic stiffness is factored at
+    /// every frequency.
     None {
-        /// The largest frequency of interest, rad/s: a damping ratio is that of every mode up to there. Nothing else asks for it.
+        /// Highest frequency of interest, rad/s. It is used only for a damping ratio, which
+        /// applies to every mode up to this frequency.
         up_to: f64,
     },
-    /// With as many modes as the error asks for.
+    /// The number of modes follows from the required error.
     UpTo {
-        /// The largest frequency of interest, rad/s: of the drive with all harmonics that count.
+        /// Highest frequency of interest, rad/s, including all significant harmonics of the
+        /// excitation.
         up_to: f64,
-        /// The largest relative error of what the model sees up to there.
+        /// Largest relative error of the observed displacements up to this frequency.
         tolerance: f64,
-        /// Of one kind only, if it is named.
+        /// Kind of reduction; `None` allows all.
         kind: Option<ReductionKind>,
     },
-    /// With so many modes.
+    /// A fixed number of modes.
     Modes {
-        /// How many.
+        /// Number of modes.
         modes: usize,
-        /// Of which kind.
+        /// Kind of reduction.
         kind: ReductionKind,
-        /// Orders of residual vectors beside free modes, from 1 on: each makes two more terms of their series exact.
+        /// Orders of residual vectors for free modes, at least 1. Each order makes two more
+        /// terms of their series exact.
         orders: usize,
-        /// The largest frequency of interest, rad/s, up to which the error is measured; zero: as far as so many modes serve, which is up to the
-        /// last of them over 1.5.
+        /// Highest frequency for the error estimate, rad/s. Zero means the frequency of the
+        /// last mode divided by 1.5.
         up_to: f64,
     },
 }
 
-/// Kinds of reduction, see [`reduction`](super).
+/// Kinds of reduction; see [`reduction`](super).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReductionKind {
-    /// Free modes, and what the others add at the places.
+    /// Free modes, and the static response of the omitted modes at the places.
     Rubin,
-    /// Modes with the places held, and static answers to unit motions of them.
+    /// Modes with fixed places, and static responses to unit displacements of the places.
     CraigBampton,
 }
 
 impl Reduction {
-    /// The relative error of what is seen that is small beside that of any law of friction.
+    /// Default relative error of the observed displacements. It is small compared with the
+    /// uncertainty of any friction law.
     pub const TOLERANCE: f64 = 1e-4;
 
-    /// As many modes as that error asks for, of whatever kind, up to a frequency in rad/s.
+    /// Requests as many modes of any kind as the default error requires, up to a frequency in
+    /// rad/s.
     pub fn up_to(up_to: f64) -> Self {
         Reduction::UpTo { up_to, tolerance: Self::TOLERANCE, kind: None }
     }

@@ -1,26 +1,31 @@
-//! What modes leave of the answer at the ports: residual vectors of any order.
+//! Residual vectors of any order: the response of the omitted modes at the ports.
 //!
-//! The answer of the modes that are not kept is a power series in λ around σ,
+//! It is a power series in λ around σ,
 //!
-//! `Σ φ φᵀ F / (λₖ - λ) = Σⱼ (λ - σ)ʲ Xⱼ`, `X₀ = R F`, `Xⱼ₊₁ = R M Xⱼ`, `R = (K - σM)⁻¹` without the modes that are kept.
+//! `Σ φ φᵀ F / (λₖ - λ) = Σⱼ (λ - σ)ʲ Xⱼ`, `X₀ = R F`, `Xⱼ₊₁ = R M Xⱼ`, where `R = (K - σM)⁻¹`
+//! without the retained modes.
 //!
-//! `X₀` at σ = 0 is the residual flexibility. A structure that can move freely has no `K⁻¹`: forces are made self-equilibrated by the
-//! inertia of that motion, and as many degrees of freedom are held as it has directions. Holding them takes no force then, so that it may
-//! be done by springs of any stiffness.
+//! `X₀` at σ = 0 is the residual flexibility. If the structure has free motions, `K⁻¹` does not
+//! exist. Then the inertia of these motions makes the forces self-equilibrated, and one degree
+//! of freedom per free motion is fixed. The reaction forces are zero, so that springs of any
+//! stiffness can fix them.
 //!
-//! Sources: MacNeal (1971), "A hybrid method of component mode synthesis"; Rubin (1975), "Improved component-mode representation for structural
-//! dynamic analysis"; Hansteen and Bell (1979), "On the accuracy of mode superposition analysis in structural dynamics"; Dickens, Nakagawa and
-//! Wittbrodt (1997), "A critique of mode acceleration and modal truncation augmentation methods for modal response analysis".
+//! Sources: MacNeal (1971), "A hybrid method of component mode synthesis"; Rubin (1975),
+//! "Improved component-mode representation for structural dynamic analysis"; Hansteen and Bell
+//! (1979), "On the accuracy of mode superposition analysis in structural dynamics"; Dickens,
+//! Nakagawa and Wittbrodt (1997), "A critique of mode acceleration and modal truncation
+//! augmentation methods for modal response analysis".
 
 use super::{AT_ONCE, ReductionError, Whole};
 use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
 
-/// Attempts to factor beside an eigenvalue, each further by `STEP` of the shift.
+/// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
+/// `STEP`.
 const ATTEMPTS: usize = 8;
 const STEP: f64 = 1e-3;
 
-/// The modes, then the blocks `X₀, …`, as many as `order`, n × (k + p J), with the modes projected out of the blocks. Also the shift that was taken,
-/// rad²/s².
+/// Returns the modes and the blocks `X₀, …` up to `order`, n × (k + p J), and the shift,
+/// rad²/s². The modes are projected out of the blocks.
 pub(super) fn basis(
     whole: &Whole,
     modes: &NaturalModes,
@@ -46,7 +51,8 @@ pub(super) fn basis(
                 }
                 None => whole.forces(numbers),
             };
-            // forces without the part that the modes answer: A F = (1 - M Φ Φᵀ) F, self-equilibrated with them
+            // removes the modal part of the forces, A F = (1 - M Φ Φᵀ) F, which makes them
+            // self-equilibrated
             let along = columns::products(n, &modes.shapes, &some);
             columns::add(n, &mut some, -1.0, &heavy, &along);
             factor.solve(&mut some);
@@ -58,7 +64,7 @@ pub(super) fn basis(
     Ok((basis, shift))
 }
 
-/// `K - σM`; at zero with springs where a free motion is largest.
+/// Factors `K - σM`. At zero shift, it adds springs where the free motions are largest.
 fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
     if shift == 0.0 {
         let supports = supports(whole, modes)?;
@@ -77,8 +83,9 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f6
     Err(failed.unwrap_or(ReductionError::OutOfRange))
 }
 
-/// Springs that hold every free motion once: at the degree of freedom that moves most, then at that which moves most with the first one
-/// held, and so on.
+/// Returns springs that fix each free motion once. The first spring is at the degree of freedom
+/// that moves most. The next one is at that with the largest motion when the first is fixed,
+/// and so on.
 fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);

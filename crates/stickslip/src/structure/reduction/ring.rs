@@ -1,14 +1,20 @@
-//! A sector of a ring in few coordinates that serve all its waves.
+//! Reduction of a sector of a ring, valid for all its waves.
 //!
-//! The matrices of a wave are affine in `e^{jθ}`, so that its modes and residual vectors change smoothly with the nodal diameter. Real and
-//! imaginary parts of those of some diameters make one real basis of the sector, `q(s) = V p(s)`, and the reduced ring couples neighbours
-//! only, as the whole does: `V* A(θ) V` for every θ at once. It has the modes of these diameters exactly, and is held against the waves of others;
-//! as many diameters are taken as the error asks for. What differs from sector to sector is seen by the same basis, `Vᵀ ΔA V`: the nominal modes
-//! of the ring span nearly what the mistuned ring does (`nominal`, `mistuned`). Where that is not near enough, the residual vectors of the forces `D φ` join them, by which a
-//! blade that deviates answers the modes φ.
+//! The matrices of a wave are affine in `e^{jθ}`. Therefore its modes and residual vectors
+//! depend smoothly on the nodal diameter. Real and imaginary parts of those of some diameters
+//! form one real basis of the sector, `q(s) = V p(s)`. The reduced ring couples adjacent
+//! sectors only, like the whole ring: `V* A(θ) V` for every θ at once.
 //!
-//! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of nominal system modes", J. Eng. Gas Turbines Power 123,
-//! 893-900.
+//! It has the modes of these diameters exactly and is compared with the whole ring for other
+//! diameters. The number of diameters follows from the required error.
+//!
+//! Differences between sectors use the same basis, `Vᵀ ΔA V`: the nominal modes of the ring
+//! approximately span the space of the mistuned ring (`nominal`, `mistuned`). If that is not
+//! accurate enough, the basis also receives residual vectors of the forces `D φ`, which a
+//! deviating blade exerts in the modes φ.
+//!
+//! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of
+//! nominal system modes", J. Eng. Gas Turbines Power 123, 893-900.
 
 use super::{
     Damping, Deviation, Free, Reduced, Reduction, ReductionError, ReductionKind, Reference, Row, Whole, damping,
@@ -22,27 +28,30 @@ use std::sync::Arc;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{NaturalModes, Wanted, columns};
 
-/// Shares of the largest eigenvalue of the vectors' Gram matrix, below which a combination of them is left out, with the order of the residual
-/// vectors: as they are tried, one after the other.
+/// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
+/// which a combination is dropped. They are tried in this sequence.
 const SIZES: [(usize, f64); 5] = [(1, 1e-6), (1, 1e-9), (2, 1e-9), (3, 1e-9), (3, 1e-12)];
-/// Modes of every wave up to these multiples of the frequency of interest are tried.
+/// Multiples of the frequency of interest up to which the modes of every wave are tried.
 const EXTENTS: [f64; 2] = [1.5, 3.0];
-/// From which of these, extent by extent, blades that differ take their vectors: the first is that of the tuned ring, without any.
+/// First entry of the sequence of extents and sizes that each step tries for different blades.
+/// The first step is that of the tuned ring, without blade vectors.
 pub(in crate::structure) const STEPS: [usize; 5] = [0, 1, 2, 7, 9];
-/// What a relative shift of a natural frequency counts as an error of the receptance: as much as at a resonance of this half width. Modes that no
-/// port sees are held against the whole so.
+/// Converts a relative shift of a natural frequency to an error of the receptance: the shift
+/// divided by this half width of a resonance. Modes that no port observes are compared in this
+/// way.
 pub(super) const HALF_WIDTH: f64 = 1e-3;
-/// Samples by which a wave is compared with the whole at most: each takes a factor of a sector twice.
+/// Largest number of samples in the comparison of a wave; each needs a factorization of twice
+/// the size of a sector.
 const SAMPLES: usize = 5;
 
-/// A sector in few coordinates.
+/// A reduced sector.
 #[derive(Debug, Clone)]
 pub(crate) struct ReducedSector {
     pub kind: String,
-    /// Columns over the rows that are left.
+    /// Columns over the remaining rows.
     pub basis: Vec<f64>,
     pub n: usize,
-    /// Row, column, shift, value.
+    /// Entries as row, column, shift, value.
     pub mass: Vec<RingEntry>,
     pub damping: Option<Vec<RingEntry>>,
     pub stiffness: Vec<RingEntry>,
@@ -51,48 +60,49 @@ pub(crate) struct ReducedSector {
     pub port_count: usize,
 }
 
-/// What came of a reduction.
+/// Result of a reduction.
 #[derive(Debug, Clone)]
 pub(in crate::structure) struct ChosenSector {
     pub reduced: ReducedSector,
     pub deviation: Deviation,
-    /// Of the waves that were computed, rad/s, rising; each wave that travels either way once.
+    /// Frequencies of the computed waves, rad/s, ascending. Each pair of travelling waves is
+    /// listed once.
     pub frequencies: Vec<f64>,
-    /// Free motions among them.
+    /// Number of free motions among them.
     pub free: usize,
-    /// The deviation is known up to there, rad/s.
+    /// Upper end of the frequency range of the deviation, rad/s.
     pub up_to: f64,
-    /// The modes serve up to there, rad/s.
+    /// Highest frequency for which the basis is intended, rad/s.
     pub serves: f64,
 }
 
-/// A wave that was computed.
+/// A computed wave.
 struct Computed {
     diameter: usize,
     whole: Whole,
     modes: NaturalModes,
-    /// Up to this multiple of the frequency of interest.
+    /// Multiple of the frequency of interest up to which modes are computed.
     extent: f64,
     reference: Reference,
 }
 
-/// The first share that is tried with so many orders.
+/// Returns the first Gram tolerance for this number of orders.
 fn share(orders: usize) -> f64 {
     SIZES.iter().find(|(order, _)| *order >= orders).map_or(SIZES[SIZES.len() - 1].1, |(_, share)| *share)
 }
 
-/// The waves of a sector, as they are asked for.
+/// The waves of a sector, computed on request.
 struct Waves<'a> {
     sector: &'a CyclicSector,
     seen: &'a [Row],
-    /// Of blades that differ, and up to which frequency.
+    /// For different blades: the blade, and the highest frequency of interest.
     blade: Option<(&'a Blade, f64)>,
     met: Vec<Computed>,
 }
 
 impl CyclicSector {
-    /// The sector in few coordinates, seen at these weighted sums of the component's rows; with vectors of a blade that differs from that one of the
-    /// [`STEPS`] on.
+    /// Returns the reduced sector, observed at these weighted sums of the component's rows. For
+    /// different blades, it includes blade vectors, from this entry of [`STEPS`] on.
     pub(in crate::structure) fn reduced(
         &self,
         seen: &[Row],
@@ -113,7 +123,7 @@ impl CyclicSector {
         }
     }
 
-    /// Nodal diameters that are computed at a level: all from the last one on.
+    /// Returns the nodal diameters of a refinement level. High levels contain all diameters.
     pub(super) fn diameters(&self, level: usize) -> Vec<usize> {
         let (half, parts) = (self.sectors / 2, 2usize << level);
         let mut all: Vec<usize> = (0..=parts).map(|part| (part * half + parts / 2) / parts).collect();
@@ -123,7 +133,8 @@ impl CyclicSector {
 }
 
 impl Waves<'_> {
-    /// The waves of these diameters with all modes up to `extent` times the frequency of interest.
+    /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
+    /// of interest.
     fn meet(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
         for &diameter in diameters {
             match self.met.iter_mut().find(|wave| wave.diameter == diameter) {
@@ -173,7 +184,7 @@ impl Waves<'_> {
                 if all.error <= tolerance {
                     return Ok(self.chosen(reduced, all, (up_to, up_to)));
                 }
-                // where the waves that were taken are close, it is others that are missing
+                // if the computed waves are accurate, other diameters are missing
                 if own.error > tolerance || taken == between {
                     break;
                 }
@@ -184,7 +195,7 @@ impl Waves<'_> {
         Err(ReductionError::OutOfReach { best: least.error, at: least.omega, dofs, tolerance })
     }
 
-    /// With so many modes of every wave.
+    /// Reduces the sector with a fixed number of modes of every wave.
     fn with_modes(
         &mut self,
         count: usize,
@@ -225,7 +236,7 @@ impl Waves<'_> {
         ChosenSector { reduced, deviation, frequencies, free, up_to, serves }
     }
 
-    /// One basis of the waves of these diameters.
+    /// Builds one basis from the waves of these diameters.
     fn basis(
         &self,
         diameters: &[usize],
@@ -262,7 +273,8 @@ impl Waves<'_> {
         Ok(self.projected(kind, basis, n))
     }
 
-    /// What a wave answers to the forces of a blade that deviates, in its modes up to a frequency: residual vectors, both parts of the wave.
+    /// Returns residual vectors of a wave for the forces of a deviating blade, in its modes up
+    /// to a frequency. Both parts of the wave are included.
     fn relieved(&self, wave: &Computed, blade: &Blade, up_to: f64, order: usize) -> Result<Vec<f64>, ReductionError> {
         let (n, modes) = (self.sector.dofs, &wave.modes);
         let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
@@ -278,8 +290,9 @@ impl Waves<'_> {
         Ok(basis.split_off(modes.shapes.len()))
     }
 
-    /// Combinations of columns over the rows that are left, orthogonal in the sector's own energy, without those that hardly differ from
-    /// others; each of unit displacement where most is seen of it.
+    /// Returns combinations of columns over the remaining rows that are orthogonal in the
+    /// energy of the sector. Nearly dependent combinations are dropped. Each is scaled to unit
+    /// displacement at the port that moves most.
     fn independent(&self, vectors: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.sector.dofs;
         let (mass, stiffness) = (self.sector.alone(&self.sector.mass)?, self.sector.alone(&self.sector.stiffness)?);
@@ -342,7 +355,7 @@ impl Waves<'_> {
         }
     }
 
-    /// How far the waves of these diameters are from the whole.
+    /// Returns the error of the waves of these diameters relative to the whole ring.
     fn deviation(&self, reduced: &ReducedSector, diameters: &[usize], up_to: f64) -> Result<Deviation, ReductionError> {
         let mut worst = Deviation { error: 0.0, omega: 0.0 };
         for wave in self.met.iter().filter(|wave| diameters.contains(&wave.diameter)) {
@@ -361,10 +374,11 @@ impl Waves<'_> {
     }
 }
 
-/// As [`Reduction::Modes`] of a component has it: the last modes only complete those below.
+/// Same ratio as in [`Reduction::Modes`] of a component: the last modes only improve those
+/// below.
 const BEYOND: f64 = 1.5;
 
-/// `Vᵀ A V` of entries with shifts.
+/// Returns `Vᵀ A V` for entries with shifts.
 fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
     let r = basis.len() / n.max(1);
     let mut out = Vec::with_capacity(3 * r * r);
@@ -383,12 +397,13 @@ fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
 }
 
 impl ReducedSector {
-    /// Coordinates of a sector.
+    /// Returns the number of coordinates of a sector.
     pub fn dofs(&self) -> usize {
         self.basis.len() / self.n.max(1)
     }
 
-    /// Damping in every sector and between any two, of a law that knows modes.
+    /// Returns the damping within every sector and between any two sectors, for damping that
+    /// depends on modes.
     pub fn damped(&self, by: &Damping, sectors: usize) -> Result<Vec<RingEntry>, ReductionError> {
         by.check()?;
         let r = self.dofs();
@@ -398,7 +413,8 @@ impl ReducedSector {
             };
             return Ok([of(&self.mass, mass), of(&self.stiffness, stiffness)].concat());
         }
-        // of every wave that of its modes; C of a sector is the mean of the waves with their phases
+        // damping by the modes of every wave; C of a sector is the phase-weighted mean over the
+        // waves
         let mut between = vec![DMatrix::<f64>::zeros(r, r); sectors];
         for diameter in 0..=sectors / 2 {
             let wave = self.wave(diameter, sectors)?;
@@ -421,7 +437,7 @@ impl ReducedSector {
         Ok(symmetrised(all.collect(), back))
     }
 
-    /// The reduced structure in a wave.
+    /// Returns the reduced structure in a wave.
     pub(super) fn wave(&self, diameter: usize, sectors: usize) -> Result<Reduced, ReductionError> {
         let r = self.dofs();
         let copies = if is_real(diameter, sectors) { 1 } else { 2 };

@@ -1,8 +1,11 @@
-//! The receptance of ports as a sum over modes and a power series of what they leave: for methods that want receptances only.
+//! Receptance of the ports as a modal sum and a power series of the residual, for methods that
+//! need receptances only.
 //!
-//! `R(ω) = Σ φ φᵀ / (λ - ω² + jω c) + Σⱼ (z - σ)ʲ Qⱼ / (1 + jω β)`, `z = (ω² - jω α) / (1 + jω β)`, with `Qⱼ = Fᵀ Xⱼ` of the residual vectors X and
-//! damping `α M + β K` of what is not a mode. J orders of vectors make 2 J terms, for `Q₍ᵢ₊ⱼ₊₁₎ = Xᵢᵀ M Xⱼ`.
-//! It converges like `((ω² - σ) / (λ - σ))²ᴶ` of the first mode that is left out.
+//! `R(ω) = Σ φ φᵀ / (λ - ω² + jω c) + Σⱼ (z - σ)ʲ Qⱼ / (1 + jω β)`,
+//! `z = (ω² - jω α) / (1 + jω β)`. Here `Qⱼ = Fᵀ Xⱼ` with the residual vectors X, and
+//! `α M + β K` is the damping outside the modes. J orders of vectors yield 2 J terms, because
+//! `Q₍ᵢ₊ⱼ₊₁₎ = Xᵢᵀ M Xⱼ`. The error decreases like `((ω² - σ) / (λ - σ))²ᴶ`, with λ of the
+//! first omitted mode.
 //!
 //! Sources: Hansteen and Bell (1979); Dickens, Nakagawa and Wittbrodt (1997), as in `residual`.
 
@@ -14,7 +17,7 @@ use nalgebra::{Complex, DMatrix};
 pub struct Series {
     /// λ of the modes, rad²/s².
     values: Vec<f64>,
-    /// The ports' displacements in every mode, p × k.
+    /// Displacements of the ports in every mode, p × k.
     shapes: DMatrix<f64>,
     /// `Q₀, …`, p × p each.
     terms: Vec<DMatrix<f64>>,
@@ -24,13 +27,14 @@ pub struct Series {
 }
 
 impl Series {
-    /// Of the first `modes` modes and twice as many terms as there are orders of residual vectors.
+    /// Creates a series from the first `modes` modes, with two terms per order of residual
+    /// vectors.
     ///
     /// # Errors
     /// [`ReductionError::SeriesDamping`] for a structure with a damping matrix.
     ///
     /// # Panics
-    /// If there are fewer modes.
+    /// If `free` has fewer modes.
     pub fn new(free: &Free, modes: usize) -> Result<Self, ReductionError> {
         assert!(modes <= free.modes(), "{modes} of {} modes", free.modes());
         let damping = free.whole().damping.clone();
@@ -47,18 +51,18 @@ impl Series {
         Ok(Series { values: free.values[..modes].to_vec(), shapes, terms, shift: free.shift, damping })
     }
 
-    /// The residual terms `Q`.
+    /// Returns the number of residual terms `Q`.
     pub fn terms(&self) -> usize {
         self.terms.len()
     }
 
-    /// Receptance of the ports at ω (rad/s), p × p, m/N.
+    /// Returns the receptance of the ports at ω (rad/s), p × p, m/N.
     pub fn receptance(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let modal = |value: f64| self.damping.of_mode(value.max(0.0).sqrt()).unwrap_or(0.0);
         self.sum(omega, modal, self.damping.proportional().unwrap_or((0.0, 0.0)))
     }
 
-    /// The same without damping.
+    /// Returns the receptance without damping.
     pub(super) fn undamped(&self, omega: f64) -> DMatrix<Complex<f64>> {
         self.sum(omega, |_| 0.0, (0.0, 0.0))
     }
