@@ -253,7 +253,7 @@ mod tests {
         assert_eq!((largest.difference, largest.points), (2.0, 1));
         largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
         assert_eq!(largest.points, 1);
-        // The same rule holds between two points of a curve.
+        // This also holds between two points of a curve.
         let half = Pair { first: 0, other: (0, 1, 0.5) };
         assert_eq!(half.value("blade_phase_deg", &[179.0, -179.0]), 180.0);
         assert_eq!(half.value("blade_amplitude_m", &[179.0, -179.0]), 0.0);
