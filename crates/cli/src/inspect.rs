@@ -221,7 +221,7 @@ fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
 struct Pair {
     /// Number of constrained rows, which are removed.
     constrained: usize,
-    /// The lowest angular frequencies, or the reason why there are none.
+    /// The lowest angular frequencies, or the reason why they are not available.
     frequencies: Result<Vec<f64>, String>,
     /// The frequencies of free vibration if a damping matrix has a gyroscopic part.
     turning: Option<Vec<f64>>,
@@ -230,7 +230,7 @@ struct Pair {
 }
 
 impl Pair {
-    /// Pairs the matrices. Row names come from the matrices, otherwise from `beside`.
+    /// Pairs the matrices. Row names come from the matrices, otherwise from the last argument.
     ///
     /// The error states why they do not form a pair.
     fn new(

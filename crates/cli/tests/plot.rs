@@ -181,7 +181,7 @@ fn one_case_is_compared_with_the_same_case_of_many() {
         let points: Vec<&str> =
             differences.iter().filter(|row| row["table"] == "curve").map(|row| row["points"].as_str()).collect();
         assert!(!points.is_empty() && points.iter().all(|points| *points == "13"), "{points:?}");
-        // The same case gives the same bits.
+        // Equal cases give equal bits.
         assert!(differences.iter().all(|row| row["largest_difference"] == "0.0"), "{differences:?}");
     }
 }
