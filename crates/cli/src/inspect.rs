@@ -195,8 +195,8 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
 
 /// Returns stiffness and mass among several matrices, and the criterion.
 ///
-/// The criterion is their names. Of two matrices without telling names, the one with the larger
-/// entries is the stiffness.
+/// The criterion is their names. If the names of two matrices do not state their roles, the matrix
+/// with the larger entries is the stiffness.
 fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
     let of = |role: Role| square.iter().filter(|named| named.role == Some(role)).collect::<Vec<_>>();
     let (stiffness, mass, why) = match (&of(Role::Stiffness)[..], &of(Role::Mass)[..], square) {
