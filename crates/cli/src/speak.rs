@@ -1,8 +1,8 @@
 //! Messages on standard error: sentences for users, or one JSON object per line for programs.
 //!
 //! Every object has the key `event`:
-//! - `begin`: a study with its number of `points` (null if unknown), its `units` of work from
-//!   `from` to `to`, and the number of units `kept` from an earlier run.
+//! - `begin`: a study, with the number of its `points` (null if unknown), its `units` of work,
+//!   their range `from` and `to`, and the number of units `kept` from an earlier run.
 //! - `progress`: finished `points`, units `kept` on disk and `elapsed_s`, at most twice a
 //!   second.
 //! - `written`: the `files`.

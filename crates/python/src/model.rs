@@ -504,8 +504,9 @@ impl PyModel {
 
     /// Checks the model and returns its known properties without computing an orbit.
     ///
-    /// The dictionary contains the places, the joints, the chosen method, and for models of
-    /// moderate size the natural frequencies with free and with stuck joints (Hz).
+    /// The dictionary contains the places, the joints and the chosen method. For models of
+    /// moderate size it also contains the natural frequencies with free and with stuck joints
+    /// (Hz).
     #[pyo3(signature = (method="auto", **options))]
     fn check<'py>(
         &self,

@@ -289,9 +289,9 @@ impl PyStudy {
     /// Runs the study and returns its :class:`Result`.
     ///
     /// - ``threads``: number of threads; by default all.
-    /// - ``progress``: ``True`` for a bar of tqdm (no bar if tqdm is not installed), or a
-    ///   function of the number of finished points and of all points (``None`` for adaptive
-    ///   frequencies).
+    /// - ``progress``: ``True`` for a bar of tqdm, or a function. The function receives the
+    ///   numbers of finished points and of all points; the latter is ``None`` for adaptive
+    ///   frequencies. Without tqdm, there is no bar.
     /// - ``memory``: memory limit of the run in bytes.
     ///
     /// Ctrl-C ends the run. The results have the same bits for any number of threads.

@@ -475,7 +475,7 @@ mod tests {
     fn many_values_are_told_by_colours_and_few_by_names() {
         let figure = samples::cases(400).figure;
         let (entries, more) = legend(&figure);
-        // The label that stands for many values stays.
+        // The label of many values keeps its entry.
         assert_eq!(
             (entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), more),
             (vec!["peak", "free", "stuck"], 0)
