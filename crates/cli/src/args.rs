@@ -1,10 +1,10 @@
-//! The command line: what can be typed.
+//! Command-line arguments. The doc comments of the items are the help texts that users see.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use stickslip_report::stream::Shard;
 
-/// How structures with dry-friction joints vibrate.
+/// Compute the vibration of structures with dry-friction joints
 #[derive(Debug, Parser)]
 #[command(name = "stickslip", version, about, long_about = None, max_term_width = 100)]
 #[command(
@@ -12,100 +12,105 @@ use stickslip_report::stream::Shard;
                         written; 1 anything else."
 )]
 pub struct Cli {
-    /// What to do.
+    /// The command to run.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// The commands.
+/// All commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Compute every figure of Pust, Pesek, Radolfova (2015) and check the paper's claims
     Paper {
         #[command(flatten)]
         destination: Destination,
-        /// Show the report in the browser
+        /// Open the report in the browser
         #[arg(long)]
         open: bool,
     },
     /// Run study files
     Run {
-        /// Study files (TOML); `-` is standard input
+        /// Study files (TOML); `-` reads standard input
         #[arg(required = true)]
         files: Vec<PathBuf>,
         #[command(flatten)]
         destination: Destination,
-        /// Change a parameter, for example --set Ft=3N (may be given several times)
+        /// Set a parameter, for example --set Ft=3N (repeatable)
         #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
         set: Vec<(String, String)>,
-        /// Use this method instead of the file's
+        /// Use this method instead of the one in the file
         #[arg(long)]
         method: Option<String>,
-        /// Memory that a run may take, for example 4GB; a study that needs more is refused [default: 2GB, or what is free]
+        /// Memory limit of a run, for example 4GB; a study that needs more is refused [default:
+        /// 2GB, or the free memory if that is less]
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
-        /// Write only these outputs: csv, parquet, json, svg, png, html (comma between them)
+        /// Write only these outputs: csv, parquet, json, svg, png, html (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
-        /// Write these outputs too: parquet
+        /// Also write these outputs: parquet
         #[arg(long, value_delimiter = ',')]
         also: Vec<String>,
         /// Print the results as JSON on standard output, one line per study
         #[arg(long)]
         json: bool,
-        /// Show the figure in the browser
+        /// Open the figure in the browser
         #[arg(long)]
         open: bool,
         /// Run again whenever a file changes, until Ctrl-C
         #[arg(long)]
         watch: bool,
-        /// Go on where a run that did not end has stopped; begin anew if there is none
+        /// Resume an unfinished run; start from the beginning if there is none
         #[arg(long, conflicts_with_all = ["restart", "watch"])]
         resume: bool,
-        /// Throw away what a long run that did not end has kept
+        /// Discard an unfinished run and start from the beginning
         #[arg(long)]
         restart: bool,
-        /// Compute one part of so many, on as many machines as you like; `stickslip merge` joins them, and takes what outputs there are to be
+        /// Compute only part N of OF, for example on another machine; `stickslip merge` joins
+        /// the parts and takes the output options
         #[arg(long, value_name = "N/OF", conflicts_with_all = ["only", "also", "json", "open", "watch"])]
         shard: Option<Shard>,
-        /// How progress is shown: a bar on a terminal, or for programs one JSON object a line on standard error
+        /// Progress display: a bar on a terminal, or one JSON object per line on standard error
+        /// for programs
         #[arg(long, value_name = "HOW", default_value = "bar")]
         progress: Progress,
     },
-    /// Join the parts of a study that `run --shard` has computed, and draw its figure
+    /// Merge the parts of a study that `run --shard` computed, and draw its figure
     Merge {
-        /// Folders of the parts, or the folder in which they are
+        /// Folders of the parts, or the folder that contains them
         #[arg(required = true, value_name = "DIR")]
         folders: Vec<PathBuf>,
-        /// Folder of the results; the study gets a folder of its name in it
+        /// Folder of the results; the study gets a subfolder with its name
         #[arg(long, default_value = "stickslip-out")]
         out: PathBuf,
-        /// Write only these outputs: csv, parquet, json, svg, png, html (comma between them)
+        /// Write only these outputs: csv, parquet, json, svg, png, html (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
-        /// Write these outputs too: parquet
+        /// Also write these outputs: parquet
         #[arg(long, value_delimiter = ',')]
         also: Vec<String>,
-        /// Show the figure in the browser
+        /// Open the figure in the browser
         #[arg(long)]
         open: bool,
     },
     /// Check study files without running them
     Check {
-        /// Study files (TOML); `-` is standard input
+        /// Study files (TOML); `-` reads standard input
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// Change a parameter, for example --set Ft=3N (may be given several times)
+        /// Set a parameter, for example --set Ft=3N (repeatable)
         #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
         set: Vec<(String, String)>,
-        /// Use this method instead of the file's
+        /// Use this method instead of the one in the file
         #[arg(long)]
         method: Option<String>,
-        /// Memory that a run may take, for example 4GB; a study that needs more is refused [default: 2GB, or what is free]
+        /// Memory limit of a run, for example 4GB; a study that needs more is refused [default:
+        /// 2GB, or the free memory if that is less]
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
     },
-    /// Draw stored results again, or several runs in one figure with a table of their differences
+    /// Draw stored results again, or several runs in one figure with a table of their
+    /// differences
     Plot {
         /// Folders of results, for example stickslip-out/couple
         #[arg(required = true)]
@@ -113,56 +118,59 @@ pub enum Command {
         /// Draw all runs in one figure and compare them with the first
         #[arg(long)]
         overlay: bool,
-        /// Draw as this study file says in its [figure]; nothing is computed
+        /// Draw the figure with the [figure] settings of this study file; nothing is computed
         #[arg(long, value_name = "FILE")]
         study: Option<PathBuf>,
-        /// Where the folder of the comparison goes [default: stickslip-out]
+        /// Folder that gets the folder of the comparison [default: stickslip-out]
         #[arg(long, requires = "overlay")]
         out: Option<PathBuf>,
-        /// Write only these: svg, png, html; with --overlay csv and json too (comma between them)
+        /// Write only these outputs: svg, png, html; with --overlay also csv and json
+        /// (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
-        /// Show the figure in the browser
+        /// Open the figure in the browser
         #[arg(long)]
         open: bool,
     },
-    /// Say what is in files of matrices: size, entries, symmetry, definiteness, names; of a pair the lowest frequencies
+    /// Describe matrix files: size, entries, symmetry, definiteness, row names; for stiffness
+    /// and mass also the lowest frequencies
     Inspect {
-        /// Files of matrices, and of the names of their rows
+        /// Files with matrices or with the names of their rows
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// Their format, if it is not seen from their content
+        /// Format of the files, if their content does not show it
         #[arg(long)]
         format: Option<String>,
     },
-    /// Save the structure of a study in few coordinates, to be read instead of the whole
+    /// Reduce the structure of a study and save the reduced matrices as input for other studies
     Reduce {
         /// Study file (TOML) with a [structure]
         file: PathBuf,
-        /// Folder for the matrices and the tables that name them
+        /// Folder for the matrices and for the TOML tables that refer to them
         #[arg(long)]
         out: PathBuf,
-        /// Change a parameter, for example --set zeta=1% (may be given several times)
+        /// Set a parameter, for example --set zeta=1% (repeatable)
         #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
         set: Vec<(String, String)>,
     },
-    /// Start a study file from a template
+    /// Create a study file from a template
     New {
-        /// Template (see `stickslip list templates`)
+        /// Name of the template (see `stickslip list templates`)
         template: String,
-        /// File to write, none that is there already; NAME.toml of the template when absent, `-` is standard output
+        /// File to write, which must not exist; default: NAME.toml with the template's name;
+        /// `-` writes to standard output
         file: Option<PathBuf>,
     },
-    /// List what there is
+    /// List laws, methods, templates, study kinds or outputs
     List {
-        /// What to list; everything when absent
+        /// Table to list; default: all
         what: Option<What>,
     },
-    /// Print the JSON Schema of study files, for editors
+    /// Print the JSON Schema of study files for editors
     Schema,
-    /// Print a completion script
+    /// Print a shell completion script
     Completions {
-        /// The shell
+        /// Name of the shell
         shell: clap_complete::Shell,
     },
     /// Print the manual page (roff)
@@ -170,29 +178,29 @@ pub enum Command {
     Man,
 }
 
-/// Where results go and how many threads compute them.
+/// Destination of the results, and number of threads.
 #[derive(Debug, Args)]
 pub struct Destination {
-    /// Folder of the results; each study gets a folder of its name in it
+    /// Folder of the results; each study gets a subfolder with its name
     #[arg(long, default_value = "stickslip-out")]
     pub out: PathBuf,
-    /// Threads; all cores when absent. Results do not depend on it
+    /// Number of threads; default: all cores. The results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 }
 
-/// How progress is shown.
+/// Kind of progress display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Progress {
     /// A bar, if standard error is a terminal
     Bar,
-    /// One JSON object a line
+    /// One JSON object per line
     Json,
-    /// Nothing
+    /// No progress display
     None,
 }
 
-/// What `list` lists.
+/// Tables that `list` can print.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum What {
     /// Friction laws
@@ -203,7 +211,7 @@ pub enum What {
     Templates,
     /// Study kinds
     Studies,
-    /// What `output` of a study can ask for
+    /// Outputs for the key `output` of a study
     Outputs,
 }
 
@@ -214,7 +222,7 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// A number of bytes: `4GB`, `500 MB`.
+/// Parses a number of bytes: `4GB`, `500 MB`.
 fn bytes(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());

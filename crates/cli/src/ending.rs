@@ -1,23 +1,23 @@
-//! How a command ends, and what it prints.
+//! Exit status of a command, and printing on standard output.
 
 use std::io::Write;
 use std::process::ExitCode;
 
-/// How a command ends; the numbers are those of the exit status.
+/// Result of a command, which determines the exit status.
 #[derive(Debug)]
 pub enum Ending {
     /// All points converged.
     Done,
-    /// Results are written, some points failed.
+    /// Results were written, but some points failed.
     SomeFailed,
-    /// The input is wrong; nothing was written. The report has been printed.
+    /// The input is wrong and nothing was written. The error has been printed.
     WrongInput,
-    /// Anything else, in words.
+    /// Any other failure, as text.
     Failed(String),
 }
 
 impl Ending {
-    /// The exit status.
+    /// Returns the exit status.
     pub fn code(&self) -> ExitCode {
         match self {
             Ending::Done => ExitCode::SUCCESS,
@@ -28,7 +28,7 @@ impl Ending {
     }
 }
 
-/// Prints on standard output; a reader that has gone away (`| head`) is no error.
+/// Prints on standard output. A closed pipe (`| head`) is not an error.
 pub fn print(text: &str) -> Ending {
     match std::io::stdout().write_all(text.as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Ending::Failed(error.to_string()),

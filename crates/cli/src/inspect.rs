@@ -1,4 +1,5 @@
-//! `stickslip inspect`: what is in files of matrices, and whether they can be those of a structure.
+//! `stickslip inspect`: describes matrix files, and checks whether they can belong to a
+//! structure.
 
 use crate::ending::{Ending, print};
 use std::borrow::Cow;
@@ -13,20 +14,21 @@ use stickslip_numerics::sparse;
 use stickslip_study::summary::{DIRECTIONS, mass_along};
 use stickslip_study::unit_sets;
 
-/// Frequencies that are shown of a pair of matrices.
+/// Number of frequencies shown for a pair of matrices.
 const LOWEST: usize = 6;
 
-/// Masses of what usually vibrates with dry friction, kg: a blade or a bracket, held or free.
+/// Usual masses of parts that vibrate with dry friction, in kg: a blade or a bracket, clamped
+/// or free.
 const USUAL: RangeInclusive<f64> = 0.01..=100.0;
 
-/// A matrix with its name for people.
+/// A matrix and its displayed name.
 struct Named {
     name: String,
     role: Option<Role>,
     matrix: Matrix,
 }
 
-/// What a matrix is of a structure.
+/// Role of a matrix in a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Role {
     Stiffness,
@@ -34,16 +36,17 @@ enum Role {
     Damping,
 }
 
-/// Beginnings of words that say what a matrix is: `STIF1`, `sti`, `mass`, `mas`, `damping`.
+/// Word beginnings that state the role of a matrix: `STIF1`, `sti`, `mass`, `mas`, `damping`.
 const WORDS: [(&str, Role); 3] = [("sti", Role::Stiffness), ("mas", Role::Mass), ("dam", Role::Damping)];
-/// Letters that say it where they begin a short name: `K`, `KAAX`, `Mff`.
+/// First letters of short names that state the role of a matrix: `K`, `KAAX`, `Mff`.
 const LETTERS: [(char, Role); 4] =
     [('k', Role::Stiffness), ('m', Role::Mass), ('c', Role::Damping), ('d', Role::Damping)];
-/// Letters of such a name at most.
+/// Maximum length of such a short name.
 const SHORT: usize = 4;
 
 impl Role {
-    /// What the name of a matrix says it is, or without one that of its file.
+    /// Returns the role that the name of a matrix states, or that of its file if the matrix has
+    /// no name.
     fn of(file: &Path, name: Option<&str>) -> Option<Role> {
         let text = |part: Option<&std::ffi::OsStr>| part.map(|part| part.to_string_lossy().to_lowercase());
         let (short, all) = match name {
@@ -58,7 +61,8 @@ impl Role {
     }
 }
 
-/// Shows every matrix in the files, and of stiffness and mass the lowest frequencies.
+/// Describes every matrix in the files, and prints the lowest frequencies of stiffness and
+/// mass.
 pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     let (mut text, mut wrong) = (String::new(), false);
     let mut square: Vec<Named> = Vec::new();
@@ -70,7 +74,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
                 square.extend(matrices);
                 wrong |= !whole;
             }
-            // names of rows stand in files of their own
+            // Row names are in separate files.
             Err(error) if error.kind == Kind::Format && format.is_none() => rows.push((file, error)),
             Err(error) => {
                 complain!("error: {error}");
@@ -122,7 +126,9 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
     }
 }
 
-/// The square matrices of one file, described in `text`, and whether none is damaged.
+/// Describes the matrices of one file in `text`.
+///
+/// Returns the square matrices, and `true` if no matrix is damaged.
 fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Named>, bool), Error> {
     let variables = formats::list(file, format)?;
     let several = variables.len() > 1;
@@ -137,7 +143,7 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
             Ok(matrix) => matrix,
             Err(error) if several => {
                 let _ = writeln!(text, "  {variable}: {error}");
-                // what stands beside matrices is no fault
+                // Other content of the file, such as a text, is not an error.
                 whole &= matches!(error.kind, Kind::Complex | Kind::Unsupported);
                 continue;
             }
@@ -169,10 +175,10 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
     Ok((found, whole))
 }
 
-/// Difference across the diagonal, relative to the largest entry, of a matrix that was written with ten digits.
+/// Symmetry tolerance relative to the largest entry, for matrices written with ten digits.
 const SYMMETRIC: f64 = 1e-9;
 
-/// A square matrix without some of its rows.
+/// Returns a square matrix without some of its rows and columns.
 fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::Matrix> {
     let free = if out.is_empty() { Cow::Borrowed(matrix) } else { Cow::Owned(matrix.clone().without(out).ok()?) };
     let entries = free.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value));
@@ -187,7 +193,10 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
     }
 }
 
-/// Stiffness and mass among several matrices, and what tells them: their names, else of two the size of their entries.
+/// Returns stiffness and mass among several matrices, and the criterion.
+///
+/// The criterion is their names. If the names of two matrices do not state their roles, the matrix
+/// with the larger entries is the stiffness.
 fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
     let of = |role: Role| square.iter().filter(|named| named.role == Some(role)).collect::<Vec<_>>();
     let (stiffness, mass, why) = match (&of(Role::Stiffness)[..], &of(Role::Mass)[..], square) {
@@ -208,20 +217,22 @@ fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
     Ok((stiffness, mass, why))
 }
 
-/// Stiffness and mass of a structure, as a study takes them: rows by their names, without those that are constrained.
+/// Stiffness and mass as in a study: rows matched by name, without constrained rows.
 struct Pair {
-    /// Rows that are left out.
+    /// Number of constrained rows, which are removed.
     constrained: usize,
-    /// The lowest angular frequencies, or why there are none.
+    /// The lowest angular frequencies, or the reason why they are not available.
     frequencies: Result<Vec<f64>, String>,
-    /// Those of free vibration, where a damping matrix has a gyroscopic part.
+    /// The frequencies of free vibration if a damping matrix has a gyroscopic part.
     turning: Option<Vec<f64>>,
-    /// Along every direction that names of rows have: the mass, in its units.
+    /// Mass along each direction in the row names, in the units of the file.
     mass: Vec<(&'static str, f64)>,
 }
 
 impl Pair {
-    /// Of rows with names of their own, else those `beside` them. Why they are no pair, otherwise.
+    /// Pairs the matrices. Row names come from the matrices, otherwise from the last argument.
+    ///
+    /// The error states why they do not form a pair.
     fn new(
         stiffness: &Named,
         mass: &Named,

@@ -1,11 +1,11 @@
-//! `stickslip list`: the tables of laws, methods, templates and study kinds.
+//! `stickslip list`: prints the tables of laws, methods, templates, study kinds and outputs.
 
 use crate::args::What;
 use clap::ValueEnum;
 use stickslip::{law, method};
 use stickslip_study::{kinds, templates};
 
-/// The list as text; without a choice all of them, each under its heading.
+/// Returns one list as text, or all lists with headings.
 pub fn text(what: Option<What>) -> String {
     let all =
         What::value_variants().iter().map(|what| format!("{}\n\n{}", format!("{what:?}").to_uppercase(), one(*what)));

@@ -1,6 +1,6 @@
 //! The `stickslip` command.
 
-/// Says something on standard error, see [`speak`].
+/// Prints a message on standard error; see [`speak`].
 macro_rules! complain {
     ($($text:tt)*) => {
         $crate::speak::line(&format!($($text)*))
@@ -95,7 +95,8 @@ fn main() -> ExitCode {
     ending.code()
 }
 
-/// `stickslip new`: writes the study of a template into a file of its name, or of the one that is given; `-` prints it.
+/// `stickslip new`: writes the study of a template to a file. The file name `-` prints the
+/// study.
 fn new(name: &str, file: Option<&Path>) -> Ending {
     let Some(template) = templates::find(name) else {
         let meant = templates::nearest(name).map_or_else(String::new, |near| format!("did you mean `{near}`? "));

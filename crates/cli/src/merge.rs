@@ -1,4 +1,4 @@
-//! `stickslip merge`: the parts of a study, joined.
+//! `stickslip merge`: merges the parts of a study.
 
 use crate::ending::Ending;
 use crate::run;
@@ -7,7 +7,7 @@ use stickslip_report::assemble::{Parts, assemble};
 use stickslip_report::stored::study_of;
 use stickslip_report::{check_writable, stream};
 
-/// Joins parts into `out/NAME/`.
+/// Merges the parts into `out/NAME/`.
 pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String]), open: bool) -> Ending {
     let outputs = match run::outputs(only, also) {
         Ok(outputs) => outputs,
@@ -23,7 +23,7 @@ pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String
     };
     let Some(first) = journals.first() else { return wrong("there is nothing to join".to_owned()) };
     let mut outline = first.head().outline.clone();
-    // the times of all are added up, that of each check too
+    // The wall time includes those of all parts and of their checks.
     outline.record.wall_time_s = journals.iter().map(|journal| journal.head().outline.record.wall_time_s).sum();
     let study = match study_of(&outline.record.study, first.folder()) {
         Ok(study) => study,

@@ -1,12 +1,12 @@
-//! Shows a file in the browser, or whatever the desktop opens it with.
+//! Opens a file in the browser, or in the program that the desktop uses for it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Figures and reports, the first one that was written is shown.
+/// Figure files in order of preference; the first existing one is opened.
 const SHOWN: [&str; 3] = ["figure.html", "figure.svg", "figure.png"];
 
-/// The file among those of a run that a reader wants to see.
+/// Returns the figure among the files of a run.
 pub fn figure(files: &[PathBuf]) -> Option<&Path> {
     SHOWN
         .iter()
@@ -14,10 +14,10 @@ pub fn figure(files: &[PathBuf]) -> Option<&Path> {
         .map(PathBuf::as_path)
 }
 
-/// Asks the desktop to show the file and does not wait for it.
+/// Asks the desktop to open the file, and does not wait for the program to end.
 ///
 /// # Errors
-/// In words: there is no desktop, or no program for it.
+/// A text, if there is no desktop or no suitable program.
 pub fn show(file: &Path) -> Result<(), String> {
     let (program, arguments): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])
@@ -26,13 +26,13 @@ pub fn show(file: &Path) -> Result<(), String> {
     } else {
         ("xdg-open", &[])
     };
-    // a path that begins with a dash is no option
+    // An absolute path that starts with a dash is not read as an option.
     let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
     let mut command = Command::new(program);
     command.args(arguments).arg(path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let said = |reason: String| format!("{} cannot be shown: {reason}; open it by hand", file.display());
     let mut child = command.spawn().map_err(|error| said(format!("{program}: {error}")))?;
-    // a program that refuses says so soon, one that shows the file may live as long as the browser
+    // A program that fails ends soon. A successful one may run as long as the browser.
     let until = std::time::Instant::now() + PATIENCE;
     while std::time::Instant::now() < until {
         match child.try_wait() {
@@ -44,7 +44,7 @@ pub fn show(file: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// How long a refusal is waited for.
+/// Time to wait for a failure of the program.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(1);
 
 #[cfg(test)]

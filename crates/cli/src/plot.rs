@@ -1,4 +1,4 @@
-//! `stickslip plot`: figures from stored results, and runs beside each other. Nothing is computed.
+//! `stickslip plot`: draws stored results and comparisons of runs. It computes no points.
 
 use crate::ending::{Ending, print};
 use crate::run::{outputs, show, show_figure};
@@ -9,7 +9,7 @@ use stickslip_report::stored::{Stored, StoredError, read};
 use stickslip_report::{Outputs, terminal::Terminal};
 use stickslip_study::read_file;
 
-/// What is to be drawn.
+/// Options of the command.
 pub struct Wanted<'a> {
     /// `--overlay`.
     pub overlay: bool,
@@ -23,7 +23,7 @@ pub struct Wanted<'a> {
     pub open: bool,
 }
 
-/// `stickslip plot`.
+/// Runs `stickslip plot`.
 pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
     let outputs = match outputs(wanted.only, &[]) {
         Ok(outputs) => outputs,
@@ -31,13 +31,13 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
     };
     let mut runs = Vec::new();
     let mut wrong = false;
-    // all are read before anything is written
+    // All results are read before anything is written.
     for folder in folders {
         match read(folder).map_err(Some).and_then(|run| like(run, wanted.study).map_err(|()| None)) {
             Ok(run) => runs.push(run),
             Err(error) => {
                 match error {
-                    // the place in the study that the record holds is what helps
+                    // The location in the recorded study helps the user.
                     Some(StoredError::Study { path, cause }) => {
                         complain!("error: {}: the study in it cannot be read", path.display());
                         show(&cause);
@@ -61,11 +61,11 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
     if wanted.overlay { overlay(&runs, wanted, &outputs) } else { each(&runs, wanted, &outputs) }
 }
 
-/// The run, drawn as the study file says if there is one. An error has been shown.
+/// Applies the figure settings of the study file, if given. Errors have been printed.
 fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     let Some(file) = file else { return Ok(run) };
     let study = read_file(file, &run.overrides()).map_err(|error| show(&error))?;
-    // the method may come from the command line, as it did for the run
+    // The run may have taken its method from the command line.
     let study = match run.study.case(0).map(|case| study.clone().with_method(&case.method.name)) {
         Ok(Ok(study)) => study,
         _ => study,
@@ -96,7 +96,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     Ok(run)
 }
 
-/// Every run for itself, in its own folder.
+/// Draws every run in its folder.
 fn each(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     for run in runs {
         if run.dataset.figure.panels.is_empty() {
@@ -118,7 +118,7 @@ fn each(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     Ending::Done
 }
 
-/// All runs in one figure, and their differences.
+/// Draws all runs in one figure, and prints their differences.
 fn overlay(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     let comparison = match compare::compare(runs) {
         Ok(comparison) => comparison,

@@ -1,4 +1,7 @@
-//! A progress bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is finished; SIGTERM and SIGHUP are like Ctrl-C.
+//! Progress display and interruption.
+//!
+//! A terminal shows a progress bar, a pipe shows nothing. Ctrl-C stops the run and keeps the
+//! finished points, as do SIGTERM and SIGHUP.
 
 use crate::args::Progress as Shown;
 use crate::speak;
@@ -9,15 +12,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// The flag that Ctrl-C sets; a second Ctrl-C ends the program at once.
+/// Returns the flag that Ctrl-C sets. A second Ctrl-C ends the program at once.
 pub fn stop_flag() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
     let first = Mutex::new(None::<Instant>);
-    // a second handler in the same process is an error that changes nothing
+    // Installing a second handler in the same process fails without any effect.
     let _ = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
-            // some senders signal a process and then its group: that is one request
+            // Some senders signal a process and then its group, which counts as one request.
             let repeated = first.lock().is_ok_and(|first| first.is_some_and(|first| first.elapsed() < REPEATED));
             if !repeated {
                 std::process::exit(1);
@@ -32,21 +35,21 @@ pub fn stop_flag() -> Arc<AtomicBool> {
     stop
 }
 
-/// Signals closer than this to the first are the same request.
+/// Signals within this time after the first are the same request.
 const REPEATED: Duration = Duration::from_millis(400);
 
-/// Shows how a run goes on.
+/// Display of the progress of a run.
 #[derive(Clone)]
 pub enum Progress {
-    /// On a terminal.
+    /// A bar on a terminal.
     Bar(ProgressBar),
-    /// For programs: the study, its points so far, units that are kept, when it began, and when it was said last.
+    /// JSON lines for programs.
     Lines(Arc<Lines>),
-    /// Not at all.
+    /// No display.
     Silent,
 }
 
-/// What programs are told.
+/// State of the JSON lines.
 pub struct Lines {
     study: String,
     points: AtomicU64,
@@ -55,11 +58,11 @@ pub struct Lines {
     said: Mutex<Instant>,
 }
 
-/// Programs are told no more often than this.
+/// Minimum time between two progress lines.
 const SAID: Duration = Duration::from_millis(500);
 
 impl Progress {
-    /// Of a study with so many points, of which the first `done` are there.
+    /// Starts the display for a study with `points` points, of which `done` are finished.
     pub fn new(how: Shown, points: Option<u64>, done: u64, study: &str) -> Progress {
         match how {
             Shown::None => Progress::Silent,
@@ -79,13 +82,13 @@ impl Progress {
         }
     }
 
-    /// A point is finished.
+    /// Counts a finished point.
     pub fn point(&self) {
         match self {
             Progress::Bar(bar) => bar.inc(1),
             Progress::Lines(lines) => {
                 lines.points.fetch_add(1, Ordering::Relaxed);
-                // who finds it taken leaves the saying to the other
+                // If another thread holds the lock, it prints the line.
                 if let Ok(mut said) = lines.said.try_lock()
                     && said.elapsed() >= SAID
                 {
@@ -97,14 +100,14 @@ impl Progress {
         }
     }
 
-    /// So many units are on the disk.
+    /// Sets the number of units on disk.
     pub fn kept(&self, units: usize) {
         if let Progress::Lines(lines) = self {
             lines.kept.store(units as u64, Ordering::Relaxed);
         }
     }
 
-    /// The end.
+    /// Ends the display.
     pub fn end(&self) {
         match self {
             Progress::Bar(bar) => bar.finish_and_clear(),
@@ -128,7 +131,9 @@ impl Lines {
     }
 }
 
-/// A bar over `points`, or a count where their number is not known before; it draws nothing unless standard error is a terminal.
+/// Returns a bar over `points`, or a counter if their number is unknown.
+///
+/// It draws only if standard error is a terminal.
 fn bar(points: Option<u64>, what: &str) -> ProgressBar {
     let bar = points.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let template = match points {
@@ -141,15 +146,15 @@ fn bar(points: Option<u64>, what: &str) -> ProgressBar {
         }));
     }
     bar.set_message(what.to_owned());
-    // also while a point takes long: the estimate grows with the time that has gone by
+    // Redraws also during a long point, because the estimate grows with the elapsed time.
     bar.enable_steady_tick(TICK);
     bar
 }
 
-/// How often the bar is drawn anew.
+/// Interval between redraws of the bar.
 const TICK: Duration = Duration::from_millis(250);
 
-/// What the bar says of the time that is left; never that none is left while there is work.
+/// Returns the text about the remaining time, which is never zero while there is work.
 fn left(done: u64, all: u64, estimate: Duration) -> String {
     match (done, estimate.as_secs()) {
         (0, _) => "no estimate yet".to_owned(),
@@ -170,6 +175,7 @@ mod tests {
         assert_eq!(at(5, 0), "less than 1s left");
         assert_eq!(at(5, 999), "less than 1s left");
         assert_eq!(at(9, 3_000), "about 3 seconds left");
-        assert_eq!(at(10, 0), "finishing"); // refined peaks, figures, files
+        // Refining peaks and writing figures and files still remain.
+        assert_eq!(at(10, 0), "finishing");
     }
 }

@@ -1,4 +1,4 @@
-//! `stickslip reduce`: the structure of a study in few coordinates, as files that a study can read instead of the whole.
+//! `stickslip reduce`: saves the reduced structure of a study as files for other studies.
 
 use crate::ending::{Ending, print};
 use crate::{run, speak};
@@ -14,7 +14,7 @@ use stickslip_study::Exports;
 
 /// Name of the file with `[structure]` and `[[place]]`.
 const TABLES: &str = "structure.toml";
-/// Names of the rows of the sector of a disk, and its sides.
+/// Files with the row names of a disk sector, and with the node pairs of its sides.
 const ROWS: &str = "rows.csv";
 const BOUNDARY: &str = "boundary.csv";
 
@@ -73,25 +73,25 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     }
 }
 
-/// What is saved.
+/// The reduced structure to save.
 struct Few {
     system: System,
-    /// How it was made, and its error.
+    /// Description of the reduction, with its error.
     what: String,
-    /// More keys of `[structure]`.
+    /// Additional keys of `[structure]`.
     keys: Vec<String>,
-    /// The stiffness at a speed.
+    /// Stiffness at the second speed, if rotation stiffens the structure.
     there: Option<sparse::Matrix>,
-    /// Of the sector of a disk.
+    /// Data of a disk sector.
     sector: Option<Sector>,
 }
 
-/// How a sector goes on.
+/// Data of a disk sector.
 struct Sector {
     sectors: usize,
-    /// Names of its rows, which are coordinates.
+    /// Names of its rows, which are reduced coordinates.
     rows: Vec<String>,
-    /// Of its low and its high side.
+    /// Names of the rows on its low side and on its high side.
     pairs: Vec<(String, String)>,
 }
 
@@ -105,7 +105,7 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
     Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None, sector: None })
 }
 
-/// In coordinates that serve all speeds up to that of the second export.
+/// Reduces with one basis for all speeds up to that of the second export.
 fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<Few, String> {
     let seen: Vec<Row> =
         places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
@@ -134,7 +134,7 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
     Ok(Few { system, what, keys, there: Some(few.there), sector: None })
 }
 
-/// The sector of a disk, in coordinates that serve all of its waves.
+/// Reduces the sector of a disk with one basis for all its travelling waves.
 fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize, &DiskPart)) -> Result<Few, String> {
     let stated = &places[..places.len() / sectors];
     let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.clone()).collect();
@@ -143,7 +143,7 @@ fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize
     let mut seen = few.seen.into_iter();
     let mut places = stated.to_vec();
     for place in &mut places {
-        // as the file calls it, without the number of the sector
+        // The file uses the name without the sector number.
         place.name = place.name.strip_suffix("_0").unwrap_or(&place.name).to_owned();
         place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen);
     }
@@ -156,7 +156,7 @@ fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize
     Ok(Few { system, what, keys: damping_keys(substructure), there: None, sector: Some(sector) })
 }
 
-/// A reduction as a structure of its own.
+/// Assembles reduced matrices as a structure.
 fn whole(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -> Result<System, String> {
     let (damping, reduction) = (SubstructureDamping::Own, Reduction::None { up_to: 0.0 });
     let whole = Substructure { component, damping, reduction, earlier: Some(earlier), disk: None };
@@ -164,13 +164,16 @@ fn whole(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -
     model.assemble().map_err(|error| error.to_string())
 }
 
-/// Damping that follows the stiffness at every speed; of modes that of those that a reduction at that speed has.
+/// Returns the keys for damping.
+///
+/// Rayleigh damping follows the stiffness at every speed. Modal damping uses the modes of a
+/// reduction at that speed.
 fn damping_keys(substructure: &Substructure) -> Vec<String> {
     let reduce = match substructure.reduction {
         Reduction::UpTo { up_to, tolerance, kind } => {
             format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, named(kind))
         }
-        // what its error is measured up to is the study's
+        // The frequency limit of its error comes from the study.
         Reduction::Modes { modes, kind: ReductionKind::Rubin, orders, .. } if orders > 1 => {
             format!("reduce = {{ modes = {modes}, orders = {orders} }}")
         }
@@ -221,7 +224,7 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
             made.map_err(|error| error.to_string())?;
             let _ = writeln!(text, "dofs = \"{ROWS}\"");
         }
-        // its key has a speed beside the file
+        // The key `stiffened` also contains a speed.
         if key != "stiffened" {
             let _ = writeln!(text, "{key} = \"{key}.mtx\"");
         }
@@ -253,7 +256,8 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
     std::fs::write(&path, text).map_err(|error| format!("{}: {error}", path.display()))
 }
 
-/// The weights of the coordinates, which count from 1, to the last bit; those of a sector have names.
+/// Writes the weights of the coordinates with all digits. Coordinates count from 1, or have
+/// names in a sector.
 fn sum(axis: &Axis, sector: Option<&Sector>) -> String {
     let name = |row: usize| sector.map_or_else(|| (row + 1).to_string(), |sector| sector.rows[row].clone());
     let weights: Vec<String> =

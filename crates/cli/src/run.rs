@@ -23,7 +23,7 @@ use stickslip_study::summary::ModelSummary;
 use stickslip_study::thinning::MOST_ROWS;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
-/// The studies that a command line names.
+/// The studies named on the command line.
 pub struct Request<'a> {
     /// Study files.
     pub files: &'a [PathBuf],
@@ -31,7 +31,7 @@ pub struct Request<'a> {
     pub set: &'a [(String, String)],
     /// `--method`.
     pub method: Option<&'a str>,
-    /// `--memory`, bytes.
+    /// `--memory` in bytes.
     pub memory: Option<u64>,
 }
 
@@ -51,7 +51,7 @@ impl Request<'_> {
                     None => study,
                 })
                 .and_then(|study| check_study(&study))
-                // of many studies, large ones perhaps, none keeps what its run makes again
+                // With several studies, each releases the data that its run can compute again.
                 .map(|checked| if self.files.len() > 1 { checked.lean() } else { checked });
             match study {
                 Ok(study) => studies.push(study),
@@ -65,23 +65,23 @@ impl Request<'_> {
     }
 }
 
-/// What stands for standard input among files.
+/// File name that means standard input.
 const STDIN: &str = "-";
 
-/// Reads a study from a file, or from standard input.
+/// Reads a study from a file or from standard input.
 fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
     if file != Path::new(STDIN) {
         return read_file(file, set);
     }
     let mut bytes = Vec::new();
-    // what was read before an error is no whole study either
+    // A partly read study is not valid.
     match std::io::stdin().lock().take(MOST_BYTES + 1).read_to_end(&mut bytes) {
         Ok(_) => read_bytes("stdin", &bytes, set),
         Err(_) => read_bytes("stdin", &[], set),
     }
 }
 
-/// Prints an error of a study file with its place underlined.
+/// Prints an error of a study file with its location underlined.
 pub(crate) fn show(error: &StudyError) {
     if speak::is_for_programs() {
         return speak::error(&error.to_string());
@@ -90,7 +90,7 @@ pub(crate) fn show(error: &StudyError) {
     complain!("{report:?}");
 }
 
-/// `stickslip check`.
+/// Runs `stickslip check`.
 pub fn check(request: &Request<'_>) -> Ending {
     match request.read() {
         Err(ending) => ending,
@@ -119,7 +119,7 @@ pub fn check(request: &Request<'_>) -> Ending {
     }
 }
 
-/// What a run is to yield.
+/// Options of a run.
 pub struct Wanted<'a> {
     /// `--only`.
     pub only: &'a [String],
@@ -139,13 +139,13 @@ pub struct Wanted<'a> {
     pub progress: crate::args::Progress,
 }
 
-/// What is known of a study before it is run, with its warnings on standard error.
+/// Returns the summary of a study, and prints its warnings on standard error.
 fn warned(checked: &Checked) -> &ModelSummary {
     checked.summary().warnings.iter().for_each(|warning| complain!("{warning}"));
     checked.summary()
 }
 
-/// The outputs that `--only` names, the usual ones without it; and those of `--also`.
+/// Returns the outputs of `--only`, or the default ones, together with those of `--also`.
 pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Ending> {
     let outputs = if only.is_empty() { Ok(Outputs::usual()) } else { Outputs::only(only) };
     outputs.and_then(|outputs| Ok(outputs.and(&Outputs::only(also)?))).map_err(|error| {
@@ -154,7 +154,7 @@ pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Endin
     })
 }
 
-/// `stickslip run`.
+/// Runs `stickslip run`.
 pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>) -> Ending {
     if wanted.progress == crate::args::Progress::Json {
         speak::for_programs();
@@ -179,7 +179,7 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
         if !wanted.watch || stop.load(Ordering::Relaxed) {
             return ending;
         }
-        // the browser shows it; a reload shows what follows
+        // The browser shows the figure after the first run; a reload shows later ones.
         open &= matches!(ending, Ending::WrongInput);
         if let Ending::Failed(message) = &ending {
             speak::error(message);
@@ -191,7 +191,7 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
                 return Ending::Done;
             }
         }
-        // a file that is being written is empty for a moment
+        // A file can be empty for a moment while an editor writes it.
         loop {
             let now = contents(request.files);
             std::thread::sleep(WRITTEN);
@@ -202,17 +202,18 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
     }
 }
 
-/// How often files are looked at.
+/// Interval between two checks of the files for changes.
 const LOOK: Duration = Duration::from_millis(300);
-/// How long files that have changed must stay as they are until they are read.
+/// Changed files are read when they stay unchanged for this time.
 const WRITTEN: Duration = Duration::from_millis(50);
 
-/// What stands in the files; editors write them in ways that no date tells.
+/// Returns the contents of the files. Modification times do not reveal every change by an
+/// editor.
 fn contents(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
     files.iter().map(|file| std::fs::read(file).ok()).collect()
 }
 
-/// One run of all files.
+/// Runs all files once.
 fn once(
     request: &Request<'_>,
     destination: &Destination,
@@ -235,7 +236,7 @@ fn once(
         return Ending::Failed(error.to_string());
     }
     let mut failed = false;
-    // each is let go once it was run, with the case that it keeps
+    // Each study is dropped after its run, together with its cached case.
     for checked in studies {
         let (study, summary) = (checked.study(), warned(&checked));
         if std::io::stderr().is_terminal() && wanted.progress == crate::args::Progress::Bar {
@@ -252,7 +253,7 @@ fn once(
     if failed { Ending::SomeFailed } else { Ending::Done }
 }
 
-/// One run of one study.
+/// Runs one study once.
 fn one(
     checked: &Checked,
     destination: &Destination,
@@ -271,7 +272,7 @@ fn one(
     };
     let done: u64 = journal.tally().points().values().sum();
     let range = journal.head().range.clone();
-    // of adaptive frequencies, and of a part, nobody knows the number before
+    // The number of points of adaptive frequencies and of a shard is unknown in advance.
     let points = Some(study.points() as u64).filter(|_| !study.is_adaptive() && wanted.shard.is_none());
     speak::event(
         "begin",
@@ -314,7 +315,7 @@ fn one(
     let interrupted = assembled.dataset.record.interrupted;
     if !interrupted {
         drop(journal);
-        // the results are there; what cannot be removed is no reason to fail
+        // The results exist; a folder that cannot be removed is not an error.
         let _ = std::fs::remove_dir_all(&folder);
     }
     let ending = told(&assembled, &outline.notes, (wanted.json, wanted.open));
@@ -340,7 +341,7 @@ fn one(
     }
 }
 
-/// The end of a part of a study, whose journal stays.
+/// Ends a run of a shard, whose journal stays.
 fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Ending {
     let folder = journal.folder().join("").display().to_string();
     if !whole {
@@ -363,7 +364,7 @@ fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Endi
     if failed { Ending::SomeFailed } else { Ending::Done }
 }
 
-/// Says what there is to say of results that are written, but the notes that are `known`.
+/// Prints the messages about written results, except the notes in `known`.
 pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool, bool)) -> Ending {
     let Assembled { dataset, is_whole, files } = assembled;
     let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known.contains(note));
@@ -375,7 +376,7 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
         (false, false) => "done",
     };
     speak::event("written", json!({ "study": dataset.name, "files": files }));
-    // the summary on a terminal says it too
+    // The summary on a terminal contains these messages.
     let summary = !json && std::io::stdout().is_terminal();
     if !(summary && std::io::stderr().is_terminal()) {
         complain(dataset);
@@ -403,10 +404,10 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
     }
 }
 
-/// Failed points that are named on standard error; the record has all.
+/// Number of failed points named on standard error; the record names all.
 const NAMED_FAILURES: usize = 10;
 
-/// One line of JSON on standard output; a reader that has gone away (`| head`) is no error.
+/// Prints one line of JSON on standard output. A closed pipe (`| head`) is not an error.
 fn print_json(dataset: &Dataset) -> Ending {
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     match write_dataset_json(dataset, &mut out).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
@@ -415,7 +416,7 @@ fn print_json(dataset: &Dataset) -> Ending {
     }
 }
 
-/// Points that failed or are not what was asked for, on standard error.
+/// Prints the failed points and those of lower accuracy than requested on standard error.
 fn complain(dataset: &Dataset) {
     for failure in dataset.failures.iter().take(NAMED_FAILURES) {
         complain!("{}: {failure}", dataset.name);
@@ -437,17 +438,17 @@ fn complain(dataset: &Dataset) {
     }
 }
 
-/// Shows the figure among these files in the browser.
+/// Opens the figure among these files in the browser.
 pub(crate) fn show_figure(files: &[PathBuf]) {
     match open::figure(files).map(open::show) {
         Some(Ok(())) => {}
-        // the results are there all the same
+        // The results exist even if they cannot be shown.
         Some(Err(message)) => complain!("{message}"),
         None => complain!("there is no figure to show: it is not among the outputs of --only"),
     }
 }
 
-/// `stickslip paper`.
+/// Runs `stickslip paper`.
 pub fn paper(destination: &Destination, open: bool) -> Ending {
     if let Err(error) = check_writable(&destination.out) {
         return Ending::Failed(error.to_string());
@@ -482,7 +483,7 @@ pub fn paper(destination: &Destination, open: bool) -> Ending {
     }
 }
 
-/// Sets up the threads; returns their number.
+/// Creates the thread pool and returns its number of threads.
 fn pool(destination: &Destination) -> Result<usize, Ending> {
     let mut builder = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = destination.threads {

@@ -1,4 +1,4 @@
-//! The command line as a user meets it: exit status, files, messages, bits.
+//! Tests of the command line: exit status, files, messages and bits of the results.
 
 use assert_cmd::Command;
 use std::fs;
@@ -10,7 +10,7 @@ fn stickslip(folder: &Path, arguments: &[&str]) -> Output {
     Command::cargo_bin("stickslip").unwrap().current_dir(folder).args(arguments).output().unwrap()
 }
 
-/// A folder with the starting study of a template, edited.
+/// Creates a folder with the starting study of a template after `edits`.
 fn folder(template: &str, edits: &[(&str, &str)]) -> (TempDir, PathBuf) {
     let folder = TempDir::new().unwrap();
     let mut text = stickslip_study::templates::find(template).unwrap().study.to_owned();
@@ -66,7 +66,7 @@ fn a_study_runs_and_every_output_is_there() {
     ];
     assert_eq!(header, expected);
     assert_eq!(curve.lines().count(), 1 + 4 * 13);
-    // 119.5 Hz to 122.5 Hz in 13 points, as a user would type them
+    // 119.5 Hz to 122.5 Hz in 13 points, as a user would type them.
     let typed: Vec<String> = (0..13).map(|i| format!("2.0,{:?},", 119.5 + 0.25 * f64::from(i))).collect();
     assert!(curve.lines().skip(1).zip(&typed).all(|(line, typed)| line.starts_with(typed)), "{curve}");
     assert!(curve.lines().skip(1).all(|line| line.ends_with(",converged")));
@@ -78,7 +78,7 @@ fn parameters_and_methods_change_from_outside() {
     let output = stickslip(folder.path(), &["run", "study.toml", "--set", "Ft=2mN", "--only", "csv", "--json"]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let dataset: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    // 4 Ft (a - Ft/kt) at a = 2.75 mm, Ft = 2 mN, kt = 1 N/m
+    // 4 Ft (a - Ft/kt) at a = 2.75 mm, Ft = 2 mN, kt = 1 N/m.
     let summary = &dataset["tables"]["loops_summary"][2];
     assert_eq!(summary["a_m"], 0.00275);
     let last = summary["dissipation_J"].as_f64().unwrap();
@@ -92,7 +92,7 @@ fn parameters_and_methods_change_from_outside() {
 
 #[test]
 fn wrong_input_names_its_place_and_writes_nothing() {
-    // LINE is where the edit stands
+    // LINE stands for the line of the edit.
     let cases: &[(&str, &str, &[&str])] = &[
         ("stiffness = \"kt\"", "stifness = \"kt\"", &["study.toml:LINE:1", "stifness", "did you mean `stiffness`?"]),
         ("stiffness = \"kt\"", "stiffness = \"10 kg\"", &["study.toml:LINE:", "stiffness", "mass"]),
@@ -161,7 +161,7 @@ fn the_bits_do_not_depend_on_threads() {
     assert!(tables[0] == tables[1] && tables[1] == tables[2]);
 }
 
-/// An undamped resonance without a joint that slips has no periodic motion: the point fails, the others stand.
+/// An undamped resonance without slip has no periodic orbit: the point fails, the others stay.
 #[test]
 fn a_failed_point_stays_in_the_curve_and_ends_with_3() {
     let text = r#"
@@ -192,8 +192,11 @@ frequency = ["0.5 rad/s", "1 rad/s", "2 rad/s"]
     assert!(!rows[1].contains("converged") || rows[1].ends_with("not-converged"), "{}", rows[1]);
 }
 
-/// Methods that estimate their truncation have a column for it, also where a point failed or sticks.
-/// Three harmonics are too few for rigid friction with a contact mass: the points keep their numbers, but none of them looks converged.
+/// Methods that estimate their truncation error have a column for it, also for failed or stuck
+/// points.
+///
+/// Three harmonics are too few for rigid friction with a contact mass. The points keep their
+/// numbers, but none has the status converged.
 #[test]
 fn a_series_that_is_too_short_says_so_and_ends_with_3() {
     let series = "\n[method]\nkind = \"harmonic-balance\"\nharmonics = 3\n";
@@ -214,7 +217,7 @@ fn a_series_that_is_too_short_says_so_and_ends_with_3() {
     }
     assert!(truncated > 10);
     assert!(fs::read_to_string(out.join("record.json")).unwrap().contains("the series is too short"));
-    // the user who says that half is good enough gets it
+    // A user can accept an error of one half.
     fs::write(&path, text + "tolerance = 0.5\n").unwrap();
     assert_eq!(code(&stickslip(folder.path(), &["run", "study.toml", "--only", "csv"])), 0);
 }
@@ -244,7 +247,7 @@ fn every_method_fills_the_table() {
     }
 }
 
-/// What a long run of `study.toml` says after this signal.
+/// Returns the output of a long run of `study.toml` after this signal.
 #[cfg(unix)]
 fn interrupted(folder: &Path, signal: &str) -> Output {
     let child = std::process::Command::new(assert_cmd::cargo::cargo_bin("stickslip"))
@@ -253,14 +256,16 @@ fn interrupted(folder: &Path, signal: &str) -> Output {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    // on one thread the run takes half a minute, and it has begun by now also where the machine is busy
+    // The run takes half a minute on one thread. After this time it has started even on a busy
+    // machine.
     std::thread::sleep(std::time::Duration::from_secs(3));
     let kill = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
     assert!(kill.success());
     child.wait_with_output().unwrap()
 }
 
-/// Ctrl-C during a long sweep leaves the finished points readable, and so does what a scheduler sends.
+/// Ctrl-C and the signals of job schedulers keep the finished points readable during a long
+/// sweep.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_finished_points() {
@@ -282,7 +287,8 @@ fn an_interrupt_keeps(signal: &str) {
     assert!(record.contains("\"interrupted\": true"));
 }
 
-/// Tables, figures and record of a folder belong to one run, and an interrupted run does not destroy a whole one.
+/// Tables, figures and record of a folder belong to one run. An interrupted run replaces no
+/// complete run.
 #[cfg(unix)]
 #[test]
 fn results_belong_to_one_run() {
@@ -309,12 +315,12 @@ fn results_belong_to_one_run() {
     assert!(stderr(&output).contains("the whole run in stickslip-out/study/ stays"), "{}", stderr(&output));
     assert_eq!(fs::read_to_string(out.join("record.json")).unwrap(), record);
     let cut_short = folder.path().join("stickslip-out/study.interrupted");
-    // peaks are there if a stretch of the curve was finished
+    // Peaks exist if a stretch of the curve was finished.
     let found: Vec<String> = names(&cut_short).into_iter().filter(|name| name != "peaks.csv").collect();
     assert_eq!(found, ["curve.csv", "record.json"]);
 }
 
-/// What is in the way of the results is found before anything is computed.
+/// An unusable results folder is reported before the computation.
 #[test]
 fn an_unwritable_folder_is_found_first() {
     let (folder, _) = folder("blade-couple", &[("points = 241", "points = 200000")]);
@@ -324,7 +330,7 @@ fn an_unwritable_folder_is_found_first() {
         let output = stickslip(folder.path(), arguments);
         assert_eq!(code(&output), 1);
         assert!(stderr(&output).contains("cannot write taken"), "{}", stderr(&output));
-        // the study takes minutes
+        // The study takes minutes.
         assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     }
 }
@@ -347,7 +353,7 @@ fn a_study_comes_from_standard_input() {
     assert_eq!(code(&run(text, &["run", "-", "--watch"])), 2);
 }
 
-/// Waits until it is so, with an end.
+/// Waits until the condition holds, up to a limit.
 #[cfg(unix)]
 fn until(what: &str, so: &dyn Fn() -> bool) {
     let start = std::time::Instant::now();
@@ -357,7 +363,8 @@ fn until(what: &str, so: &dyn Fn() -> bool) {
     }
 }
 
-/// A file that changes is run again; one that is wrong for a while says so and ends nothing.
+/// A changed file runs again. A temporarily wrong file is reported and does not end the
+/// program.
 #[cfg(unix)]
 #[test]
 fn a_watched_file_runs_again() {
@@ -385,7 +392,8 @@ fn a_watched_file_runs_again() {
     assert_eq!(child.wait().unwrap().code(), Some(0), "{}", read(&log));
 }
 
-/// `--open` hands the figure to the desktop; without a desktop the results are there all the same.
+/// `--open` passes the figure to the desktop. Without a desktop, the results exist
+/// nevertheless.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_figure_is_shown() {
@@ -452,7 +460,7 @@ fn check_says_what_is_known_before_a_run() {
     let output = stickslip(folder.path(), &["check", "study.toml"]);
     let text = String::from_utf8_lossy(&output.stdout);
     assert_eq!((code(&output), stderr(&output).as_str()), (0, ""));
-    // free 121.25 Hz, stuck 120.94 Hz, strongest stuck force 19.72 N at 120.9589 Hz against a limit of 2 N
+    // Free 121.25 Hz, stuck 120.94 Hz, largest stuck force 19.72 N at 120.9589 Hz, limit 2 N.
     for word in [
         "nothing wrong",
         "3 degrees of freedom",
@@ -516,9 +524,12 @@ fn a_run_that_needs_too_much_memory_is_refused_in_advance() {
     assert_eq!(code(&stickslip(folder.path(), &["check", "study.toml", "--memory", "lots"])), 2);
 }
 
-/// A rod of equal masses, held at one end and driven at the other: `x/F` of the tip by eliminating mass after mass,
-/// `d₁ = 2k - mω²`, `dᵢ = 2k - mω² - k²/dᵢ₋₁`, at the tip with one k. What is saved errs from it by no more than its results say, reduced on
-/// the spot, read again, or reduced once more, when the errors add.
+/// A rod of equal masses, clamped at one end and excited at the other.
+///
+/// `x/F` at the tip follows from eliminating one mass after another: `d₁ = 2k - mω²`,
+/// `dᵢ = 2k - mω² - k²/dᵢ₋₁`, with a single k at the tip. The error of the reduction stays
+/// within its reported error in three cases: reduced in the study, read from the saved files,
+/// or reduced once more. In the last case the errors add.
 #[test]
 fn a_reduction_that_is_saved_keeps_its_error() {
     let folder = TempDir::new().unwrap();
@@ -534,7 +545,7 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     write("k.mtx", &stiffness);
     let diagonal: String = (1..=n).map(|i| format!("{i} {i} {m}\n")).collect();
     write("m.mtx", &format!("%%MatrixMarket matrix coordinate real symmetric\n{n} {n} {n}\n{diagonal}"));
-    // between resonances, near 66, 197 and 328 Hz, and what stands still between them
+    // Between the resonances, near 66, 197 and 328 Hz, and the antiresonances.
     let hertz = [20.0, 100.0, 230.0, 300.0];
     let exact = |hertz: f64| {
         let own = m * (std::f64::consts::TAU * hertz).powi(2);
@@ -544,7 +555,7 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     let response = "[[force]]\non = \"tip\"\namplitude = \"1 N\"\n[study]\nkind = \"response\"\n\
                     frequency = [\"20 Hz\", \"100 Hz\", \"230 Hz\", \"300 Hz\"]\n\
                     [method]\nkind = \"harmonic-balance\"\nharmonics = 1\n";
-    // the error, which is the largest of every row
+    // The largest error over all rows.
     let errs = |study: &str| -> f64 {
         let out = format!("{}-out", study.replace('/', "-"));
         let run = stickslip(folder.path(), &["run", study, "--out", &out]);
@@ -579,14 +590,14 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     let said = stickslip(folder.path(), &["check", "few/study.toml"]);
     let said = String::from_utf8_lossy(&said.stdout).into_owned();
     assert!(said.contains("before, error") && said.contains("up to 400 Hz"), "{said}");
-    // what is reduced already has nothing to save
+    // A structure that is already reduced has nothing to save.
     let said = stickslip(folder.path(), &["reduce", "few/study.toml", "--out", "fewer"]);
     assert_eq!(said.status.code(), Some(2), "{}", String::from_utf8_lossy(&said.stderr));
     assert!(
         String::from_utf8_lossy(&said.stderr).contains("nothing is to be saved")
             && !folder.path().join("fewer").exists()
     );
-    // fewer still
+    // A second reduction with fewer coordinates.
     let again = few.replace("reduce = false", "reduce = { modes = 5 }");
     write("few/again.toml", &format!("schema = 1\n{again}{response}"));
     let fewer = saved("few/again.toml", "fewer");
@@ -596,14 +607,18 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     assert!(twice > read, "{twice:e} {read:e}");
 }
 
-/// The sector of a disk saved in few coordinates is a sector again, whose rows stand for its own coordinates and those of the next sector: the study of
-/// the saved one has the results of the one that reduces on the spot, and both err from that of all rows by no more than they say. Its nodes turn about
-/// z, and one that is looked at stands on the high side.
+/// The saved reduced sector of a disk is a sector again.
+///
+/// Its rows stand for its coordinates and for those of the next sector. The study of the saved
+/// sector has the results of the study with the reduction. Both deviate from the full sector by
+/// at most their reported errors. The nodes rotate about z, and one observed node is on the
+/// high side.
 #[test]
 fn the_sector_of_a_disk_is_saved_and_read_again() {
     let folder = TempDir::new().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    // node 1 on the low side, 2 on the high one, and a blade from 3 to 14 on the first
+    // Node 1 is on the low side, node 2 on the high side, and nodes 3 to 14 are a blade on node
+    // 1.
     let nodes = 14;
     let springs =
         std::iter::once((1, 2, 3e6)).chain((3..=nodes).map(|node| (if node == 3 { 1 } else { node - 1 }, node, 2e6)));
@@ -613,7 +628,8 @@ fn the_sector_of_a_disk_is_saved_and_read_again() {
     };
     for (a, b, k) in springs {
         for along in 1..=3 {
-            // another stiffness along each axis, and x and y coupled, so that it matters how the sides turn
+            // The stiffness differs along each axis and couples x and y, so that the rotation
+            // of the sides matters.
             let (a, b, k) = (3 * a - 3 + along, 3 * b - 3 + along, k / along as f64);
             [(a, a, k), (b, b, k), (a, b, -k)].into_iter().for_each(|(row, column, k)| add(row, column, k));
         }
@@ -676,13 +692,14 @@ fn the_sector_of_a_disk_is_saved_and_read_again() {
             assert!(error > 0.0 && error >= a[columns.len()] * (1.0 - 1e-9), "{damping}: {a:?} {b:?}");
             for k in 0..columns.len() {
                 assert!((a[k] - b[k]).abs() <= bound * a[k].abs(), "{damping}: {}: {a:?} {b:?}", columns[k]);
-                // beside the resonances, of which the damping makes a small shift of frequency fifty times as large
+                // Close to resonances, damping amplifies a small frequency shift by up to
+                // fifty.
                 let exact = whole.as_ref().map_or(b[k], |whole| whole[point][k]);
                 assert!((b[k] - exact).abs() <= 50.0 * error * exact.abs(), "{}: {b:?} {exact}", columns[k]);
             }
         }
     }
-    // what cannot be saved is refused with what to do
+    // A disk that cannot be saved gives an error with a remedy.
     write("blade.csv", &("node\n".to_owned() + &(4..=nodes).map(|node| format!("{node}\n")).collect::<String>()));
     let mistuned = "[disk]\nblade = \"blade.csv\"\nmistuning = { of = \"blade.stiffness\", deviation = \"1 %\" }\n";
     let tables = tables("", "reduce = { up_to = \"1200 Hz\" }").replace("[disk]\n", mistuned);
@@ -693,14 +710,16 @@ fn the_sector_of_a_disk_is_saved_and_read_again() {
     assert!(!folder.path().join("none").exists());
 }
 
-/// One set of coordinates serves all speeds of a structure that rotation stiffens: saved, it has the frequencies of the whole from rest to the speed of the
-/// second export, within the error that is said, and its damping follows them.
+/// One set of coordinates serves all speeds of a structure with rotational stiffening.
+///
+/// From rest to the speed of the second export, the saved structure has the frequencies of the
+/// full structure within the reported error. Its damping follows them.
 #[test]
 fn a_structure_that_rotation_stiffens_is_saved_for_all_speeds() {
     let folder = TempDir::new().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     let n = 24;
-    // a rod held at one end; what tightens it falls from there to the tip
+    // A rod clamped at one end; the tension falls from there to the tip.
     let rod = |pull: f64| {
         let mut text = format!("%%MatrixMarket matrix coordinate real symmetric\n{n} {n} {}\n", 2 * n - 1);
         let spring = |i: usize| if i > n { 0.0 } else { 1e6 * (1.0 + pull * (1.0 - (i as f64 / n as f64).powi(2))) };
@@ -747,7 +766,8 @@ fn a_structure_that_rotation_stiffens_is_saved_for_all_speeds() {
             let (whole, few) = (rows("study.toml", &structure), rows("few/study.toml", &few));
             assert!(whole.len() == few.len() && whole.len() >= 6, "{} {}", whole.len(), few.len());
             for (a, b) in whole.iter().zip(&few) {
-                // each of both reductions errs by a share of 1e-4 at most beside a resonance
+                // Each of the two reductions has a relative error of at most 1e-4 close to a
+                // resonance.
                 assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 3e-4 * a.abs()), "{damping}: {a:?} {b:?}");
             }
             whole
@@ -759,8 +779,11 @@ fn a_structure_that_rotation_stiffens_is_saved_for_all_speeds() {
     }
 }
 
-/// Two matrices and the names of their rows in a file of its own: the lowest frequencies, and the mass along x, which tells the units. The mass is the sum of
-/// the entries of `bricks.mas` between rows along x, by hand.
+/// Two matrices and a separate file of row names give the lowest frequencies and the mass along
+/// x.
+///
+/// The mass identifies the units. It is the sum of the entries of `bricks.mas` between rows
+/// along x, computed by hand.
 #[test]
 fn inspect_tells_frequencies_and_mass() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/data");
@@ -775,20 +798,23 @@ fn inspect_tells_frequencies_and_mass() {
         "bricks.sti as stiffness, bricks.mas as mass",
         "by their names",
         "mass of what is free, in its units: along x 1.354889e-8",
-        // millimetre, tonne, second: 1000 kg; inch: 4.4482216152605 N by 0.0254 m
+        // Millimetre, tonne, second: 1000 kg; inch: 4.4482216152605 N by 0.0254 m.
         "1.3549e-5 kg if units = \"mm-t-s\"",
         "1.3549e-8 kg if units = \"mm-kg-s\"",
         "2.3728e-6 kg if units = \"in-lbf-s\"",
     ] {
         assert!(said.contains(words), "{words}: {said}");
     }
-    // without names there are no directions
+    // Without names there are no directions.
     let unnamed = inspect(&["bricks.sti", "bricks.mas"]);
     assert!(unnamed.contains("lowest frequencies") && unnamed.contains("mass: no row"), "{unnamed}");
 }
 
-/// What programs do with constrained and massless rows is seen by `inspect` as a study sees it: zero rows of ANSYS, the 1e36 of Abaqus, rows that the mass
-/// matrix does not have. Two springs of 4 and 9 N/m on 1 kg each, and a third row that is constrained, or has no mass.
+/// `inspect` treats constrained and massless rows in the same way as a study.
+///
+/// Covered are zero rows of ANSYS, the 1e36 of Abaqus, and rows that are missing in the mass
+/// matrix. The structure has two springs of 4 and 9 N/m on 1 kg each, and a third row that is
+/// constrained or massless.
 #[test]
 fn inspect_leaves_out_what_is_constrained() {
     let folder = tempfile::tempdir().unwrap();
@@ -824,8 +850,10 @@ fn inspect_leaves_out_what_is_constrained() {
     assert!(said.contains("no frequencies: row `7.x` of the matrix is not among the 3 names"), "{said}");
 }
 
-/// Names tell stiffness from mass before sizes do: a heavy mass on a soft spring, and three matrices, of which one is the damping. 4 N/m and 100 kg
-/// are 0.2 rad/s.
+/// Names identify stiffness and mass before the size of their entries does.
+///
+/// The cases are a heavy mass on a soft spring, and three matrices with one damping matrix. 4
+/// N/m and 100 kg give 0.2 rad/s.
 #[test]
 fn inspect_goes_by_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -854,8 +882,10 @@ fn inspect_goes_by_names() {
     assert!(said.contains("no frequencies: which matrix"), "{said}");
 }
 
-/// What is no matrix, or none any more, is said with its file, the line where there are lines, what was expected, and what to do, by `inspect` and by
-/// `check`; nothing of it looks like a good file.
+/// `inspect` and `check` report invalid matrix files.
+///
+/// The message contains the file, the line if the file has lines, the expected content and a
+/// remedy. No damaged file is accepted.
 #[test]
 fn wrong_files_of_matrices_say_what_to_do() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/data");
@@ -874,7 +904,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
     for name in ["bricks.sti", "bricks.mas", "bricks.dof", "hbmat.mapping", "general.mtx", "v5.mat"] {
         write(name, &read(name));
     }
-    // an end of a zip that lists nothing
+    // The end record of a zip file without entries.
     write("empty.npz", &[b"PK\x05\x06".to_vec(), vec![0; 18]].concat());
     write("coordinate.mtx", &cut("abaqus_coordinate.mtx"));
     write("input.mtx", &cut("abaqus_input.mtx"));
@@ -908,7 +938,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
         let (status, said) = inspect(&[file]);
         assert!(status == 2 && words.iter().all(|words| said.contains(words)), "{file}: {status}, {said}");
     }
-    // names beside a matrix that has not their rows, and beside one that is not square
+    // Names next to a matrix with other rows, and next to a matrix that is not square.
     let (status, said) = inspect(&["bricks.sti", "hbmat.mapping"]);
     assert!(status == 2 && said.contains("hbmat.mapping: 6 names for 30 rows"), "{said}");
     let (status, said) = inspect(&["general.mtx", "bricks.dof"]);
@@ -916,7 +946,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
         status == 2 && said.contains("beside the square matrix whose rows they name") && said.contains("4 x 3"),
         "{said}"
     );
-    // a text and complex numbers beside matrices are no fault
+    // A text and complex numbers in the file of a matrix are not errors.
     let (status, said) = inspect(&["v5.mat"]);
     assert!(status == 0 && said.contains("a real matrix was expected, this is"), "{said}");
     let check = |stiffness: &str, mass: &str, more: &str| {
@@ -926,7 +956,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
         );
         fs::write(folder.path().join("study.toml"), text).unwrap();
         let checked = stickslip(folder.path(), &["check", "study.toml"]);
-        // the lines of a box are as wide as a terminal
+        // The lines of a box are as wide as a terminal.
         let said = stderr(&checked);
         (code(&checked), said.split(['\n', '│', ' ']).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" "))
     };

@@ -1,4 +1,4 @@
-//! `stickslip plot` as a user meets it: figures from stored results, and runs beside each other.
+//! Tests of `stickslip plot`: figures from stored results, and comparisons of runs.
 
 use assert_cmd::Command;
 use std::fs;
@@ -22,7 +22,7 @@ fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// A folder with the starting study of a template as `study.toml`.
+/// Creates a folder with the starting study of a template as `study.toml`.
 fn folder(template: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("study.toml"), stickslip_study::templates::find(template).unwrap().study).unwrap();
@@ -37,7 +37,7 @@ fn run(folder: &Path, out: &str, more: &[&str]) {
     assert_eq!(code(&output), 0, "{}", stderr(&output));
 }
 
-/// The rows of a table as cells by column.
+/// Returns the rows of a table as maps from column to cell.
 fn rows(path: &Path) -> Vec<std::collections::BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_path(path).unwrap();
     reader.deserialize().map(Result::unwrap).collect()
@@ -57,24 +57,24 @@ fn a_figure_is_drawn_again_without_computing() {
         assert!(fs::metadata(results.join(file)).unwrap().len() > 100, "{file}");
     }
     assert_eq!(fs::read(results.join("loops.csv")).unwrap(), tables);
-    // the same figure as that of a run
+    // The figure equals that of a run.
     let drawn = fs::read(results.join("figure.svg")).unwrap();
     assert_eq!(code(&stickslip(folder, &["run", "study.toml", "--out", "whole", "--only", "svg"])), 0);
     assert_eq!(fs::read(folder.join("whole/study/figure.svg")).unwrap(), drawn);
-    // the file has another [figure] now
+    // The study file now has a different `[figure]`.
     let study = fs::read_to_string(folder.join("study.toml")).unwrap();
     fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nx_unit = \"um\"\n")).unwrap();
     let output = stickslip(folder, &["plot", "out/study", "--study", "study.toml", "--only", "svg"]);
     assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     assert!(!String::from_utf8_lossy(&drawn).contains("(um)"));
     assert!(fs::read_to_string(results.join("figure.svg")).unwrap().contains("(um)"));
-    // and another model, which the results are not of
+    // The study file now has a different model, which does not match the results.
     let other = fs::read_to_string(folder.join("study.toml")).unwrap().replace("Ft = ", "unused = \"1 N\"\nFt = ");
     fs::write(folder.join("study.toml"), other).unwrap();
     let output = stickslip(folder, &["plot", "out/study", "--study", "study.toml", "--only", "svg"]);
     assert_eq!(code(&output), 0);
     assert!(stderr(&output).contains("has changed in more than its figure"), "{}", stderr(&output));
-    // a figure that cannot be
+    // An impossible `[figure]`.
     fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nx_unit = \"N\"\n")).unwrap();
     let output = stickslip(folder, &["plot", "out/study", "--study", "study.toml"]);
     assert_eq!(code(&output), 2);
@@ -99,7 +99,7 @@ fn two_slip_limits_differ_by_the_closed_form() {
     assert!(svg.contains("Ft = 0.001 N") && svg.contains("Ft = 0.002 N"));
     let differences = rows(&both.join("differences.csv"));
     let loss = differences.iter().find(|row| row["column"] == "dissipation_J").unwrap();
-    // 4 Ft (a - Ft/kt) for kt = 1 N/m, over the amplitudes of the study
+    // 4 Ft (a - Ft/kt) for kt = 1 N/m, over the amplitudes of the study.
     let losses = |limit: f64| {
         rows(&folder.join("weak/study/loops_summary.csv"))
             .iter()
@@ -111,10 +111,10 @@ fn two_slip_limits_differ_by_the_closed_form() {
     let expected = weak.iter().zip(&strong).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
     let largest = weak.iter().copied().fold(0.0, f64::max);
     let number = |name: &str| loss[name].parse::<f64>().unwrap();
-    // rounding of two losses of some µJ
+    // Rounding error of two losses of some µJ.
     assert!((number("largest_difference") - expected).abs() < 1e-18, "{loss:?}");
     assert!((number("relative") - expected / largest).abs() < 1e-12, "{loss:?}");
-    // the comparison replaces itself, and no run
+    // The comparison replaces itself, but not a run.
     assert_eq!(code(&stickslip(folder, &["plot", "weak/study", "strong/study", "--overlay", "--out", "both"])), 0);
     run(folder, "clash", &[]);
     fs::rename(folder.join("clash/study"), folder.join("clash/study+study")).unwrap();
@@ -152,12 +152,12 @@ fn methods_and_grids_are_compared_and_told() {
         assert_eq!(row["how"], how);
         row["relative"].parse::<f64>().unwrap()
     };
-    // fifteen harmonics of a motion that rubs: less than a percent of the peak
+    // Fifteen harmonics of a slipping orbit: less than one percent of the peak.
     assert!(of("harmonic-balance", "row by row") < 0.01);
-    // a chord over 0.12 Hz beside a peak of 0.2 Hz width
+    // A chord over 0.12 Hz next to a peak with a width of 0.2 Hz.
     let chord = of("coarse", "interpolated");
     assert!(chord > 1e-6 && chord < 0.1, "{chord}");
-    // peaks stand where they stand, on any grid
+    // The positions of peaks do not depend on the grid.
     let peaks = rows(&all.join("peaks.csv"));
     let coarse: Vec<_> = peaks.iter().filter(|row| row["run"].contains("coarse")).collect();
     assert!(!coarse.is_empty());
@@ -181,7 +181,7 @@ fn one_case_is_compared_with_the_same_case_of_many() {
         let points: Vec<&str> =
             differences.iter().filter(|row| row["table"] == "curve").map(|row| row["points"].as_str()).collect();
         assert!(!points.is_empty() && points.iter().all(|points| *points == "13"), "{points:?}");
-        // the same case, the same bits
+        // Equal cases give equal bits.
         assert!(differences.iter().all(|row| row["largest_difference"] == "0.0"), "{differences:?}");
     }
 }
@@ -202,10 +202,10 @@ fn what_cannot_be_drawn_is_named() {
     assert!(wrong(&["plot", "out/study", "--only", "pdf"]).contains("`pdf`"));
     assert!(wrong(&["plot", "out/study", "--study", "study.tom"]).contains("did you mean"));
     wrong(&["plot"]);
-    // without tables
+    // No tables.
     assert_eq!(code(&stickslip(folder, &["run", "study.toml", "--out", "bare", "--only", "svg"])), 0);
     assert!(wrong(&["plot", "bare/study"]).contains("with csv among them"));
-    // other kinds
+    // Different kinds.
     fs::write(
         folder.join("study.toml"),
         stickslip_study::templates::find("blade-couple").unwrap().study.replacen("points = 241", "points = 3", 1),
@@ -218,19 +218,19 @@ fn what_cannot_be_drawn_is_named() {
         "{text}"
     );
     assert!(wrong(&["plot", "out/study", "--study", "study.toml"]).contains("holds results of the kind `hysteresis`"));
-    // reference curves are computed
+    // Reference curves require a computation.
     let study = fs::read_to_string(folder.join("study.toml")).unwrap();
     fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nreferences = true\n")).unwrap();
     let output = stickslip(folder, &["plot", "couple/study", "--study", "study.toml", "--only", "svg"]);
     assert_eq!(code(&output), 0);
     assert!(stderr(&output).contains("no reference curves"), "{}", stderr(&output));
-    // changed by hand
+    // A table changed by hand.
     let path = folder.join("out/study/loops.csv");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.lines().take(5).collect::<Vec<_>>().join("\n")).unwrap();
     let text = wrong(&["plot", "out/study"]);
     assert!(text.contains("loops.csv, line 5:") && text.contains("ends after 4 rows"), "{text}");
-    // an interrupted run is drawn, and it is said
+    // An interrupted run is drawn with a warning.
     let path = folder.join("couple/study/record.json");
     let record = fs::read_to_string(&path).unwrap();
     fs::write(&path, record.replacen("\"interrupted\": false", "\"interrupted\": true", 1)).unwrap();

@@ -1,4 +1,5 @@
-//! Runs that are killed, cut into parts, or lose their disk: what comes of them in the end is what one undisturbed run gives.
+//! Runs that are killed, sharded, or lose their disk give the same results as an undisturbed
+//! run.
 #![cfg(unix)]
 
 use serde_json::Value;
@@ -25,7 +26,7 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
     stderr(&output)
 }
 
-/// What a command says that is refused.
+/// Returns the error output of a refused command.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = stickslip(folder, arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
@@ -36,7 +37,7 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A folder with the study of the couple at so many frequencies, for four slip limits.
+/// Creates a folder with the study of the couple for `points` frequencies and four slip limits.
 fn couple(points: usize) -> TempDir {
     let folder = TempDir::new().unwrap();
     let text = stickslip_study::templates::find("blade-couple").unwrap().study;
@@ -45,7 +46,7 @@ fn couple(points: usize) -> TempDir {
     folder
 }
 
-/// The files of a run, the record without what two runs differ in.
+/// Returns the files of a run, without the entries of the record that differ between runs.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
     entries
@@ -70,7 +71,7 @@ fn same(a: &Path, b: &Path) {
     }
 }
 
-/// Waits for so long, then ends the run as nothing else would. Whether it had ended by itself.
+/// Waits, then kills the run. Returns `true` if it had already ended.
 fn killed(mut child: Child, after: Duration) -> bool {
     let start = Instant::now();
     while start.elapsed() < after {
@@ -90,12 +91,13 @@ fn events(text: &str, name: &str) -> Vec<Value> {
     lines.filter(|event| event["event"] == name).collect()
 }
 
-/// The instants at which the test kills, s: any will do, and the same ones each time.
+/// Times of the kills in s. They are arbitrary, but equal in every test run.
 fn instants() -> impl Iterator<Item = Duration> {
     (1u64..).map(|i| Duration::from_millis(i.wrapping_mul(2_654_435_761) % 1_700))
 }
 
-/// So many kills, each resumed: as many runs to the end as that takes, of which every one has the bytes of the undisturbed run.
+/// Kills and resumes runs `kills` times. Every completed run must have the bytes of the
+/// undisturbed run.
 fn killed_at(points: usize, kills: usize) {
     let folder = couple(points);
     let outputs = ["--only", "csv,parquet,svg"];
@@ -112,11 +114,12 @@ fn killed_at(points: usize, kills: usize) {
             let child = command.stderr(fs::File::create(&log).unwrap()).spawn().unwrap();
             let after = if left > 0 { instants.next().unwrap() } else { Duration::from_secs(600) };
             by_itself = killed(child, after);
-            // a kill may also come when all is written and the journal gone: nothing is left to go on with
+            // A kill may come after the results are written and the journal is removed. No run
+            // remains to resume.
             over = by_itself || results.join("record.json").exists() && !running.join("journal").exists();
             left -= usize::from(!by_itself);
             runs += 1;
-            // what was said to be kept is there
+            // The units reported as kept are on disk.
             let log = fs::read_to_string(&log).unwrap();
             for begin in events(&log, "begin") {
                 assert!(begin["kept"].as_u64().unwrap() >= reported, "{log}");
@@ -136,7 +139,7 @@ fn a_killed_run_goes_on_and_ends_with_the_same_bytes() {
     killed_at(20_000, 8);
 }
 
-/// Fifty times, with 200,000 points: minutes.
+/// Fifty kills of a run with 200,000 points, which takes minutes.
 #[test]
 #[ignore = "takes minutes"]
 fn fifty_kills_of_a_large_run_change_nothing() {
@@ -168,7 +171,7 @@ fn parts_joined_are_the_whole() {
     assert!(said.contains("with --set kt=9 N/mm, not without --set"), "{said}");
     let said = refused(folder.path(), &["merge", "whole", "--out", "no"]);
     assert!(said.contains("there is no part of a study in whole"), "{said}");
-    // a part that did not end
+    // An unfinished shard.
     let journal = at(&part(2)).join("journal");
     let bytes = fs::read(&journal).unwrap();
     fs::write(&journal, &bytes[..bytes.len() / 2]).unwrap();
@@ -180,7 +183,7 @@ fn parts_joined_are_the_whole() {
     same(&at("whole/couple"), &at("again/couple"));
 }
 
-/// Ends a run of which something is kept, and returns its folder.
+/// Kills a run after some units are kept, and returns its folder.
 fn unfinished(folder: &Path) -> PathBuf {
     let log = folder.join("log");
     let mut child = command(folder, &["run", "couple.toml", "--progress", "json", "--threads", "1", "--only", "csv"])
@@ -222,7 +225,7 @@ fn a_journal_that_is_taken_away_ends_the_run() {
         assert!(start.elapsed() < Duration::from_secs(60));
         std::thread::sleep(Duration::from_millis(5));
     }
-    // another run into the same folder is told so
+    // Another run into the same folder reports this.
     let other = stickslip(folder.path(), &["run", "couple.toml", "--resume"]);
     assert!(other.status.code() == Some(1) && stderr(&other).contains("another run is writing"), "{}", stderr(&other));
     fs::remove_dir_all(&running).unwrap();
@@ -232,13 +235,14 @@ fn a_journal_that_is_taken_away_ends_the_run() {
     assert!(!folder.path().join("stickslip-out/couple").exists());
 }
 
-/// A file may not become longer than a limit: what a full disk is for the program.
+/// A limit on the file size has the same effect on the program as a full disk.
 #[test]
 fn a_full_disk_ends_the_run_and_loses_nothing() {
     let folder = couple(20_000);
     done(folder.path(), &["run", "couple.toml", "--out", "whole", "--only", "csv"]);
     let program = assert_cmd::cargo::cargo_bin("stickslip");
-    // blocks of 512 bytes; without the trap the system ends the program before it can say why
+    // Blocks of 512 bytes. Without the trap, the system ends the program before it can report
+    // the error.
     let limited = |blocks: usize| {
         let script = format!(
             "trap '' XFSZ; ulimit -f {blocks}; exec {} run couple.toml --out full --only csv --resume --threads 2",
@@ -250,7 +254,7 @@ fn a_full_disk_ends_the_run_and_loses_nothing() {
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let said = stderr(&output);
     assert!(said.contains("cannot write full/couple.running/journal") && said.contains("--resume"), "{said}");
-    // the journal fits now, the table does not
+    // The journal now fits, the table does not.
     let output = limited(35_000);
     let said = stderr(&output);
     assert!(output.status.code() == Some(1) && said.contains("--resume makes the results of it"), "{said}");
@@ -274,7 +278,7 @@ fn programs_read_how_a_run_goes_on() {
     assert!(written.as_array().unwrap().iter().any(|file| file == "stickslip-out/couple/curve.csv"), "{written}");
     let end = &events(&said, "end")[0];
     assert_eq!((&end["status"], &end["points"]["converged"]), (&"done".into(), &80.into()));
-    // what is wrong is told in the same way
+    // Errors are also reported as events.
     fs::write(folder.path().join("couple.toml"), "schema = 1").unwrap();
     let output = stickslip(folder.path(), &["run", "couple.toml", "--progress", "json"]);
     assert_eq!(output.status.code(), Some(2));
@@ -314,7 +318,7 @@ fn samples_are_the_same_in_parts_and_on_any_number_of_threads() {
         assert_eq!(curve.lines().count(), 1 + 32 * 31);
         let figure = fs::read_to_string(at("one").join("figure.svg")).unwrap();
         assert!(figure.contains("32 draws") && figure.contains("median"), "{design}");
-        // what was stored is drawn again
+        // The stored results are drawn again.
         let before = figure;
         done(folder.path(), &["plot", "one/couple"]);
         assert_eq!(fs::read_to_string(at("one").join("figure.svg")).unwrap(), before);

@@ -1,4 +1,4 @@
-//! Figs. 6-8 and 10: the response of the blade couple, and what the paper says of it.
+//! Figs. 6-8 and 10: the response of the blade couple, and the paper's claims about it.
 
 use crate::further::Further;
 use crate::measure::{Curve, largest};
@@ -12,24 +12,24 @@ use stickslip::model::Model;
 use stickslip_report::{PageTable, Section, Verdict};
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 
-/// The masses of the couple in the order of the study files.
+/// Indices of the masses of the couple, in the order of the study files.
 const BLADE1: usize = 0;
 const CONTACT: usize = 1;
 const BLADE3: usize = 2;
 /// The other blade of the symmetric couple.
 const BLADE4: usize = 3;
 
-/// Peaks of one mass over the slip limits: amplitudes in cm.
+/// Returns the peak amplitudes of one mass over the slip limits in cm.
 fn heights(curves: &[Curve], mass: usize) -> Vec<f64> {
     curves.iter().map(|curve| 100.0 * curve.peak[mass].amplitude).collect()
 }
 
-/// And their frequencies, Hz.
+/// Returns the peak frequencies of one mass over the slip limits in Hz.
 fn frequencies(curves: &[Curve], mass: usize) -> Vec<f64> {
     curves.iter().map(|curve| curve.peak[mass].frequency).collect()
 }
 
-/// By how much the peak of one mass lies above that of another in frequency, Hz.
+/// Returns the peak frequency of mass `above` minus that of mass `below` in Hz, per slip limit.
 fn shifts(curves: &[Curve], above: usize, below: usize) -> Vec<f64> {
     frequencies(curves, above).iter().zip(frequencies(curves, below)).map(|(a, b)| a - b).collect()
 }
@@ -39,12 +39,12 @@ fn limits(curves: &[Curve]) -> String {
     format!("Ft = {} N", limits.join(", "))
 }
 
-/// Whether the frequencies are the printed one.
+/// Compares the frequencies with the printed value.
 fn printed(frequencies: &[f64], value: f64) -> Verdict {
     in_all(&frequencies.iter().map(|f| (f - value).abs() <= PRINTED).collect::<Vec<_>>())
 }
 
-/// The peaks as a table.
+/// Returns the peaks as a table.
 fn peaks(caption: &str, curves: &[Curve], masses: &[(&str, usize)]) -> PageTable {
     let mut header = vec!["Ft (N)".to_owned()];
     for (name, _) in masses {
@@ -71,12 +71,12 @@ fn section(results: &Results, name: &str, heading: &str, paragraph: &str) -> Opt
     })
 }
 
-/// The mass of this name in a model, kg.
+/// Returns the mass with this name in a model, in kg.
 fn mass_of(model: &Model, name: &str) -> Option<f64> {
     model.masses.iter().find(|mass| mass.name == name).map(|mass| mass.mass)
 }
 
-/// The claim that a1 falls, with the limit at which it turns.
+/// Checks the claim that a1 falls, and states the slip limit at which it rises again.
 fn falling(curves: &[Curve], optimum: Option<&Optimum>) -> (String, Verdict) {
     let mut measured = format!("Peak of a1 at {}: {} cm.", limits(curves), list(heights(curves, BLADE1), 3));
     let mut verdict = monotone(&heights(curves, BLADE1), -1.0);
@@ -193,9 +193,9 @@ fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Opt
     ))
 }
 
-/// What is said of `kt`.
+/// Checks the claims about `kt`.
 fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<Finding> {
-    // largest distance of a2 and a3 as a part of their own peak, at each slip limit
+    // Largest difference between a2 and a3 relative to the peak of a3, at each slip limit.
     let apart = |curve: &Curve| {
         let pairs = curve.amplitude[CONTACT].iter().zip(&curve.amplitude[BLADE3]);
         largest(pairs.map(|(a, b)| (a - b).abs())) / curve.peak[BLADE3].amplitude
@@ -315,7 +315,7 @@ pub fn figure7(results: &Results, further: &Further) -> Option<Part> {
 pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
     let (heavy, light) = (results.curves("fig06")?, results.curves("fig07")?);
     let model = results.model("fig06")?;
-    // half-power width of a blade's resonance, Hz
+    // Half-power width of a blade's resonance in Hz.
     let width = model.springs.first()?.damping / (TAU * mass_of(&model, "blade1")?);
     let double = further.stiffness.iter().find(|(kt, _)| *kt == 2e4).map(|(_, curves)| curves)?;
     let changes = [("Ft doubled", heavy.get(1)?), ("kt doubled", double.first()?), ("m1 halved", light.first()?)];
@@ -360,13 +360,15 @@ pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
     Some(Part { section, findings })
 }
 
-/// Largest difference between the curves of Fig. 6 and ten times those of a study with a tenth of the forces.
+/// Returns the largest difference between one figure and ten times another with a tenth of the
+/// forces.
 fn image(results: &Results, large: &str, small: &str) -> Option<f64> {
     let (large, small) = (results.curves(large)?, results.curves(small)?);
     (large.len() == small.len()).then(|| largest(large.iter().zip(&small).map(|(a, b)| a.difference(b, 10.0))))
 }
 
-/// Relative difference below which one curve is the image of the other: the smooth orbits are computed to about 1e-7.
+/// Relative difference below which two curves are similar: smooth orbits have an error of about
+/// 1e-7.
 const IMAGE: f64 = 1e-6;
 
 /// Fig. 8.
@@ -401,7 +403,7 @@ pub fn figure8(results: &Results) -> Option<Part> {
     Some(Part { section, findings })
 }
 
-/// Two peaks stand at the same frequency if a curve read to a twentieth of the half-power width (0.17 Hz) cannot tell.
+/// Tolerance in Hz for equal peak frequencies: about 1/20 of the half-power width (0.17 Hz).
 const SAME_FREQUENCY: f64 = 0.01;
 
 /// Fig. 10.
@@ -480,7 +482,7 @@ pub fn figure10(results: &Results) -> Option<Part> {
     Some(Part { section, findings })
 }
 
-/// The peak over the slip limit, which the paper\u{2019}s four values sample.
+/// The peak over the slip limit; the paper's four values are samples of this curve.
 pub fn optimum(further: &Further) -> Option<Part> {
     let (couple, light, symmetric) = (further.couple.as_ref()?, further.light.as_ref()?, further.symmetric.as_ref()?);
     let rows = (0..couple.limits.len())
@@ -520,7 +522,7 @@ pub fn optimum(further: &Further) -> Option<Part> {
     Some(Part { section, findings: Vec::new() })
 }
 
-/// The arctangent law against the exact one.
+/// The arctangent law compared with the exact law.
 pub fn laws(results: &Results) -> Option<Part> {
     let mut rows = Vec::new();
     let mut worst = Vec::new();

@@ -1,4 +1,4 @@
-//! Figs. 2-4: the loops of the friction elements, and what the paper says of them.
+//! Figs. 2-4: the loops of the friction elements, and the paper's claims about them.
 
 use crate::further::Further;
 use crate::measure::{Loop, largest};
@@ -9,13 +9,13 @@ use crate::verdict::{APPROXIMATE, DIFFERENT, SIMILAR, in_all, small};
 use stickslip_report::{PageTable, Section, Verdict};
 use stickslip_study::dataset::{Figure, Panel};
 
-/// Slip limit of the elements, N.
+/// Slip limit of the elements in N.
 const LIMIT: f64 = 1e-3;
 
-/// A turn of the force counts from this part of Ft on.
+/// Smallest turn of the force that counts, relative to Ft.
 const TURN: f64 = 0.01;
 
-/// Panels of several figures in one, each with the figure's number in its title.
+/// Merges the panels of several figures. Each panel title has the number of its figure.
 fn merged(results: &Results, title: &str, figures: &[(&str, &str)]) -> Option<Figure> {
     let mut panels = Vec::new();
     for (name, number) in figures {
@@ -30,7 +30,7 @@ fn merged(results: &Results, title: &str, figures: &[(&str, &str)]) -> Option<Fi
 pub fn exact(results: &Results) -> Option<Part> {
     let loops = results.loops(&["fig02"])?;
     let corners: Vec<usize> = loops.iter().map(Loop::break_points).collect();
-    // the sides of a rhomboid: two slopes that alternate
+    // A rhomboid has four sides with two alternating slopes.
     let rhomboid: Vec<bool> = loops
         .iter()
         .map(|l| {
@@ -75,7 +75,7 @@ pub fn exact(results: &Results) -> Option<Part> {
     Some(Part { section, findings })
 }
 
-/// Figs. 3 and 4 with the law that the paper used.
+/// Figs. 3 and 4 with the paper's law.
 pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
     let elements = Elements::of(results)?;
     let mut findings = elements.findings();
@@ -99,7 +99,7 @@ pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
     Some(Part { section, findings })
 }
 
-/// The loops of the four kinds of element, in the same order.
+/// Loops of the four kinds of element, in the same order.
 struct Elements {
     exact: Vec<Loop>,
     arctan: Vec<Loop>,
@@ -107,12 +107,12 @@ struct Elements {
     coulomb: Vec<Loop>,
 }
 
-/// How much larger each area is than the one beside it, as a share of that.
+/// Returns the relative excess of each area over that of the other element.
 fn excess(a: &[Loop], b: &[Loop]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a.area / b.area - 1.0).collect()
 }
 
-/// The largest difference of force between loops of the same displacements, in limits.
+/// Returns the largest force difference between loops of the same motion, in slip limits.
 fn apart(a: &[Loop], b: &[Loop]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a.difference(b) / LIMIT).collect()
 }
@@ -253,7 +253,7 @@ fn frequencies(further: &Further) -> PageTable {
     }
 }
 
-/// Fig. 4 as its caption has it.
+/// Fig. 4 with the law of its caption.
 pub fn coulomb(results: &Results) -> Option<Part> {
     let loops = results.loops(&["fig04a_coulomb", "fig04b_coulomb"])?;
     let arctan = results.loops(&["fig04a", "fig04b"])?;

@@ -1,4 +1,4 @@
-//! What the paper leaves open, and how far the numbers of the report may be trusted.
+//! Data that the paper does not state, and the accuracy of the report's numbers.
 
 use crate::further::Further;
 use crate::part::Part;
@@ -7,7 +7,7 @@ use crate::text::{list, words};
 use stickslip_report::{PageTable, Section};
 use stickslip_study::results::worst_evidence;
 
-/// What had to be inferred, and what is misprinted.
+/// Lists inferred values and misprints.
 pub fn open(further: &Further) -> Part {
     let rows = [
         [
@@ -78,7 +78,7 @@ pub fn open(further: &Further) -> Part {
     Part { section, findings: Vec::new() }
 }
 
-/// The evidence for every dataset.
+/// Lists the error measures of every dataset.
 pub fn record(results: &Results) -> Part {
     let rows = results.all().map(|dataset| {
         let points: u64 = dataset.record.points.values().sum();
@@ -109,7 +109,7 @@ pub fn record(results: &Results) -> Part {
     Part { section, findings: Vec::new() }
 }
 
-/// A number of the evidence, if there is one.
+/// Formats an error measure, if it exists.
 fn shown(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| format!("{value:.1e}"))
 }

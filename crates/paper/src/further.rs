@@ -1,35 +1,35 @@
-//! Cases beyond the figures that the claims ask for: other slip limits, contact stiffnesses, frequencies.
+//! Additional cases for the claims: other slip limits, contact stiffnesses and frequencies.
 
 use crate::measure::{Curve, Loop, curves, loops};
 use crate::optimum::Optimum;
 use crate::studies::read;
 use stickslip_study::run::{Context, run};
 
-/// Cases beyond the figures; absent if the run was interrupted.
+/// Additional cases; empty if the run was interrupted.
 #[derive(Debug, Default)]
 pub struct Further {
     /// Contact stiffness (N/m) and the curves of Fig. 6 with it.
     pub stiffness: Vec<(f64, Vec<Curve>)>,
     /// Peaks over the slip limit, non-symmetric element.
     pub couple: Option<Optimum>,
-    /// The same with m1 = m/200.
+    /// Peaks over the slip limit, non-symmetric element with m1 = m/200.
     pub light: Option<Optimum>,
-    /// The same with the symmetric element.
+    /// Peaks over the slip limit, symmetric element.
     pub symmetric: Option<Optimum>,
-    /// Frequency of the loops (rad/s), and those of Figs. 3 and 4.
+    /// Frequency of the loops (rad/s), and the loops of Figs. 3 and 4.
     pub omega: Vec<(f64, Vec<Loop>, Vec<Loop>)>,
 }
 
 /// Contact stiffnesses for the claim about `kt`.
 const STIFFNESSES: [(f64, &str); 4] = [(5e3, "5000 N/m"), (1e4, "10000 N/m"), (2e4, "20000 N/m"), (4e4, "40000 N/m")];
-/// Frequencies for the inference of the loops' frequency.
+/// Frequencies that support the inferred frequency of the loops.
 const OMEGAS: [(f64, &str); 4] =
     [(0.5, "0.5 rad/s"), (1.0, "1 rad/s"), (2.0, "2 rad/s"), (std::f64::consts::TAU, "6.283185307179586 rad/s")];
 
 impl Further {
-    /// Computes them; `points` replaces the number of points of response curves.
+    /// Computes the cases. `points` replaces the number of points of response curves.
     pub fn new(context: &Context, points: Option<usize>) -> Further {
-        // an interrupted or failed extra case only leaves its claim unmeasured
+        // An interrupted or failed case leaves only its claim without a measurement.
         let with = |name: &str, key: &str, value: &str| {
             let study = read(name, points, &[(key, value)]).ok()?;
             let dataset = run(&study, context).ok()?;

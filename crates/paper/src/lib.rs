@@ -1,9 +1,11 @@
-//! Every figure of the paper, and its claims beside measured numbers: what `stickslip paper` does.
+//! Computes every figure of the paper and compares its claims with measured numbers.
 //!
-//! The study files under `studies/paper/` are run as any other; a file per group of figures measures what they yield against what the text
-//! says, and the rules that decide stand in one file.
+//! This is the command `stickslip paper`. The study files under `studies/paper/` run like any
+//! other. One module per group of figures measures the results and compares them with the
+//! paper's text. The module `verdict` contains the decision rules.
 //!
-//! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 (2015) 31-40.
+//! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and
+//! Computational Mechanics 9 (2015) 31-40.
 
 mod couple;
 mod elements;
@@ -25,21 +27,21 @@ use stickslip_study::StudyError;
 use stickslip_study::run::{Context, run};
 use studies::{FILES, Results, read};
 
-/// How the job ended.
+/// Result of the command.
 #[derive(Debug)]
 pub struct Outcome {
-    /// What the terminal shows.
+    /// Text for the terminal.
     pub summary: String,
-    /// Points without a result.
+    /// Number of points without a result.
     pub failed: u64,
-    /// The page of figures and claims.
+    /// Path of the page with figures and claims.
     pub report: PathBuf,
 }
 
-/// Why the figures cannot be made.
+/// Reason why the figures cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
-    /// A study cannot be run here, for example because it needs more memory than there is.
+    /// A study cannot run here, for example because it needs more memory than available.
     #[error(transparent)]
     Study(#[from] StudyError),
     /// A file cannot be written.
@@ -47,19 +49,21 @@ pub enum PaperError {
     Report(#[from] ReportError),
 }
 
-/// How much is computed; tests take less.
+/// Amount of computation, which tests reduce.
 struct Extent {
     points: Option<usize>,
     outputs: Outputs,
 }
 
-/// Computes all figures of the paper and writes, under `out`, a folder of results per figure and `report.html`: each figure beside what
-/// the paper's text claims of it, the measured number and a verdict. `say` gets a line per figure.
+/// Computes all figures of the paper and writes them with the report under `out`.
 ///
-/// An interrupted run writes what is finished and measures what is complete.
+/// Each figure has a folder of results. The page `report.html` shows each figure with the
+/// paper's claims, the measured numbers and a verdict. `say` receives one line per figure.
+///
+/// An interrupted run writes the finished figures and measures the complete ones.
 ///
 /// # Errors
-/// [`PaperError`]: a file cannot be written, or a study cannot be run here. The figures finished before stay.
+/// [`PaperError`] if a file cannot be written or a study cannot run here. Earlier figures stay.
 ///
 /// # Example
 /// ```no_run
@@ -106,7 +110,7 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     .into_iter()
     .flatten()
     .collect();
-    // what an interrupted run has does not replace a whole report
+    // An interrupted run does not replace a complete report.
     let whole = out.join("report.html");
     let cut_short = context.stopped() && whole.exists();
     let report = if cut_short { out.join("report.interrupted.html") } else { whole };
@@ -141,7 +145,7 @@ fn page(parts: Vec<Part>) -> Page {
     }
 }
 
-/// The claims for the terminal.
+/// Returns the claims as text for the terminal.
 fn summary(report: &Path, parts: &[Part], results: &Results) -> String {
     let mut text = String::new();
     for part in parts.iter().filter(|part| !part.findings.is_empty()) {
@@ -195,7 +199,7 @@ mod tests {
         {
             assert!(report.contains(&format!("<h2>{heading}")), "{heading}");
         }
-        // a claim whose numbers cannot be read would be absent
+        // A claim without readable numbers would be missing.
         assert!(
             outcome.summary.contains("28 claims:") && outcome.summary.contains("report.html"),
             "{}",
@@ -210,7 +214,7 @@ mod tests {
         assert!(out.path().join("report.html").is_file());
     }
 
-    /// What an interrupted job has goes beside a report that is there.
+    /// An interrupted run writes its report under a different name if a report exists.
     #[test]
     fn an_interrupted_job_does_not_replace_a_report() {
         let out = tempfile::tempdir().unwrap();

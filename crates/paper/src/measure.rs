@@ -1,4 +1,4 @@
-//! Numbers read off results: peaks and differences of response curves, corners and areas of loops.
+//! Measures on results: peaks and differences of response curves, corners and areas of loops.
 
 use stickslip_study::dataset::Dataset;
 use stickslip_study::kinds::{hysteresis, response};
@@ -8,11 +8,11 @@ use stickslip_study::{Study, VariedValue};
 /// The response at one slip limit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Curve {
-    /// Slip limit, N.
+    /// Slip limit in N.
     pub limit: f64,
-    /// Frequencies, Hz.
+    /// Frequencies in Hz.
     pub frequency: Vec<f64>,
-    /// Amplitudes (m) by mass, then frequency.
+    /// Amplitudes in m by mass, then by frequency.
     pub amplitude: Vec<Vec<f64>>,
     /// Highest refined peak of every mass.
     pub peak: Vec<Peak>,
@@ -21,26 +21,28 @@ pub struct Curve {
 /// A loop of force over displacement.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Loop {
-    /// Tangential stiffness, N/m.
+    /// Tangential stiffness in N/m.
     pub stiffness: f64,
-    /// Amplitude of the imposed motion, m.
+    /// Amplitude of the imposed motion in m.
     pub amplitude: f64,
-    /// Instants, s; both ends of the period are there.
+    /// Times in s, including both ends of the period.
     pub time: Vec<f64>,
-    /// Displacement, m.
+    /// Displacement in m.
     pub displacement: Vec<f64>,
-    /// Force, N.
+    /// Force in N.
     pub force: Vec<f64>,
-    /// Loss per cycle, J.
+    /// Dissipation per cycle in J.
     pub area: f64,
 }
 
-/// A varied parameter of a case, SI.
+/// Returns a varied parameter of a case in SI units.
 fn value(varied: &[VariedValue], name: &str) -> Option<f64> {
     varied.iter().find(|varied| varied.name == name).map(|varied| varied.si)
 }
 
-/// The curves of a response study that varies `Ft`; `None` if it is no such study, or a mass has no peak.
+/// Returns the curves of a response study that varies `Ft`.
+///
+/// Returns `None` for another study, or if a mass has no peak.
 pub fn curves(study: &Study, dataset: &Dataset) -> Option<Vec<Curve>> {
     let curves = response::curves(study, dataset).ok()?;
     let measured = curves.into_iter().map(|curve| {
@@ -54,7 +56,8 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Option<Vec<Curve>> {
     measured.collect()
 }
 
-/// The loops of a hysteresis study that varies `kt` and `a`; `None` if it is no such study.
+/// Returns the loops of a hysteresis study that varies `kt` and `a`, or `None` for another
+/// study.
 pub fn loops(study: &Study, dataset: &Dataset) -> Option<Vec<Loop>> {
     let loops = hysteresis::loops(study, dataset).ok()?;
     let measured = loops.into_iter().map(|found| {
@@ -70,26 +73,31 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Option<Vec<Loop>> {
     measured.collect()
 }
 
-/// The largest of some numbers; NaN if there is none.
+/// Returns the largest number, or NaN for an empty list.
 pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(f64::NAN, f64::max)
 }
 
 impl Curve {
-    /// The highest of the peaks, m.
+    /// Returns the highest peak in m.
     pub fn highest(&self) -> f64 {
         self.peak.iter().map(|peak| peak.amplitude).fold(f64::NAN, f64::max)
     }
 
-    /// Largest difference to another curve at the same frequencies, after `factor` has been applied to the other, as a part
-    /// of the highest peak.
+    /// Returns the largest difference to `factor` times another curve, relative to the highest
+    /// peak.
+    ///
+    /// Both curves must have the same frequencies.
     pub fn difference(&self, other: &Curve, factor: f64) -> f64 {
         let pairs = self.amplitude.iter().zip(&other.amplitude).flat_map(|(a, b)| a.iter().zip(b));
         let largest = pairs.map(|(a, b)| (a - factor * b).abs()).fold(f64::NAN, f64::max);
         largest / self.highest()
     }
 
-    /// Largest distance of the masses' amplitudes at one frequency, as a part of the highest peak, and that frequency, Hz.
+    /// Returns the largest difference between the masses' amplitudes at one frequency, and that
+    /// frequency.
+    ///
+    /// The difference is relative to the highest peak, the frequency is in Hz.
     pub fn spread(&self) -> (f64, f64) {
         let at = |i: usize| {
             let values = || self.amplitude.iter().map(|a| a[i]);
@@ -104,26 +112,30 @@ impl Curve {
         (widest.0 / self.highest(), widest.1)
     }
 
-    /// Largest distance of the peaks of all masses, as a part of the highest.
+    /// Returns the difference between the highest and the lowest peak of the masses, relative
+    /// to the highest.
     pub fn peak_spread(&self) -> f64 {
         let lowest = self.peak.iter().map(|peak| peak.amplitude).fold(f64::NAN, f64::min);
         1.0 - lowest / self.highest()
     }
 }
 
-/// A change of slope counts from this part of the steepest slope on. Rounding of the samples is a million times smaller, and the
-/// corners of the exact loop change the slope by all of it.
+/// Smallest change of slope that counts as a corner, relative to the steepest slope.
+///
+/// Rounding of the samples is a million times smaller. A corner of the exact loop changes the
+/// slope by its full value.
 const CORNER: f64 = 0.01;
 
 impl Loop {
-    /// The slopes of the loop's straight pieces in order; two neighbours never have the same, nor do the last and the first.
+    /// Returns the slopes of the straight pieces in order. Adjacent slopes differ, also
+    /// cyclically.
     pub fn slopes(&self) -> Vec<f64> {
         let largest = self.displacement.iter().fold(0.0f64, |a, u| a.max(u.abs()));
         let mut slopes: Vec<f64> = Vec::new();
         let steepest = std::cell::Cell::new(0.0f64);
         let new = |last: f64, slope: f64| (slope - last).abs() > CORNER * steepest.get().max(slope.abs());
         for (u, f) in self.displacement.windows(2).zip(self.force.windows(2)) {
-            // the imposed motion stands still at its ends: steps there say nothing about the slope
+            // Near its turning points the imposed motion is too small for a slope.
             if (u[1] - u[0]).abs() < 1e-6 * largest {
                 continue;
             }
@@ -139,7 +151,7 @@ impl Loop {
         slopes
     }
 
-    /// Number of break points in one cycle: at each the slope changes.
+    /// Returns the number of break points in one cycle, at which the slope changes.
     pub fn break_points(&self) -> usize {
         match self.slopes().len() {
             1 => 0,
@@ -147,15 +159,17 @@ impl Loop {
         }
     }
 
-    /// Largest force, N.
+    /// Returns the largest force in N.
     pub fn highest(&self) -> f64 {
         self.force.iter().fold(0.0f64, |a, f| a.max(f.abs()))
     }
 
-    /// Number of turns of the force in one cycle that are larger than `small` (N): a loop of flat or rounded sides has two.
+    /// Returns the number of turns of the force in one cycle that exceed `small` (N).
+    ///
+    /// A loop with flat or rounded sides has two.
     pub fn turns(&self, small: f64) -> usize {
         let (mut turns, mut rising, mut extreme) = (0, None, self.force.first().copied().unwrap_or(0.0));
-        // the cycle twice: the first time round only finds the direction at the start
+        // The first pass through the cycle finds the direction at its start, the second counts.
         for round in 0..2 {
             for force in &self.force {
                 let up = rising == Some(true);
@@ -171,8 +185,9 @@ impl Loop {
         turns
     }
 
-    /// Largest distance of a point of either loop from the other loop, with displacements measured in the amplitude of the motion
-    /// and forces in `limit` (N).
+    /// Returns the largest distance of a point of either loop from the other loop.
+    ///
+    /// Displacements are relative to the amplitude of the motion, forces to `limit` (N).
     pub fn distance(&self, other: &Loop, limit: f64) -> f64 {
         let scaled = |l: &Loop| -> Vec<(f64, f64)> {
             l.displacement.iter().zip(&l.force).map(|(u, f)| (u / self.amplitude, f / limit)).collect()
@@ -185,14 +200,14 @@ impl Loop {
         farthest(&a, &b).max(farthest(&b, &a))
     }
 
-    /// The force at `time`, between samples by straight lines.
+    /// Returns the force at `time` by linear interpolation.
     fn force_at(&self, time: f64) -> f64 {
         let next = self.time.partition_point(|t| *t < time).clamp(1, self.time.len() - 1);
         let (t, f) = (&self.time[next - 1..=next], &self.force[next - 1..=next]);
         f[0] + (f[1] - f[0]) * ((time - t[0]) / (t[1] - t[0])).clamp(0.0, 1.0)
     }
 
-    /// Largest difference of the force to another loop of the same motion, N.
+    /// Returns the largest difference of the force to another loop of the same motion, in N.
     pub fn difference(&self, other: &Loop) -> f64 {
         if other.time.len() < 2 {
             return f64::NAN;
@@ -201,7 +216,7 @@ impl Loop {
     }
 }
 
-/// Distance of a point from a segment.
+/// Returns the distance of a point from a segment.
 fn from_segment(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
     let (d, r) = ((b.0 - a.0, b.1 - a.1), (p.0 - a.0, p.1 - a.1));
     let length = d.0 * d.0 + d.1 * d.1;

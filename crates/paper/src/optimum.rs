@@ -1,28 +1,31 @@
-//! The highest resonance peak over the slip limit: the curve on which the paper's four values lie, and its lowest point.
+//! The highest resonance peak over the slip limit, and its minimum.
 
 use stickslip_study::Study;
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 use stickslip_study::kinds::performance;
 use stickslip_study::run::{Context, run};
 
-/// The lowest peak stands inside the range if that at the highest limit is above it by more than this part: what is seen, not rounding.
+/// Relative excess of the peak at the highest limit over the lowest peak, above which the
+/// minimum lies inside the range. The value excludes rounding errors.
 const WORSE_AGAIN: f64 = 1e-3;
 
 /// The peak of the excited blade over the slip limit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Optimum {
-    /// Slip limits, N.
+    /// Slip limits in N.
     pub limits: Vec<f64>,
-    /// Peaks, m.
+    /// Peaks in m.
     pub peaks: Vec<f64>,
-    /// The lowest point: slip limit (N) and peak (m).
+    /// Minimum: slip limit (N) and peak (m).
     pub lowest: (f64, f64),
-    /// Whether the lowest point lies inside the range, so that a higher limit is worse again.
+    /// `true` if the minimum lies inside the range: a higher limit increases the peak again.
     pub interior: bool,
 }
 
 impl Optimum {
-    /// Computes the curve of a performance study that varies `Ft`; `None` if the run is stopped or a case fails.
+    /// Computes the curve of a performance study that varies `Ft`.
+    ///
+    /// Returns `None` if the run is stopped or a case fails.
     pub fn new(study: &Study, context: &Context) -> Option<Optimum> {
         let dataset = run(study, context).ok()?;
         let curve = performance::curves(study, &dataset).ok()?.into_iter().next()?;
@@ -35,13 +38,13 @@ impl Optimum {
         Some(Optimum { limits, peaks, lowest, interior })
     }
 
-    /// The peak at one of the limits of the curve, m.
+    /// Returns the peak at one of the limits of the curve in m, or NaN for another limit.
     pub fn at(&self, limit: f64) -> f64 {
         self.limits.iter().position(|l| *l == limit).map_or(f64::NAN, |i| self.peaks[i])
     }
 }
 
-/// The curves of both elements in one panel.
+/// Draws the curves in one panel.
 pub fn figure(curves: &[(&str, &Optimum)]) -> Figure {
     let mut series = Vec::new();
     for (colour, (label, curve)) in curves.iter().enumerate() {

@@ -1,26 +1,26 @@
-//! A section of the report and its claims, as the figures hand them over.
+//! A section of the report with its claims.
 
 use stickslip_report::{Claim, Section, Verdict};
 
-/// A claim with the short name that the terminal shows.
+/// A claim with a short name for the terminal.
 #[derive(Debug, Clone)]
 pub struct Finding {
-    /// The short name.
+    /// Short name.
     pub name: &'static str,
     /// The claim.
     pub claim: Claim,
 }
 
-/// A claim, what was measured of it, and the verdict.
+/// Creates a finding from a claim, its measured values and the verdict.
 pub fn finding(name: &'static str, text: &str, measured: String, verdict: Verdict) -> Finding {
     Finding { name, claim: Claim { text: text.to_owned(), measured, verdict } }
 }
 
-/// A section of the report before its claims are handed over.
+/// A section of the report, with its claims still separate.
 #[derive(Debug, Clone, Default)]
 pub struct Part {
     /// The section.
     pub section: Section,
-    /// Its claims.
+    /// Claims of the section.
     pub findings: Vec<Finding>,
 }

@@ -1,4 +1,4 @@
-//! The study files of the paper's figures, and what running them yields.
+//! The study files of the paper's figures, and their results.
 
 use crate::measure::{Curve, Loop, curves, loops};
 use std::collections::BTreeMap;
@@ -32,17 +32,20 @@ pub const FILES: &[(&str, &str)] = files![
     "fig10_arctan",
 ];
 
-/// The highest peak over the slip limit, for the models of three figures: name and text.
+/// Name and text of the studies of the peak over the slip limit, for the models of three
+/// figures.
 pub const OPTIMA: &[(&str, &str)] = files!["fig06_optimum", "fig07_optimum", "fig10_optimum"];
 
-/// Points of the response curves in the files.
+/// Number of points of the response curves in the files.
 const POINTS: &str = "points = 241";
-/// Those of [`OPTIMA`]: every third is enough to find the peak before it is refined.
+/// Number of points in [`OPTIMA`]: a third is enough to find the peak before its refinement.
 const COARSE_POINTS: &str = "points = 81";
-/// Every this many points of a response curve.
+/// Ratio of the two numbers of points.
 const COARSE: usize = 3;
 
-/// Reads an embedded study; `points` replaces the number of points of its response curves, `set` its parameters.
+/// Reads an embedded study.
+///
+/// `points` replaces the number of points of its response curves, `set` its parameters.
 pub fn read(name: &str, points: Option<usize>, set: &[(&str, &str)]) -> Result<Study, StudyError> {
     let text = FILES.iter().chain(OPTIMA).find(|file| file.0 == name).map_or("", |file| file.1);
     let text = points.map_or(text.to_owned(), |points| {
@@ -53,7 +56,7 @@ pub fn read(name: &str, points: Option<usize>, set: &[(&str, &str)]) -> Result<S
     read_study(&format!("{name}.toml"), &text, &set)
 }
 
-/// What has been computed, by name. A dataset that an interruption cut short is kept on disk but not measured.
+/// Results by name. Incomplete datasets of an interrupted run are on disk but not measured.
 #[derive(Debug, Default)]
 pub struct Results {
     runs: BTreeMap<String, (Study, Dataset)>,
@@ -69,28 +72,28 @@ impl Results {
         self.runs.get(name).filter(|(_, dataset)| !dataset.record.interrupted)
     }
 
-    /// A dataset that is complete.
+    /// Returns a complete dataset.
     pub fn get(&self, name: &str) -> Option<&Dataset> {
         self.complete(name).map(|(_, dataset)| dataset)
     }
 
-    /// The model of the first case of a study whose dataset is complete.
+    /// Returns the model of the first case of a study whose dataset is complete.
     pub fn model(&self, name: &str) -> Option<Model> {
         Some(self.complete(name)?.0.case(0).ok()?.model)
     }
 
-    /// Every dataset, in the order of [`FILES`].
+    /// Iterates over the datasets in the order of [`FILES`].
     pub fn all(&self) -> impl Iterator<Item = &Dataset> {
         FILES.iter().filter_map(|(name, _)| self.runs.get(*name)).map(|(_, dataset)| dataset)
     }
 
-    /// The response curves of a study, one per slip limit.
+    /// Returns the response curves of a study, one per slip limit.
     pub fn curves(&self, name: &str) -> Option<Vec<Curve>> {
         let (study, dataset) = self.complete(name)?;
         curves(study, dataset)
     }
 
-    /// The loops of several studies, one after the other.
+    /// Returns the loops of several studies in sequence.
     pub fn loops(&self, names: &[&str]) -> Option<Vec<Loop>> {
         let mut all = Vec::new();
         for name in names {
@@ -100,7 +103,7 @@ impl Results {
         Some(all)
     }
 
-    /// Points without a result.
+    /// Returns the number of points without a result.
     pub fn failed(&self) -> u64 {
         self.runs.values().map(|(_, dataset)| dataset.failures.len() as u64).sum()
     }
@@ -128,7 +131,7 @@ mod tests {
         assert_eq!((frequencies(None).len(), frequencies(Some(25)).len()), (81, 9));
     }
 
-    /// Where both have the same slip limit they have the same model, and the same ends of the range.
+    /// At equal slip limits, the optimum and its figure have equal models and frequency ranges.
     #[test]
     fn the_optima_are_of_the_models_of_their_figures() {
         for (name, _) in OPTIMA {

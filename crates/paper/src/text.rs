@@ -1,11 +1,11 @@
-//! Numbers and words as the report shows them.
+//! Formatting of numbers and texts for the report.
 
-/// Numbers in a row, with digits after the point.
+/// Joins numbers with `digits` digits after the decimal point.
 pub fn list(values: impl IntoIterator<Item = f64>, digits: usize) -> String {
     values.into_iter().map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(", ")
 }
 
-/// A small part as per cent: enough digits for what it is.
+/// Formats a ratio in percent, with more digits for smaller values.
 pub fn percent(part: f64) -> String {
     let value = 100.0 * part;
     match value.abs() {
@@ -17,12 +17,12 @@ pub fn percent(part: f64) -> String {
     }
 }
 
-/// Counts in a row.
+/// Joins integers.
 pub fn join(numbers: &[usize]) -> String {
     numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Words as strings.
+/// Converts texts to strings.
 pub fn words(words: &[&str]) -> Vec<String> {
     words.iter().map(|word| (*word).to_owned()).collect()
 }

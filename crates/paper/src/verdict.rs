@@ -1,28 +1,31 @@
-//! The rules by which a measured number decides about a claim.
+//! Rules that derive a verdict on a claim from a measured number.
 
 use stickslip_report::Verdict;
 
-/// Two quantities are called the same, or similar, up to this relative difference: what a reader can see in a printed figure.
+/// Relative difference up to which two quantities are the same or similar: visible in a printed
+/// figure.
 pub const SIMILAR: f64 = 0.05;
-/// Up to this relative difference they are called approximately the same.
+/// Relative difference up to which two quantities are approximately the same.
 pub const APPROXIMATE: f64 = 0.10;
-/// Beyond this relative difference nobody would call them similar.
+/// Relative difference beyond which two quantities are not similar by any reading.
 pub const DIFFERENT: f64 = 0.25;
-/// Frequencies that the paper prints to 0.25 Hz are met within half of that.
+/// Tolerance in Hz for frequencies that the paper prints in steps of 0.25 Hz: half a step.
 pub const PRINTED: f64 = 0.125;
 
-/// A claim that something is small: it is up to `holds`, it is with a qualification up to `qualified`.
+/// Returns the verdict on a claim that a value is small.
+///
+/// The claim holds up to `holds`, and with a qualification up to `qualified`.
 pub fn small(value: f64, holds: f64, qualified: f64) -> Verdict {
     if value.abs() <= holds {
         Verdict::Holds
     } else if value.abs() <= qualified {
         Verdict::HoldsWithQualification
     } else {
-        Verdict::DoesNotHold // also a number that does not exist
+        Verdict::DoesNotHold // NaN also has this verdict.
     }
 }
 
-/// A claim about several cases: it holds in all, in some, or in none.
+/// Returns the verdict on a claim about several cases: it holds in all, in some, or in none.
 pub fn in_all(cases: &[bool]) -> Verdict {
     if !cases.is_empty() && cases.iter().all(|ok| *ok) {
         Verdict::Holds
@@ -33,7 +36,10 @@ pub fn in_all(cases: &[bool]) -> Verdict {
     }
 }
 
-/// A claim that a quantity only rises (`sign` = 1) or only falls (-1): it does throughout; it does at first and in all; it does not.
+/// Returns the verdict on a claim that a quantity only rises (`sign` = 1) or only falls (-1).
+///
+/// The claim holds if every step agrees. It holds with a qualification if the first step and
+/// the total change agree.
 pub fn monotone(values: &[f64], sign: f64) -> Verdict {
     let steps: Vec<bool> = values.windows(2).map(|pair| sign * (pair[1] - pair[0]) > 0.0).collect();
     let whole = matches!(values, [first, .., last] if sign * (last - first) > 0.0);
@@ -43,7 +49,7 @@ pub fn monotone(values: &[f64], sign: f64) -> Verdict {
     }
 }
 
-/// The weaker of two verdicts.
+/// Returns the weaker of two verdicts.
 pub fn both(a: Verdict, b: Verdict) -> Verdict {
     a.max(b)
 }

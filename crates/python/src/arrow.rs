@@ -1,7 +1,11 @@
-//! Tables by Arrow's C stream interface (PyCapsule protocol): pandas, polars, pyarrow and others read the columns where they lie.
+//! Exports tables through Arrow's C stream interface (PyCapsule protocol).
 //!
-//! Numbers and counts are not copied; words and flags, which Rust keeps otherwise, are. A number that does not exist (NaN) is null.
-//! Source: the Arrow columnar format, "The Arrow C data interface" and "The Arrow C stream interface".
+//! pandas, polars, pyarrow and other libraries read the columns in place. Numbers and counts
+//! are not copied. Texts and flags are copied, because Rust stores them differently. NaN
+//! becomes null.
+//!
+//! Source: the Arrow columnar format, "The Arrow C data interface" and "The Arrow C stream
+//! interface".
 #![allow(unsafe_code)]
 
 use pyo3::prelude::*;
@@ -52,7 +56,7 @@ unsafe impl Send for ArrowArrayStream {}
 
 impl Drop for ArrowArrayStream {
     fn drop(&mut self) {
-        // a stream that was taken from the capsule has no release any more
+        // A consumer that took the stream out of the capsule has cleared `release`.
         if let Some(release) = self.release {
             // SAFETY: not released before, and `self` is the stream that it was made for
             unsafe { release(self) }
@@ -60,19 +64,19 @@ impl Drop for ArrowArrayStream {
     }
 }
 
-/// Values may be null.
+/// Flag of a column with nullable values.
 const NULLABLE: i64 = 2;
-/// The name that the protocol asks of a capsule with a stream.
+/// Name that the protocol prescribes for a capsule with a stream.
 const STREAM: &std::ffi::CStr = c"arrow_array_stream";
 
-/// What is behind a stream: one table, given once.
+/// Private data of a stream, which delivers one table once.
 struct Stream {
     dataset: Arc<Dataset>,
     table: usize,
     given: bool,
 }
 
-/// A capsule with the stream of a table.
+/// Returns a capsule with the stream of a table.
 pub fn stream<'py>(py: Python<'py>, dataset: Arc<Dataset>, table: usize) -> PyResult<Bound<'py, PyCapsule>> {
     let private = Box::new(Stream { dataset, table, given: false });
     let stream = ArrowArrayStream {
@@ -86,7 +90,7 @@ pub fn stream<'py>(py: Python<'py>, dataset: Arc<Dataset>, table: usize) -> PyRe
 }
 
 unsafe extern "C" fn get_schema(stream: *mut ArrowArrayStream, out: *mut ArrowSchema) -> c_int {
-    // SAFETY: the consumer gives a live stream of ours and room for a schema
+    // SAFETY: the consumer passes a live stream of this module and memory for a schema
     unsafe {
         let stream = &*(*stream).private_data.cast::<Stream>();
         let columns = &stream.dataset.tables[stream.table].columns;
@@ -97,7 +101,7 @@ unsafe extern "C" fn get_schema(stream: *mut ArrowArrayStream, out: *mut ArrowSc
 }
 
 unsafe extern "C" fn get_next(stream: *mut ArrowArrayStream, out: *mut ArrowArray) -> c_int {
-    // SAFETY: the consumer gives a live stream of ours and room for an array
+    // SAFETY: the consumer passes a live stream of this module and memory for an array
     unsafe {
         let stream = &mut *(*stream).private_data.cast::<Stream>();
         if stream.given {
@@ -122,14 +126,14 @@ unsafe extern "C" fn get_last_error(_: *mut ArrowArrayStream) -> *const c_char {
 }
 
 unsafe extern "C" fn release_stream(stream: *mut ArrowArrayStream) {
-    // SAFETY: called once, by the owner; the private data came from a box
+    // SAFETY: the owner calls this once; the private data came from a box
     unsafe {
         drop(Box::from_raw((*stream).private_data.cast::<Stream>()));
         (*stream).release = None;
     }
 }
 
-/// The format string of a column.
+/// Returns Arrow's format string of a column.
 fn format_of(values: &Values) -> &'static str {
     match values {
         Values::Number(_) => "g",
@@ -139,14 +143,14 @@ fn format_of(values: &Values) -> &'static str {
     }
 }
 
-/// What a schema points to.
+/// Private data of a schema.
 struct Named {
     _texts: [CString; 2],
     children: Vec<*mut ArrowSchema>,
 }
 
 fn schema(format: &str, name: &str, flags: i64, children: Vec<ArrowSchema>) -> ArrowSchema {
-    // names of columns hold no zero bytes; what did would be cut off
+    // Column names contain no zero bytes; a name with one would be cut off.
     let text = |text: &str| CString::new(text.split('\0').next().unwrap_or_default()).unwrap_or_default();
     let texts = [text(format), text(name)];
     let [format, name] = [texts[0].as_ptr(), texts[1].as_ptr()];
@@ -166,7 +170,7 @@ fn schema(format: &str, name: &str, flags: i64, children: Vec<ArrowSchema>) -> A
 }
 
 unsafe extern "C" fn release_schema(schema: *mut ArrowSchema) {
-    // SAFETY: called once, by the owner; children that were moved away have no release any more
+    // SAFETY: the owner calls this once; children that were moved out have no `release`
     unsafe {
         let named = Box::from_raw((*schema).private_data.cast::<Named>());
         for &child in &named.children {
@@ -179,9 +183,9 @@ unsafe extern "C" fn release_schema(schema: *mut ArrowSchema) {
     }
 }
 
-/// What an array points to.
+/// Private data of an array.
 struct Kept {
-    /// Keeps the numbers and counts.
+    /// Keeps the numbers and counts alive.
     _dataset: Arc<Dataset>,
     bits: Vec<Vec<u8>>,
     offsets: Vec<i64>,
@@ -205,19 +209,19 @@ impl Kept {
     }
 }
 
-/// Bits, the first value in the lowest.
+/// Packs flags into bits, with the first value in the lowest bit.
 fn bits(values: impl ExactSizeIterator<Item = bool>) -> Vec<u8> {
     let mut bytes = vec![0; values.len().div_ceil(8).max(1)];
     values.enumerate().filter(|(_, value)| *value).for_each(|(i, _)| bytes[i / 8] |= 1 << (i % 8));
     bytes
 }
 
-/// The array of a column.
+/// Returns the array of a column.
 fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
     let mut kept = Kept::of(dataset);
     let rows = column.values.len();
     let mut nulls = 0;
-    // validity first
+    // The first buffer is the validity bitmap.
     let mut buffers: Vec<*const c_void> = vec![ptr::null()];
     match &column.values {
         Values::Number(values) => {
@@ -253,7 +257,7 @@ fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
 fn array(rows: usize, nulls: usize, kept: Kept, buffers: &[*const c_void]) -> ArrowArray {
     let mut kept = Box::new(kept);
     kept.buffers = buffers.to_vec();
-    // children have addresses of their own: a consumer may move one out
+    // Each child has a separate allocation, because a consumer may move one out.
     kept.addresses =
         std::mem::take(&mut kept.children).into_iter().map(|child| Box::into_raw(Box::new(child))).collect();
     ArrowArray {
@@ -270,7 +274,7 @@ fn array(rows: usize, nulls: usize, kept: Kept, buffers: &[*const c_void]) -> Ar
     }
 }
 
-/// The array that ends a stream: it is released already.
+/// Returns the released array that ends a stream.
 fn end() -> ArrowArray {
     ArrowArray {
         length: 0,
@@ -287,7 +291,7 @@ fn end() -> ArrowArray {
 }
 
 unsafe extern "C" fn release_array(array: *mut ArrowArray) {
-    // SAFETY: called once, by the owner; children that were moved away have no release any more
+    // SAFETY: the owner calls this once; children that were moved out have no `release`
     unsafe {
         let kept = Box::from_raw((*array).private_data.cast::<Kept>());
         for &child in &kept.addresses {

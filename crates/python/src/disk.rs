@@ -1,4 +1,4 @@
-//! Disks by calls: how forces go around a ring, and what of its sectors deviates.
+//! Disks in the Python interface: excitation around a ring, and mistuning of its sectors.
 
 use crate::{error, quantity};
 use pyo3::prelude::*;
@@ -7,7 +7,7 @@ use stickslip::dimension::Dimension;
 use stickslip::model::{Around, Disk, Mistuned, Model, ModelError, Ring, normal_pattern, too_far};
 use stickslip_study::schema::MOST_MASSES;
 
-/// How a force or an imposed motion goes around a disk, if something is said of it.
+/// Returns the distribution of a force or an imposed motion around a disk, if one is given.
 pub fn around(
     py: Python<'_>,
     engine_order: Option<i64>,
@@ -26,7 +26,7 @@ pub fn around(
     }
 }
 
-/// The names of what `of` names: one, or the two ends of a spring.
+/// Returns the names in `of`: one name, or the two ends of a spring.
 fn names(of: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
     match of.cast::<PyString>() {
         Ok(name) => Ok(vec![name.extract()?]),
@@ -34,7 +34,7 @@ fn names(of: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
     }
 }
 
-/// What of the sectors deviates, and by how much in each.
+/// Parses `mistuning`: the deviating quantity, and the deviation of each sector.
 fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyResult<(Mistuned, Vec<f64>)> {
     let py = given.py();
     if let Some(key) = given
@@ -89,7 +89,7 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
     Ok((of, deviations))
 }
 
-/// The ring of so many sectors, tuned or not.
+/// Builds the ring of a disk from one sector, tuned or mistuned.
 pub fn ring(
     py: Python<'_>,
     sector: &Model,
@@ -115,7 +115,7 @@ pub fn ring(
     }))
 }
 
-/// Of a ring that was changed: its sectors may differ from now on.
+/// Marks the sectors of a changed ring as possibly unequal.
 pub fn of_any_sectors(model: &mut Model) {
     model.ring = model.ring.map(|ring| Ring { equal: false, order: None, ..ring });
 }

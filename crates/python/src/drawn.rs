@@ -1,4 +1,4 @@
-//! Tables and figures of what is computed of a model.
+//! Tables and figures of the results of a model.
 
 use crate::orbit::PyOrbit;
 use std::f64::consts::TAU;
@@ -6,7 +6,8 @@ use stickslip::curve::modes::{Mode, ModePoint};
 use stickslip::model::System;
 use stickslip_study::dataset::{Axis, Column, Figure, Panel, Series, Table, column_name};
 
-/// Amplitudes over the frequency, or over the first parameter where the frequency is one.
+/// Draws amplitudes over the frequency, or over the first parameter if the frequency is
+/// constant.
 pub fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
     let numbers = |name: &str| table.numbers(&column_name(name)).unwrap_or_default().to_vec();
     let frequencies = numbers("frequency_Hz");
@@ -25,7 +26,9 @@ pub fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
     }
 }
 
-/// The loops of all joints, `points` instants of a period and the switches, and what they lose.
+/// Returns the loops of all joints and their dissipation, with a figure.
+///
+/// A loop has `points` equidistant times of a period and the switching times.
 pub fn loops(found: &PyOrbit, points: usize) -> (Vec<Table>, Figure) {
     let (mut labels, mut times, mut signals) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
     let mut figure = Figure::default();
@@ -63,7 +66,7 @@ pub fn loops(found: &PyOrbit, points: usize) -> (Vec<Table>, Figure) {
     (vec![loops, summary], figure)
 }
 
-/// Frequency and damping of a mode over its amplitude.
+/// Returns frequency and damping of a mode over its amplitude, with a figure.
 pub fn mode(found: &Mode, system: &System) -> (Table, Figure) {
     let numbers =
         |name: &str, value: &dyn Fn(&ModePoint) -> f64| Column::numbers(name, found.points.iter().map(value).collect());
@@ -100,7 +103,7 @@ pub fn mode(found: &Mode, system: &System) -> (Table, Figure) {
 }
 
 fn loop_panel(joint: String, displacement: &[f64], force: &[f64]) -> Panel {
-    // closed by its first point
+    // The first point closes the loop.
     let closed = |values: &[f64]| values.iter().chain(values.first()).copied().collect();
     let series = vec![Series::line("", closed(displacement), closed(force), 0)];
     Panel { title: joint, x: Axis::new("displacement", "m"), y: Axis::new("force", "N"), series, ..Panel::default() }

@@ -1,13 +1,14 @@
-//! Errors as Python's exceptions, with the text that the command prints.
+//! Converts errors to Python exceptions with the text that the command prints.
 //!
-//! The classes stand in `stickslip/_errors.py`: they have bases and attributes that Python states more simply.
+//! The classes are in `stickslip/_errors.py`, because Python defines their bases and attributes
+//! more simply.
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use stickslip_study::StudyError;
 
-/// An exception of this class of `stickslip._errors`.
+/// Creates an exception of a class in `stickslip._errors`.
 pub fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
     with(py, class, message, |_| Ok(()))
 }
@@ -24,7 +25,10 @@ fn with(py: Python<'_>, class: &str, message: String, fill: impl FnOnce(&Bound<'
     }
 }
 
-/// A study that is refused: the picture of the command, with file, line, column, key and help as attributes.
+/// Creates the exception for a refused study.
+///
+/// Its text is the message of the command. File, line, column, key, reason and help are
+/// attributes.
 pub fn study(py: Python<'_>, error: &StudyError) -> PyErr {
     let mut text = String::new();
     let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
@@ -41,22 +45,22 @@ pub fn study(py: Python<'_>, error: &StudyError) -> PyErr {
     })
 }
 
-/// A model, a law or a quantity that is refused.
+/// Creates the exception for a refused model, law or quantity.
 pub fn model(py: Python<'_>, error: impl ToString) -> PyErr {
     exception(py, "ModelError", error.to_string())
 }
 
-/// A system that a method cannot take.
+/// Creates the exception for a system that a method cannot solve.
 pub fn method(py: Python<'_>, error: impl ToString) -> PyErr {
     exception(py, "MethodError", error.to_string())
 }
 
-/// An orbit that was not found.
+/// Creates the exception for an orbit that was not found.
 pub fn orbit(py: Python<'_>, error: impl ToString) -> PyErr {
     exception(py, "OrbitError", error.to_string())
 }
 
-/// Results that could not be made or written.
+/// Creates the exception for results that could not be made or written.
 pub fn report(py: Python<'_>, error: impl ToString) -> PyErr {
     exception(py, "ReportError", error.to_string())
 }

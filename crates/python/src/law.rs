@@ -10,22 +10,22 @@ use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw};
 
-/// What happens where two places rub or touch; made by `stickslip.law` or `stickslip.rate_law`.
+/// The friction or contact law of a joint, made by `stickslip.law` or `stickslip.rate_law`.
 ///
-/// A law does not change; it can be copied and pickled, one written in Python where it stands at
-/// the top of a module under its own name.
+/// A law is immutable. It can be copied and pickled. Pickling a law written in Python requires
+/// that it is a module-level variable with its own name.
 #[pyclass(frozen, module = "stickslip", name = "Law")]
 pub struct PyLaw {
     pub law: SharedLaw,
-    /// The law behind it, if it is written in Python.
+    /// The Python implementation, if the law is written in Python.
     pub written: Option<Arc<Written>>,
 }
 
-/// A function and its arguments, by which a pickle makes a thing anew.
+/// A function and its arguments, from which a pickle recreates an object.
 type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 impl PyLaw {
-    /// The law of a joint.
+    /// Wraps the law of a joint.
     pub fn of(law: SharedLaw) -> PyLaw {
         PyLaw { written: python_law::written(&law), law }
     }
@@ -39,7 +39,7 @@ impl PyLaw {
         self.law.name()
     }
 
-    /// The parameters in SI.
+    /// The parameters in SI units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
@@ -48,19 +48,21 @@ impl PyLaw {
         Ok(values)
     }
 
-    /// Directions of relative motion, 1 to 3.
+    /// Number of directions of the relative motion, 1 to 3.
     #[getter]
     fn directions(&self) -> usize {
         self.law.directions()
     }
 
-    /// Compares the derivatives of a law written in Python with difference quotients, and returns
-    /// the largest error, relative to the largest such derivative. Raises `ValueError`, which names
-    /// the derivative and the instant, where it is more than ``tolerance``.
+    /// Compares the derivatives of a law written in Python with difference quotients.
     ///
-    /// ``u`` (m), ``v`` (m/s) and ``z`` are instants at which to compare, of shape (n,) or
-    /// (directions, n) and (states, n); without them 64 are drawn, up to 1 mm, 1 m/s and 0.9
-    /// ``state_scale``.
+    /// Returns the largest error, relative to the largest derivative of the same kind. Raises
+    /// `ValueError` if the error exceeds ``tolerance``; the message names the derivative and
+    /// the point.
+    ///
+    /// ``u`` (m), ``v`` (m/s) and ``z`` are the points of the comparison, with the shape (n,)
+    /// or (directions, n) and (states, n). By default 64 points are drawn, up to 1 mm, 1 m/s
+    /// and 0.9 ``state_scale``.
     ///
     /// >>> import stickslip
     /// >>> law = stickslip.rate_law(lambda u, v, z: 1e9 * u**3, derivatives=lambda u, v, z: [[2e9 * u**2, 0 * v]])
@@ -106,7 +108,7 @@ impl PyLaw {
     }
 
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
-        let _ = memo; // it does not change
+        let _ = memo; // The object is immutable.
         slf
     }
 
@@ -119,19 +121,19 @@ impl PyLaw {
         Ok((py.import("stickslip._core")?.getattr("_law")?, (this.name(), values).into_pyobject(py)?.into_any()))
     }
 
-    /// The function of a law written in Python, as it is called.
+    /// The `_rate._Kernel` of a law written in Python.
     #[getter]
     fn _kernel(&self, py: Python<'_>) -> Option<Py<PyAny>> {
         self.written.as_ref().map(|written| written.kernel.clone_ref(py))
     }
 
-    /// The size of its states.
+    /// Magnitude of its internal states.
     #[getter]
     fn _state_scale(&self) -> f64 {
         self.law.rate().map_or(1.0, |rate| rate.state_scale())
     }
 
-    /// The same law with other values of its parameters, in SI.
+    /// Returns the law with other values of its parameters, in SI units.
     fn _with(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<PyLaw> {
         let mut law = self.law.clone();
         for (key, value) in values {
@@ -141,10 +143,10 @@ impl PyLaw {
     }
 }
 
-/// A law with another value of one parameter, SI, or why there is none.
+/// Returns a law with another value (SI) of one parameter, or the reason why it is invalid.
 pub fn with(law: &SharedLaw, key: &str, value: f64) -> Result<SharedLaw, String> {
     let changed = law.with(key, value).ok_or_else(|| format!("law `{}` has no parameter `{key}`", law.name()))?;
-    // that a law written in Python is odd was tried when it was made
+    // The symmetry of a law written in Python was tested when it was made.
     let checked = if python_law::is_written(law) {
         changed.consistent()
     } else {
@@ -158,7 +160,7 @@ pub fn with(law: &SharedLaw, key: &str, value: f64) -> Result<SharedLaw, String>
     }
 }
 
-/// A built-in law from its pickle: its name and all values, SI.
+/// Recreates a built-in law from its pickle: its name and all values in SI units.
 #[pyfunction]
 pub fn _law(py: Python<'_>, name: &str, values: Vec<f64>) -> PyResult<PyLaw> {
     let row = row(py, name)?;
@@ -173,7 +175,7 @@ pub fn _law(py: Python<'_>, name: &str, values: Vec<f64>) -> PyResult<PyLaw> {
     Ok(PyLaw { law, written: None })
 }
 
-/// The row of a law, or an exception that names those that there are.
+/// Returns the table row of a law, or an exception that lists the laws.
 fn row(py: Python<'_>, name: &str) -> PyResult<&'static LawInfo> {
     law::find(name).ok_or_else(|| {
         let names: Vec<&str> = law::TABLE.iter().map(|row| row.name).collect();
@@ -181,9 +183,9 @@ fn row(py: Python<'_>, name: &str) -> PyResult<&'static LawInfo> {
     })
 }
 
-/// A law by its name; ``stickslip.laws()`` lists them with their parameters.
+/// Creates a law by its name; ``stickslip.laws()`` lists the laws with their parameters.
 ///
-/// Quantities are numbers in SI or strings with units.
+/// Quantities are numbers in SI units or strings with units.
 ///
 /// >>> import stickslip
 /// >>> stickslip.law("jenkins", stiffness="10 N/mm", limit=2.0)
@@ -201,7 +203,8 @@ pub fn named(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>)
         return Err(error::model(py, format!("law `{name}` has no parameter `{unknown}`; it has {}", keys.join(", "))));
     }
     let mut values: BTreeMap<&str, f64> = BTreeMap::new();
-    // a dimension may depend on the value of another parameter, which has none itself
+    // The dimension of a parameter may depend on the value of a parameter with a fixed
+    // dimension.
     let (plain, raised): (Vec<&Parameter>, Vec<&Parameter>) =
         row.parameters.iter().partition(|parameter| parameter.power.is_none());
     for parameter in plain.into_iter().chain(raised) {
@@ -218,7 +221,7 @@ pub fn named(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>)
     Ok(PyLaw { law, written: None })
 }
 
-/// All laws: a dictionary from their names to their summaries and parameters.
+/// Returns all laws as a dictionary from their names to their summaries and parameters.
 ///
 /// >>> import stickslip
 /// >>> stickslip.laws()["coulomb"]["parameters"]["limit"].split(":")[0]
@@ -238,7 +241,7 @@ pub fn laws(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(all)
 }
 
-/// A size of a law that is written in Python: a number, or the name of a parameter.
+/// Parses a size of a law written in Python: a number, or the name of a parameter.
 fn size(given: &Bound<'_, PyAny>, what: &str, law: &str, parameters: &[(String, Dimension)]) -> PyResult<Size> {
     let py = given.py();
     if let Ok(name) = given.cast::<PyString>() {
@@ -259,10 +262,10 @@ fn size(given: &Bound<'_, PyAny>, what: &str, law: &str, parameters: &[(String, 
     }
 }
 
-/// A law in rate form from Python's functions; `stickslip.rate_law` wraps it.
+/// Creates a law in rate form from Python functions; `stickslip.rate_law` wraps this function.
 #[pyfunction]
 #[pyo3(signature = (name, kernel, *, directions, states, parameters, state_scale, scale, odd, passive))]
-#[allow(clippy::too_many_arguments)] // one for each keyword of `rate_law`
+#[allow(clippy::too_many_arguments)] // one argument for each keyword of `rate_law`
 pub fn _rate_law(
     py: Python<'_>,
     name: &str,

@@ -1,4 +1,5 @@
-//! The Python package of Stickslip: the part in Rust, `stickslip._core`. The package around it stands in `python/stickslip`.
+//! The Rust part `stickslip._core` of the Python package; the Python part is in
+//! `python/stickslip`.
 
 mod arrow;
 mod disk;
@@ -23,7 +24,7 @@ mod watch;
 
 use pyo3::prelude::*;
 
-/// The part of `stickslip` in Rust.
+/// The Rust part of `stickslip`.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
@@ -49,7 +50,7 @@ mod _core {
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 
-    /// All templates: a dictionary from their names to their summaries.
+    /// Returns all templates as a dictionary from their names to their summaries.
     ///
     /// >>> import stickslip
     /// >>> "blade-couple" in stickslip.templates()

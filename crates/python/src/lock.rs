@@ -1,5 +1,4 @@
-//! The lock of a campaign's folder: one process at a time writes into it, as with the journal of
-//! the command.
+//! The lock of a campaign's folder: only one process at a time writes into the folder.
 
 use crate::error;
 use pyo3::prelude::*;
@@ -13,14 +12,16 @@ pub struct Lock(Mutex<Option<File>>);
 
 #[pymethods]
 impl Lock {
-    /// Lets others write.
+    /// Releases the lock.
     fn release(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 }
 
-/// Locks the file at this path, which is made; `None` where another process holds it. A file system
-/// without locks locks nothing.
+/// Locks the file at this path and creates it if necessary.
+///
+/// Returns `None` if another process holds the lock. On a file system without locks, nothing is
+/// locked.
 #[pyfunction]
 pub fn _lock(py: Python<'_>, path: PathBuf) -> PyResult<Option<Lock>> {
     let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);

@@ -1,4 +1,4 @@
-//! Matrices of mass, damping and stiffness from NumPy and SciPy.
+//! Mass, damping and stiffness matrices from NumPy and SciPy.
 
 use crate::error;
 use crate::watch::apart;
@@ -10,10 +10,10 @@ use stickslip::model::Place;
 use stickslip::structure::Component;
 use stickslip_numerics::sparse::Matrix;
 
-/// The entries of a matrix: row, column, value.
+/// Entries of a matrix: row, column, value.
 type Entries = Vec<(usize, usize, f64)>;
 
-/// The entries of a square matrix of n rows: an array, or any sparse matrix of SciPy.
+/// Returns the entries of an n x n matrix: an array, or any sparse matrix of SciPy.
 fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> {
     let py = value.py();
     let size = |rows: usize, columns: usize| {
@@ -60,7 +60,8 @@ fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> 
     Ok(all.map(|((i, k), value)| (i, k, *value)).collect())
 }
 
-/// A structure of n rows by its matrices of mass (kg), damping (kg/s), if there is one, and stiffness (N/m).
+/// Creates a structure from its mass (kg), optional damping (kg/s) and stiffness (N/m)
+/// matrices.
 pub fn component(
     py: Python<'_>,
     names: Vec<String>,
@@ -79,10 +80,10 @@ pub fn component(
     made.map_err(|cause| error::model(py, cause))
 }
 
-/// The places of a model on a structure of n rows, and what the rows are called.
+/// Returns the names of the n rows of a structure, and the places on it.
 ///
-/// A list names every row; `name.direction` makes nodes. A dictionary names those that are looked at: to the number of their row, or for a node
-/// to a dictionary from its directions to their rows.
+/// A list names every row, and `name.direction` defines nodes. A dictionary names selected
+/// places: its values are row numbers, or for a node a dictionary from directions to rows.
 pub fn places(py: Python<'_>, given: &Bound<'_, PyAny>, n: usize) -> PyResult<(Vec<String>, Vec<Place>)> {
     if let Ok(given) = given.cast::<PyDict>() {
         let mut places = Vec::new();

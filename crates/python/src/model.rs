@@ -1,4 +1,4 @@
-//! Models by calls, and what is computed of them: orbits, responses, loops, modes.
+//! Models built in Python, and their results: orbits, responses, loops, modes.
 
 use crate::law::PyLaw;
 use crate::orbit::{PyOrbit, instants};
@@ -29,10 +29,11 @@ use stickslip_study::dataset::{Column, Dataset, Failure, Figure, Record, Table};
 use stickslip_study::hertz;
 use stickslip_study::run::{CONVERGED, NOT_REACHED};
 
-/// A structure with joints and its excitation, stated by calls.
+/// A structure with joints and its excitation, built by method calls.
 ///
-/// Quantities are numbers in SI or strings with units; frequencies are numbers in Hz. A place is a mass, a direction of one (``"name.x"``),
-/// ``"ground"``, or a place that is moved.
+/// Quantities are numbers in SI units or strings with units; frequencies are numbers in Hz. A
+/// place is a mass, a direction of a node (``"name.x"``), ``"ground"``, or a place with an
+/// imposed motion.
 ///
 /// >>> import stickslip
 /// >>> model = stickslip.Model()
@@ -48,54 +49,55 @@ use stickslip_study::run::{CONVERGED, NOT_REACHED};
 #[derive(Default)]
 pub struct PyModel {
     model: Model,
-    /// Of forces and imposed motions how they go around a disk, where something is said of it.
+    /// Distribution of each force and each imposed motion around a disk, if given.
     around: [Vec<Option<Around>>; 2],
-    /// The study and the case of which it is the model, if it is one: its structure by matrices is
-    /// that of the study.
+    /// Study and index of the case that the model comes from. Its structure by matrices then
+    /// belongs to the study.
     study: Option<(PyStudy, usize)>,
-    /// The system and what finds its orbits, as asked for last.
+    /// The system and the solver of the last request.
     ready: Mutex<Option<Ready>>,
 }
 
-/// A system with a solver of it.
+/// A system with its solver.
 struct Ready {
     key: (String, Options),
-    /// The model as it was then.
+    /// Copy of the model at the time of the request.
     model: Arc<PyModel>,
-    /// Borrows from `system`, and is dropped before it.
+    /// Borrows from `system`. The field order drops it first.
     solver: Box<dyn Solver + Send>,
     system: Arc<System>,
 }
 
-/// The solver of a system that is kept beside it.
+/// Creates the solver of a system that is stored together with the solver.
 fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
     let solver = advised(method, system)?;
-    // SAFETY: the system stands on the heap and does not move; `Ready` drops the solver before its own reference to the system, and gives
-    // the solver to nobody
+    // SAFETY: the system is on the heap and does not move; `Ready` drops the solver before its
+    // own reference to the system, and never gives the solver away
     #[allow(unsafe_code)]
     Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
 }
 
-/// Degrees of freedom up to which the natural frequencies of a model are computed in full, in a second.
+/// Largest number of degrees of freedom for which all natural frequencies are computed: one
+/// second.
 const MOST_SURVEYED: usize = 600;
 
 impl PyModel {
-    /// This model.
+    /// Wraps a model.
     pub fn from_model(model: Model) -> Self {
         PyModel { model, ..PyModel::default() }
     }
 
-    /// The model of a case of a study.
+    /// Wraps the model of a case of a study.
     pub fn of_study(study: &PyStudy, case: usize, model: Model) -> Self {
         PyModel { study: Some((study.clone(), case)), ..PyModel::from_model(model) }
     }
 
-    /// The same, with nothing computed of it.
+    /// Returns a copy without the stored solver.
     fn copied(&self) -> PyModel {
         PyModel { around: self.around.clone(), study: self.study.clone(), ..PyModel::from_model(self.model.clone()) }
     }
 
-    /// The model is another one from now on; what was a ring may have other sectors.
+    /// Discards the solver after a change of the model. Sectors of a ring may then differ.
     fn changed(&mut self) {
         disk::of_any_sectors(&mut self.model);
         *self.ready.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
@@ -115,8 +117,9 @@ impl PyModel {
         Ok(Asked { system: Arc::new(self.system(py)?), method })
     }
 
-    /// The orbit at a frequency (rad/s); `made` gives the method and its options where the solver
-    /// that is kept may be another one's.
+    /// Computes the orbit at a frequency in rad/s.
+    ///
+    /// `made` returns the method and its options if the stored solver does not match.
     fn search(
         &self,
         py: Python<'_>,
@@ -125,9 +128,9 @@ impl PyModel {
         (method, plain): (&str, bool),
         made: impl FnOnce() -> PyResult<(Box<dyn Method>, Options)>,
     ) -> PyResult<PyOrbit> {
-        // who waits for it does not keep Python waiting
+        // A thread that waits for this lock does not hold the lock of the Python interpreter.
         let mut ready = self.ready.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
-        // without options a solver that is kept is known by its name alone
+        // Without options, the name identifies the stored solver.
         let same = |ready: &Ready| plain && ready.key.0 == method && ready.key.1.is_empty();
         if !ready.as_ref().is_some_and(same) {
             let (made, options) = made()?;
@@ -150,7 +153,7 @@ impl PyModel {
         let outcome = match outcome {
             Ok(outcome) => outcome,
             Err(ended) => {
-                // what was interrupted is no solver any more
+                // An interrupted solver is in an undefined state.
                 *ready = None;
                 return Err(ended);
             }
@@ -197,7 +200,7 @@ fn refused(py: Python<'_>, cause: &ModelError, model: &Model) -> PyErr {
     error::model(py, said(cause, model))
 }
 
-/// What is said of a computation in its record.
+/// Record of a computation.
 struct Told {
     methods: Vec<String>,
     notes: Vec<String>,
@@ -219,7 +222,7 @@ impl Told {
     }
 }
 
-/// The method of this name with its options.
+/// Returns the method of this name with its options.
 fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<(Box<dyn Method>, Options)> {
     let Some(row) = method::find(name) else {
         let names: Vec<&str> = method::TABLE.iter().map(|row| row.name).collect();
@@ -246,7 +249,7 @@ fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyRes
     Ok((method, options))
 }
 
-/// The frequency of one orbit, rad/s.
+/// Returns the frequency of one orbit in rad/s.
 fn one_frequency(value: &Bound<'_, PyAny>) -> PyResult<f64> {
     quantity::si(value, Dimension::FREQUENCY, "frequency")
 }
@@ -258,13 +261,20 @@ impl PyModel {
         PyModel::default()
     }
 
-    /// A model whose structure is given by matrices: arrays, or sparse matrices of SciPy, n × n, in kg, N/m and kg/s.
+    /// Creates a model from the matrices of its structure.
     ///
-    /// ``places``: a list that names all rows, where ``"tip.x"`` and ``"tip.y"`` make a node ``"tip"`` for joints of several directions; or a
-    /// dictionary of those that are looked at: ``{"tip": 12, "foot": {"x": 3, "y": 4}}`` (rows from 0).
-    /// ``reduce``: the highest frequency of interest, of the drive with all harmonics that count; the structure is then brought into as few
-    /// coordinates as leave an error of 1e-4 up to there. ``damping_ratio``: that of every mode, instead of ``damping``.
-    /// Masses, springs, joints, forces and motions may be added.
+    /// The matrices are n x n arrays or sparse matrices of SciPy, in kg, N/m and kg/s.
+    ///
+    /// - ``places``: a list with a name for every row, or a dictionary of selected places. In a
+    ///   list, ``"tip.x"`` and ``"tip.y"`` define a node ``"tip"`` for joints with several
+    ///   directions. A dictionary has the form ``{"tip": 12, "foot": {"x": 3, "y": 4}}`` (rows
+    ///   from 0).
+    /// - ``damping_ratio``: damping ratio of every mode, instead of ``damping``.
+    /// - ``reduce``: the highest frequency of interest, including all relevant harmonics of the
+    ///   excitation. The structure is then reduced to the smallest number of coordinates with
+    ///   an error of 1e-4 up to this frequency.
+    ///
+    /// Masses, springs, joints, forces and motions can be added.
     ///
     /// >>> import numpy as np, stickslip
     /// >>> model = stickslip.Model.from_matrices(np.eye(2), [[2, -1], [-1, 2]], places=["a", "b"])
@@ -281,7 +291,7 @@ impl PyModel {
         damping_ratio: Option<Bound<'_, PyAny>>,
         reduce: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PyModel> {
-        // of a list its length is that of the matrices, or they are refused
+        // The length of a list of names is the expected size of the matrices.
         let n = match places.cast::<PyDict>() {
             Ok(_) if stiffness.hasattr("shape")? => stiffness.getattr("shape")?.get_item(0)?.extract()?,
             Ok(_) => stiffness.len()?,
@@ -309,7 +319,9 @@ impl PyModel {
         Ok(made)
     }
 
-    /// Adds a point mass (kg); with ``directions``, up to three names, it is a node with a place for each.
+    /// Adds a point mass (kg).
+    ///
+    /// With ``directions``, up to three names, it is a node with one place per direction.
     #[pyo3(signature = (name, mass, *, directions=None))]
     fn mass(&mut self, name: String, mass: &Bound<'_, PyAny>, directions: Option<Vec<String>>) -> PyResult<()> {
         let mass = quantity::si(mass, Dimension::MASS, &format!("mass of `{name}`"))?;
@@ -337,17 +349,21 @@ impl PyModel {
         Ok(())
     }
 
-    /// Adds a joint: two places or nodes that rub or touch by this law. ``u`` is the motion of ``a`` relative to ``b``.
+    /// Adds a joint: two places or nodes with this friction or contact law between them.
+    ///
+    /// ``u`` is the displacement of ``a`` relative to ``b``.
     fn joint(&mut self, name: String, a: String, b: String, law: &PyLaw) {
         self.model.joints.push(Joint { name, between: [a, b], law: law.law.clone() });
         self.changed();
     }
 
-    /// Adds a force ``amplitude cos(harmonic Ω t + phase)``: N, rad; ``harmonic=0`` makes it constant.
+    /// Adds a force ``amplitude cos(harmonic Ω t + phase)`` in N, with the phase in rad.
     ///
-    /// On one sector of a disk it goes around with ``engine_order``, stands with ``nodal_diameter``, or acts on one ``sector`` alone.
+    /// ``harmonic=0`` makes it constant. On a sector of a disk, the force is a travelling wave
+    /// with ``engine_order``, a standing wave with ``nodal_diameter``, or acts on one
+    /// ``sector``.
     #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1, engine_order=None, nodal_diameter=None, sector=None))]
-    #[allow(clippy::too_many_arguments)] // keywords
+    #[allow(clippy::too_many_arguments)] // one argument per keyword
     fn force(
         &mut self,
         py: Python<'_>,
@@ -369,9 +385,11 @@ impl PyModel {
         Ok(())
     }
 
-    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place: m, rad; around a disk as a force.
+    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place, in m and rad.
+    ///
+    /// The keywords for a disk are those of :meth:`force`.
     #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1, engine_order=None, nodal_diameter=None, sector=None))]
-    #[allow(clippy::too_many_arguments)] // keywords
+    #[allow(clippy::too_many_arguments)] // one argument per keyword
     fn motion(
         &mut self,
         py: Python<'_>,
@@ -393,12 +411,18 @@ impl PyModel {
         Ok(())
     }
 
-    /// The disk of so many sectors, each of them this model: ``"next.blade"`` is the blade of the sector after, and the last sector's next is the
-    /// first. Its places are ``blade_0``, ``blade_1`` …, as in a study file with ``[disk]``.
+    /// Returns the disk whose sectors each equal this model.
     ///
-    /// ``mistuning``: what differs from sector to sector, ``{"of": "blade", "deviation": "2 %", "seed": 7}``: ``of`` is a mass, or a spring by its
-    /// two ends, ``deviation`` the standard deviation of normal numbers, or a list with that of every sector. A tuned disk under an excitation
-    /// that travels is solved on one sector; what is changed in the ring afterwards makes it a ring of any sectors.
+    /// ``"next.blade"`` is the blade of the next sector; the sector after the last is the
+    /// first. The places of the disk are ``blade_0``, ``blade_1`` …, as in a study file with
+    /// ``[disk]``.
+    ///
+    /// ``mistuning``: the deviations of the sectors, as in ``{"of": "blade", "deviation": "2
+    /// %", "seed": 7}``. ``of`` is a mass, or the two ends of a spring. ``deviation`` is the
+    /// standard deviation of a normal distribution, or a list with one deviation per sector.
+    ///
+    /// A tuned disk under a travelling excitation is solved on one sector. A later change of
+    /// the ring makes its sectors independent.
     ///
     /// >>> import stickslip
     /// >>> sector = stickslip.Model()
@@ -424,7 +448,10 @@ impl PyModel {
         Ok(PyModel::from_model(model))
     }
 
-    /// Gives parameters other values: ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness": 1e5, "a.force": 5})``.
+    /// Changes the values of parameters.
+    ///
+    /// An example is ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness":
+    /// 1e5, "a.force": 5})``.
     fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyAny>) -> PyResult<()> {
         let values = quantity::dictionary(values, "what `set` is given")?;
         let along = parameters::along(py, &self.model, Some(&values), &mut vec![1.0])?;
@@ -443,7 +470,7 @@ impl PyModel {
         Ok(())
     }
 
-    /// Names of the places at which results are given.
+    /// Names of the places with results.
     #[getter]
     fn places(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         Ok(self.system(py)?.places().to_vec())
@@ -455,7 +482,7 @@ impl PyModel {
         self.model.joints.iter().map(|joint| joint.name.as_str()).collect()
     }
 
-    /// The matrices of mass (kg), damping (kg/s) and stiffness (N/m) without joints, in full.
+    /// Full mass (kg), damping (kg/s) and stiffness (N/m) matrices, without joints.
     #[getter]
     fn matrices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let system = self.system(py)?;
@@ -467,7 +494,7 @@ impl PyModel {
         for (name, matrix) in
             [("mass", structure.mass()), ("damping", structure.damping()), ("stiffness", structure.stiffness())]
         {
-            // columns follow each other, those of the transpose are rows
+            // Storage is column by column; the transpose gives the rows.
             let (rows, values) = (matrix.nrows(), matrix.transpose());
             let array = PyArray1::from_slice(py, values.as_slice()).reshape([rows, rows])?;
             out.set_item(name, array)?;
@@ -475,8 +502,11 @@ impl PyModel {
         Ok(out)
     }
 
-    /// Checks the model and says what is known of it before anything is computed: natural frequencies with joints free and stuck (Hz), and the
-    /// method that would find its orbits.
+    /// Checks the model and returns its known properties without computing an orbit.
+    ///
+    /// The dictionary contains the places, the joints and the chosen method. For models of
+    /// moderate size it also contains the natural frequencies with free and with stuck joints
+    /// (Hz).
     #[pyo3(signature = (method="auto", **options))]
     fn check<'py>(
         &self,
@@ -502,10 +532,12 @@ impl PyModel {
         Ok(out)
     }
 
-    /// The periodic motion at a drive frequency, as an :class:`Orbit`.
+    /// Computes the periodic solution at an excitation frequency and returns an :class:`Orbit`.
     ///
-    /// ``method`` and its options as in a study's ``[method]``; ``start`` is the ``start`` of a neighbouring orbit.
-    /// Raises :class:`OrbitError` where none is found, :class:`MethodError` where the method cannot take the model.
+    /// ``method`` and its options are those of a study's ``[method]``. ``start`` is the
+    /// ``start`` of an orbit at a similar frequency, as an initial guess. Raises
+    /// :class:`OrbitError` if no orbit is found, and :class:`MethodError` if the method cannot
+    /// solve the model.
     #[pyo3(signature = (frequency, *, method="auto", start=None, **options))]
     fn orbit(
         &self,
@@ -526,13 +558,20 @@ impl PyModel {
         self.search(py, omega, start, (method, plain), || built(py, method, options))
     }
 
-    /// Orbits at many frequencies, or with many values of parameters, by one call: a :class:`Result` with the table ``curve`` and a figure.
+    /// Computes orbits at many frequencies, or for many values of parameters.
     ///
-    /// ``frequency``: numbers in Hz or strings. ``vary``: values of parameters, as many as there are frequencies (or one frequency for all), named
-    /// as in :meth:`set`; point ``i`` has the ``i``-th value of each. Without ``vary`` each orbit starts from its neighbour, else from nothing.
-    /// A point without an orbit has empty cells and stands among the ``failures``. ``threads`` and ``progress`` as in :meth:`Study.run`.
+    /// Returns a :class:`Result` with the table ``curve`` and a figure.
+    ///
+    /// - ``frequency``: numbers in Hz or strings. A single frequency applies to all points.
+    /// - ``vary``: values of parameters, named as in :meth:`set`, either one or as many as
+    ///   there are points. Point ``i`` has the ``i``-th value of each parameter.
+    /// - ``threads`` and ``progress``: as in :meth:`Study.run`.
+    ///
+    /// Without ``vary``, each orbit starts from that of the adjacent point. With ``vary``, each
+    /// orbit starts without an initial guess. A point without an orbit has empty cells and is
+    /// listed in ``failures``.
     #[pyo3(signature = (frequency, *, vary=None, method="auto", threads=None, progress=None, **options))]
-    #[allow(clippy::too_many_arguments)] // they are keywords in Python
+    #[allow(clippy::too_many_arguments)] // one argument per keyword
     fn response(
         &self,
         py: Python<'_>,
@@ -576,8 +615,12 @@ impl PyModel {
         Ok(self.result("response", "Response", vec![table], figure, told))
     }
 
-    /// The loops of all joints at a drive frequency: a :class:`Result` with the tables ``loops`` (force over displacement, ``points`` instants
-    /// of a period and the switches) and ``loops_summary`` (energy lost per period, J), and a figure.
+    /// Computes the loops of all joints at an excitation frequency and returns a
+    /// :class:`Result`.
+    ///
+    /// The table ``loops`` has force over displacement at ``points`` equidistant times of a
+    /// period and at the switching times. The table ``loops_summary`` has the dissipation per
+    /// period (J). The result has a figure.
     #[pyo3(signature = (frequency, *, points=256, method="auto", **options))]
     fn hysteresis(
         &self,
@@ -595,9 +638,12 @@ impl PyModel {
         Ok(self.result("hysteresis", "Hysteresis", tables, figure, told))
     }
 
-    /// A nonlinear mode: frequency and damping ratio over the amplitude (m √kg, modal), as a :class:`Result` with the table ``modes``.
+    /// Computes a nonlinear mode and returns a :class:`Result` with the table ``modes``.
     ///
-    /// ``amplitude``: the smallest and the largest. ``mode``: its number by rising frequency, from 1.
+    /// The table has frequency and damping ratio over the modal amplitude (m √kg).
+    ///
+    /// - ``amplitude``: the smallest and the largest amplitude.
+    /// - ``mode``: number of the mode in ascending order of frequency, from 1.
     #[pyo3(signature = (amplitude, *, mode=1, points=61, harmonics=15, samples=1024))]
     fn modes(
         &self,
@@ -620,7 +666,7 @@ impl PyModel {
             let message = "modes need amplitudes 0 < from < to, mode and harmonics from 1, and at least two points";
             return Err(error::model(py, message));
         }
-        // enough that no harmonic is taken for another
+        // The minimum number of samples avoids aliasing of harmonics.
         if samples < 4 * harmonics + 4 {
             return Err(error::model(
                 py,
@@ -645,7 +691,7 @@ impl PyModel {
     }
 
     fn __deepcopy__(&self, memo: Bound<'_, PyAny>) -> PyModel {
-        let _ = memo; // what it refers to does not change
+        let _ = memo; // The referenced objects are immutable.
         self.copied()
     }
 
@@ -672,10 +718,10 @@ impl PyModel {
     }
 }
 
-/// A pickled model: its parts, the laws of its joints, and the study of which it has its structure.
+/// Pickled model: its parts, the laws of its joints, and the study that owns its structure.
 type Pickled<'py> = (Bound<'py, PyBytes>, Bound<'py, PyList>, Option<(PyStudy, usize)>);
 
-/// A model from its pickle.
+/// Recreates a model from its pickle.
 #[pyfunction]
 #[pyo3(signature = (bytes, laws, study))]
 pub fn _model(
@@ -693,7 +739,7 @@ pub fn _model(
     Ok(PyModel { around, study, ..PyModel::from_model(model) })
 }
 
-/// How an orbit was sought: the same search gives the same bits.
+/// Input of an orbit search, which reproduces the same bits.
 pub struct Recipe {
     pub model: Arc<PyModel>,
     pub method: String,
@@ -702,13 +748,13 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// The model, as it was then.
+    /// Returns the model at the time of the search.
     pub fn model(&self) -> PyModel {
         self.model.copied()
     }
 }
 
-/// An orbit from its pickle: frequency in rad/s, options in SI.
+/// Recreates an orbit from its pickle: frequency in rad/s, options in SI units.
 #[pyfunction]
 pub fn _orbit(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! An orbit as Python sees it: numbers on demand.
+//! Orbits in Python; their values are computed on demand.
 
 use crate::model::{PyModel, Recipe};
 use crate::watch::alone;
@@ -13,10 +13,10 @@ use stickslip::model::System;
 use stickslip::orbit::Orbit;
 use stickslip_study::hertz;
 
-/// A periodic motion, with the evidence for it.
+/// A periodic solution with its error measures.
 ///
-/// An orbit does not change. Its pickle holds the model and how it was sought; reading it computes
-/// the orbit again, with the same bits.
+/// An orbit is immutable. Its pickle contains the model and the input of the search; unpickling
+/// computes the orbit again, with the same bits.
 ///
 /// >>> import stickslip
 /// >>> couple = stickslip.Study.from_template("blade-couple").model()
@@ -44,38 +44,38 @@ fn dict<'py, V: IntoPyObject<'py>>(
 
 #[pymethods]
 impl PyOrbit {
-    /// Name of the method that found it.
+    /// Name of the method that found the orbit.
     #[getter]
     fn method(&self) -> &str {
         self.orbit.method
     }
 
-    /// Drive frequency, Hz.
+    /// Excitation frequency in Hz.
     #[getter]
     #[pyo3(name = "frequency_Hz")]
     fn frequency(&self) -> f64 {
         hertz(self.orbit.omega)
     }
 
-    /// Period of the motion, s.
+    /// Period of the solution in s.
     #[getter]
     fn period(&self) -> f64 {
         self.orbit.period()
     }
 
-    /// Half of peak to peak of every place, m.
+    /// Amplitude (half of peak to peak) of every place in m.
     #[getter]
     fn amplitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         dict(py, self.orbit.places.iter().map(|place| (&place.name, place.amplitude())))
     }
 
-    /// Mean displacement of every place, m.
+    /// Mean displacement of every place in m.
     #[getter]
     fn mean<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         dict(py, self.orbit.places.iter().map(|place| (&place.name, place.mean)))
     }
 
-    /// First harmonic ``X`` of every place, complex, m: ``x = Re(X exp(jΩt)) + …``.
+    /// Complex first harmonic ``X`` of every place in m: ``x = Re(X exp(jΩt)) + …``.
     #[getter]
     fn first_harmonic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let complex = |place: &stickslip::orbit::PlaceMotion| {
@@ -84,7 +84,7 @@ impl PyOrbit {
         dict(py, self.orbit.places.iter().map(|place| (&place.name, complex(place))))
     }
 
-    /// Energy lost in every joint per period, J.
+    /// Energy dissipated in every joint per period in J.
     #[getter]
     fn dissipation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.dissipation)))
@@ -96,27 +96,31 @@ impl PyOrbit {
         dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.slip_fraction)))
     }
 
-    /// Fraction of the period in which the faces of every joint stick.
+    /// Fraction of the period in which the contact faces of every joint stick.
     #[getter]
     fn stick_fraction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.stick_fraction)))
     }
 
-    /// Fraction of the period in which they are apart.
+    /// Fraction of the period in which the contact faces of every joint are separated.
     #[getter]
     fn open_fraction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         dict(py, self.orbit.joints.iter().map(|joint| (&joint.name, joint.open_fraction)))
     }
 
-    /// Energies per period, J: ``work_in``, ``viscous``, ``friction``.
+    /// Energies per period in J: ``work_in``, ``viscous``, ``friction``.
     #[getter]
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let energy = &self.orbit.energy;
         dict(py, [("work_in", energy.work_in), ("viscous", energy.viscous), ("friction", energy.friction)])
     }
 
-    /// Why the orbit may be trusted: ``residual``, ``energy_gap``, ``truncation``, ``return_defect`` (pure numbers, ``None`` where the method has
-    /// none), ``status``, ``found_by``, ``iterations``, ``switches``, and the joints that are ``stuck`` or keep their ``history``.
+    /// Error measures of the orbit.
+    ///
+    /// ``residual``, ``energy_gap``, ``truncation`` and ``return_defect`` are dimensionless,
+    /// and ``None`` if the method does not compute them. The other keys are ``status``,
+    /// ``found_by`` (the algorithm), ``iterations``, ``switches``, and two lists of joints. ``stuck``: permanently stuck
+    /// joints. ``history``: joints whose mean force depends on the history of the motion.
     #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = &self.orbit.evidence;
@@ -134,13 +138,14 @@ impl PyOrbit {
         Ok(evidence)
     }
 
-    /// Whether no small disturbance grows; ``None`` if that is not known.
+    /// ``True`` if no small disturbance grows; ``None`` if this is unknown.
     #[getter]
     fn stable(&self, py: Python<'_>) -> PyResult<Option<bool>> {
         alone(py, || self.orbit.is_stable())
     }
 
-    /// Floquet multipliers of a period, by falling modulus; ``None`` if there is no return map.
+    /// Floquet multipliers of a period in descending order of modulus; ``None`` without a
+    /// return map.
     #[getter]
     fn multipliers<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<numpy::Complex64>>>> {
         let Some(multipliers) = alone(py, || self.orbit.multipliers())? else { return Ok(None) };
@@ -149,13 +154,15 @@ impl PyOrbit {
         Ok(Some(multipliers.to_pyarray(py)))
     }
 
-    /// State at t = 0: displacements (m), velocities (m/s), then the states of joints. A start for neighbouring orbits.
+    /// State at t = 0: displacements (m), velocities (m/s), then the states of joints.
+    ///
+    /// It is an initial guess for orbits at similar frequencies.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.orbit.start.to_pyarray(py)
     }
 
-    /// Instants at which a joint switches, s, rising.
+    /// Switching times of the joints in s, ascending.
     #[getter]
     fn switch_times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.orbit.switch_times().to_pyarray(py)
@@ -167,10 +174,13 @@ impl PyOrbit {
         self.orbit.places.iter().map(|place| place.name.as_str()).collect()
     }
 
-    /// The motion at times (s): a dictionary of arrays ``time_s`` (n), ``displacement_m``, ``velocity_m_per_s`` and
-    /// ``acceleration_m_per_s2`` (n × places).
+    /// Returns the motion at times (s) as a dictionary of arrays.
     ///
-    /// Without ``times`` at ``points`` equal steps over a period, the first at zero.
+    /// ``time_s`` has the shape (n,); ``displacement_m``, ``velocity_m_per_s`` and
+    /// ``acceleration_m_per_s2`` have the shape (n, places).
+    ///
+    /// Without ``times``, the method returns ``points`` equidistant times of a period from
+    /// zero.
     #[pyo3(signature = (times=None, *, points=256))]
     fn sample<'py>(
         &self,
@@ -203,8 +213,11 @@ impl PyOrbit {
         Ok(out)
     }
 
-    /// The loop of a joint: arrays ``time_s``, ``displacement_m``, ``velocity_m_per_s`` and ``force_N`` (n, or n × directions), at ``points``
-    /// equal steps over a period and at its switches.
+    /// Returns the loop of a joint as a dictionary of arrays.
+    ///
+    /// ``time_s`` has the shape (n,); ``displacement_m``, ``velocity_m_per_s`` and ``force_N``
+    /// have the shape (n,) or (n, directions). The times are ``points`` equidistant times of a
+    /// period and the switching times.
     #[pyo3(signature = (joint=None, *, points=256))]
     fn hysteresis<'py>(&self, py: Python<'py>, joint: Option<&str>, points: usize) -> PyResult<Bound<'py, PyDict>> {
         let index = match joint {
@@ -233,7 +246,7 @@ impl PyOrbit {
     }
 
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
-        let _ = memo; // it does not change
+        let _ = memo; // The object is immutable.
         slf
     }
 
@@ -254,17 +267,17 @@ impl PyOrbit {
     }
 }
 
-/// A pickled orbit: model, frequency in rad/s, method, options and start.
+/// Pickled orbit: model, frequency in rad/s, method, options and start.
 type Pickled<'a> = (PyModel, f64, &'a str, Options, Option<Vec<f64>>);
 
 fn rows<'py>(py: Python<'py>, values: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_vec(py, values).reshape([rows, columns])
 }
 
-/// Most instants at which a motion is asked for: some hundred megabytes.
+/// Maximum number of times of a sampled motion: a few hundred megabytes.
 const MOST_INSTANTS: usize = 10_000_000;
 
-/// A number of instants, or an exception.
+/// Checks a number of times.
 pub fn instants(py: Python<'_>, points: usize) -> PyResult<usize> {
     if (1..=MOST_INSTANTS).contains(&points) {
         return Ok(points);
@@ -277,7 +290,7 @@ impl PyOrbit {
         (0..points).map(|i| self.orbit.period() * i as f64 / points as f64).collect()
     }
 
-    /// Times, and displacements, velocities and forces of a joint, instant by instant.
+    /// Returns the times, and displacements, velocities and forces of a joint at each time.
     pub fn loop_of(&self, joint: usize, points: usize) -> (Vec<f64>, [Vec<f64>; 3]) {
         let d = self.system.joints()[joint].axes().len();
         let mut times = self.times(points);

@@ -1,4 +1,4 @@
-//! The parameters of a model, by their names: those that calls set and vary.
+//! Parameters of a model by name, for setting and varying them.
 
 use crate::{error, law, python_law, quantity};
 use pyo3::prelude::*;
@@ -6,13 +6,14 @@ use pyo3::types::PyDict;
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 
-/// How the points of a response are told apart: values of parameters, one for each point.
+/// Varied parameters with their values, one per point.
 pub type Along = Vec<(String, Vec<f64>)>;
 
-/// Gives a parameter of the model, one that `dimension` knows, another value, SI.
+/// Sets a parameter of the model to a value in SI units. [`dimension`] must know its name.
 ///
 /// # Errors
-/// The value is none that the law can have. Those of masses, springs, forces and motions are checked when the model is assembled.
+/// The law rejects the value. Masses, springs, forces and motions are checked when the model is
+/// assembled.
 pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
     let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
     match key {
@@ -35,8 +36,10 @@ pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
     Ok(())
 }
 
-/// The dimension of a parameter of the model, `None` where any will do; `None` if it has none of
-/// this name.
+/// Returns the dimension of a parameter of the model, or `None` if the model has no such
+/// parameter.
+///
+/// The inner `None` means that any dimension is accepted.
 pub fn dimension(model: &Model, name: &str) -> Option<Option<Dimension>> {
     let (of, key) = name.rsplit_once('.')?;
     let springs = || model.springs.iter().any(|spring| spring.between.join("-") == of);
@@ -50,15 +53,15 @@ pub fn dimension(model: &Model, name: &str) -> Option<Option<Dimension>> {
             let law = &model.joints.iter().find(|joint| joint.name == of)?.law;
             let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;
             if python_law::is_written(law) && parameter.dimension == Dimension::NONE {
-                return Some(None); // its author gave a number in SI
+                return Some(None); // The author of the law gave a number in SI units.
             }
-            // what is raised to a power that is no whole number is a plain number
+            // A quantity raised to a fractional power is a plain number.
             Some(Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE)))
         }
     }
 }
 
-/// The parameters of `vary`, as long as each other and as the frequencies.
+/// Parses `vary`. All lists, including the frequencies, get the same length.
 pub fn along(
     py: Python<'_>,
     model: &Model,

@@ -1,4 +1,4 @@
-//! Many orbits of a model by one call: at many frequencies, or with many values of parameters.
+//! Many orbits of a model in one call: at many frequencies, or for many values of parameters.
 
 use crate::parameters::{self, Along};
 use crate::rows::Row;
@@ -12,18 +12,18 @@ use stickslip::model::{Model, ModelError, System};
 use stickslip::orbit::Orbit;
 use stickslip_study::run::Context;
 
-/// What orbits of a model are sought with.
+/// System and method of a request.
 pub struct Asked {
     pub system: Arc<System>,
     pub method: Box<dyn Method>,
 }
 
-/// What is wrong with a part of a model, by its name.
+/// Describes an error in a model, with the name of its element and key.
 pub fn said(cause: &ModelError, model: &Model) -> String {
     format!("{}, `{}`: {}", cause.element.named(model), cause.key, cause.message)
 }
 
-/// Why a point cannot even be tried.
+/// Reason why a point cannot be computed.
 pub enum Refusal {
     Model(String),
     Method(String),
@@ -38,16 +38,16 @@ impl Refusal {
     }
 }
 
-/// One model at all frequencies, from neighbour to neighbour.
+/// Computes orbits of one model at all frequencies, each from the adjacent solution.
 pub fn along_frequencies(asked: &Asked, omegas: &[f64], context: &Context) -> Result<Vec<Row>, Refusal> {
     let watch = Sweep { finished: &*context.finished, stop: &context.stop };
     let row = |index: usize, outcome: Result<&Orbit, &OrbitError>| Row::new(&asked.system, omegas[index], outcome);
     let rows = sweep(&*asked.method, &asked.system, omegas.len(), &|index| omegas[index], watch, &row);
-    // a run that was stopped ends with the exception that stopped it
+    // If the run was stopped, the caller raises the exception that stopped it.
     Ok(rows.map_err(|cause| Refusal::Method(cause.to_string()))?.into_iter().flatten().collect())
 }
 
-/// One model for each point: in blocks, so that threads take whole stretches.
+/// Computes one model per point, in blocks of points per thread.
 pub fn along_parameters(
     model: &Model,
     asked: &Asked,
@@ -60,7 +60,7 @@ pub fn along_parameters(
             return Ok(None);
         }
         let mut model = model.clone();
-        // a parameter of one sector makes it another one
+        // A changed parameter may make one sector different from the others.
         disk::of_any_sectors(&mut model);
         let at = |message: String| format!("point {index}: {message}");
         for (name, values) in along {

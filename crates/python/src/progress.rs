@@ -1,9 +1,9 @@
-//! Bars of progress: those of tqdm, if it is there, or a function of the caller's.
+//! Progress bars of tqdm if it is installed, or a callback of the caller.
 
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
-/// What `progress` asks for: `None`, a bar, or the function that was given.
+/// Returns the progress callback: none, a bar, or the given function.
 pub fn bar<'py>(
     py: Python<'py>,
     progress: Option<Bound<'py, PyAny>>,
@@ -14,7 +14,7 @@ pub fn bar<'py>(
         Some(progress) if progress.is_none() => Ok(None),
         Some(progress) => match progress.cast::<PyBool>() {
             Ok(flag) if !flag.is_true() => Ok(None),
-            // without tqdm there is none
+            // Without tqdm there is no bar.
             Ok(_) => {
                 let bar = py.import("stickslip._progress")?.call_method1("bar", (name,))?;
                 Ok((!bar.is_none()).then_some(bar))
@@ -24,7 +24,7 @@ pub fn bar<'py>(
     }
 }
 
-/// Closes a bar that was made here; a function from elsewhere has nothing to close.
+/// Closes a bar made by [`bar`]. A function of the caller needs no closing.
 pub fn close(bar: Option<Bound<'_, PyAny>>) -> PyResult<()> {
     match bar {
         Some(bar) if bar.hasattr("_stickslip_close")? => bar.call_method0("_stickslip_close").map(|_| ()),

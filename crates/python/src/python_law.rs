@@ -1,8 +1,9 @@
-//! Laws written in Python, in rate form: `f = h(u, u', z)`, `z' = g(u, u', z)` over arrays of instants.
+//! Laws written in Python in rate form: `f = h(u, u', z)`, `z' = g(u, u', z)` over arrays of
+//! points.
 //!
-//! Python is called with arrays. Derivatives come from `stickslip/_rate.py`: exact ones by dual arrays, or the author's own.
-//! What a call raises ends the computation at once: it unwinds to the call of the package that
-//! began it, which raises it.
+//! Python functions receive arrays. `stickslip/_rate.py` provides derivatives, either exact
+//! ones from dual arrays or those of the author. An exception in a function ends the
+//! computation at once. The stack unwinds to the call from Python, which raises the exception.
 
 use crate::error;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -16,21 +17,21 @@ use stickslip::dimension::Dimension;
 use stickslip::law::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Rate, RatePoint, Relative, SharedLaw};
 use stickslip_numerics::interrupt;
 
-/// A size that is a number, or the value of a parameter.
+/// A size: a number, or the value of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Size {
     Number(f64),
-    /// Its place among the parameters.
+    /// Index of the parameter.
     Parameter(usize),
 }
 
-/// What a law that Python wrote is to Rust, whatever the values of its parameters.
+/// A law written in Python, without the values of its parameters.
 pub struct Written {
     info: &'static LawInfo,
-    /// Tells laws of one name and the same parameters apart.
+    /// Distinguishes laws with the same name and the same parameters.
     number: u64,
-    /// `_rate._Kernel`: its `value` and `linearise` are called with `u, v, z`, all two-dimensional
-    /// (row, instant), and the values of parameters.
+    /// A `_rate._Kernel`. Its `value` and `linearise` take `u, v, z`, all two-dimensional (row,
+    /// point), and the values of the parameters.
     pub kernel: Py<PyAny>,
     pub directions: usize,
     pub states: usize,
@@ -46,13 +47,12 @@ impl fmt::Debug for Written {
     }
 }
 
-/// What tells rows of laws apart: the name, and of each parameter its name and dimension.
+/// Identification of a table row: the name, and the name and dimension of each parameter.
 type Signature = (String, Vec<(String, Dimension)>);
 
-/// Rows of laws: each is kept for as long as the process lives, as all that refers to a law asks
-/// for it without end.
+/// Table rows of laws. They are leaked, because laws require `&'static` rows.
 static ROWS: Mutex<BTreeMap<Signature, &'static LawInfo>> = Mutex::new(BTreeMap::new());
-/// The laws that there are, by number: with other values of parameters they are built from these.
+/// Existing laws by number, from which laws with other values of parameters are built.
 static LAWS: Mutex<BTreeMap<u64, Weak<Written>>> = Mutex::new(BTreeMap::new());
 static NUMBER: AtomicU64 = AtomicU64::new(0);
 
@@ -76,7 +76,7 @@ fn row(name: &str, parameters: &[(String, Dimension)]) -> &'static LawInfo {
     })
 }
 
-/// The law with these values: those of its parameters, then its number.
+/// Builds the law from the values of its parameters, followed by its number.
 fn build(values: &[f64]) -> SharedLaw {
     let (number, values) = values.split_last().map_or((u64::MAX, values), |(number, rest)| (*number as u64, rest));
     let laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
@@ -86,20 +86,22 @@ fn build(values: &[f64]) -> SharedLaw {
     }
 }
 
-/// What a law is behind, if it was written in Python.
+/// Returns the Python implementation of a law, if it is written in Python.
 pub fn written(law: &SharedLaw) -> Option<Arc<Written>> {
     let number = law.values().get(law.info().parameters.len()).copied()?;
     LAWS.lock().unwrap_or_else(PoisonError::into_inner).get(&(number as u64)).and_then(Weak::upgrade)
 }
 
-/// Whether the number of a law written in Python stands behind the values of its parameters.
+/// Returns `true` if the law is written in Python: its number follows the values of its
+/// parameters.
 pub fn is_written(law: &SharedLaw) -> bool {
     law.values().len() > law.info().parameters.len()
 }
 
 impl Written {
-    /// A law of one direction without states, to be told what else it is before it is
-    /// [shared](Written::shared).
+    /// Creates a law with one direction and no states.
+    ///
+    /// The caller sets other properties before [sharing](Written::shared) it.
     pub fn new(name: &str, kernel: Py<PyAny>, parameters: &[(String, Dimension)]) -> Self {
         Written {
             info: row(name, parameters),
@@ -114,14 +116,14 @@ impl Written {
         }
     }
 
-    /// Makes it known by its number.
+    /// Registers the law under its number.
     pub fn shared(self) -> Arc<Self> {
         let shared = Arc::new(self);
         LAWS.lock().unwrap_or_else(PoisonError::into_inner).insert(shared.number, Arc::downgrade(&shared));
         shared
     }
 
-    /// The law with these values of its parameters.
+    /// Returns the law with these values of its parameters.
     pub fn law(self: &Arc<Self>, values: Vec<f64>) -> SharedLaw {
         Arc::new(Shown { written: self.clone(), values })
     }
@@ -133,7 +135,7 @@ impl Drop for Written {
     }
 }
 
-/// The law that methods see.
+/// A law written in Python, with values of its parameters.
 #[derive(Debug)]
 struct Shown {
     written: Arc<Written>,
@@ -148,15 +150,17 @@ impl Shown {
         }
     }
 
-    /// Asks Python at instants. Of `out`, (row, instant), the first rows are the forces, then the
-    /// rates; of `slopes`, (row, argument, instant). What Python raises ends the computation.
+    /// Calls Python for several points.
+    ///
+    /// Returns forces, then rates, as (row, point), and slopes as (row, argument, point). A
+    /// Python exception ends the computation.
     fn ask(&self, motions: &[Relative<f64>], z: &[f64], linear: bool) -> (Vec<f64>, Vec<f64>) {
         interrupt::check();
         match Python::attach(|py| self.answer(py, motions, z, linear)) {
             Ok(answer) => answer,
             Err(error) => {
                 interrupt::throw(Box::new(error));
-                // nobody is there to raise it: an answer that no method takes
+                // No caller can raise the exception: NaN is a value that no method accepts.
                 let rows = self.written.directions + self.written.states;
                 let arguments = rows + self.written.directions;
                 (vec![f64::NAN; rows * motions.len()], vec![f64::NAN; rows * arguments * motions.len()])
@@ -206,7 +210,7 @@ impl Shown {
 }
 
 impl Shown {
-    /// Forces, rates and their derivatives at instants.
+    /// Computes forces, rates and their derivatives at several points.
     fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
         let (out, slopes) = self.ask(motions, z, true);
         let n = motions.len();

@@ -1,4 +1,6 @@
-//! Quantities: numbers in SI, or strings with units as in a study file. Frequencies are numbers in Hz, as in the tables.
+//! Quantities from Python: numbers in SI units, or strings with units as in a study file.
+//!
+//! Frequencies are numbers in Hz, as in the tables.
 
 use crate::error;
 use pyo3::prelude::*;
@@ -10,7 +12,8 @@ use std::f64::consts::PI;
 use stickslip::dimension::Dimension;
 use stickslip_study::expression::{Expression, quantity};
 
-/// A quantity of this dimension, in SI; `what` says whose it is, for the message.
+/// Returns a quantity of this dimension in SI units. `what` names the quantity in error
+/// messages.
 pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResult<f64> {
     let py = value.py();
     if let Ok(text) = value.cast::<PyString>() {
@@ -33,7 +36,7 @@ pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResul
     Ok(from_unit(number, dimension))
 }
 
-/// A quantity of any dimension, in SI, and which one it has.
+/// Returns a quantity of any dimension in SI units, and its dimension.
 pub fn of_any_dimension(value: &Bound<'_, PyAny>, what: &str) -> PyResult<(f64, Dimension)> {
     let dimension = match value.cast::<PyString>() {
         Ok(text) => Expression::compile::<&str>(text.to_str()?, &[])
@@ -48,8 +51,10 @@ pub fn of_any_dimension(value: &Bound<'_, PyAny>, what: &str) -> PyResult<(f64, 
     Ok((si(value, dimension, what)?, dimension))
 }
 
-/// One quantity or many of them, in SI: a number, a string, or a sequence of them such as an array.
-/// Of `None` as dimension any will do.
+/// Returns one or several quantities in SI units.
+///
+/// The value is a number, a string, or a sequence of them such as an array. A `dimension` of
+/// `None` accepts any dimension.
 pub fn many(value: &Bound<'_, PyAny>, dimension: Option<Dimension>, what: &str) -> PyResult<Vec<f64>> {
     let one = |value: &Bound<'_, PyAny>| match dimension {
         Some(dimension) => si(value, dimension, what),
@@ -71,7 +76,7 @@ pub fn many(value: &Bound<'_, PyAny>, dimension: Option<Dimension>, what: &str) 
     value.try_iter()?.map(|item| one(&item?)).collect()
 }
 
-/// Numbers without a unit: an array or a sequence.
+/// Returns numbers without a unit from an array or a sequence.
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
     if let Some(numbers) = array(value, what)? {
         return Ok(numbers);
@@ -83,26 +88,29 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
     value.try_iter()?.map(|item| plain(item?)).collect()
 }
 
-/// A frequency in Hz, such that the same comes back where it is given as a number; of other
-/// dimensions the value in SI.
+/// Returns the number that a user would give for an SI value: Hz for frequencies, otherwise SI.
+///
+/// Passing the number back gives exactly the same SI value.
 pub fn in_unit(si: f64, dimension: Option<Dimension>) -> f64 {
     let is_frequency = |dimension| dimension == Dimension::FREQUENCY || dimension == Dimension::SWEEP_RATE;
     if !dimension.is_some_and(is_frequency) {
         return si;
     }
     let nearest = si / (2.0 * PI);
-    // beside the rounding of this division stands the number whose multiple is rounded to `si`
+    // The exact inverse may be an adjacent floating-point number of the rounded quotient.
     let candidates = [nearest, nearest.next_up(), nearest.next_down()];
     candidates.into_iter().find(|hertz| 2.0 * hertz * PI == si).unwrap_or(nearest)
 }
 
-/// The unit of frequencies in all tables is Hz; the rounding is that of the unit in a study file.
+/// Converts Hz to rad/s with the same rounding as a unit in a study file.
 fn from_unit(number: f64, dimension: Dimension) -> f64 {
     if dimension == Dimension::FREQUENCY { 2.0 * number * PI } else { number }
 }
 
-/// A real number of Python or NumPy; `None` for anything else, which may have a length or be
-/// complex, masked, a flag or bytes.
+/// Returns a real number of Python or NumPy.
+///
+/// Returns `None` for other objects, such as sequences, complex or masked numbers, flags or
+/// bytes.
 pub fn number(value: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
     if value.cast::<PyFloat>().is_ok() {
         return value.extract().map(Some);
@@ -118,12 +126,14 @@ pub fn number(value: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
             is_real(&dtype) && value.getattr("ndim").is_ok_and(|ndim| ndim.extract::<usize>().is_ok_and(|n| n == 0));
         return if plain && !is_masked(value)? { value.call_method0("item")?.extract().map(Some) } else { Ok(None) };
     }
-    // fractions, decimals and other numbers
+    // Fractions, decimals and other numbers.
     Ok(if value.hasattr("__float__")? && !value.hasattr("__len__")? { value.extract().ok() } else { None })
 }
 
-/// The numbers of a one-dimensional array of numbers, such as NumPy's, a column of pandas or a
-/// range of memory; `None` for what is no such array.
+/// Returns the numbers of a one-dimensional numeric array, such as a NumPy array or a pandas
+/// column.
+///
+/// Returns `None` for other objects.
 fn array(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Option<Vec<f64>>> {
     let py = value.py();
     if !value.hasattr("__array__")? || is_masked(value)? {
@@ -146,7 +156,8 @@ fn array(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Option<Vec<f64>>> {
     Ok(Some(array.as_array().iter().copied().collect()))
 }
 
-/// Integers and reals; no flags, complex numbers, words or times.
+/// Returns `true` for integer and real types, and `false` for flags, complex numbers, texts or
+/// times.
 fn is_real(dtype: &Bound<'_, PyAny>) -> bool {
     let kind = dtype.getattr("kind").and_then(|kind| kind.extract::<String>());
     kind.is_ok_and(|kind| matches!(kind.as_str(), "f" | "i" | "u"))
@@ -160,7 +171,7 @@ fn is_bytes(value: &Bound<'_, PyAny>) -> bool {
     value.cast::<PyBytes>().is_ok() || value.cast::<PyByteArray>().is_ok() || value.cast::<PyMemoryView>().is_ok()
 }
 
-/// Whether its items are values in an order: those of a dictionary or a set are not.
+/// Returns `true` for an ordered sequence of values, but not for a dictionary or a set.
 fn is_sequence(value: &Bound<'_, PyAny>) -> PyResult<bool> {
     let unordered =
         value.cast::<PyDict>().is_ok() || value.cast::<PySet>().is_ok() || value.cast::<PyFrozenSet>().is_ok();
@@ -179,7 +190,7 @@ fn no_sequence(value: &Bound<'_, PyAny>, what: &str) -> PyErr {
     error::model(value.py(), message)
 }
 
-/// A mapping as a dictionary.
+/// Returns a mapping as a dictionary.
 pub fn dictionary<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyDict>> {
     if let Ok(dict) = value.cast::<PyDict>() {
         return Ok(dict.clone());
@@ -192,7 +203,7 @@ pub fn dictionary<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<
     Ok(dict)
 }
 
-/// What kind of thing it is, in a word.
+/// Returns the type name of an object for messages.
 fn kind(value: &Bound<'_, PyAny>) -> String {
     let name = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
     match value.getattr("dtype").and_then(|dtype| dtype.str().map(|text| text.to_string())) {

@@ -1,4 +1,4 @@
-//! What a study yields: tables, a figure, the record of the run.
+//! Results of a study: tables, a figure and the record of the run.
 
 use crate::{arrow, error, lend};
 use pyo3::exceptions::{PyIndexError, PyKeyError};
@@ -10,9 +10,10 @@ use stickslip_report::{Outputs, html, png, svg, terminal::Terminal, write_datase
 use stickslip_study::dataset::{self, Column, Dataset, Values};
 use stickslip_study::results::worst_evidence;
 
-/// What a run yields: tables, a figure, notes, and the record of how it was made.
+/// Results of a run: tables, a figure, notes, and the record of the run.
 ///
-/// `result["curve"]` is a :class:`Table`; `result.save("out")` writes the files that the command writes; in a notebook it shows its figure.
+/// `result["curve"]` is a :class:`Table`; `result.save("out")` writes the files that the
+/// command writes. A notebook shows the figure of the result.
 ///
 /// >>> import stickslip
 /// >>> result = stickslip.Study.from_template("element").run()
@@ -61,13 +62,13 @@ impl PyResultSet {
         self.dataset.tables.iter().map(|table| table.name.as_str()).collect()
     }
 
-    /// Sentences that a reader of the results must know.
+    /// Notes that a reader of the results must know.
     #[getter]
     fn notes(&self) -> Vec<&str> {
         self.dataset.notes.iter().map(String::as_str).collect()
     }
 
-    /// Points without a result: pairs of where and why.
+    /// Points without a result: pairs of the point and the reason.
     #[getter]
     fn failures(&self) -> Vec<(&str, &str)> {
         self.dataset.failures.iter().map(|failure| (failure.at.as_str(), failure.reason.as_str())).collect()
@@ -81,8 +82,11 @@ impl PyResultSet {
         Ok(points)
     }
 
-    /// The worst evidence over all orbits: ``residual`` (defect of the return map) and ``energy_gap`` (relative gap between work put in and
-    /// energy lost), both pure numbers; ``None`` where the kind keeps none.
+    /// The largest error measures over all orbits.
+    ///
+    /// ``residual`` is the defect of the return map. ``energy_gap`` is the relative difference
+    /// between the work of the excitation and the dissipated energy. Both are dimensionless,
+    /// and ``None`` if the kind of study does not have them.
     #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let worst = worst_evidence(&self.dataset);
@@ -92,13 +96,16 @@ impl PyResultSet {
         Ok(evidence)
     }
 
-    /// How the run was made, as a dictionary: version, the study with all values in SI, methods, threads, wall time in s.
+    /// Record of the run as a dictionary.
+    ///
+    /// It contains the version, the study with all values in SI units, the methods, the threads
+    /// and the wall time in s.
     #[getter]
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json(py, &self.dataset.record)
     }
 
-    /// The figure as plain data: panels with axes and series, as the figure files show them.
+    /// The figure as plain data: panels with axes and series, as in the figure files.
     #[getter]
     fn figure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json(py, &self.dataset.figure)
@@ -121,9 +128,11 @@ impl PyResultSet {
         self.dataset.tables.len()
     }
 
-    /// Writes the files of the command into ``folder/NAME/`` and returns their paths: tables as
-    /// CSV, the record as JSON, the figure as SVG, PNG and a page of HTML. ``only`` names outputs
-    /// instead: csv, parquet, json, svg, png, html; the record is always among them.
+    /// Writes the files of the command into ``folder/NAME/`` and returns their paths.
+    ///
+    /// The files are tables as CSV, the record as JSON, and the figure as SVG, PNG and HTML
+    /// page. ``only`` selects outputs instead: csv, parquet, json, svg, png, html. The record
+    /// is always written.
     #[pyo3(signature = (folder, only=None))]
     fn save<'py>(&self, py: Python<'py>, folder: PathBuf, only: Option<Vec<String>>) -> PyResult<Bound<'py, PyList>> {
         let outputs = match only {
@@ -134,24 +143,29 @@ impl PyResultSet {
         PyList::new(py, files.map_err(|cause| error::report(py, cause))?)
     }
 
-    /// The figure as SVG.
+    /// Returns the figure as SVG.
     fn svg(&self, py: Python<'_>) -> String {
         py.detach(|| svg::to_svg(&self.dataset.figure))
     }
 
-    /// The figure as PNG.
+    /// Returns the figure as PNG.
     fn png<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let png = py.detach(|| png::to_png(&self.dataset.figure)).map_err(|cause| error::report(py, cause))?;
         Ok(PyBytes::new(py, &png))
     }
 
-    /// The interactive figure as a page of its own; ``script`` is the address of plotly.js, which `save` writes beside the folder.
+    /// Returns the interactive figure as a separate page.
+    ///
+    /// ``script`` is the address of plotly.js. By default it is the name of the file that
+    /// `save` writes next to the study's folder.
     #[pyo3(signature = (script=None))]
     fn html(&self, py: Python<'_>, script: Option<&str>) -> String {
         py.detach(|| html::to_html(&self.dataset.figure, script.unwrap_or(&html::script_name())))
     }
 
-    /// Draws the figure with matplotlib and returns its ``Figure``; ``axes`` takes axes of your own, one for each panel.
+    /// Draws the figure with matplotlib and returns its ``Figure``.
+    ///
+    /// ``axes`` are existing axes to draw on, one per panel.
     #[pyo3(signature = (axes=None))]
     fn plot<'py>(slf: Bound<'py, Self>, axes: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("stickslip._plot")?.getattr("plot")?.call1((slf.getattr("figure")?, axes))
@@ -177,13 +191,12 @@ impl PyResultSet {
         format!("<stickslip.Result {} ({}): {}>", self.dataset.name, self.dataset.kind, self.tables().join(", "))
     }
 
-    /// What the command prints on a terminal.
+    /// Returns the text that the command prints on a terminal.
     fn __str__(&self, py: Python<'_>) -> String {
         py.detach(|| Terminal { colour: false, width: None }.text(&self.dataset, &[]))
     }
 
-    /// Whether all tables, the figure, and what is said of them are the same. A number that does
-    /// not exist equals one that does not either.
+    /// Compares all tables, the figure, the notes and the record. NaN equals NaN.
     fn __eq__(&self, py: Python<'_>, other: &PyResultSet) -> bool {
         py.detach(|| same(&self.dataset, &other.dataset))
     }
@@ -193,7 +206,7 @@ impl PyResultSet {
     }
 
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
-        let _ = memo; // it does not change
+        let _ = memo; // The object is immutable.
         slf
     }
 
@@ -203,7 +216,7 @@ impl PyResultSet {
     }
 }
 
-/// Whether two datasets are the same, where NaN equals NaN.
+/// Compares two datasets, with NaN equal to NaN.
 fn same(one: &Dataset, other: &Dataset) -> bool {
     let without_tables = |whole: &Dataset| {
         let Dataset { name, title, source, kind, tables: _, figure, notes, failures, record } = whole;
@@ -231,33 +244,35 @@ fn same_table(one: &dataset::Table, other: &dataset::Table) -> bool {
         && one.columns.iter().zip(&other.columns).all(same_column)
 }
 
-/// A result from its pickle.
+/// Recreates a result from its pickle.
 #[pyfunction]
 pub fn _result(py: Python<'_>, bytes: &[u8]) -> PyResult<PyResultSet> {
     let dataset = py.detach(|| rmp_serde::from_slice(bytes));
     dataset.map(PyResultSet::new).map_err(|cause| error::report(py, format!("this is no pickled result: {cause}")))
 }
 
-/// A value as Python's plain data.
+/// Converts a value to plain Python data.
 fn json<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(value).map_err(|cause| error::report(py, cause))?;
     py.import("json")?.call_method1("loads", (text,))
 }
 
-/// Text for a page.
+/// Escapes text for a page.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A table: named columns of equal length; units stand at the end of their names.
+/// A table with named columns of equal length; the names end with the units.
 ///
-/// ``table["blade1_amplitude_m"]`` is a NumPy array over the memory of the result, without a copy
-/// and read-only. A table is a mapping from names to columns, ``len(table)`` is its number of rows,
-/// as of a ``DataFrame``. pyarrow and others read the whole table by Arrow's PyCapsule interface,
-/// in which a number that does not exist is null, and so do `to_arrow`, `to_pandas` and
-/// `to_polars`; ``pandas.DataFrame(table)`` and ``polars.DataFrame(table)`` take the columns, in
-/// which it is NaN. ``numpy.asarray(table)`` has the shape of the table: real numbers, or objects
-/// where a column holds words or flags.
+/// ``table["blade1_amplitude_m"]`` is a read-only NumPy array over the memory of the result,
+/// without a copy. A table is a mapping from names to columns. ``len(table)`` is its number of
+/// rows, as for a ``DataFrame``.
+///
+/// pyarrow and other libraries read the whole table through Arrow's PyCapsule interface, as do
+/// `to_arrow`, `to_pandas` and `to_polars`; NaN then becomes null. ``pandas.DataFrame(table)``
+/// and ``polars.DataFrame(table)`` take the columns and keep NaN. ``numpy.asarray(table)`` has
+/// the shape of the table and contains real numbers, or objects if a column contains texts or
+/// flags.
 ///
 /// >>> import stickslip
 /// >>> table = stickslip.Study.from_template("element").run()["loops"]
@@ -272,7 +287,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table that belongs to no result.
+    /// Creates a table that belongs to no result.
     pub fn alone(table: dataset::Table) -> Table {
         let dataset = Dataset { tables: vec![table], ..Dataset::default() };
         Table { dataset: Arc::new(dataset), index: 0 }
@@ -297,7 +312,7 @@ impl Table {
         self.table().columns.iter().map(|column| column.name.as_str()).collect()
     }
 
-    /// Rows and columns.
+    /// Number of rows and columns.
     #[getter]
     fn shape(&self) -> (usize, usize) {
         (self.table().rows(), self.table().columns.len())
@@ -316,10 +331,10 @@ impl Table {
         let owner = slf.clone().into_any();
         let numpy = || py.import("numpy");
         match &found.values {
-            // SAFETY: the table, which the array refers to, keeps the dataset, which nobody can change
+            // SAFETY: the array refers to the table, which keeps the immutable dataset
             #[allow(unsafe_code)]
             Values::Number(values) => Ok(unsafe { lend::array(values, owner) }.into_any()),
-            // SAFETY: the same
+            // SAFETY: the array refers to the table, which keeps the immutable dataset
             #[allow(unsafe_code)]
             Values::Integer(values) => Ok(unsafe { lend::array(values, owner) }.into_any()),
             Values::Text(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "str")),
@@ -335,23 +350,23 @@ impl Table {
         PyList::new(py, self.columns())?.call_method0("__iter__")
     }
 
-    /// Names of the columns.
+    /// Returns the names of the columns.
     fn keys(&self) -> Vec<&str> {
         self.columns()
     }
 
-    /// The columns.
+    /// Returns the columns.
     fn values<'py>(slf: Bound<'py, Self>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         slf.get().columns().into_iter().map(|name| Table::__getitem__(slf.clone(), name)).collect()
     }
 
-    /// Names and columns.
+    /// Returns pairs of names and columns.
     fn items<'py>(slf: Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
         let names = slf.get().columns().into_iter();
         names.map(|name| Ok((name.to_owned(), Table::__getitem__(slf.clone(), name)?))).collect()
     }
 
-    /// A column, or ``default`` where there is none of this name.
+    /// Returns a column, or ``default`` if there is no column of this name.
     #[pyo3(signature = (column, default=None))]
     fn get<'py>(
         slf: Bound<'py, Self>,
@@ -364,14 +379,14 @@ impl Table {
         Table::__getitem__(slf, column).map(Some)
     }
 
-    /// What libraries that ask for a dictionary take it for: pandas builds frames of dictionaries,
-    /// and of no other mappings.
+    /// The class that other libraries see: pandas builds frames from dictionaries, but not from
+    /// other mappings.
     #[getter]
     fn __class__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("stickslip._tables")?.getattr("Mapped")
     }
 
-    /// The table as one array of its shape.
+    /// Returns the table as one array of its shape.
     #[pyo3(signature = (dtype=None, copy=None))]
     fn __array__<'py>(
         slf: Bound<'py, Self>,
@@ -394,7 +409,7 @@ impl Table {
     }
 
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
-        let _ = memo; // it does not change
+        let _ = memo; // The object is immutable.
         slf
     }
 
@@ -403,7 +418,7 @@ impl Table {
         Ok((py.import("stickslip._core")?.getattr("_table")?, (PyBytes::new(py, &bytes),)))
     }
 
-    /// Row ``index`` as a dictionary; a negative one counts from the end.
+    /// Returns row ``index`` as a dictionary; a negative index counts from the end.
     fn row<'py>(slf: Bound<'py, Self>, index: isize) -> PyResult<Bound<'py, PyDict>> {
         let (py, table) = (slf.py(), slf.get().table());
         let at = if index < 0 { table.rows().checked_add_signed(index) } else { Some(index as usize) };
@@ -422,29 +437,31 @@ impl Table {
         Ok(row)
     }
 
-    /// The table by Arrow's PyCapsule interface: what pandas, polars, pyarrow, DuckDB and others ask for.
+    /// Returns the table through Arrow's PyCapsule interface.
+    ///
+    /// pandas, polars, pyarrow, DuckDB and other libraries call this method.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // a producer that has one schema may give it whatever is requested
+        // The protocol permits a producer with a single schema to ignore the request.
         let _ = requested_schema;
         arrow::stream(py, self.dataset.clone(), self.index)
     }
 
-    /// As a ``pyarrow.Table``; numbers stay where they are.
+    /// Returns a ``pyarrow.Table``; numbers are not copied.
     fn to_arrow<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         tables(&slf, "to_arrow")
     }
 
-    /// As a ``pandas.DataFrame``.
+    /// Returns a ``pandas.DataFrame``.
     fn to_pandas<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         tables(&slf, "to_pandas")
     }
 
-    /// As a ``polars.DataFrame``; numbers stay where they are.
+    /// Returns a ``polars.DataFrame``; numbers are not copied.
     fn to_polars<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         tables(&slf, "to_polars")
     }
@@ -455,7 +472,7 @@ impl Table {
     }
 }
 
-/// A table from its pickle.
+/// Recreates a table from its pickle.
 #[pyfunction]
 pub fn _table(py: Python<'_>, bytes: &[u8]) -> PyResult<Table> {
     let table = py.detach(|| rmp_serde::from_slice(bytes));

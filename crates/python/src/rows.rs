@@ -1,4 +1,4 @@
-//! Tables of orbits with the columns that studies have.
+//! Tables of orbits with the columns of studies.
 
 use stickslip::method::{Method, OrbitError};
 use stickslip::model::System;
@@ -6,13 +6,13 @@ use stickslip::orbit::Orbit;
 use stickslip_study::dataset::{Column, Table, Values, column_name};
 use stickslip_study::hertz;
 
-/// What a table keeps of one orbit, or of its absence.
+/// Table row of one orbit, or of a failed point.
 pub struct Row {
     omega: f64,
     places: Vec<[f64; 3]>,
     joints: Vec<[f64; 2]>,
     stable: Option<bool>,
-    /// Residual, energy gap, truncation, return defect.
+    /// Residual, energy gap, truncation error, return defect.
     evidence: [f64; 4],
     iterations: u64,
     found_by: &'static str,
@@ -21,7 +21,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Of what was found at a frequency, rad/s.
+    /// Creates the row of an outcome at a frequency in rad/s.
     pub fn new(system: &System, omega: f64, outcome: Result<&Orbit, &OrbitError>) -> Row {
         match outcome {
             Ok(orbit) => {
@@ -64,7 +64,7 @@ impl Row {
     }
 }
 
-/// The columns of these rows, behind `first`.
+/// Returns the table of these rows, with `first` as its first columns.
 pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Method, rows: &[Row]) -> Table {
     let numbers =
         |name: &str, value: &dyn Fn(&Row) -> f64| Column::numbers(&column_name(name), rows.iter().map(value).collect());
@@ -85,7 +85,7 @@ pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Metho
     let stable = Values::Flag(rows.iter().map(|row| row.stable).collect());
     columns.push(Column { name: "stable".to_owned(), values: stable });
     for (k, what) in ["residual", "energy_gap", "truncation", "return_defect"].into_iter().enumerate() {
-        // where motions are closed the residual is the return defect
+        // If the method closes the motion, the residual is the return defect.
         if k < 3 || !method.closes_motions(system) {
             columns.push(numbers(what, &|row| row.evidence[k]));
         }

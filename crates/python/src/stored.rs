@@ -1,4 +1,4 @@
-//! The parts of a model as bytes, for pickles; the laws of its joints stand beside them.
+//! Binary form of a model for pickles, without the laws of its joints, which are separate.
 
 use serde::{Deserialize, Serialize};
 use stickslip::law::SharedLaw;
@@ -8,7 +8,7 @@ use stickslip::model::{
 use stickslip::structure::{Component, Reduction};
 use stickslip_numerics::sparse::Matrix;
 
-/// How forces and imposed motions go around a disk.
+/// Distribution of forces and of imposed motions around a disk.
 type Arounds = [Vec<Option<Around>>; 2];
 type Entries = Vec<(usize, usize, f64)>;
 
@@ -19,8 +19,8 @@ type StoredBody = (String, f64, [[f64; 3]; 3], Vec<String>);
 struct Stored {
     /// Name, mass, directions.
     masses: Vec<(String, f64, Vec<String>)>,
-    /// Ends, stiffness, damping.
     bodies: Vec<StoredBody>,
+    /// Ends, stiffness, damping.
     springs: Vec<([String; 2], f64, f64)>,
     /// Name, ends.
     joints: Vec<(String, [String; 2])>,
@@ -28,7 +28,7 @@ struct Stored {
     forces: Vec<(String, f64, f64, u32)>,
     motions: Vec<(String, f64, f64, u32)>,
     around: [Vec<Option<StoredAround>>; 2],
-    /// Sectors, whether they are equal, order.
+    /// Number of sectors, flag for equal sectors, order.
     ring: Option<(usize, bool, Option<usize>)>,
     structure: Option<StoredStructure>,
 }
@@ -40,7 +40,7 @@ enum StoredAround {
     Sector(usize),
 }
 
-/// A structure by matrices as `from_matrices` makes it.
+/// A structure by matrices, as made by `from_matrices`.
 #[derive(Serialize, Deserialize)]
 struct StoredStructure {
     rows: Vec<String>,
@@ -48,7 +48,7 @@ struct StoredStructure {
     damping: Option<Entries>,
     stiffness: Entries,
     damping_ratio: Option<f64>,
-    /// Highest frequency of interest, rad/s.
+    /// Highest frequency of interest in rad/s.
     reduce: Option<f64>,
     /// Name, directions, rows.
     places: Vec<(String, Vec<String>, Vec<Entry>)>,
@@ -56,7 +56,7 @@ struct StoredStructure {
 
 type Entry = Vec<(usize, f64)>;
 
-/// The parts of a model; without its structure by matrices where that is a study's.
+/// Returns the parts of a model as bytes, without a structure that belongs to a study.
 pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>, String> {
     let around = around.each_ref().map(|all| {
         let stored = |around: &Around| match *around {
@@ -85,7 +85,7 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
     rmp_serde::to_vec(&stored).map_err(|cause| cause.to_string())
 }
 
-/// The model of these parts with these laws.
+/// Recreates a model from its parts and laws.
 pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), String> {
     let stored: Stored = rmp_serde::from_slice(bytes).map_err(|cause| format!("this is no pickled model: {cause}"))?;
     if stored.joints.len() != laws.len() {

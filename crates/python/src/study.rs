@@ -1,4 +1,4 @@
-//! Studies: files, texts and dictionaries, read, checked and run.
+//! Studies from files, texts and dictionaries: reading, checking and running.
 
 use crate::model::PyModel;
 use crate::progress::{bar, close};
@@ -17,9 +17,10 @@ use stickslip_study::dataset::{self, Column, Values};
 use stickslip_study::run::{Checked, check, redrawn, units};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
 
-/// What a study file asks for, read and checked.
+/// A study, read and checked.
 ///
-/// Made by `from_file`, `from_text`, `from_dict` or `from_template`. A study does not change: `set` and `method` return another one.
+/// Made by `from_file`, `from_text`, `from_dict` or `from_template`. A study is immutable:
+/// `set` and `method` return another study.
 ///
 /// >>> import stickslip
 /// >>> study = stickslip.Study.from_template("blade-couple")
@@ -31,11 +32,11 @@ use stickslip_study::{StudyError, read_bytes, read_file, templates};
 #[derive(Clone)]
 pub struct PyStudy {
     pub study: Arc<stickslip_study::Study>,
-    /// The file's name as given.
+    /// Name of the file as given.
     file: String,
     overrides: Vec<(String, String)>,
     method: Option<String>,
-    /// The study after its check, once it was asked for: that prepares every case.
+    /// Result of the check, which prepares every case. Computed on the first request.
     checked: Arc<Mutex<Option<Arc<Checked>>>>,
 }
 
@@ -45,13 +46,13 @@ impl PyStudy {
         if let Some(checked) = kept().as_ref() {
             return Ok(checked.clone());
         }
-        // the lock is not held meanwhile: another call may check too, and what it finds is the same
+        // The lock is not held during the check. A concurrent check gives the same result.
         let study = self.study.clone();
         let checked = apart(py, move || check(&study))?.map_err(|cause| error::study(py, &cause))?;
         Ok(kept().insert(Arc::new(checked)).clone())
     }
 
-    /// The model of a case.
+    /// Returns the model of a case.
     pub fn model_of(&self, py: Python<'_>, index: usize) -> PyResult<Model> {
         let case = alone(py, || self.study.case(index))?;
         Ok(case.map_err(|cause| error::study(py, &cause))?.model)
@@ -81,7 +82,7 @@ impl PyStudy {
         PyStudy::finished(py, self.file.clone(), overrides, method, move |set| read_bytes(&file, text.as_bytes(), set))
     }
 
-    /// Values of parameters as they would be typed.
+    /// Converts values of parameters to text as on the command line.
     fn typed(&self, py: Python<'_>, values: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, String)>> {
         typed(values, &|name| {
             let case = self.study.case(0).map_err(|cause| error::study(py, &cause))?;
@@ -90,7 +91,9 @@ impl PyStudy {
     }
 }
 
-/// Values of parameters as they would be typed: numbers in the SI unit of the parameter's dimension, frequencies in Hz.
+/// Converts values of parameters to text as on the command line.
+///
+/// Numbers have the SI unit of the parameter's dimension, frequencies have Hz.
 fn typed(
     values: Option<&Bound<'_, PyDict>>,
     dimension: &dyn Fn(&str) -> PyResult<Option<Dimension>>,
@@ -122,7 +125,9 @@ fn typed(
 
 #[pymethods]
 impl PyStudy {
-    /// Reads the study file (TOML) at ``path``; keyword arguments give parameters other values, as ``--set`` does.
+    /// Reads the study file (TOML) at ``path``.
+    ///
+    /// Keyword arguments change the values of parameters, as ``--set`` does.
     #[staticmethod]
     #[pyo3(signature = (path, **set))]
     fn from_file(py: Python<'_>, path: PathBuf, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
@@ -131,7 +136,7 @@ impl PyStudy {
         study.set(py, set)
     }
 
-    /// Reads the text of a study file; ``name`` stands for the file's name.
+    /// Reads the text of a study file; ``name`` replaces the name of the file.
     #[staticmethod]
     #[pyo3(signature = (text, name="study", **set))]
     fn from_text(py: Python<'_>, text: &str, name: &str, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
@@ -141,7 +146,7 @@ impl PyStudy {
         study.set(py, set)
     }
 
-    /// A study from a dictionary with the tables and keys of a study file.
+    /// Creates a study from a dictionary with the tables and keys of a study file.
     #[staticmethod]
     #[pyo3(signature = (tables, name="study", **set))]
     fn from_dict(
@@ -154,7 +159,7 @@ impl PyStudy {
         PyStudy::from_text(py, &text, name, set)
     }
 
-    /// The study of a template; ``stickslip.templates()`` lists them.
+    /// Creates the study of a template; ``stickslip.templates()`` lists the templates.
     #[staticmethod]
     #[pyo3(signature = (template, **set))]
     fn from_template(py: Python<'_>, template: &str, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
@@ -168,7 +173,9 @@ impl PyStudy {
         }
     }
 
-    /// The same study with other values of its parameters: strings with units, or numbers in SI (frequencies in Hz).
+    /// Returns the study with other values of its parameters.
+    ///
+    /// Values are strings with units, or numbers in SI units (frequencies in Hz).
     #[pyo3(signature = (**values))]
     fn set(&self, py: Python<'_>, values: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
         if values.is_none_or(|values| values.is_empty()) {
@@ -180,24 +187,24 @@ impl PyStudy {
         self.again(py, overrides, self.method.clone())
     }
 
-    /// The same study with another method.
+    /// Returns the study with another method.
     fn method(&self, py: Python<'_>, name: &str) -> PyResult<PyStudy> {
         self.again(py, self.overrides.clone(), Some(name.to_owned()))
     }
 
-    /// Name: the stem of the file.
+    /// Name: the file name without its extension.
     #[getter]
     fn name(&self) -> &str {
         self.study.name()
     }
 
-    /// Title.
+    /// Title of the study.
     #[getter]
     fn title(&self) -> &str {
         self.study.title()
     }
 
-    /// Kind, for example ``"response"``.
+    /// Kind of the study, for example ``"response"``.
     #[getter]
     fn kind(&self) -> &str {
         self.study.kind().name
@@ -209,13 +216,13 @@ impl PyStudy {
         self.study.text()
     }
 
-    /// Version of Stickslip that computes it.
+    /// Version of Stickslip that computes the study.
     #[getter]
     fn version(&self) -> &str {
         env!("CARGO_PKG_VERSION")
     }
 
-    /// Names of the tables that it yields, the most important first.
+    /// Names of the result tables, the most important first.
     #[getter]
     fn tables(&self) -> Vec<&str> {
         self.study.kind().tables.to_vec()
@@ -227,7 +234,7 @@ impl PyStudy {
         self.study.cases()
     }
 
-    /// Number of units of work, which know nothing of each other.
+    /// Number of independent units of work.
     #[getter]
     fn units(&self) -> usize {
         units(&self.study)
@@ -245,8 +252,8 @@ impl PyStudy {
         self.study.varied()
     }
 
-    /// The parameters of case ``index``: values in SI, frequencies in Hz, as :meth:`set` takes
-    /// them.
+    /// Returns the parameters of case ``index``: values in SI units, frequencies in Hz, as for
+    /// :meth:`set`.
     #[pyo3(signature = (index=0))]
     fn parameters<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyDict>> {
         let case = self.study.case(index).map_err(|cause| error::study(py, &cause))?;
@@ -257,15 +264,18 @@ impl PyStudy {
         Ok(parameters)
     }
 
-    /// The model of case ``index``, to compute with by calls.
+    /// Returns the model of case ``index`` for further computations in Python.
     #[pyo3(signature = (index=0))]
     fn model(&self, py: Python<'_>, index: usize) -> PyResult<PyModel> {
         Ok(PyModel::of_study(self, index, self.model_of(py, index)?))
     }
 
-    /// What is known before anything is computed, as text: modes with joints free and stuck, when joints slip, warnings, size and time.
+    /// Checks the study and returns its known properties as text, without running it.
     ///
-    /// Raises :class:`StudyError` where the study cannot be run.
+    /// The text contains warnings, the modes with free and with stuck joints, the onset of
+    /// slip, the size and the time.
+    ///
+    /// Raises :class:`StudyError` if the study cannot run.
     fn check(&self, py: Python<'_>) -> PyResult<String> {
         let checked = self.checked(py)?;
         let summary = checked.summary();
@@ -278,9 +288,13 @@ impl PyStudy {
 
     /// Runs the study and returns its :class:`Result`.
     ///
-    /// ``threads``: how many; all without it. ``progress``: ``True`` for a bar by tqdm (none if it is not installed), or a function of the points
-    /// done and of all (``None`` where adaptive). Ctrl-C ends the run. ``memory``: bytes that the run may take.
-    /// The results are the same bits on any number of threads.
+    /// - ``threads``: number of threads; by default all.
+    /// - ``progress``: ``True`` for a bar of tqdm, or a function. The function receives the
+    ///   numbers of finished points and of all points; the latter is ``None`` for adaptive
+    ///   frequencies. Without tqdm, there is no bar.
+    /// - ``memory``: memory limit of the run in bytes.
+    ///
+    /// Ctrl-C ends the run. The results have the same bits for any number of threads.
     #[pyo3(signature = (*, threads=None, progress=None, memory=None))]
     fn run(
         &self,
@@ -301,13 +315,15 @@ impl PyStudy {
         outcome?.map(PyResultSet::new).map_err(|cause| error::study(py, &cause))
     }
 
-    /// What tells the matrices of its files from others; `None` without such files.
+    /// Identification of the matrices in its files; ``None`` without such files.
     #[getter]
     fn _matrices(&self) -> Option<String> {
         self.study.matrices_check()
     }
 
-    /// Computes units `start` to `stop` (excluded), on one thread: their tables, and what is to be said of them, for `_joined`.
+    /// Computes the units from `start` to `stop` (exclusive) on one thread.
+    ///
+    /// Returns their tables, points and tally for `_joined`.
     fn _batch<'py>(&self, py: Python<'py>, start: usize, stop: usize) -> PyResult<Bound<'py, PyDict>> {
         let checked = self.checked(py)?;
         let watch = Watch { threads: Some(1), progress: None, total: None };
@@ -343,10 +359,10 @@ impl PyStudy {
     }
 }
 
-/// A pickled study: name of the file, text, values of parameters, method.
+/// Pickled study: name of the file, text, values of parameters, method.
 type Pickled<'a> = (&'a str, &'a str, Vec<(String, String)>, Option<String>);
 
-/// A study from its pickle.
+/// Recreates a study from its pickle.
 #[pyfunction]
 pub fn _study(
     py: Python<'_>,
@@ -359,10 +375,10 @@ pub fn _study(
     PyStudy::finished(py, file, overrides, method, move |set| read_bytes(&name, text.as_bytes(), set))
 }
 
-/// A table as Python hands it over: its name, and of each column the name, the type that Arrow calls it, and the values.
+/// Columns of a table from Python: name, Arrow type and values.
 type Columns<'py> = Vec<(String, String, Bound<'py, PyAny>)>;
 
-/// The result of a study from the tables of all its units and what is to be said of them, batch by batch.
+/// Combines the tables and tallies of all batches of units to the result of a study.
 #[pyfunction]
 pub fn _joined<'py>(
     py: Python<'py>,
@@ -392,7 +408,7 @@ pub fn _joined<'py>(
         let figure = redrawn(checked.study(), &all);
         checked.outline(1).completed(all, figure, tally, Duration::ZERO)
     });
-    // that of all batches, wherever they were computed
+    // The wall time of all batches, on all machines.
     whole.record.wall_time_s = seconds;
     Ok(PyResultSet::new(whole))
 }

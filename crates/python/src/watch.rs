@@ -1,8 +1,7 @@
-//! Long work: while Python's lock is free, with progress, and ended at once by Ctrl-C or by what a
-//! law in Python raises.
+//! Runs long work without the lock of the Python interpreter, with progress and interruption.
 //!
-//! Work that is to end unwinds, see [`stickslip_numerics::interrupt`]: what it was changing is
-//! lost.
+//! Ctrl-C, or an exception in a law written in Python, ends the work at once. The stack of the
+//! work unwinds, see [`stickslip_numerics::interrupt`], and its partial state is discarded.
 
 use crate::error;
 use pyo3::prelude::*;
@@ -15,22 +14,22 @@ use std::time::{Duration, Instant};
 use stickslip_numerics::interrupt::{self, Interrupted, Stop};
 use stickslip_study::run::Context;
 
-/// How often progress is told and Ctrl-C looked for.
+/// Interval between progress reports, and between checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// Most threads that may be asked for.
+/// Maximum number of threads in a request.
 const MOST_THREADS: usize = 1024;
 
-/// How a call is watched.
+/// Supervision of a call.
 pub struct Watch {
-    /// Threads that it may use; those of the machine, or of `RAYON_NUM_THREADS`, without it.
+    /// Number of threads. The default is that of the machine or of `RAYON_NUM_THREADS`.
     pub threads: Option<usize>,
-    /// Called with the points done and the points of all, `None` where that is not known before.
+    /// Receives the number of finished points and of all points (`None` if unknown).
     pub progress: Option<Py<PyAny>>,
-    /// Points of all.
+    /// Number of all points.
     pub total: Option<u64>,
 }
 
-/// Does short `work` on this thread.
+/// Runs short `work` on this thread.
 pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let (begun, looked) = (Instant::now(), AtomicU64::new(0));
@@ -50,13 +49,13 @@ pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResu
     outcome.map_err(|panic| ended(panic, raised.lock().unwrap_or_else(PoisonError::into_inner).take()))
 }
 
-/// Does long `work` on a thread of its own, which Ctrl-C leaves behind where it cannot end at once.
+/// Runs long `work` on a new thread, which Ctrl-C abandons if it cannot end at once.
 pub fn apart<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let stop = Stop::new();
     let (send, receive) = mpsc::channel();
     let watched = stop.clone();
     let spawned = std::thread::Builder::new().spawn(move || {
-        // nobody listens any more if it was left behind
+        // The result of an abandoned thread has no receiver.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| watched.watch(work))));
     });
     spawned.map_err(|cause| error::exception(py, "StickslipError", format!("no thread: {cause}")))?;
@@ -71,8 +70,9 @@ pub fn apart<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send 
     }
 }
 
-/// The exception that ended work: what a law raised, or what Ctrl-C did. Any other panic is a bug,
-/// and goes on.
+/// Returns the exception that ended the work: that of a law, or that of Ctrl-C.
+///
+/// Any other panic is a bug and continues to unwind.
 fn ended(panic: Box<dyn Any + Send>, interrupted: Option<PyErr>) -> PyErr {
     match (panic.downcast::<PyErr>(), interrupted) {
         (Ok(error), _) => *error,
@@ -81,16 +81,16 @@ fn ended(panic: Box<dyn Any + Send>, interrupted: Option<PyErr>) -> PyErr {
     }
 }
 
-/// The process in which threads were first made: those of a fork are gone.
+/// Process that first created threads; a forked process does not have them.
 static PROCESS: OnceLock<u32> = OnceLock::new();
-/// Pools that nobody uses, by their number of threads: calls beside each other have threads of their own.
+/// Idle thread pools by number of threads. Concurrent calls use different pools.
 static POOLS: Mutex<BTreeMap<usize, Vec<rayon::ThreadPool>>> = Mutex::new(BTreeMap::new());
 
-/// Threads that are lent to one call.
+/// Threads in use by one call.
 struct Lent {
     number: usize,
     pool: Option<rayon::ThreadPool>,
-    /// What ends their work.
+    /// Flag that ends their work.
     stop: Stop,
 }
 
@@ -103,14 +103,14 @@ impl Lent {
 impl Drop for Lent {
     fn drop(&mut self) {
         if self.stop.is_set() {
-            return; // they may still be at work
+            return; // The threads may still be working.
         }
         let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
         pools.entry(self.number).or_default().extend(self.pool.take());
     }
 }
 
-/// Threads for one call: as many as asked for, or as the machine has.
+/// Returns threads for one call: the requested number, or that of the machine.
 fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
     let process = std::process::id();
     if *PROCESS.get_or_init(|| process) != process {
@@ -136,7 +136,7 @@ fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
     Ok(Lent { number, pool: Some(pool), stop })
 }
 
-/// Does `work` on the threads of a pool. Meanwhile progress is told, and Ctrl-C ends the work.
+/// Runs `work` on the threads of a pool, reports progress, and lets Ctrl-C end the work.
 pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Context) -> T + Send) -> PyResult<T> {
     let lent = lent(py, watch.threads)?;
     let pool = lent.pool();
@@ -152,7 +152,7 @@ pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Contex
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let outcome = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&context))));
-            // who called waits for it, whatever happens
+            // The caller waits for the result in every case.
             let _ = send.send(outcome);
         });
         let mut wrong: Option<PyErr> = None;

@@ -21,10 +21,10 @@ def test_the_blocks_of_the_book_run(tmp_path, monkeypatch):
     stiffness = np.array([[3e4, 0, -1e4], [0, 2e4, 0], [-1e4, 0, 5e4]])
     names = {"mass": np.eye(3), "stiffness": stiffness, "damping": 1e-4 * stiffness}
     for block in blocks:
-        # there is no such cluster; test_campaign.py has one
+        # this cluster does not exist; test_campaign.py starts one
         if "tcp://" in block:
             continue
-        # blocks that go on with a model speak of the couple
+        # blocks that use an earlier model refer to the couple
         if "model" in block and "stickslip.Model" not in block:
             names["model"] = stickslip.Study.from_text(EXAMPLE).model()
         exec(compile(block, "python.md", "exec"), names)  # noqa: S102

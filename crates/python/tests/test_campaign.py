@@ -96,7 +96,7 @@ def test_a_campaign_that_is_killed_goes_on(study, whole, tmp_path):
         )
     )
     kept = []
-    for wait in (1, 2, 4):  # parts that are there when it is killed
+    for wait in (1, 2, 4):  # number of finished parts at the time of the kill
         process = subprocess.Popen([sys.executable, script], cwd=tmp_path, start_new_session=True)
         done = tmp_path / "c" / "done"
         deadline = time.monotonic() + 60
@@ -108,7 +108,7 @@ def test_a_campaign_that_is_killed_goes_on(study, whole, tmp_path):
         process.wait()
         kept = list(done.glob("*.json"))
         assert process.returncode == -signal.SIGKILL or len(kept) > 2
-    # a part without what is said of it was never computed
+    # a part without its record counts as not computed
     orphan = tmp_path / "c" / "parts" / "curve" / f"{0:012}-{study.units:012}.parquet"
     orphan.write_bytes(b"half a file")
     finished = stickslip.campaign(study, out=tmp_path / "c", processes=2)
@@ -152,7 +152,7 @@ def test_matrices_that_change_are_refused(tmp_path):
     matrix("k.mtx", 8.1e4)
     with pytest.raises(stickslip.CampaignError, match="other matrices"):
         stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c")
-    # processes whose files are not those of the one who asked: no fault of a unit
+    # worker processes see other files than the caller: this is not a failure of a unit
     with pytest.raises(stickslip.CampaignError, match="other matrices"):
         stickslip.campaign(study, out=tmp_path / "d", processes=1)
     assert not list((tmp_path / "d" / "done").iterdir())
@@ -177,7 +177,7 @@ def test_a_second_campaign_in_a_folder_is_refused_while_the_first_one_writes(stu
         os.kill(first.pid, signal.SIGSTOP)
         with pytest.raises(stickslip.CampaignError, match="another campaign is writing into .*: wait for its end"):
             stickslip.campaign(study, out=tmp_path / "c", processes=1)
-        # reading it is no writing
+        # reading is allowed during writing
         assert stickslip.Campaign(tmp_path / "c").points["converged"] > 0
     finally:
         os.kill(first.pid, signal.SIGCONT)
@@ -209,7 +209,7 @@ def test_parts_that_are_missing_or_damaged_are_computed_again(study, whole, tmp_
             file.unlink()
         (tmp_path / "parts" / "curve").rmdir()
     seen = stickslip.Campaign(tmp_path)
-    if damage != "flipped":  # that only its checksum tells
+    if damage != "flipped":  # only the checksum reveals a flipped bit
         assert seen.damaged and (damage == "records" or not seen.is_complete)
     if not seen.is_complete:
         with pytest.raises(stickslip.CampaignError, match="damaged or missing"):
@@ -254,7 +254,7 @@ def test_ctrl_c_ends_a_campaign_and_its_processes(tmp_path):
         time.sleep(0.01)
     time.sleep(0.5)
     pressed = time.monotonic()
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
+    os.killpg(process.pid, signal.SIGINT)  # a terminal also signals all processes
     _, errors = process.communicate(timeout=60)
     assert time.monotonic() - pressed < 1.5
     assert errors.count("Traceback") == 1 and "KeyboardInterrupt" in errors

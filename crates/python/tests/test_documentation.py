@@ -56,7 +56,7 @@ def test_the_stubs_name_what_is_there():
 
 def test_the_package_holds_the_strictest_types(tmp_path):
     api = pytest.importorskip("mypy.api")
-    # a copy, for mypy takes no package of its own environment
+    # a copy, because mypy does not check installed packages of its environment
     package = shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "stickslip", ignore=shutil.ignore_patterns("*.so", "*.pyd"))
     out, errors, status = api.run(["--strict", "--no-incremental", str(package)])
     assert status == 0, out + errors
@@ -74,8 +74,8 @@ def test_the_types_hold(tmp_path):
         "wrong: str = orbit.amplitude['a']\n"
         "model.mass('b')\n"
     )
-    # a copy, for mypy takes no package of its own environment
+    # a copy, because mypy does not check installed packages of its environment
     package = shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "stickslip", ignore=shutil.ignore_patterns("*.so", "*.pyd"))
     out, errors, _ = api.run([str(use), str(package), "--cache-dir", str(tmp_path / "cache"), "--ignore-missing-imports"])
-    # two wrong lines there, and none in the package
+    # two errors in the script, and no error in the package
     assert "use.py:6" in out and "use.py:7" in out and "Found 2 errors" in out, out + errors

@@ -67,9 +67,9 @@ def test_what_a_law_raises_ends_the_call_with_no_further_calls(call):
     with pytest.raises(ValueError, match="mine"):
         CALLS[call](model)
     assert time.monotonic() - begun < 1.0
-    # each thread that was inside the law by then may have raised as well
+    # other threads inside the law at that time may have raised too
     assert fails <= calls <= fails + 2
-    # and the model goes on to work
+    # the model still works
     fails = 10**9
     assert model.orbit(118, method="harmonic-balance").amplitude["a"] > 0
 

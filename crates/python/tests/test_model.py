@@ -37,7 +37,7 @@ def test_an_orbit_of_the_couple_is_what_scipy_integrates():
     orbit = couple().orbit(frequency)
     joint = orbit.hysteresis("shroud")
     assert abs(joint["force_N"]).max() == pytest.approx(LIMIT, rel=1e-12)
-    # over a period from the orbit's own start, with the slider's force smoothed by nothing but the clamp
+    # integrate one period from the orbit's start, with the slider force as an exact clamp
     start = orbit.start
     offset = start[0] - start[1] - joint["force_N"][0] / CONTACT
 
@@ -73,7 +73,7 @@ def test_methods_agree_and_give_their_evidence():
     assert exact.evidence["residual"] < 1e-10 and exact.evidence["energy_gap"] < 1e-9
     assert series.evidence["truncation"] < 1e-3 and series.method == "harmonic-balance"
     assert exact.stable and abs(exact.multipliers).max() <= 1 + 1e-6
-    # the loss is the area of the loop
+    # the dissipation is the area of the loop
     loop = exact.hysteresis(points=20_000)
     u, f = (np.append(loop[key], loop[key][0]) for key in ("displacement_m", "force_N"))
     assert 0.5 * np.sum((f[1:] + f[:-1]) * np.diff(u)) == pytest.approx(exact.dissipation["shroud"], rel=1e-6)
@@ -127,7 +127,7 @@ def test_matrices_are_the_model_that_was_stated_by_masses():
     rng = np.random.default_rng(5)
     stiffness = sparse.diags([2.1 + rng.random(n), -np.ones(n - 1), -np.ones(n - 1)], [0, 1, -1], format="csr") * 1e4
     mass = np.diag(0.1 + rng.random(n))
-    mass[3, 4] = mass[4, 3] = 0.02  # which no list of masses could say
+    mass[3, 4] = mass[4, 3] = 0.02  # a coupling that point masses cannot describe
     damping = 1e-5 * stiffness
     places = [f"p{i}" for i in range(n)]
     model = stickslip.Model.from_matrices(sparse.coo_matrix(mass), stiffness, damping.toarray(), places=places)
@@ -140,7 +140,7 @@ def test_matrices_are_the_model_that_was_stated_by_masses():
     expected = abs(linalg.solve(stiffness.toarray() - omega**2 * mass + 1j * omega * damping.toarray(), force))
     found = model.response(15.0)["curve"]
     np.testing.assert_allclose([found[f"{place}_amplitude_m"][0] for place in places], expected, rtol=1e-7)
-    # a joint and a lumped damper beside them
+    # add a joint and a lumped damper
     model.mass("damper", 0.05)
     model.spring("damper", "p3", stiffness=1e4)
     model.joint("rub", "damper", "p9", stickslip.law("jenkins", stiffness=5e3, limit=0.1))
@@ -172,7 +172,7 @@ def test_nodes_of_matrices_take_laws_of_several_directions():
 def test_a_large_structure_is_reduced_to_what_is_looked_at():
     sparse = pytest.importorskip("scipy.sparse")
     linalg = pytest.importorskip("scipy.sparse.linalg")
-    n = 3000  # a rod of masses on springs, held at its beginning
+    n = 3000  # a rod of masses and springs, clamped at its first end
     stiffness = 1e7 * sparse.diags([np.append(2 * np.ones(n - 1), 1.0), -np.ones(n - 1), -np.ones(n - 1)], [0, 1, -1], format="csc")
     mass = 1e-3 * sparse.identity(n, format="csc")
     damping = 1e-5 * stiffness
@@ -193,7 +193,7 @@ def test_a_large_structure_is_reduced_to_what_is_looked_at():
 def test_modes_begin_stuck_and_end_free():
     result = couple().modes((1e-6, 1.0), points=21)
     table = result["modes"]
-    # in phase the joint does not move: its frequency is the blade's at any amplitude
+    # the in-phase mode does not move the joint: its frequency is that of a blade
     alone = np.sqrt(STIFFNESS / MASS) / (2 * np.pi)
     second = couple().modes((1e-6, 1.0), mode=2, points=21)["modes"]["frequency_Hz"]
     stuck = np.sqrt((STIFFNESS + 2 * CONTACT) / MASS) / (2 * np.pi)
@@ -345,10 +345,10 @@ def test_a_disk_by_calls_is_that_of_the_study_file(stated, given):
 
 def test_a_measured_pattern_and_wrong_disks():
     ring = sector().disk(3, mistuning={"of": "blade", "deviation": [0.01, "-2 %", 0]})
-    # ω² = k/m of blades that nothing ties together
+    # ω² = k/m of uncoupled blades
     free = np.sort(np.sqrt(150e3 / (0.3 * (1 + np.array([0.01, -0.02, 0])))) / (2 * np.pi))
     np.testing.assert_allclose(ring.check()["free_Hz"], free, rtol=1e-12)
-    # what differs from sector to sector is no wave on one of them
+    # a mistuned ring is not solved as a wave on one sector
     tuned = sector().disk(3)
     tuned.set({"blade_1.mass": 0.33})
     one = tuned.orbit(115, method="harmonic-balance", harmonics=1).amplitude

@@ -145,7 +145,7 @@ def test_parameters_of_a_law_are_set_and_varied():
     rust = couple(stickslip.law("dahl", stiffness=K, limit=2.0)).response(118.0, vary={"shroud.limit": limits}, **options)["curve"]
     np.testing.assert_allclose(own["blade1_amplitude_m"], rust["blade1_amplitude_m"], rtol=1e-9)
     assert own["shroud_limit"].tolist() == limits
-    # the law of before is what it was
+    # the original law is unchanged
     assert with_parameters.parameters["limit"] == LIMIT
     for values, words in [
         ({"shroud.limit": 0.0}, "scale"),
@@ -220,7 +220,7 @@ FUNCTIONS = [
 def test_dual_arrays_have_the_derivatives_that_differences_have(function):
     a, b = np.array([-0.7, 0.05, 0.4, 0.9]), np.array([0.3, 0.8, 1.1, 0.6])
     ones, zeros = np.ones_like(a), np.zeros_like(a)
-    dual = function(Dual(a, np.stack([ones, zeros])), Dual(b, np.stack([zeros, ones])))  # rows: derivatives by a and b
+    dual = function(Dual(a, np.stack([ones, zeros])), Dual(b, np.stack([zeros, ones])))  # rows: derivatives with respect to a and b
     step = 1e-6
     by_a = (function(a + step, b) - function(a - step, b)) / (2 * step)
     by_b = (function(a, b + step) - function(a, b - step)) / (2 * step)

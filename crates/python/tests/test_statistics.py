@@ -10,7 +10,7 @@ from stickslip.statistics import exceedance, first_order, sobol
 @pytest.mark.parametrize("mean", [0.0, 121.0, 1e4, 1e8])
 def test_indices_do_not_depend_on_the_mean(mean):
     pytest.importorskip("scipy")
-    # f = c (x + 2 y) of uniform x, y: the variances are 1 to 4
+    # f = c (x + 2 y) of uniform x, y: the variances have the ratio 1:4
     found = sobol(lambda p: mean + 0.02 * (p[:, 0] + 2 * p[:, 1]), [(0, 1), (0, 1)])
     np.testing.assert_allclose(found["first"], [0.2, 0.8], atol=1e-3)
     np.testing.assert_allclose(found["total"], [0.2, 0.8], atol=1e-3)
@@ -29,7 +29,7 @@ def test_values_that_are_missing_are_left_out_and_counted():
     np.testing.assert_allclose(found["first"], [0.2, 0.8], atol=0.02)
     with pytest.warns(UserWarning, match="3072 of 3072"):
         assert np.isnan(sobol(lambda p: np.full(len(p), np.nan), [(0, 1)])["first"]).all()
-    # what does not vary has no index but zero
+    # a constant function has the index zero
     assert sobol(lambda p: np.ones(len(p)), [(0, 1)])["first"].tolist() == [0.0]
     with pytest.raises(ValueError, match="must return 3072 values"):
         sobol(lambda p: 1.0, [(0, 1)])

@@ -22,7 +22,7 @@ def test_a_study_gives_the_files_of_the_command(command, tmp_path):
     written = result.save(tmp_path / "python", only=["csv", "svg"])
     assert len(written) > 2
     for path in written:
-        if path.name != "record.json":  # it holds the time that the run took
+        if path.name != "record.json":  # it contains the wall time
             assert path.read_bytes() == (tmp_path / "command" / "couple" / path.name).read_bytes(), path.name
 
 
@@ -88,7 +88,7 @@ def test_errors_have_the_text_of_the_command(command, tmp_path):
     assert error.file == str(file) and error.line > 0 and error.reason in " ".join(str(error).split())
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.line, again.help) == (str(error), error.line, error.help)
-    with pytest.raises(ValueError):  # what Python's own readers raise
+    with pytest.raises(ValueError):  # as Python's own parsers raise
         stickslip.Study.from_text("mass = ")
     with pytest.raises(stickslip.StudyError, match="no such file"):
         stickslip.Study.from_file(tmp_path / "absent.toml")
@@ -129,14 +129,14 @@ def test_arrow_reads_columns_where_they_lie():
         assert arrow[name].to_pylist() == table[name].tolist()
     del table
     assert arrow["force_N"].to_numpy().size == arrow.num_rows
-    # the stream may be taken from its capsule or left in it
+    # a consumer may take the stream out of its capsule or leave it
     for _ in range(100):
         ELEMENT.run()["loops"].__arrow_c_stream__()
 
 
 def test_pandas_and_polars_have_nulls_where_there_is_no_number():
     pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
-    # no damper, and a force at the resonance: no orbit
+    # an undamped model excited at resonance has no orbit
     model = stickslip.Model()
     model.mass("m", 1.0)
     model.spring("m", "ground", stiffness=(2 * np.pi * 3) ** 2)

@@ -49,7 +49,7 @@ def test_frames_have_the_columns_of_the_table(table):
     frame = polars.DataFrame(table)
     assert frame.columns == table.columns and frame["status"].to_list() == table["status"].tolist()
     np.testing.assert_array_equal(frame["m_amplitude_m"].to_numpy(), table["m_amplitude_m"])
-    # by Arrow what is no number is null
+    # NaN becomes null in Arrow
     assert table.to_polars()["m_amplitude_m"].null_count() == 1
     pyarrow = pytest.importorskip("pyarrow")
     assert pyarrow.table(table)["m_amplitude_m"].null_count == 1
@@ -142,7 +142,7 @@ def test_models_and_orbits_are_copied_and_pickled(model):
     loaded = pickle.loads(pickle.dumps(orbit))
     assert (loaded.start == orbit.start).all() and loaded.amplitude == orbit.amplitude and loaded.frequency_Hz == orbit.frequency_Hz
     assert copy.deepcopy(orbit) is orbit
-    # an orbit is that of the model as it was
+    # an orbit belongs to the model at the time of the search
     force = next(iter(model.places))
     model.force(force, 0.5)
     assert (pickle.loads(pickle.dumps(orbit)).start == orbit.start).all()
@@ -159,7 +159,7 @@ def test_a_copied_model_is_another_one():
     sector.force("blade", 1.0, nodal_diameter=2)
     again = pickle.loads(pickle.dumps(sector)).disk(6).orbit(10.0)
     assert again.amplitude == sector.disk(6).orbit(10.0).amplitude
-    # of a start that was given, too
+    # this also holds for a given initial guess
     begun = model.orbit(121.0)
     near = model.orbit(121.1, start=list(begun.start))
     assert (pickle.loads(pickle.dumps(near)).start == near.start).all()

@@ -1,21 +1,24 @@
-//! The rows of a table of peaks as a terminal shows them: the worst place of every case first, equal sectors of a disk as one row.
+//! Peak tables for the terminal: the largest peak of every case first, equal sectors merged.
 
 use stickslip_study::dataset::{Column, Table, Values};
 
-/// Relative differences up to which peaks of two sectors are one: what refining them leaves.
+/// Relative difference up to which the peaks of two sectors are equal: the accuracy of peak
+/// refinement.
 const ALIKE: f64 = 1e-4;
 
 /// A peak of a case.
 struct Peak {
     row: usize,
-    /// The place, without the number of its sector, and how many sectors have it.
+    /// Place without the number of its sector.
     place: String,
     sectors: usize,
     frequency: f64,
     amplitude: f64,
 }
 
-/// The rows of a table of peaks in the order of their heights, case by case; a table of another sort is none.
+/// Sorts the rows of a table of peaks by amplitude within each case, and merges equal sectors.
+///
+/// Returns `None` if the table is not a table of peaks.
 pub(crate) fn worst_first(table: &Table) -> Option<Table> {
     let at = table.columns.iter().position(|column| column.name == "mass")?;
     let (names, frequency, amplitude) =
@@ -63,7 +66,7 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
     Some(Table { name: table.name.clone(), columns: table.columns.iter().map(picked).collect() })
 }
 
-/// The place that a name is in every sector: `blade.x` of `blade_3.x`.
+/// Returns the name of a place without its sector number: `blade.x` for `blade_3.x`.
 fn of_sector(name: &str) -> Option<String> {
     let (node, direction) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
     let (place, number) = node.rsplit_once('_')?;
@@ -99,7 +102,7 @@ mod tests {
         let shown = worst_first(&table(&given)).unwrap();
         assert_eq!(shown.texts("mass").unwrap(), ["blade, 2 sectors", "disk, 2 sectors", "b", "a"]);
         assert_eq!(shown.numbers("Ft_N").unwrap(), [1.0, 1.0, 2.0, 2.0]);
-        // sectors that differ are told apart
+        // Sectors with different peaks have separate rows.
         let differ = [(1.0, "blade_0", 50.0, 1e-3), (1.0, "blade_1", 50.0, 1.2e-3)];
         assert_eq!(worst_first(&table(&differ)).unwrap().texts("mass").unwrap(), ["blade_1", "blade_0"]);
     }

@@ -1,7 +1,7 @@
-//! Results from journals: the tables block by block, the figure, and the record, as files of one run.
+//! Assembles results from journals: the tables block by block, the figure and the record.
 //!
-//! Whatever the blocks are and whichever journals they stand in, the files are the same. Memory is that of one block, and of as many rows as the
-//! figure shows.
+//! The files do not depend on the division into blocks and journals. Memory holds one block,
+//! and as many rows as the figure shows.
 
 use crate::file::{File, Output, ReportError, Rows, file_name};
 use crate::folder::{self, Aside};
@@ -17,7 +17,7 @@ use stickslip_study::dataset::Dataset;
 use stickslip_study::run::drawn;
 use stickslip_study::thinning::Thinning;
 
-/// Why results cannot be made of journals.
+/// Reason why results cannot be assembled from journals.
 #[derive(Debug, thiserror::Error)]
 pub enum AssembleError {
     /// A file cannot be written.
@@ -28,33 +28,37 @@ pub enum AssembleError {
     Journal(#[from] JournalError),
 }
 
-/// Everything that one run has yielded: journals whose units follow each other, and what came after them in a run that was interrupted.
+/// All results of one run: consecutive journals, then the blocks that follow in an interrupted
+/// run.
 #[derive(Debug)]
 pub struct Parts<'a> {
-    /// The results as far as they were known before.
+    /// The part of the results that was known before the run.
     pub outline: &'a Dataset,
-    /// The journals, in the order of their units.
+    /// Journals in the order of their units.
     pub journals: &'a [Journal],
-    /// Blocks that no journal keeps.
+    /// Blocks that are in no journal.
     pub rest: &'a [Block],
 }
 
-/// Results that are written.
+/// Results that have been written.
 #[derive(Debug)]
 pub struct Assembled {
-    /// The results; of long tables only as many rows as the figure needs.
+    /// The results. Long tables contain only the rows that the figure needs.
     pub dataset: Dataset,
-    /// Whether it has all rows.
+    /// `true` if the dataset contains all rows.
     pub is_whole: bool,
-    /// The files.
+    /// Paths of the written files.
     pub files: Vec<PathBuf>,
 }
 
-/// Writes the chosen outputs of `study` into `out/NAME/`, as [`write_dataset`](crate::write_dataset) does. What is written bit by bit grows in
-/// the folder `aside` before.
+/// Writes the chosen outputs of `study` into `out/NAME/`.
+///
+/// The result is the same as that of [`write_dataset`](crate::write_dataset). Tables are first
+/// written incrementally to the folder `aside`.
 ///
 /// # Errors
-/// [`AssembleError`]: a file cannot be written or read; what was in the folder before stays, and the journals do.
+/// [`AssembleError`] if a file cannot be written or read. The earlier content of the folder and
+/// the journals then stay.
 pub fn assemble(
     parts: &Parts<'_>,
     study: &Study,
@@ -100,7 +104,7 @@ fn written(
     let is_whole = thinning.keeps_all();
     let (mut begun, mut names): (Vec<String>, Vec<String>) = Default::default();
     let mut sinks: Vec<(&str, Box<dyn Rows>)> = Vec::new();
-    // in the order of the outputs, as they are listed
+    // The sinks are in the order of the outputs.
     let wanted: Vec<_> = outputs.iter().filter_map(|output| output.sink).collect();
     let blocks = || {
         let kept = parts.journals.iter().flat_map(Journal::blocks);
@@ -132,14 +136,14 @@ fn written(
     let figure = drawn(study, &tables);
     let dataset = parts.outline.clone().completed(tables, figure, tally, Duration::from_secs_f64(time));
     let mut files = Vec::new();
-    // a run that was stopped before anything was finished has nothing to draw
+    // A run that was stopped before its first result has nothing to draw.
     let empty = dataset.record.interrupted && shapes.iter().all(|shape| shape.rows == 0);
     let makes = |output: &&Output| output.sink.is_none() && !(empty && FIGURES.contains(&output.name));
     for output in outputs.iter().filter(makes) {
         files.extend((output.make)(&dataset)?);
     }
     names.sort_by_key(|name| {
-        // as in memory: output by output, and in each table by table
+        // The order is the same as in memory: by output, then by table.
         let output = wanted.iter().position(|sink| name.ends_with(&format!(".{}", sink.extension)));
         let table = shapes
             .iter()

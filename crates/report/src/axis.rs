@@ -1,8 +1,8 @@
-//! Axes: the interval that one shows, the place of a value on it, its ticks and its title.
+//! Axes: range, position of a value, ticks and title.
 
 use stickslip_study::dataset::{Axis, Scale};
 
-/// Interval of an axis, finite and not empty; both ends positive if it is logarithmic.
+/// Range of an axis: finite and not empty. Both ends are positive on a logarithmic axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Range {
     pub from: f64,
@@ -10,22 +10,24 @@ pub(crate) struct Range {
     pub scale: Scale,
 }
 
-/// Values beyond this are drawn at the edge, so that differences of two of them stay finite.
+/// Larger values are drawn at the edge, so that the difference of two values stays finite.
 const LARGEST: f64 = 1e307;
-/// A range narrower than this part of its values is drawn as a constant: ticks could not tell its ends apart.
+/// A range narrower than this, relative to its values, is drawn as a constant. Tick labels
+/// could not distinguish its ends.
 const NARROWEST: f64 = 1e-12;
-/// Free space beyond the data, part of the range.
+/// Margin around the data, relative to the range.
 pub(crate) const MARGIN: f64 = 0.05;
-/// Widest logarithmic axis that the data choose, decades below the largest value: what is smaller is rounding.
+/// Maximum length of an automatic logarithmic axis, in decades below the largest value. Smaller
+/// values are rounding errors.
 const DECADES: f64 = 16.0;
 
 impl Range {
-    /// Where there are no data.
+    /// Returns the default range of an axis without data.
     pub(crate) fn unit(scale: Scale) -> Range {
         Range { from: if scale == Scale::Log { 0.1 } else { 0.0 }, to: 1.0, scale }
     }
 
-    /// The ends that a statement fixes, if they can be the ends of an axis.
+    /// Returns the range given for the axis, if it is valid.
     pub(crate) fn fixed(axis: &Axis) -> Option<Range> {
         let [from, to] = axis.range?;
         let good = from.is_finite() && to.is_finite() && from < to && (axis.scale == Scale::Linear || from > 0.0);
@@ -33,7 +35,7 @@ impl Range {
         (good && range.span().is_finite() && range.span() > 0.0).then_some(range)
     }
 
-    /// Whether the axis has a place for a value.
+    /// Returns `true` if the axis can show the value.
     pub(crate) fn takes(scale: Scale, value: f64) -> bool {
         value.is_finite() && (scale == Scale::Linear || value > 0.0)
     }
@@ -59,7 +61,8 @@ impl Range {
         Range { from: self.from.min(other.from), to: self.to.max(other.to), ..self }
     }
 
-    /// The value in the measure in which the axis is even.
+    /// Converts a value to the linear measure of the axis: the value or its logarithm to base
+    /// 10.
     pub(crate) fn measure(self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
@@ -67,17 +70,17 @@ impl Range {
         }
     }
 
-    /// Length of the axis in its measure.
+    /// Returns the length of the axis in its linear measure.
     pub(crate) fn span(self) -> f64 {
         self.measure(self.to) - self.measure(self.from)
     }
 
-    /// Where a value stands: 0 at the lower end, 1 at the upper.
+    /// Returns the relative position of a value: 0 at the lower end, 1 at the upper end.
     pub(crate) fn part(self, value: f64) -> f64 {
         (self.measure(value) - self.measure(self.from)) / self.span()
     }
 
-    /// What stands at a part of the axis: the inverse of [`Range::part`].
+    /// Returns the value at a relative position: the inverse of [`Range::part`].
     pub(crate) fn at(self, part: f64) -> f64 {
         match self.scale {
             Scale::Linear => self.from + part * (self.to - self.from),
@@ -93,7 +96,7 @@ impl Range {
         self.from.abs().max(self.to.abs())
     }
 
-    /// Widens by `margin` of the span on both ends; a constant gets a range around it.
+    /// Extends both ends by `margin` times the span. A constant gets a range around it.
     pub(crate) fn widened(self, margin: f64) -> Range {
         if self.scale == Scale::Log {
             let pad = if self.span() <= NARROWEST { 0.5 } else { margin * self.span() };
@@ -114,15 +117,18 @@ impl Range {
     }
 }
 
-/// The logarithm to base ten of a positive number, by additions, multiplications and divisions only: a figure has the
-/// same bytes on every machine, and the logarithms of their libraries differ in the last bit.
+/// Returns the logarithm to base 10 of a positive number.
 ///
-/// `log v = e log 2 + 2 atanh((m - 1)/(m + 1)) log e` for `v = m 2^e`, m between 1/√2 and √2; 13 terms leave 1e-20.
+/// The function uses additions, multiplications and divisions only, so that a figure has the
+/// same bytes on every machine. The logarithms of system libraries differ in the last bit.
+///
+/// `log v = e log 2 + 2 atanh((m - 1)/(m + 1)) log e` for `v = m 2^e`, m between 1/√2 and √2.
+/// The error after 13 terms is 1e-20.
 pub(crate) fn log10(value: f64) -> f64 {
     if value <= 0.0 || !value.is_finite() {
         return if value > 0.0 { f64::INFINITY } else { f64::NEG_INFINITY };
     }
-    // numbers too small for a full mantissa are made larger first
+    // Subnormal numbers are scaled up first, because their mantissa is short.
     let (value, shift) = if value < f64::MIN_POSITIVE { (value * (1u64 << 54) as f64, -54.0) } else { (value, 0.0) };
     let bits = value.to_bits();
     let mut exponent = ((bits >> 52) & 0x7ff) as f64 - 1023.0 + shift;
@@ -135,7 +141,7 @@ pub(crate) fn log10(value: f64) -> f64 {
     let square = s * s;
     let series = (0..13).rev().fold(0.0, |sum, k| sum * square + 1.0 / f64::from(2 * k + 1));
     let log = exponent * std::f64::consts::LOG10_2 + 2.0 * s * series * std::f64::consts::LOG10_E;
-    // the logarithm of a power of ten is whole
+    // The logarithm of a power of ten is an integer.
     let whole = log.round();
     if log != whole && (log - whole).abs() < 1e-14 * whole.abs() && power_of_ten(whole as i32) == value {
         return whole;
@@ -143,20 +149,21 @@ pub(crate) fn log10(value: f64) -> f64 {
     log
 }
 
-/// Ten to a small power, by additions and multiplications only: the inverse of [`log10`].
+/// Returns ten to a power, by additions and multiplications only: the inverse of [`log10`].
 fn exp10(power: f64) -> f64 {
     let whole = power.floor();
     let x = (power - whole) * std::f64::consts::LN_10;
-    // exp x for x < 2.4 to the last bits: 30 terms of its series
+    // For x < 2.4, the terms up to x²⁹ give exp x to the last bits.
     power_of_ten(whole as i32) * (1..30).rev().fold(1.0, |sum, k| 1.0 + sum * x / f64::from(k))
 }
 
-/// A power of ten with all its digits; zero or infinity beyond the numbers.
+/// Returns a correctly rounded power of ten, which may underflow to zero or overflow to
+/// infinity.
 pub(crate) fn power_of_ten(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(f64::INFINITY)
 }
 
-/// Ticks of an axis: where they are, what stands there, short ticks between them, and the power of ten taken out of the
+/// Ticks of an axis: positions, labels, minor ticks, and the power of ten factored out of the
 /// labels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Ticks {
@@ -166,12 +173,13 @@ pub(crate) struct Ticks {
     pub power: i32,
 }
 
-/// A logarithmic axis shorter than this has the ticks of a linear one, decades: it may hold no power of ten.
+/// A logarithmic axis with fewer decades has the ticks of a linear axis, because it may contain
+/// no power of ten.
 const SHORT: f64 = 0.7;
-/// Up to here every decade has short ticks at 2 to 9 times its power.
+/// Up to this number of decades, minor ticks are at 2 to 9 times each power of ten.
 const FINE: f64 = 9.0;
 
-/// About `count` ticks at round values inside the range.
+/// Returns about `count` ticks at round values inside the range.
 pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
     match range.scale {
         Scale::Log if range.span() >= SHORT => logarithmic(range, count),
@@ -179,7 +187,8 @@ pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
     }
 }
 
-/// The same, with the names of an axis that has such, and at whole numbers only where the values are.
+/// Returns the ticks of `axis`: its names if it has any, integers only if its values are
+/// integers.
 pub(crate) fn ticks_of(axis: &Axis, range: Range, count: f64) -> Ticks {
     if !axis.names.is_empty() {
         return named(&axis.names, range, count);
@@ -188,7 +197,7 @@ pub(crate) fn ticks_of(axis: &Axis, range: Range, count: f64) -> Ticks {
     if axis.whole && ticks.at.iter().any(|at| at.fract() != 0.0) { whole(range, count) } else { ticks }
 }
 
-/// Ticks at every whole number, every second or every fifth; wider steps are whole anyway.
+/// Places ticks at every first, second or fifth integer. Wider steps are integers anyway.
 fn whole(range: Range, count: f64) -> Ticks {
     let steps = [1.0, 2.0, 5.0];
     let step = steps.into_iter().find(|step| range.to - range.from <= step * count).unwrap_or(steps[2]);
@@ -198,10 +207,10 @@ fn whole(range: Range, count: f64) -> Ticks {
     Ticks { at, labels, minor: vec![], power: 0 }
 }
 
-/// Names stand closer than numbers: so many for each of those.
+/// Number of names per numeric tick: names may stand closer together.
 const NAMES: f64 = 2.0;
 
-/// All names, or every second, fifth, tenth … of them.
+/// Shows all names, or every second, fifth, tenth and so on.
 fn named(names: &[String], range: Range, count: f64) -> Ticks {
     let inside: Vec<usize> = (0..names.len()).filter(|i| range.contains(*i as f64)).collect();
     let steps = (0..6).flat_map(|power| [1, 2, 5].map(|digit| digit * 10usize.pow(power)));
@@ -221,10 +230,11 @@ fn linear(range: Range, count: f64) -> Ticks {
     let (first, last) = ((range.from / step - 1e-6).ceil(), (range.to / step + 1e-6).floor());
     let number = ((last - first).max(0.0) as usize).min(100);
     let at: Vec<f64> = (0..=number).map(|i| (first + i as f64) * step + 0.0).collect();
-    // five figures before the point or three zeros after it are hard to read: take a power of a thousand out
+    // Numbers with five digits before the decimal point or three zeros after it are hard to
+    // read. A power of 1000 is therefore factored out.
     let size = range.size();
     let exponent = log10(size).floor() as i32;
-    // (unless the ticks differ in their last figures only)
+    // The exception: ticks that differ only in their last digits keep their digits.
     let usual = if span < 1e-3 * size { -4..=9 } else { -2..=4 };
     let power = if usual.contains(&exponent) { 0 } else { 3 * exponent.div_euclid(3) };
     let scaled = |v: f64| scaled(v, power);
@@ -237,8 +247,10 @@ fn linear(range: Range, count: f64) -> Ticks {
     Ticks { at, labels, minor: vec![], power }
 }
 
-/// Ticks at 1, 2 and 5 times the powers of ten, at the powers, or at every second, third … of them: whatever is about
-/// `count`.
+/// Places about `count` ticks on a logarithmic axis.
+///
+/// Ticks are at 1, 2 and 5 times the powers of ten, at 1 and 3 times, at the powers, or at
+/// every n-th power.
 fn logarithmic(range: Range, count: f64) -> Ticks {
     let decades = range.span();
     let (first, last) = (log10(range.from).floor() as i32, log10(range.to).ceil() as i32);
@@ -259,19 +271,19 @@ fn logarithmic(range: Range, count: f64) -> Ticks {
         _ => vec![],
     };
     let minor = minor.into_iter().filter(|m| !at.iter().any(|v| (v - m).abs() <= 1e-9 * m)).collect();
-    // all as decimals, or all as powers: mixed they are harder to compare
+    // All labels are decimals, or all are powers: mixed labels are hard to compare.
     let plain = at.iter().all(|v| (0.999e-3..1.001e4).contains(v));
     let labels = at.iter().map(|v| if plain { decimal(*v) } else { powers(*v) }).collect();
     Ticks { at, labels, minor, power: 0 }
 }
 
-/// 0.05, 2, 1000: a round number without zeros at its end.
+/// Formats 0.05, 2 or 1000: a round number without trailing zeros.
 fn decimal(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// 10⁻⁶, 2·10⁻⁶.
+/// Formats 10⁻⁶ or 2·10⁻⁶.
 fn powers(value: f64) -> String {
     let power = (log10(value) + 1e-9).floor() as i32;
     match (value / power_of_ten(power)).round() {
@@ -280,12 +292,13 @@ fn powers(value: f64) -> String {
     }
 }
 
-/// A value in units of a power of ten.
+/// Divides a value by a power of ten.
 pub(crate) fn scaled(value: f64, power: i32) -> f64 {
-    value / 10f64.powi(power / 2) / 10f64.powi(power - power / 2) // two factors: 1e-320 has no inverse
+    // In two factors, because 1e-320 has no finite inverse.
+    value / 10f64.powi(power / 2) / 10f64.powi(power - power / 2)
 }
 
-/// A number with a true minus sign, and without the sign of a zero.
+/// Formats a number with a true minus sign, and zero without a sign.
 fn signed(text: String) -> String {
     match text.strip_prefix('-') {
         Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
@@ -294,13 +307,13 @@ fn signed(text: String) -> String {
     }
 }
 
-/// The unit of an axis, with the power of ten taken out of its numbers: `Hz`, `10⁻⁶ J`.
+/// Returns the unit of an axis with the power of ten factored out: `Hz`, `10⁻⁶ J`.
 pub(crate) fn unit(axis: &Axis, power: i32) -> String {
     let factor = if power == 0 { String::new() } else { format!("10{}", superscript(power)) };
     [factor.as_str(), axis.unit.trim()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// What an axis shows: `frequency (Hz)`; with a power of ten taken out, `energy (10⁻⁶ J)`.
+/// Returns the title of an axis: `frequency (Hz)`, or `energy (10⁻⁶ J)` with a power of ten.
 pub(crate) fn axis_title(axis: &Axis, power: i32) -> String {
     let unit = unit(axis, power);
     match (axis.quantity.trim(), unit.as_str()) {

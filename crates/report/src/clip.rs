@@ -1,9 +1,10 @@
-//! Curves inside their plot area: cut at its edges, and without the points that nobody can see.
+//! Clipping of curves to their plot area, and removal of points that make no visible
+//! difference.
 
-/// A point on the page, px.
+/// A point on the page in px.
 pub(crate) type Point = (f64, f64);
 
-/// A rectangle on the page, px.
+/// A rectangle on the page in px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Window {
     pub left: f64,
@@ -12,11 +13,12 @@ pub(crate) struct Window {
     pub bottom: f64,
 }
 
-/// Points this far outside count as inside, px: rounding must not remove a mark from the edge.
+/// Tolerance of the window in px, so that rounding does not remove a mark from the edge.
 const EDGE: f64 = 0.01;
-/// A point that lies this near to the straight line between its neighbours is left out, px: a fortieth of the line's width.
+/// Flatness tolerance in px: 1/40 of the line width. A point this close to the line is removed.
 const FLAT: f64 = 0.04;
-/// A line with more points than this is thinned column by column first: the search for flat parts is slow.
+/// A line with more points than this is first reduced column by column, because flattening is
+/// slow.
 const DENSE: usize = 4000;
 
 impl Window {
@@ -24,7 +26,7 @@ impl Window {
         x >= self.left - EDGE && x <= self.right + EDGE && y >= self.top - EDGE && y <= self.bottom + EDGE
     }
 
-    /// The pieces of a line inside the window.
+    /// Returns the pieces of a line inside the window.
     pub(crate) fn line(&self, points: &[Point]) -> Vec<Vec<Point>> {
         if points.iter().all(|p| self.contains(*p)) {
             return vec![points.to_vec()];
@@ -45,7 +47,10 @@ impl Window {
         pieces
     }
 
-    /// The part of a segment inside the window (Liang and Barsky, 1984), and whether it reaches the segment's end.
+    /// Returns the part of a segment inside the window, and `true` if it reaches the segment's
+    /// end.
+    ///
+    /// Source: Liang and Barsky (1984).
     fn segment(&self, a: Point, b: Point) -> Option<(Point, Point, bool)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0f64, 1.0f64);
@@ -67,7 +72,7 @@ impl Window {
             .then(|| (if enter > 0.0 { at(enter) } else { a }, if leave < 1.0 { at(leave) } else { b }, leave >= 1.0))
     }
 
-    /// The part of a polygon inside the window (Sutherland and Hodgman, 1974).
+    /// Returns the part of a polygon inside the window. Source: Sutherland and Hodgman (1974).
     pub(crate) fn polygon(&self, points: &[Point]) -> Vec<Point> {
         let edges: [&dyn Fn(Point) -> f64; 4] =
             [&|p| p.0 - self.left, &|p| self.right - p.0, &|p| p.1 - self.top, &|p| self.bottom - p.1];
@@ -91,12 +96,12 @@ impl Window {
     }
 }
 
-/// The line without the points that the eye cannot miss.
+/// Returns the line without the points that make no visible difference.
 pub(crate) fn visible(points: Vec<Point>) -> Vec<Point> {
     flattened(&thinned(points))
 }
 
-/// Keeps of a dense line, in every quarter of a pixel, the first and last and the extreme points.
+/// Keeps the first, last, highest and lowest point of a dense line in every quarter of a pixel.
 fn thinned(points: Vec<Point>) -> Vec<Point> {
     if points.len() <= DENSE {
         return points;
@@ -113,7 +118,9 @@ fn thinned(points: Vec<Point>) -> Vec<Point> {
     kept
 }
 
-/// Leaves out what lies within [`FLAT`] of the line through the points kept (Douglas and Peucker, 1973).
+/// Removes the points within [`FLAT`] of the line through the kept points.
+///
+/// Source: Douglas and Peucker (1973).
 fn flattened(points: &[Point]) -> Vec<Point> {
     if points.len() < 3 {
         return points.to_vec();
@@ -134,7 +141,7 @@ fn flattened(points: &[Point]) -> Vec<Point> {
     points.iter().zip(keep).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
 }
 
-/// Distance of a point from the segment between two others.
+/// Returns the distance of a point from the segment between two others.
 fn distance(p: Point, a: Point, b: Point) -> f64 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let square = dx * dx + dy * dy;
@@ -152,10 +159,10 @@ mod tests {
     #[test]
     fn a_line_that_leaves_and_returns_is_two_pieces() {
         let pieces = WINDOW.line(&[(1.0, 5.0), (3.0, 15.0), (5.0, 5.0), (8.0, 5.0)]);
-        // half way to (3, 15) the line is at the lower edge, and half way back again
+        // The line crosses the lower edge half way to (3, 15), and again half way back.
         assert_eq!(pieces, [vec![(1.0, 5.0), (2.0, 10.0)], vec![(4.0, 10.0), (5.0, 5.0), (8.0, 5.0)]]);
         assert!(WINDOW.line(&[(-5.0, 1.0), (-1.0, 9.0)]).is_empty());
-        // both ends outside, the middle inside
+        // Both ends are outside, the middle is inside.
         assert_eq!(WINDOW.line(&[(-5.0, 5.0), (15.0, 5.0)]), [vec![(0.0, 5.0), (10.0, 5.0)]]);
         let inside = [(0.0, 0.0), (10.0, 10.0)];
         assert_eq!(WINDOW.line(&inside), [inside.to_vec()]);
@@ -166,7 +173,8 @@ mod tests {
         let area = |p: &[Point]| {
             (0..p.len()).map(|i| (p[i], p[(i + 1) % p.len()])).map(|(a, b)| a.0 * b.1 - b.0 * a.1).sum::<f64>() / 2.0
         };
-        // a triangle whose lower half is below the window: of 50, three quarters lie below half of its height
+        // The lower half of the triangle is outside the window: three quarters of its area of
+        // 50.
         let triangle = [(0.0, 15.0), (10.0, 15.0), (5.0, 5.0)];
         assert!((area(&WINDOW.polygon(&triangle)).abs() - 12.5).abs() < 1e-12);
         assert!(WINDOW.polygon(&[(20.0, 1.0), (30.0, 1.0), (20.0, 9.0)]).is_empty());

@@ -1,11 +1,15 @@
-//! Colours of the figures: a palette for curves that have names, a sequential scale for curves that have values, greys.
+//! Colours of the figures: a palette for named curves, a sequential scale for values, and
+//! greys.
 //!
-//! Every colour has a partner for dark screens. The palette is that of Okabe and Ito (2008) without the yellow that
-//! vanishes on paper; its partners on dark were sought so that the nearest two are as far apart as there, for every kind
-//! of colour vision. The scale goes in equal steps of the colour space OKLab (Ottosson 2020) from a dark blue over green
-//! to a light yellow: a reader who sees only its lightness loses nothing. The tests measure all this.
+//! Every colour has a counterpart for dark screens. The palette is that of Okabe and Ito (2008)
+//! without the yellow, which is invisible on paper. Its dark counterparts keep the smallest
+//! distance between two colours for every kind of colour vision.
+//!
+//! The scale has equal steps in the colour space OKLab (Ottosson 2020), from dark blue through
+//! green to light yellow. Its lightness alone carries the value. The tests check these
+//! properties.
 
-/// Colours on white and on dark, in the order of `Series::colour`, which starts again after the last.
+/// Palette on white and on dark, in the order of `Series::colour`; the index wraps around.
 pub(crate) const PALETTE: [[&str; 2]; 7] = [
     ["#0072b2", "#2f7fc9"],
     ["#d55e00", "#ff8616"],
@@ -16,7 +20,8 @@ pub(crate) const PALETTE: [[&str; 2]; 7] = [
     ["#222222", "#fffed8"],
 ];
 
-/// The sequential scale on white and on dark, in equal steps from the smallest value to the largest.
+/// Sequential scale on white and on dark, in equal steps from the smallest to the largest
+/// value.
 const SCALE: [[&str; 2]; 17] = [
     ["#370c6f", "#6b4cae"],
     ["#30207e", "#615bbe"],
@@ -37,7 +42,7 @@ const SCALE: [[&str; 2]; 17] = [
     ["#d5bf36", "#ffea6c"],
 ];
 
-/// A colour on white and its partner on dark.
+/// A colour on white and its counterpart on dark.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Colour {
     pub light: String,
@@ -49,7 +54,7 @@ impl Colour {
         Colour { light: light.to_owned(), dark: dark.to_owned() }
     }
 
-    /// The colour of a place in the palette.
+    /// Returns a colour of the palette.
     pub(crate) fn palette(index: usize) -> Colour {
         Colour::pair(PALETTE[index % PALETTE.len()])
     }
@@ -59,12 +64,12 @@ impl Colour {
         Colour::pair(["#555555", "#b8b8b8"])
     }
 
-    /// What results are compared with.
+    /// Colour of references.
     pub(crate) fn reference() -> Colour {
         Colour::pair(["#777777", "#9a9a9a"])
     }
 
-    /// The colour at a part of the sequential scale, 0 to 1.
+    /// Returns the colour at a relative position of the sequential scale, from 0 to 1.
     pub(crate) fn sequential(part: f64) -> Colour {
         let steps = (SCALE.len() - 1) as f64;
         let place = if part.is_nan() { 0.0 } else { part.clamp(0.0, 1.0) * steps };
@@ -78,7 +83,7 @@ impl Colour {
     }
 }
 
-/// Red, green and blue of `#rrggbb`, 0 to 255; anything else is black.
+/// Returns red, green and blue of `#rrggbb`, from 0 to 255. Invalid channels are 0.
 fn channels(colour: &str) -> [f64; 3] {
     [1, 3, 5].map(|i| colour.get(i..i + 2).and_then(|h| u8::from_str_radix(h, 16).ok()).map_or(0.0, f64::from))
 }
@@ -120,7 +125,8 @@ mod tests {
         a.max(b) / a.min(b)
     }
 
-    /// Normal vision, and what protanopes, deuteranopes and tritanopes see (Machado, Oliveira, Fernandes 2009).
+    /// Normal vision, protanopia, deuteranopia and tritanopia (Machado, Oliveira, Fernandes
+    /// 2009).
     const VISION: [[[f64; 3]; 3]; 4] = [
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
@@ -135,7 +141,7 @@ mod tests {
 
     #[test]
     fn any_two_colours_of_the_palette_differ_for_every_kind_of_colour_vision() {
-        // three times the step of 0.025 that a reader tells apart side by side
+        // The limit is three times 0.025, the step that a reader distinguishes side by side.
         for dark in [0, 1] {
             for vision in 0..VISION.len() {
                 for i in 0..PALETTE.len() {
@@ -166,7 +172,7 @@ mod tests {
             let steps: Vec<f64> = lab.windows(2).map(|w| distance(w[0], w[1])).collect();
             let mean = steps.iter().sum::<f64>() / steps.len() as f64;
             assert!(steps.iter().all(|s| (s / mean - 1.0).abs() < 0.2), "{steps:?}");
-            // in grey: lighter with every step
+            // In grey, the lightness increases with every step.
             assert!(lab.windows(2).all(|w| w[1][0] - w[0][0] > 0.015), "{lab:?}");
         }
     }
@@ -177,7 +183,7 @@ mod tests {
         assert_eq!(Colour::sequential(1.0).dark, SCALE[16][1]);
         assert_eq!(Colour::sequential(2.0), Colour::sequential(1.0));
         assert_eq!(Colour::sequential(f64::NAN), Colour::sequential(0.0));
-        // half way between #370c6f and #30207e
+        // Half way between #370c6f and #30207e.
         assert_eq!(Colour::sequential(0.5 / 16.0).light, "#341677");
     }
 }

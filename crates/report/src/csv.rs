@@ -1,7 +1,7 @@
-//! Each table as `<name>.csv`: a header, then one line per row.
+//! Writes each table as `<name>.csv`: a header, then one line per row.
 //!
-//! A number is written with the fewest digits that read back as the same 64-bit value; a number that does not exist
-//! (NaN) and an unknown flag are empty cells. Same dataset, same bytes.
+//! A number has the fewest digits that read back as the same 64-bit value. NaN and unknown
+//! flags are empty cells. Equal datasets give equal bytes.
 
 use crate::file::{Output, ReportError, Rows, Sink, even};
 use rayon::prelude::*;
@@ -21,10 +21,10 @@ pub const OUTPUT: Output = Output {
 
 const SINK: Sink = Sink { extension: "csv", begin };
 
-/// Rows that one thread makes text of at a time.
+/// Number of rows that one thread converts to text at a time.
 const ROWS: usize = 1024;
 
-/// A table as CSV (RFC 4180, line feed, header first).
+/// Returns a table as CSV (RFC 4180, line feed, header first).
 /// # Errors
 /// [`ReportError::Uneven`] if the columns differ in length.
 pub fn to_csv(table: &Table) -> Result<Vec<u8>, ReportError> {
@@ -65,7 +65,7 @@ fn failed(table: &Table, reason: &dyn std::fmt::Display) -> ReportError {
 
 type Text = ::csv::Writer<Vec<u8>>;
 
-/// What `write` writes, as bytes.
+/// Returns the bytes that `write` writes.
 fn lines(table: &Table, write: impl FnOnce(&mut Text) -> ::csv::Result<()>) -> Result<Vec<u8>, ReportError> {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
     write(&mut writer).map_err(|cause| failed(table, &cause))?;
@@ -85,7 +85,7 @@ fn cells(table: &Table, rows: Range<usize>, writer: &mut Text) -> ::csv::Result<
     Ok(())
 }
 
-/// The text of one cell.
+/// Returns the text of one cell.
 pub(crate) fn cell(values: &Values, row: usize) -> String {
     let mut text = String::new();
     write_cell(values, row, &mut text);
@@ -93,7 +93,7 @@ pub(crate) fn cell(values: &Values, row: usize) -> String {
 }
 
 fn write_cell(values: &Values, row: usize, text: &mut String) {
-    // writing into a string cannot fail
+    // Writing to a string cannot fail.
     let _ = match values {
         Values::Number(v) if v[row].is_nan() => Ok(()),
         Values::Number(v) => write!(text, "{:?}", v[row]),

@@ -1,56 +1,61 @@
-//! A file of results before it is written, what makes such files, and how one reaches the disk: whole or not at all.
+//! Result files: their content in memory, the outputs that make them, and atomic writing to
+//! disk.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Table};
 
-/// One kind of output: what it is called and how its files are made.
+/// One kind of output: its name and the function that makes its files.
 #[derive(Debug)]
 pub struct Output {
-    /// Name, for flags and lists.
+    /// Name, for command-line flags and lists.
     pub name: &'static str,
-    /// What it writes, in one line.
+    /// One line that says what the output writes.
     pub summary: &'static str,
-    /// Makes the files: name inside the study's folder, and content.
+    /// Makes the files: each has a name inside the study's folder and a content.
     pub make: fn(&Dataset) -> Result<Vec<File>, ReportError>,
-    /// Writes a table row by row, for results that need not be in memory as a whole; `None` if it is no output of tables.
+    /// Writes a table row by row, for results too large for memory. `None` if the output is not
+    /// a table.
     pub sink: Option<Sink>,
-    /// Whether it is written when nobody says what.
+    /// `true` if the output is written by default.
     pub usual: bool,
 }
 
-/// Begins a file for the rows of a table, whose columns it has.
+/// Begins the file of a table in a writer. The table gives the columns; its rows are not
+/// written.
 pub type Begin = for<'a> fn(&Table, Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError>;
 
-/// A file per table, to which rows are written as they come.
+/// Writer of one file per table, to which rows are appended as they are computed.
 #[derive(Debug, Clone, Copy)]
 pub struct Sink {
-    /// What the name of the file ends in, after the name of the table and a dot.
+    /// File name extension, without the dot, after the name of the table.
     pub extension: &'static str,
-    /// Begins the file of a table with these columns, whose rows do not count, in a writer.
+    /// Begins the file of a table in a writer. The table gives the columns; its rows are not
+    /// written.
     pub begin: Begin,
 }
 
-/// The file of a table that is being written.
+/// The file of a table while it is being written.
 pub trait Rows {
-    /// Writes these rows after those before; the columns are those that it was begun with.
+    /// Appends these rows. The columns must be those that the file was begun with.
     ///
     /// # Errors
-    /// [`ReportError`]: the columns are uneven, or the writer refuses.
+    /// [`ReportError`] if the columns differ in length or the writer fails.
     fn rows(&mut self, table: &Table) -> Result<(), ReportError>;
 
-    /// Ends the file.
+    /// Finishes the file.
     ///
     /// # Errors
-    /// [`ReportError`]: the writer refuses.
+    /// [`ReportError`] if the writer fails.
     fn end(self: Box<Self>) -> Result<(), ReportError>;
 }
 
 impl Sink {
-    /// The files of all tables of a dataset.
+    /// Returns the files of all tables of a dataset.
     ///
     /// # Errors
-    /// [`ReportError`]: the columns of a table differ in length, or two tables have one name.
+    /// [`ReportError`] if the columns of a table differ in length, or if two tables have the
+    /// same name.
     pub fn files(&self, dataset: &Dataset) -> Result<Vec<File>, ReportError> {
         for (i, table) in dataset.tables.iter().enumerate() {
             if dataset.tables[..i].iter().any(|other| other.name.eq_ignore_ascii_case(&table.name)) {
@@ -61,10 +66,10 @@ impl Sink {
         dataset.tables.iter().map(file).collect()
     }
 
-    /// The file of a table.
+    /// Returns the content of the file of a table.
     ///
     /// # Errors
-    /// [`ReportError`]: its columns differ in length.
+    /// [`ReportError`] if the columns differ in length.
     pub fn file(&self, table: &Table) -> Result<Vec<u8>, ReportError> {
         let mut bytes = Vec::new();
         let mut rows = (self.begin)(table, Box::new(&mut bytes))?;
@@ -73,16 +78,16 @@ impl Sink {
         Ok(bytes)
     }
 
-    /// The name of the file of a table.
+    /// Returns the file name for a table.
     ///
     /// # Errors
-    /// [`ReportError::Name`]: the table has no name for a file.
+    /// [`ReportError::Name`] if the table's name cannot be a file name.
     pub fn file_name(&self, table: &str) -> Result<String, ReportError> {
         Ok(format!("{}.{}", file_name(table, "table")?, self.extension))
     }
 }
 
-/// Refuses columns of different length.
+/// Returns an error if the columns of a table differ in length.
 pub(crate) fn even(table: &Table) -> Result<(), ReportError> {
     let rows = table.rows();
     match table.columns.iter().find(|column| column.values.len() != rows) {
@@ -96,77 +101,78 @@ pub(crate) fn even(table: &Table) -> Result<(), ReportError> {
     }
 }
 
-/// A file before it is written.
+/// A file in memory, before it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct File {
-    /// Name inside its folder.
+    /// File name inside its folder.
     pub name: String,
-    /// The bytes.
+    /// Content in bytes.
     pub content: Vec<u8>,
-    /// Whether its folder is the one that holds the studies' folders: the same file serves them all.
+    /// `true` if the file belongs to the folder that holds the studies' folders, because all
+    /// studies share it.
     pub shared: bool,
 }
 
 impl File {
-    /// A file of this name and content in the study's folder.
+    /// Creates a file of the study's folder.
     pub fn new(name: impl Into<String>, content: impl Into<Vec<u8>>) -> File {
         File { name: name.into(), content: content.into(), shared: false }
     }
-    /// A file that all studies share, in the folder that holds theirs.
+    /// Creates a file that all studies share, in the folder that holds the studies' folders.
     pub fn shared(name: impl Into<String>, content: impl Into<Vec<u8>>) -> File {
         File { shared: true, ..File::new(name, content) }
     }
 }
 
-/// Why a result could not be written.
+/// Reason why a result could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The file system refused.
+    /// The file system returned an error.
     #[error("cannot write {}: {cause}", path.display())]
     Write {
-        /// The file or folder.
+        /// File or folder that could not be written.
         path: PathBuf,
-        /// The reason of the operating system.
+        /// Error of the operating system.
         #[source]
         cause: std::io::Error,
     },
-    /// A name that cannot be the name of a file.
+    /// The name cannot be a file name.
     #[error("`{name}` cannot name the file of a {what}: use letters, digits, `_`, `-` and `.`")]
     Name {
-        /// The name.
+        /// The rejected name.
         name: String,
-        /// What has the name.
+        /// Kind of object that has the name, such as `table`.
         what: &'static str,
     },
-    /// Two tables would be the same file.
+    /// Two tables would be written to the same file.
     #[error("two tables are named `{0}`; each needs a name of its own")]
     SameName(String),
     /// The columns of a table differ in length.
     #[error("table `{table}`: column `{column}` has {rows} rows, the first column has {expected}")]
     Uneven {
-        /// The table.
+        /// Name of the table.
         table: String,
-        /// The column that differs from the first.
+        /// Name of the column whose length differs from that of the first column.
         column: String,
-        /// Its rows.
+        /// Number of rows of this column.
         rows: usize,
-        /// The rows of the first column.
+        /// Number of rows of the first column.
         expected: usize,
     },
-    /// There is no output of this name.
+    /// No output has this name.
     #[error("there is no output `{name}`; there are: {known}")]
     UnknownOutput {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names that exist.
+        /// The names of all outputs, separated by commas.
         known: String,
     },
     /// A library could not encode a file.
     #[error("cannot make {file}: {reason}")]
     Encode {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The reason.
+        /// Error text of the library.
         reason: String,
     },
 }
@@ -177,7 +183,7 @@ impl ReportError {
     }
 }
 
-/// Writes a file unless it is there with this content.
+/// Writes a file unless it already exists with this content.
 pub(crate) fn write_once(path: &Path, content: &[u8]) -> Result<(), ReportError> {
     if std::fs::read(path).is_ok_and(|found| found == content) {
         return Ok(());
@@ -185,8 +191,10 @@ pub(crate) fn write_once(path: &Path, content: &[u8]) -> Result<(), ReportError>
     write_file(path, content).map(|_| ())
 }
 
-/// Writes one file, whole or not at all: a temporary file in the same folder, renamed when complete. Makes the folder
-/// if need be. Returns the path.
+/// Writes one file completely or not at all, and returns its path.
+///
+/// The function writes a temporary file in the same folder and renames it when it is complete.
+/// It creates the folder if necessary.
 /// # Errors
 /// [`ReportError::Write`] with the path and the cause.
 pub fn write_file(path: &Path, content: &[u8]) -> Result<PathBuf, ReportError> {
@@ -195,7 +203,7 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<PathBuf, ReportError> {
         _ => Path::new("."),
     };
     std::fs::create_dir_all(folder).map_err(|cause| ReportError::Write { path: folder.to_owned(), cause })?;
-    // the process id keeps two runs into the same folder apart
+    // The process id separates two runs that write into the same folder.
     let mut name = std::ffi::OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
     name.push(format!(".{}.part", std::process::id()));
@@ -206,13 +214,14 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<PathBuf, ReportError> {
     match written {
         Ok(()) => Ok(path.to_owned()),
         Err(cause) => {
-            let _ = std::fs::remove_file(&part); // may not exist; the first cause is the one to tell
+            // The file may not exist; the first error is the one to report.
+            let _ = std::fs::remove_file(&part);
             Err(ReportError::Write { path: path.to_owned(), cause })
         }
     }
 }
 
-/// The name itself if it can name a file in a folder on any system.
+/// Returns the name if it is a valid file name on every operating system.
 pub(crate) fn file_name<'a>(name: &'a str, what: &'static str) -> Result<&'a str, ReportError> {
     let forbidden = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
     if name.is_empty() || name.starts_with('.') || name.ends_with(['.', ' ']) || name.contains(forbidden) {

@@ -1,9 +1,12 @@
-//! A folder of results: what stands in it belongs to one run.
+//! A results folder, whose files all belong to one run.
 //!
-//! The files of a run are written aside, inside the folder, and moved in when all are complete; what an earlier run wrote is moved out
-//! before, and is put back if anything fails. Files that no run wrote stay as they are. `record.json` goes first and comes last: while it is
-//! there, the files that it lists are those of one run. A run that was interrupted does not replace one that was not: its
-//! results go beside, to `NAME.interrupted`.
+//! The files of a run are written to a temporary subfolder. When all are complete, the files of
+//! the earlier run move out and the new files move in. If a move fails, the earlier files move
+//! back. Files that no run wrote stay unchanged.
+//!
+//! `record.json` moves out first and moves in last. While it exists, the files that it lists
+//! all come from one run. An interrupted run does not replace a complete run: its results go to
+//! `NAME.interrupted`.
 
 use crate::file::{File, ReportError, file_name};
 use serde_json::Value;
@@ -12,22 +15,25 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The record of a run.
+/// File name of the record of a run.
 pub(crate) const RECORD: &str = "record.json";
 
-/// Files that every run may write beside its tables, whatever the record of an earlier one lists.
+/// Files that every run may write in addition to its tables, even if no record lists them.
 const KNOWN: [&str; 4] = [RECORD, "figure.svg", "figure.png", "figure.html"];
 
-/// What is added to the name of a folder whose results are complete, for those of an interrupted run.
+/// Suffix of the folder for an interrupted run when the folder `NAME` holds a complete run.
 const ASIDE: &str = "interrupted";
 
-/// The folder for the results of a run: `out/NAME`, or another one beside it if this run was interrupted and that one holds a whole one.
+/// Returns the folder for the results of a run.
+///
+/// The folder is `out/NAME`, or `out/NAME.interrupted` if this run was interrupted and
+/// `out/NAME` holds a complete run.
 pub(crate) fn of_run(out: &Path, name: &str, interrupted: bool) -> PathBuf {
     let folder = out.join(name);
     if interrupted && holds_whole_run(&folder) { out.join(format!("{name}.{ASIDE}")) } else { folder }
 }
 
-/// Whether a run that came to its end wrote here.
+/// Returns `true` if the folder holds the results of a complete run.
 fn holds_whole_run(folder: &Path) -> bool {
     match record(folder) {
         Some(record) => record["interrupted"] != Value::Bool(true),
@@ -39,7 +45,7 @@ fn record(folder: &Path) -> Option<Value> {
     serde_json::from_slice(&fs::read(folder.join(RECORD)).ok()?).ok()
 }
 
-/// The names of the files here that an earlier run wrote.
+/// Returns the names of the files in the folder that an earlier run wrote.
 fn written_before(folder: &Path) -> BTreeSet<String> {
     let record = record(folder).unwrap_or_default();
     let files = record["files"].as_array().into_iter().flatten().filter_map(Value::as_str);
@@ -48,28 +54,31 @@ fn written_before(folder: &Path) -> BTreeSet<String> {
     names.filter(|name| folder.join(name).is_file()).map(str::to_owned).collect()
 }
 
-/// Writes the files of a run into `folder` in place of those of an earlier one, all or none. Returns their paths.
+/// Writes the files of a run into `folder` in place of those of an earlier run, all or none.
+///
+/// Returns the paths of the files.
 ///
 /// # Errors
-/// [`ReportError`] says which file and why; what was in the folder is there as before.
+/// [`ReportError`] names the file and the cause. The content of the folder is then as before.
 pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
     Aside::new(aside(folder)).replace(folder, files)
 }
 
-/// The same, but what else the run wrote stays: these files belong to it.
+/// Replaces only these files of a run; its other files stay.
 ///
 /// # Errors
-/// As [`replace`].
+/// See [`replace`].
 pub(crate) fn exchange(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
     put(folder, files, Aside::new(aside(folder)), &BTreeSet::new)
 }
 
-/// Where files are written before they are moved in; the process id keeps two runs into the same folder apart.
+/// Returns the temporary folder for new files. The process id separates two runs that write
+/// into the same folder.
 fn aside(folder: &Path) -> PathBuf {
     folder.join(format!(".{}.part", std::process::id()))
 }
 
-/// Files that are written aside, bit by bit, on the file system of the folder that they will be moved into.
+/// Files written incrementally to a temporary folder on the file system of their destination.
 #[derive(Debug)]
 pub(crate) struct Aside {
     folder: PathBuf,
@@ -77,7 +86,7 @@ pub(crate) struct Aside {
 }
 
 impl Aside {
-    /// In a folder that is made when the first file is.
+    /// Uses `folder` as the temporary folder, which is created with the first file.
     pub fn new(folder: PathBuf) -> Aside {
         Aside { folder, written: Vec::new() }
     }
@@ -89,7 +98,7 @@ impl Aside {
     /// Begins a file.
     ///
     /// # Errors
-    /// [`ReportError`] says why it cannot be made.
+    /// [`ReportError`] gives the reason why the file cannot be created.
     pub fn file(&mut self, name: &str) -> Result<fs::File, ReportError> {
         let path = self.new_files().join(file_name(name, "result")?);
         let failed = |cause| ReportError::Write { path: path.clone(), cause };
@@ -99,18 +108,22 @@ impl Aside {
         Ok(file)
     }
 
-    /// These files, and those that were begun here and are complete now, replace those of an earlier run in `folder`, all or none. Returns the
-    /// paths, of those that were begun here first.
+    /// Moves these files and those begun here into `folder`, in place of the files of an
+    /// earlier run.
+    ///
+    /// Either all files are replaced or none. The files begun here must be complete. Returns
+    /// the paths, with those of the files begun here first.
     ///
     /// # Errors
-    /// [`ReportError`] says which file and why; what was in the folder is there as before.
+    /// [`ReportError`] names the file and the cause. The content of the folder is then as
+    /// before.
     pub fn replace(self, folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
         put(folder, files, self, &|| written_before(folder))
     }
 
-    /// Removes what was begun and is not wanted any more.
+    /// Removes the files that were begun, because they are no longer needed.
     pub fn remove(self) {
-        // what cannot be removed is no reason to fail
+        // A file that cannot be removed is not an error.
         let _ = fs::remove_dir_all(self.new_files());
         let _ = fs::remove_dir(&self.folder);
     }
@@ -155,7 +168,7 @@ fn put(
             begun.try_for_each(|(name, file)| file.sync_all().map_err(failed(&folder.join(name))))
         })
         .and_then(|()| swap(folder, &new, &old, &names, before()));
-    // only what this run has put there; what cannot be removed is no reason to fail
+    // Only files of this run are removed. A file that cannot be removed is not an error.
     let _ = fs::remove_dir_all(&old);
     drop(names);
     aside.remove();
@@ -171,7 +184,9 @@ fn write(path: &Path, file: &File) -> std::io::Result<()> {
     handle.sync_all()
 }
 
-/// Moves the old files out, and those of the same names, and the new ones in; on a failure everything back.
+/// Moves out the old files and those with the new names, then moves in the new files.
+///
+/// If a move fails, all moves are reversed.
 fn swap(
     folder: &Path,
     new: &Path,
@@ -192,7 +207,7 @@ fn swap(
     for (from, to) in outward.chain(inward) {
         if let Err(cause) = fs::rename(&from, &to) {
             for (from, to) in moves.iter().rev() {
-                let _ = fs::rename(to, from); // the first cause is the one to tell
+                let _ = fs::rename(to, from); // The first error is the one to report.
             }
             let path = if to.starts_with(old) { from } else { to };
             return Err(ReportError::Write { path, cause });
@@ -202,10 +217,11 @@ fn swap(
     Ok(files.iter().map(|name| folder.join(name)).collect())
 }
 
-/// Whether results could be written into `folder` (which need not exist yet); leaves nothing behind.
+/// Checks that results can be written into `folder`, which need not exist. Leaves no files
+/// behind.
 ///
 /// # Errors
-/// [`ReportError::Write`] with the path that is in the way and the cause.
+/// [`ReportError::Write`] with the path that prevents writing and the cause.
 pub fn check_writable(folder: &Path) -> Result<(), ReportError> {
     let mut there = folder;
     while !there.exists() {
@@ -249,14 +265,15 @@ mod tests {
         write_dataset(&samples::response(), out.path(), &Outputs::all()).unwrap();
         let folder = out.path().join("fig06");
         fs::write(folder.join("notes.txt"), "mine").unwrap();
-        // another kind of study of the same name, only tables: neither figures nor tables of the first stay
+        // A study of another kind with the same name writes only tables. No figure or table of
+        // the first stays.
         let other = Dataset { name: "fig06".into(), ..samples::hysteresis() };
         write_dataset(&other, out.path(), &only(&["csv"])).unwrap();
         assert_eq!(names(&folder), ["loops_summary.csv", "notes.txt", "record.json"]);
         assert_eq!(fs::read_to_string(folder.join("notes.txt")).unwrap(), "mine");
         let files = &record(&folder).unwrap()["files"];
         assert_eq!(*files, serde_json::json!(["loops_summary.csv", "record.json"]));
-        // a record that names files elsewhere reaches none
+        // A record that names files in other folders does not affect them.
         fs::write(folder.join(RECORD), r#"{"files": ["../fig06/notes.txt", "..", "/etc/passwd", ""]}"#).unwrap();
         assert!(written_before(&folder).iter().all(|name| name == RECORD));
     }
@@ -290,13 +307,13 @@ mod tests {
         assert!(error.contains("b.csv"), "{error}");
         assert_eq!(names(&folder), ["a.csv", "b.csv", RECORD]);
         assert_eq!(fs::read_to_string(folder.join("a.csv")).unwrap(), "old");
-        // in the middle of the moves, too: the third name is in the way only then
+        // The failure happens in the middle of the moves: only then is the third name taken.
         let new = out.path().join("new");
         let old = out.path().join("old");
         fs::create_dir_all(&new).unwrap();
         fs::create_dir_all(&old).unwrap();
         fs::write(new.join("a.csv"), "new").unwrap();
-        // the second was not written
+        // The second file was not written.
         assert!(swap(&folder, &new, &old, &["a.csv", "c.csv"], written_before(&folder)).is_err());
         assert_eq!(names(&folder), ["a.csv", "b.csv", RECORD]);
         assert_eq!(fs::read_to_string(folder.join("a.csv")).unwrap(), "old");

@@ -1,15 +1,15 @@
-//! The one font of the figures, DejaVu Sans, embedded: the width of a text does not depend on the machine.
+//! The embedded font of the figures, DejaVu Sans: text widths do not depend on the machine.
 //!
-//! DejaVu has the subscripts of `a₁`, Greek and the mathematical signs; a viewer of an SVG that lacks it falls back on
-//! [`FAMILY`], whose second choice has the same proportions.
+//! DejaVu Sans contains subscripts as in `a₁`, Greek letters and mathematical signs. An SVG
+//! viewer without it uses the next font of [`FAMILY`], Verdana, which has the same proportions.
 
 use skrifa::instance::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider};
 
-/// The fonts an SVG asks for, in order.
+/// Font family list of an SVG, in order of preference.
 pub(crate) const FAMILY: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
 
-/// Thickness of the strokes of a text.
+/// Weight of the font.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Weight {
     Regular,
@@ -23,18 +23,20 @@ pub(crate) fn data(weight: Weight) -> &'static [u8] {
     }
 }
 
-/// Width of a line of text, px.
+/// Returns the width of a line of text in px.
 pub(crate) fn width(text: &str, size: f64, weight: Weight) -> f64 {
     let Ok(font) = FontRef::new(data(weight)) else { return 0.6 * size * text.chars().count() as f64 };
     let glyphs = font.charmap();
     let metrics = font.glyph_metrics(Size::new(1000.0), LocationRef::default());
-    // a sign that DejaVu lacks is drawn by a substitute of unknown width: one em at most
+    // The viewer substitutes a character that DejaVu lacks. Its width is unknown: one em at
+    // most.
     let advance =
         |c: char| glyphs.map(c).and_then(|glyph| metrics.advance_width(glyph)).map_or(1.0, |w| f64::from(w) / 1000.0);
     size * text.chars().map(advance).sum::<f64>()
 }
 
-/// Breaks a text at its spaces into lines that fit `limit` px; a longer word is broken where it must be.
+/// Breaks a text at spaces into lines of at most `limit` px. Words longer than a line are
+/// split.
 pub(crate) fn wrap(text: &str, size: f64, weight: Weight, limit: f64) -> Vec<String> {
     let fits = |line: &str| width(line, size, weight) <= limit;
     let mut lines: Vec<String> = Vec::new();

@@ -1,12 +1,16 @@
-//! What the static and the interactive figure share: the grid of panels, ranges, the order of drawing, the legend, the
+//! Parts shared by the static and the interactive figure.
+//!
+//! These are the grid of panels, the axis ranges, the drawing order, the legend and the
 //! colours.
 
 use crate::axis::{MARGIN, Range};
 use crate::colour::Colour;
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sharing, Style};
 
-/// Columns and rows of the grid of panels: one; two side by side; two by two; then rows of three. Panels that show two or
-/// three quantities in turn, case by case, have a column for each of these.
+/// Returns the number of columns and rows of the grid of panels.
+///
+/// One panel fills the grid. Up to four panels have two columns, more have three. Panels that
+/// alternate between two or three quantities, case by case, have one column per quantity.
 pub(crate) fn grid(figure: &Figure) -> (usize, usize) {
     let panels = &figure.panels;
     let in_turn = |period: usize| {
@@ -25,7 +29,9 @@ pub(crate) fn grid(figure: &Figure) -> (usize, usize) {
     (columns, panels.len().div_ceil(columns).max(1))
 }
 
-/// The points of a series: pairs, as many as both lists have; one that its axes cannot show is not a number.
+/// Returns the points of a series, up to the length of the shorter list.
+///
+/// A point that the axes cannot show is NaN.
 pub(crate) fn points<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
     let (x_scale, y_scale) = (panel.x.scale, panel.y.scale);
     let nothing = (f64::NAN, f64::NAN);
@@ -33,28 +39,30 @@ pub(crate) fn points<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Ite
     series.x.iter().copied().zip(series.y.iter().copied()).map(move |p| if shown(&p) { p } else { nothing })
 }
 
-/// Whether a point can be drawn.
+/// Returns `true` if a point can be drawn.
 pub(crate) fn drawable((x, y): (f64, f64)) -> bool {
     x.is_finite() && y.is_finite()
 }
 
-/// The points that can be drawn.
+/// Returns the points that can be drawn.
 pub(crate) fn drawn<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
     points(panel, series).filter(|p| drawable(*p))
 }
 
-/// Lower edge of a band or foot of a bar at a point; the lower end of a logarithmic axis has no number.
+/// Returns the lower edge of a band or the foot of a bar at a point.
+///
+/// `None` means the lower end of a logarithmic axis.
 pub(crate) fn base(panel: &Panel, series: &Series, index: usize) -> Option<f64> {
     let base = series.base.get(index).copied().unwrap_or(0.0);
     Range::takes(panel.y.scale, base).then_some(base)
 }
 
-/// Whether the panel has anything to draw.
+/// Returns `true` if the panel has at least one point to draw.
 pub(crate) fn has_data(panel: &Panel) -> bool {
     panel.series.iter().any(|series| drawn(panel, series).next().is_some())
 }
 
-/// The series of a panel, those behind first.
+/// Returns the series of a panel in drawing order, background first.
 pub(crate) fn layers(panel: &Panel) -> Vec<&Series> {
     let mut series: Vec<&Series> = panel.series.iter().collect();
     series.sort_by_key(|s| match (s.style, s.emphasis) {
@@ -68,7 +76,7 @@ pub(crate) fn layers(panel: &Panel) -> Vec<&Series> {
     series
 }
 
-/// The line that is drawn: a reference is never a continuous one.
+/// Returns the line style to draw. A solid reference becomes dashed.
 pub(crate) fn line_style(series: &Series) -> Style {
     match (series.emphasis, series.style) {
         (Emphasis::Reference, Style::Solid) => Style::Dashed,
@@ -76,14 +84,14 @@ pub(crate) fn line_style(series: &Series) -> Style {
     }
 }
 
-/// The colours of a figure: by palette, or by value where there are many values.
+/// Colours of a figure: from the palette, or by value if the series have many values.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shades {
-    /// What the values mean and their range, if colours follow values.
+    /// Quantity and range of the colour scale, if colours follow values.
     pub bar: Option<(Axis, Range)>,
 }
 
-/// Up to this many values are told apart by name and by the palette.
+/// Up to this number of values, the palette and the legend distinguish the series.
 const NAMED: usize = 7;
 
 impl Shades {
@@ -104,14 +112,14 @@ impl Shades {
         let stripes = figure.panels.iter().flat_map(|panel| &panel.series).flat_map(|series| &series.shades);
         let shaded: Vec<f64> = stripes.copied().filter(|v| v.is_finite()).collect();
         let positive = values.first().is_some_and(|v| *v > 0.0);
-        // one value that is zero makes a logarithmic scale impossible, not the figure
+        // A smallest value that is not positive makes the colour scale linear.
         let axis = Axis { scale: if positive { axis.scale } else { Scale::Linear }, ..axis.clone() };
         let all = values.iter().chain(&shaded).copied();
         let range = Range::fixed(&axis).or_else(|| Range::around(all, axis.scale))?.widened(0.0);
         (values.len() > NAMED || !shaded.is_empty()).then_some((axis, range))
     }
 
-    /// The value of a series in words, if its colour shows it: `kt = 8 N/mm`.
+    /// Returns the value of a series as text if its colour shows it: `kt = 8 N/mm`.
     pub(crate) fn value(&self, series: &Series) -> Option<String> {
         let ((axis, _), value) = (self.bar.as_ref()?, series.value?);
         let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
@@ -119,7 +127,7 @@ impl Shades {
         Some(format!("{} = {rounded}{unit}", axis.quantity))
     }
 
-    /// The colour of a series.
+    /// Returns the colour of a series.
     pub(crate) fn colour(&self, series: &Series) -> Colour {
         match (&self.bar, series.value) {
             _ if series.emphasis == Emphasis::Reference => Colour::reference(),
@@ -129,10 +137,13 @@ impl Shades {
     }
 }
 
-/// A piece of a stripe: from and to where, its value.
+/// Cell of a stripe: start, end, value.
 pub(crate) type Cell = (f64, f64, f64);
 
-/// The cells of a stripe: every point has the place around it up to half way to its neighbours, points of one colour share a cell.
+/// Returns the cells of a stripe with their colours.
+///
+/// Each point occupies the interval up to half the distance to the adjacent points. Adjacent
+/// points with the same colour share a cell.
 pub(crate) fn cells(series: &Series, x: Range, shades: &Shades) -> Vec<(Cell, Colour)> {
     let Some((_, range)) = &shades.bar else { return Vec::new() };
     let count = series.x.len().min(series.shades.len());
@@ -149,10 +160,13 @@ pub(crate) fn cells(series: &Series, x: Range, shades: &Shades) -> Vec<(Cell, Co
     cells
 }
 
-/// Steps of colour that look continuous.
+/// Number of colour steps; with this number the scale looks continuous.
 const SHADES: f64 = 100.0;
 
-/// The borders of the cells of rising points, those at the ends at the points themselves; a lone point has the whole axis.
+/// Returns the borders of the cells of ascending points.
+///
+/// The first and last borders are at the first and last points. A single point occupies the
+/// whole axis.
 pub(crate) fn edges(points: &[f64], x: Range) -> Vec<f64> {
     match points {
         [] => Vec::new(),
@@ -164,29 +178,33 @@ pub(crate) fn edges(points: &[f64], x: Range) -> Vec<f64> {
     }
 }
 
-/// An entry of the legend: what all series of one label look like.
+/// Legend entry: the common appearance of all series with one label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
     pub label: String,
     pub colour: Colour,
-    /// Line style, if a line carries the label.
+    /// Line style, if a series with this label is a line.
     pub line: Option<Style>,
-    /// Whether marks carry the label.
+    /// `true` if a series with this label has marks.
     pub marks: bool,
-    /// Whether an area carries the label, a band or bars, or crosses do.
+    /// Style of the band, the bars or the crosses, if a series with this label has them.
     pub area: Option<Style>,
-    /// Whether all that carries the label is pale.
+    /// `true` if all series with this label are pale.
     pub pale: bool,
-    /// Whether it is a reference.
+    /// `true` if the label belongs to a reference.
     pub reference: bool,
 }
 
-/// Longest legend; of what is beyond only the number is told.
+/// Maximum number of legend entries. The legend states only the number of further labels.
 const MOST: usize = 24;
 
-/// The legend of a figure: every label once, in order of appearance; what has marks only and references last. A series without label or points
-/// has no entry, and one whose colour says its value has none unless its label stands for several values and is no panel's title. Also returns
-/// how many labels are left out.
+/// Returns the legend of a figure and the number of labels that it omits.
+///
+/// - Each label has one entry, in order of appearance. Labels with marks or crosses only come after
+///   the others, and references come last.
+/// - A series without a label or without points has no entry.
+/// - A series whose colour shows its value has no entry, unless its label stands for several
+///   values and is not the panel's title.
 pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
     let shades = Shades::of(figure);
     let mut entries: Vec<(Entry, Option<f64>, bool)> = Vec::new();
@@ -196,7 +214,8 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
             continue;
         }
         let colour = shades.colour(series);
-        // what stands for all values of the colours has a name
+        // References and missing points apply to all colours, so they always have a legend
+        // entry.
         let nameless = !series.emphasis.is_reference() && series.style != Style::Missing;
         let value = series.value.filter(|_| shades.bar.is_some() && nameless);
         let (line, marks, area) = match line_style(series) {
@@ -235,13 +254,14 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
     (entries, more)
 }
 
-/// Panels of one quantity share their range if none would use less than this part of it.
+/// Panels of one quantity share their range if each of them uses at least this part of it.
 const SHARE: f64 = 0.2;
-/// References count for the vertical range up to this multiple of the results: a resonance without friction would
-/// flatten the curves that matter.
+/// References extend the vertical range to at most this multiple of the results.
+///
+/// A resonance without friction would otherwise flatten the curves of interest.
 const REFERENCE_REACH: f64 = 2.0;
 
-/// Whether so many results are in a panel that they need thin lines and small marks.
+/// Returns `true` if the number of results requires thin lines and small marks.
 pub(crate) fn crowded(panel: &Panel) -> bool {
     let results = panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal && s.style != Style::Missing);
     results.count() > CROWD
@@ -250,11 +270,12 @@ pub(crate) fn crowded(panel: &Panel) -> bool {
 /// A panel with more results than this is crowded.
 const CROWD: usize = 40;
 
-/// How much of its colour a pale curve and an area keep.
+/// Opacity of pale curves and of areas.
 pub(crate) const PALE: f64 = 0.4;
 pub(crate) const AREA: f64 = 0.25;
 
-/// The axes of a panel: their ranges, and whether a panel of the same quantity has another range.
+/// Axis ranges of a panel, and flags for a range that differs from other panels of the same
+/// quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Axes {
     pub x: Range,
@@ -263,7 +284,7 @@ pub(crate) struct Axes {
     pub own_y: bool,
 }
 
-/// The axes of every panel.
+/// Returns the axes of every panel.
 pub(crate) fn axes(figure: &Figure) -> Vec<Axes> {
     let raw: Vec<Option<(Range, Range)>> = figure.panels.iter().map(extent).collect();
     let x = shared(figure, &raw, |panel| &panel.x, |pair| pair.0);
@@ -273,7 +294,7 @@ pub(crate) fn axes(figure: &Figure) -> Vec<Axes> {
         .iter()
         .zip(x.into_iter().zip(y))
         .map(|(panel, (x, y))| {
-            // a curve over a parameter fills its axis from end to end; a loop wants air around it
+            // A curve over a parameter fills its axis completely; a loop gets a margin.
             let curve = panel.series.iter().all(|series| is_curve(panel, series));
             let floor = y.scale == Scale::Linear && y.from >= 0.0 && y.from <= 0.4 * y.to && y.to > 0.0;
             let wide = y.widened(MARGIN);
@@ -299,12 +320,12 @@ pub(crate) fn axes(figure: &Figure) -> Vec<Axes> {
         .collect()
 }
 
-/// Whether two axes show the same quantity in the same unit and scale, so that a reader compares them.
+/// Returns `true` if two axes show the same quantity with the same unit and scale.
 pub(crate) fn alike(a: &Axis, b: &Axis) -> bool {
     (&a.quantity, &a.unit, a.scale) == (&b.quantity, &b.unit, b.scale)
 }
 
-/// The ranges that the data of a panel take up.
+/// Returns the ranges of the data of a panel.
 fn extent(panel: &Panel) -> Option<(Range, Range)> {
     let fixed = Range::fixed(&panel.x);
     let inside = |p: &(f64, f64)| fixed.is_none_or(|range| range.contains(p.0));
@@ -321,7 +342,7 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
     };
     let mut x = Range::around(panel.series.iter().flat_map(|s| drawn(panel, s).map(|p| p.0)), panel.x.scale)?;
     if x.scale == Scale::Linear && panel.series.iter().any(|s| s.style == Style::Bars) {
-        // the outer bars stand clear of the frame as they do of each other
+        // The distance from an outer bar to the frame equals that between two bars.
         let half = 0.5 * bar_slot(panel, x) / BAR;
         x = Range { from: x.from - half, to: x.to + half, ..x };
     }
@@ -334,13 +355,15 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
             results.union(Range { from: cut(references.from), to: cut(references.to), ..references })
         }
         (Some(results), Some(references)) => results.union(references),
-        // only outside of the fixed range is anything
+        // All data lie outside the fixed range.
         (results, references) => results.or(references).unwrap_or(Range::unit(panel.y.scale)),
     };
     Some((x, y))
 }
 
-/// Two ranges, one of them widened, so that a unit is as long on both axes of a plot so many times as wide as high.
+/// Widens one of two ranges so that a unit has the same length on both axes.
+///
+/// `aspect` is the width of the plot divided by its height.
 pub(crate) fn level(x: Range, y: Range, aspect: f64) -> (Range, Range) {
     let around = |range: Range, span: f64| {
         let middle = 0.5 * (range.from + range.to);
@@ -350,10 +373,10 @@ pub(crate) fn level(x: Range, y: Range, aspect: f64) -> (Range, Range) {
     (around(x, high * aspect), around(y, high))
 }
 
-/// Bars take this part of the smallest distance between two of them.
+/// Width of the bars relative to the smallest distance between two of them.
 const BAR: f64 = 0.8;
 
-/// Width of all bars at one abscissa, in the measure of the axis.
+/// Returns the width of all bars at one abscissa, in axis measure (logarithmic if the axis is).
 pub(crate) fn bar_slot(panel: &Panel, x: Range) -> f64 {
     let bars = panel.series.iter().filter(|s| s.style == Style::Bars);
     let mut at: Vec<f64> = bars.flat_map(|s| drawn(panel, s).map(|p| x.measure(p.0))).collect();
@@ -366,15 +389,16 @@ pub(crate) fn bar_slot(panel: &Panel, x: Range) -> f64 {
     }
 }
 
-/// Distance of rows of crosses from each other, and of the first from the lower edge, as a part of the height of a panel.
+/// Distance between rows of crosses, and from the first row to the lower edge, relative to the
+/// panel height.
 const CROSSES: f64 = 0.03;
 
-/// Where a row of crosses stands, as a part of the height of a panel.
+/// Returns the vertical position of a row of crosses, relative to the panel height.
 pub(crate) fn row_of_crosses(series: &Series) -> f64 {
     CROSSES * series.y.first().copied().unwrap_or(1.0)
 }
 
-/// Whether x never goes back (marks do not count).
+/// Returns `true` if x never decreases. Marks are always accepted.
 fn is_curve(panel: &Panel, series: &Series) -> bool {
     if matches!(series.style, Style::Marks | Style::Missing) {
         return true;
@@ -383,8 +407,10 @@ fn is_curve(panel: &Panel, series: &Series) -> bool {
     drawn(panel, series).all(|(x, _)| std::mem::replace(&mut last, x) <= x)
 }
 
-/// One range per panel; panels of the same quantity and unit share it as the figure says, so that they can be compared
-/// by eye.
+/// Returns one range per panel.
+///
+/// Panels with the same quantity and unit share a range according to `Figure::sharing`, so that
+/// a reader can compare them.
 fn shared(
     figure: &Figure,
     raw: &[Option<(Range, Range)>],
@@ -449,7 +475,7 @@ mod tests {
     fn many_values_are_told_by_colours_and_few_by_names() {
         let figure = samples::cases(400).figure;
         let (entries, more) = legend(&figure);
-        // the label that stands for many values stays
+        // The label of many values keeps its entry.
         assert_eq!(
             (entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), more),
             (vec!["peak", "free", "stuck"], 0)
@@ -462,14 +488,14 @@ mod tests {
         assert_eq!((colours.first(), colours.last()), (Some(&Colour::sequential(0.0)), Some(&Colour::sequential(1.0))));
         let few = samples::cases(7).figure;
         let masses = samples::masses().figure;
-        assert_eq!(legend(&masses), (vec![], 0)); // the panels are titled by the masses
+        assert_eq!(legend(&masses), (vec![], 0)); // The panels have the masses as titles.
         let mut untitled = masses.clone();
         untitled.panels.iter_mut().for_each(|panel| panel.title.clear());
         let names: Vec<String> = legend(&untitled).0.into_iter().map(|e| e.label).collect();
         assert_eq!(names, ["blade", "contact", "shroud"]);
         assert_eq!(Shades::of(&masses).bar.unwrap().1.part(64.0), 6.0 / 11.0);
         assert_eq!((legend(&few).0.len(), Shades::of(&few).bar), (7 + 3, None));
-        // names that are no values: the first of them, and the number of the others
+        // Without values: the first labels, and the number of further labels.
         let unnamed = Figure { varied: None, ..figure };
         let (entries, more) = legend(&unnamed);
         assert_eq!((entries.len(), more), (MOST, 400 + 3 - MOST));
@@ -510,7 +536,7 @@ mod tests {
         assert_eq!(tops(&figure(Sharing::WhereLegible, [0.2, 4.0])), [(0.21, true), (4.2, true)]);
         assert_eq!(tops(&figure(Sharing::Always, [0.2, 4.0])), [(4.2, false); 2]);
         assert_eq!(tops(&figure(Sharing::Never, [2.0, 4.0])), [(2.1, true), (4.2, true)]);
-        // a range given for one panel is no longer that of the other
+        // A fixed range of one panel does not apply to the other panel.
         let mut fixed = figure(Sharing::Always, [2.0, 4.0]);
         fixed.panels[0].y = fixed.panels[0].y.clone().between(0.0, 1.0);
         assert_eq!(tops(&fixed), [(1.0, true), (4.2, true)]);

@@ -1,4 +1,5 @@
-//! The journal of a run: what its units yielded, block after block, in a file that survives the end of the program at any instant.
+//! The journal of a run: a file of result blocks that survives an abort of the program at any
+//! time.
 //!
 //! ```text
 //! STICKJ01                                            eight bytes
@@ -8,8 +9,9 @@
 //!   payload: 2                                        all units are here: the last frame
 //! ```
 //!
-//! A frame counts if it is whole and its check holds. What follows the last such frame was torn by the end of the program and is cut off when
-//! the run goes on. A block counts as kept when the file system says that it is on the disk, and the file is still where it was.
+//! A frame is valid if it is complete and its checksum matches. A resumed run cuts off the
+//! bytes after the last valid frame, which the abort left incomplete. A block counts as kept
+//! when the file system confirms that it is on disk and the file is still at its path.
 
 mod bytes;
 mod frame;
@@ -31,33 +33,36 @@ use stickslip_study::run::Checked;
 /// Name of the file in its folder.
 pub(crate) const FILE: &str = "journal";
 const MAGIC: &[u8; 8] = b"STICKJ01";
-/// Cells of a block: a megabyte.
+/// Maximum number of cells in a block: one megabyte.
 const CELLS: usize = 131_072;
-/// After so long a block is written and brought to the disk whatever its size: what is lost to an end without warning.
+/// Interval after which a block is synchronized to disk regardless of its size. An abort loses
+/// at most the results of this interval.
 const EVERY: Duration = Duration::from_secs(1);
 /// Tags of payloads.
 const HEAD: u8 = 0;
 const BLOCK: u8 = 1;
 const END: u8 = 2;
 
-/// What a journal is of.
+/// Description of the run that a journal belongs to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// The results as far as they are known before anything is computed.
+    /// The part of the results that is known before the computation.
     pub outline: Dataset,
-    /// Units of the whole study.
+    /// Number of units of the whole study.
     pub units: usize,
-    /// The units of this run: all, or those of a shard.
+    /// Units of this run: all units, or those of a shard.
     pub range: Range<usize>,
 }
 
 impl Head {
-    /// Of a run of these units.
+    /// Describes a run of these units.
     pub fn new(checked: &Checked, range: Range<usize>, threads: usize) -> Head {
         Head { outline: checked.outline(threads), units: checked.units(), range }
     }
 
-    /// What differs between the runs that two journals are of, in words; nothing if both are parts of the same results.
+    /// Returns a description of the difference between the runs of two journals.
+    ///
+    /// Returns `None` if both belong to the same results.
     pub fn difference(&self, other: &Head) -> Option<String> {
         let (ours, theirs) = (&self.outline.record, &other.outline.record);
         let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs}, not {ours}"));
@@ -103,50 +108,50 @@ impl Head {
     }
 }
 
-/// Why a journal cannot be written or read.
+/// Reason why a journal cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
-    /// The file system refused.
+    /// The file system returned an error while writing.
     #[error("cannot write {}: {cause}; {}", path.display(), kept(*units))]
     Write {
-        /// The file.
+        /// Path of the journal.
         path: PathBuf,
-        /// The reason of the operating system.
+        /// Error of the operating system.
         #[source]
         cause: std::io::Error,
-        /// Units that are kept.
+        /// Number of units on disk.
         units: usize,
     },
-    /// Somebody took the file away.
+    /// Another program removed or replaced the file.
     #[error("{} was removed or replaced while the run went on: what it held is gone, and nothing more is written", path.display())]
     Vanished {
-        /// The file.
+        /// Path of the journal.
         path: PathBuf,
     },
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot read {}: {cause}", path.display())]
     Read {
-        /// The file.
+        /// Path of the journal.
         path: PathBuf,
-        /// The reason of the operating system.
+        /// Error of the operating system.
         #[source]
         cause: std::io::Error,
     },
-    /// It is none.
+    /// The file is not a valid journal.
     #[error("{}: {reason}", path.display())]
     Not {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Description of the error.
         reason: String,
     },
-    /// The program ended before anything was kept in it.
+    /// The program was aborted before the journal contained any data.
     #[error("{}: nothing is kept in it, begin anew", path.display())]
     Nothing {
-        /// The file.
+        /// Path of the journal.
         path: PathBuf,
     },
-    /// Another run writes there.
+    /// Another run writes to this folder.
     #[error("another run is writing into {}: wait for its end, or give this one another --out", folder.display())]
     Busy {
         /// The folder.
@@ -172,29 +177,30 @@ pub struct Journal {
     head: Head,
     /// Units whose blocks are in the file.
     units: Range<usize>,
-    /// Where the blocks stand.
+    /// Offset and payload length of each block.
     frames: Vec<(u64, u32)>,
-    /// The end of the last frame.
+    /// Offset of the end of the last frame.
     end: u64,
     pub(crate) tally: Tally,
     pub(crate) shapes: Vec<Shape>,
-    /// Wall time up to the last block, s.
+    /// Wall time up to the last block in s.
     time: f64,
-    /// Wall time of earlier runs, s, and when this one began.
+    /// Wall time of earlier runs in s, and start of this run.
     before: f64,
     begun: Instant,
     waiting: Option<Block>,
-    /// Units that are on the disk for sure.
+    /// First unit that is not confirmed on disk.
     kept: usize,
     synced: Instant,
     sealed: bool,
 }
 
 impl Journal {
-    /// A new journal in `folder`, which is made; in place of one that is there.
+    /// Creates a journal in `folder` and replaces an existing one. Creates the folder if
+    /// necessary.
     ///
     /// # Errors
-    /// [`JournalError`]: the file system refuses, or another run writes there.
+    /// [`JournalError`] if the file system fails or another run writes there.
     pub fn create(folder: &Path, head: Head) -> Result<Journal, JournalError> {
         let path = folder.join(FILE);
         let failed = |cause| JournalError::Write { path: path.clone(), cause, units: 0 };
@@ -235,10 +241,10 @@ impl Journal {
         }
     }
 
-    /// Opens a journal to go on with it; what follows its last whole frame is cut off.
+    /// Opens a journal to resume its run, and cuts off the bytes after its last valid frame.
     ///
     /// # Errors
-    /// [`JournalError`]: there is none, or another run writes there.
+    /// [`JournalError`] if there is no journal or another run writes there.
     pub fn open(folder: &Path) -> Result<Journal, JournalError> {
         let path = folder.join(FILE);
         let failed = |cause| JournalError::Write { path: path.clone(), cause, units: 0 };
@@ -250,10 +256,10 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Reads a journal and leaves it as it is.
+    /// Reads a journal without changing it.
     ///
     /// # Errors
-    /// [`JournalError`]: there is none.
+    /// [`JournalError`] if there is no journal.
     pub fn read(folder: &Path) -> Result<Journal, JournalError> {
         let path = folder.join(FILE);
         let file = File::open(&path).map_err(|cause| JournalError::Read { path: path.clone(), cause })?;
@@ -307,45 +313,48 @@ impl Journal {
         Ok(journal)
     }
 
-    /// What it is of.
+    /// Returns the description of the run.
     pub fn head(&self) -> &Head {
         &self.head
     }
 
-    /// The units that are in it.
+    /// Returns the units in the journal.
     pub fn units(&self) -> Range<usize> {
         self.units.clone()
     }
 
-    /// The first unit that is not on the disk for sure.
+    /// Returns the first unit that is not confirmed on disk.
     pub fn kept(&self) -> usize {
         self.kept
     }
 
-    /// Points by status of the units that are in it, and what else is to be said of them.
+    /// Returns the numbers of points by status, and the notes and failures, of the units in the
+    /// journal.
     pub fn tally(&self) -> &Tally {
         &self.tally
     }
 
-    /// Whether all units of its run are in it.
+    /// Returns `true` if the journal contains all units of its run.
     pub fn is_complete(&self) -> bool {
         self.units.end == self.head.range.end
     }
 
-    /// Wall time of its runs, s.
+    /// Returns the wall time of all its runs in s.
     pub fn time(&self) -> f64 {
         self.time
     }
 
-    /// The folder in which it stands.
+    /// Returns the folder of the journal.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new("."))
     }
 
-    /// Takes in the next unit; every now and then what has come together is written. Returns whether it was.
+    /// Adds the next unit. Returns `true` if the results were synchronized to disk.
+    ///
+    /// Blocks are written when they are large, and synchronized at fixed intervals.
     ///
     /// # Errors
-    /// [`JournalError`]: the file system refuses, or the file has been taken away.
+    /// [`JournalError`] if the file system fails or the file was removed.
     pub fn add(&mut self, block: Block) -> Result<bool, JournalError> {
         match &mut self.waiting {
             Some(waiting) => waiting.append(block),
@@ -361,7 +370,7 @@ impl Journal {
         Ok(late)
     }
 
-    /// Writes what waits.
+    /// Writes the waiting block.
     fn put(&mut self) -> Result<(), JournalError> {
         let Some(block) = self.waiting.take() else { return Ok(()) };
         self.time = self.before + self.begun.elapsed().as_secs_f64();
@@ -385,10 +394,10 @@ impl Journal {
         }
     }
 
-    /// Brings everything to the disk.
+    /// Writes the waiting block and synchronizes the file to disk.
     ///
     /// # Errors
-    /// [`JournalError`]: the file system refuses, or the file has been taken away.
+    /// [`JournalError`] if the file system fails or the file was removed.
     pub fn keep(&mut self) -> Result<(), JournalError> {
         self.put()?;
         self.file.sync_data().map_err(|cause| self.failed(cause))?;
@@ -398,10 +407,10 @@ impl Journal {
         Ok(())
     }
 
-    /// The same, and that nothing follows.
+    /// Synchronizes the file to disk after a final frame, which marks the journal as complete.
     ///
     /// # Errors
-    /// [`JournalError`]: the file system refuses, or the file has been taken away.
+    /// [`JournalError`] if the file system fails or the file was removed.
     pub fn seal(&mut self) -> Result<(), JournalError> {
         self.put()?;
         if !self.sealed {
@@ -411,7 +420,8 @@ impl Journal {
         self.keep()
     }
 
-    /// A file that was removed takes everything and keeps nothing.
+    /// Returns an error if the file at the path is no longer this one: a removed file accepts
+    /// writes.
     fn is_there(&self) -> Result<(), JournalError> {
         let same = || -> std::io::Result<bool> {
             let (here, there) = (self.file.metadata()?, std::fs::metadata(&self.path)?);
@@ -426,7 +436,7 @@ impl Journal {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), JournalError> {
         if let Err(cause) = self.file.write_all(bytes) {
-            // the blocks before this one are whole, and a run that goes on finds them
+            // The earlier blocks are complete, and a resumed run finds them.
             if self.file.sync_data().is_ok() {
                 self.kept = self.units.end;
             }
@@ -446,13 +456,13 @@ impl Journal {
         self.write(&bytes)
     }
 
-    /// The blocks in their order, from the file. Nothing may wait.
+    /// Reads the blocks from the file in order. No block may be waiting.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = Result<Block, JournalError>> + '_ {
         self.frames.iter().map(|(at, length)| {
             let reading = |cause| JournalError::Read { path: self.path.clone(), cause };
             let not =
                 || JournalError::Not { path: self.path.clone(), reason: "it has changed while it was read".to_owned() };
-            // a handle of its own: the other one stands where the run goes on
+            // A separate handle, because the handle in `self` stays at the end for writing.
             let mut file = File::open(&self.path).map_err(reading)?;
             file.seek(SeekFrom::Start(*at)).map_err(reading)?;
             let payload = frame(&mut file, PREFIX + u64::from(*length)).map_err(reading)?.ok_or_else(not)?;
@@ -461,7 +471,7 @@ impl Journal {
     }
 }
 
-/// One run at a time; where the file system knows no locks, the user sees to it.
+/// Allows one run at a time. On a file system without locks, the user is responsible.
 fn lock(file: &File, folder: &Path) -> Result<(), JournalError> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(JournalError::Busy { folder: folder.to_owned() }),
@@ -506,13 +516,14 @@ mod tests {
             .unwrap()
     }
 
-    /// Bit for bit, with numbers that do not exist.
+    /// Compares bit for bit, including NaN.
     fn same(journal: &Journal, expected: &[Block], what: usize) {
         let found = joined(journal.blocks().map(Result::unwrap));
         assert!(format!("{found:?}") == format!("{:?}", joined(expected.to_vec())), "{what}");
     }
 
-    /// Wherever the file ends, what stands before the torn frame is read, and the rest is computed again: nothing else comes of it.
+    /// For every truncated length, the blocks before the incomplete frame are read and the
+    /// others are computed again, with equal results.
     #[test]
     fn a_torn_journal_gives_its_whole_blocks() {
         let (out, checked) = (tempfile::tempdir().unwrap(), couple());
@@ -547,7 +558,7 @@ mod tests {
         }
     }
 
-    /// A changed byte is found, wherever it is.
+    /// A changed byte is detected at every position.
     #[test]
     fn a_changed_byte_ends_the_journal_there() {
         let (out, checked) = (tempfile::tempdir().unwrap(), couple());
@@ -588,7 +599,7 @@ mod tests {
         std::fs::remove_dir_all(&folder).unwrap();
         journal.add(all[1].clone()).unwrap();
         assert!(matches!(journal.keep(), Err(JournalError::Vanished { .. })));
-        // somebody else's journal in its place is not taken for ours
+        // The journal of another run in its place is not mistaken for this one.
         let other = Journal::create(&folder, head).unwrap();
         drop(other);
         assert!(matches!(journal.keep(), Err(JournalError::Vanished { .. })));
@@ -638,7 +649,7 @@ mod tests {
         };
         let own = head(8e4);
         assert_eq!(own.difference(&head(8e4)), None);
-        // the last digit counts
+        // A difference in the last digit is detected.
         let difference = own.difference(&head(8e4f64.next_up())).unwrap();
         assert!(difference.contains("other matrices"), "{difference}");
     }

@@ -1,6 +1,6 @@
-//! `record.json`: what was run, with which values, how it went.
+//! Writes `record.json`: the study, its values, and the outcome of the run.
 //!
-//! The wall time is the only entry that differs between two runs of the same study.
+//! Two runs of the same study differ in the wall time only.
 
 use crate::file::{File, Output, ReportError};
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -19,10 +19,10 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("record.json", to_json(dataset, &[])?)])
 }
 
-/// What a table holds, for the record.
+/// Columns and number of rows of a table, for the record.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shape {
-    /// Its columns, without rows.
+    /// The columns, without rows.
     pub header: Table,
     pub rows: usize,
 }
@@ -32,13 +32,13 @@ impl Shape {
         Shape { header: table.header(), rows: table.rows() }
     }
 
-    /// More rows of the same table.
+    /// Adds more rows of the same table.
     pub fn add(&mut self, more: Shape) {
         self.header.append(more.header);
         self.rows += more.rows;
     }
 
-    /// Rows of the table with all of its columns.
+    /// Returns these rows with all columns of the table.
     pub fn filled(&self, rows: Table) -> Table {
         let mut filled = self.header.clone();
         filled.append(rows);
@@ -46,8 +46,9 @@ impl Shape {
     }
 }
 
-/// The record of a run and what a reader of the results must know, as indented JSON with a final line feed; `files` are the names of the
-/// files that belong to the run.
+/// Returns the record of a run as indented JSON with a final line feed.
+///
+/// `files` are the names of the files that belong to the run.
 /// # Errors
 /// [`ReportError::Encode`] if a value cannot be written as JSON.
 pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportError> {
@@ -55,7 +56,7 @@ pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportErro
     with_shapes(dataset, &shapes, files)
 }
 
-/// The same, where the dataset has not all rows of its tables in memory.
+/// Returns the record of a run whose tables are not completely in memory.
 pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String]) -> Result<String, ReportError> {
     let record = &dataset.record;
     let value = serde_json::json!({
@@ -85,7 +86,7 @@ pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String])
     Ok(text + "\n")
 }
 
-/// What the cells of a column hold, so that they can be read again.
+/// Returns the type name of a column's cells, which reading the table back requires.
 pub(crate) fn sort(values: &Values) -> &'static str {
     match values {
         Values::Number(_) => "number",
@@ -95,10 +96,12 @@ pub(crate) fn sort(values: &Values) -> &'static str {
     }
 }
 
-/// The dataset as one line of JSON for other programs: what was run and how it went, and every table as a list of rows, each an object from
-/// column to value. A number or flag that does not exist is `null`.
+/// Writes the dataset as one line of JSON for other programs.
+///
+/// The object contains the record and every table as a list of rows. A row is an object from
+/// column name to value. NaN, infinity and unknown flags are `null`.
 /// # Errors
-/// `writer` fails.
+/// Returns an error if `writer` fails.
 pub fn write_dataset_json(dataset: &Dataset, writer: impl std::io::Write) -> Result<(), std::io::Error> {
     serde_json::to_writer(writer, &Whole(dataset)).map_err(std::io::Error::from)
 }
@@ -142,7 +145,7 @@ impl Serialize for Row<'_> {
         let mut map = serializer.serialize_map(Some(table.columns.len()))?;
         for column in &table.columns {
             match &column.values {
-                // NaN and infinity are no JSON
+                // JSON has neither NaN nor infinity.
                 Values::Number(v) => {
                     map.serialize_entry(&column.name, &v.get(*row).copied().filter(|value| value.is_finite()))?;
                 }

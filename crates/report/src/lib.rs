@@ -1,10 +1,14 @@
 //! Files, figures and pages from the datasets of Stickslip.
 //!
-//! A [`Dataset`] goes in; tables (`*.csv`), the record (`record.json`), a figure (`figure.svg`, `figure.png`), an
-//! interactive figure (`figure.html`), a text for the terminal or a whole report come out. Nothing here computes
-//! mechanics, needs a network, or looks at the fonts of the machine.
+//! The input is a [`Dataset`]. The outputs are:
+//! - tables (`*.csv`, `*.parquet`) and the record (`record.json`),
+//! - static figures (`figure.svg`, `figure.png`) and an interactive figure (`figure.html`),
+//! - a summary for the terminal,
+//! - a report page.
 //!
-//! The outputs are listed in [`output::TABLE`]: a new one is a new file and one line there.
+//! This crate computes no mechanics. It uses neither the network nor the fonts of the machine.
+//!
+//! [`output::TABLE`] lists the outputs. A new output is a new file and one line in that table.
 //!
 //! # Example
 //! ```no_run
@@ -16,8 +20,9 @@
 //! # }
 //! ```
 //!
-//! # From another program
-//! Units are computed one by one or in ranges, with tables in memory; whoever drives them is told of every point, and may end the run at any.
+//! # Use from another program
+//! A program can compute the units of a study one by one or in ranges and keep the tables in
+//! memory. A callback reports every finished point, and a flag stops the run at any point.
 //! ```
 //! use std::sync::Arc;
 //! use std::sync::atomic::{AtomicUsize, Ordering};
@@ -28,7 +33,7 @@
 //! let points = Arc::new(AtomicUsize::new(0));
 //! let counter = points.clone();
 //! let context = Context { finished: Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed)), ..Context::unwatched(1) };
-//! // `context.stop.store(true, …)` ends it early
+//! // `context.stop.store(true, …)` ends the run early
 //! let mut block = checked.block(0..2, &context).unwrap();
 //! block.append(checked.block(2..checked.units(), &context).unwrap());
 //! assert_eq!(points.load(Ordering::Relaxed), 964);

@@ -1,4 +1,4 @@
-//! The table of outputs, and the results of a study: all of its files or none.
+//! The table of outputs, and the function that writes all files of a study or none.
 
 use crate::file::{File, Output, ReportError, file_name, write_once};
 use crate::folder;
@@ -16,10 +16,10 @@ pub static TABLE: &[Output] = &[
     crate::html::OUTPUT,
 ];
 
-/// The outputs that are figures.
+/// Names of the outputs that are figures.
 pub(crate) const FIGURES: [&str; 3] = [crate::svg::OUTPUT.name, crate::png::OUTPUT.name, crate::html::OUTPUT.name];
 
-/// Which outputs to write.
+/// A selection of outputs to write.
 #[derive(Debug, Clone)]
 pub struct Outputs(Vec<&'static Output>);
 
@@ -30,24 +30,24 @@ impl Default for Outputs {
 }
 
 impl Outputs {
-    /// Every output of [`TABLE`].
+    /// Selects every output of [`TABLE`].
     pub fn all() -> Outputs {
         Outputs(TABLE.iter().collect())
     }
 
-    /// Those that are written when nobody says which.
+    /// Selects the default outputs.
     pub fn usual() -> Outputs {
         Outputs(TABLE.iter().filter(|output| output.usual).collect())
     }
 
-    /// The same, and those of `others`.
+    /// Returns these outputs together with `others`.
     #[must_use]
     pub fn and(&self, others: &Outputs) -> Outputs {
         let is_in = |outputs: &Outputs, output: &Output| outputs.iter().any(|known| known.name == output.name);
         Outputs(TABLE.iter().filter(|output| is_in(self, output) || is_in(others, output)).collect())
     }
 
-    /// The outputs of these names, in the order of [`TABLE`].
+    /// Selects the outputs with these names, in the order of [`TABLE`].
     /// # Errors
     /// [`ReportError::UnknownOutput`] for a name that is not in [`TABLE`].
     pub fn only<S: AsRef<str>>(names: &[S]) -> Result<Outputs, ReportError> {
@@ -58,7 +58,7 @@ impl Outputs {
         Ok(Outputs(TABLE.iter().filter(|output| names.iter().any(|name| name.as_ref() == output.name)).collect()))
     }
 
-    /// The chosen outputs.
+    /// Iterates over the selected outputs.
     pub fn iter(&self) -> impl Iterator<Item = &'static Output> + '_ {
         self.0.iter().copied()
     }
@@ -68,13 +68,17 @@ fn known() -> String {
     TABLE.iter().map(|output| output.name).collect::<Vec<_>>().join(", ")
 }
 
-/// Writes the chosen outputs of a dataset into `out/NAME/` and returns the paths of the files, in that order. Files that
-/// studies share go into `out`, unless they are there already, and are not among the paths: they are no results.
+/// Writes the selected outputs of a dataset into `out/NAME/`.
 ///
-/// The files replace those of an earlier run there, all or none; files that no run wrote stay. The record is always among them: it lists what
-/// belongs to the run. The results of an interrupted run go to `out/NAME.interrupted/` where `out/NAME/` holds a whole one.
+/// Returns the paths of the written files, in the order of the outputs. Files that several
+/// studies share go into `out`, unless they already exist there. Shared files are not results,
+/// and the returned paths do not contain them.
+///
+/// The new files replace all files of an earlier run, or none of them. Files that no run wrote
+/// stay. The record is always written, because it lists the files of the run. If `out/NAME/`
+/// holds the results of a complete run, an interrupted run writes to `out/NAME.interrupted/`.
 /// # Errors
-/// [`ReportError`] says which file and why; what was there before stays.
+/// [`ReportError`] names the file and the cause. The earlier files then stay.
 pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
     let name = file_name(&dataset.name, "study")?;
     let mut files = Vec::new();
@@ -86,7 +90,9 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
     folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
 }
 
-/// The files of a run without those that studies share, which are written, and with the record, which lists them and those that are `begun`.
+/// Writes the files that studies share, and returns the other files of the run with the record.
+///
+/// The record lists the returned files and those in `begun`, which are already on disk.
 pub(crate) fn with_record(
     dataset: &Dataset,
     shapes: &[Shape],
@@ -102,7 +108,7 @@ pub(crate) fn with_record(
     for file in files.iter_mut().filter(|file| file.name == folder::RECORD) {
         file.content = with_shapes(dataset, shapes, &names)?.into_bytes();
     }
-    // shared files first: a page must not appear before what it needs
+    // Shared files come first: a page must not appear before its script.
     for file in &shared {
         write_once(&out.join(file_name(&file.name, "result")?), &file.content)?;
     }
@@ -140,17 +146,18 @@ mod tests {
         names.sort();
         found.sort();
         assert_eq!(found, names);
-        // the script of the interactive figure stands beside the folder, once
+        // The script of the interactive figure is next to the study's folder, and is written
+        // once.
         let script = out.path().join(crate::html::script_name());
         let written = std::fs::metadata(&script).unwrap().modified().unwrap();
         write_dataset(&samples::hysteresis(), out.path(), &Outputs::all()).unwrap();
         assert_eq!(std::fs::metadata(&script).unwrap().modified().unwrap(), written);
         assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 3);
-        // one that is broken is written anew
+        // A damaged script is written again.
         std::fs::write(&script, "half a scr").unwrap();
         write_dataset(&samples::response(), out.path(), &Outputs::only(&["html"]).unwrap()).unwrap();
         assert_eq!(std::fs::read_to_string(&script).unwrap(), crate::html::script());
-        // a second run replaces the files
+        // A second run replaces the files.
         write_dataset(&samples::response(), out.path(), &Outputs::only(&["csv"]).unwrap()).unwrap();
     }
 
@@ -171,8 +178,9 @@ mod tests {
         let error = write_dataset(&samples::response(), out.path(), &Outputs::all()).unwrap_err();
         assert!(error.to_string().contains(taken.to_str().unwrap()), "{error}");
         std::fs::create_dir(out.path().join("target")).unwrap();
-        assert!(write_file(&out.path().join("target"), b"x").is_err()); // a folder has the name
-        // and the script, which is written first
+        // A folder already has this name.
+        assert!(write_file(&out.path().join("target"), b"x").is_err());
+        // The third entry is the script, which is written first.
         assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 3);
     }
 

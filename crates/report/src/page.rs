@@ -1,6 +1,8 @@
-//! A report as one page: figures beside the claims made of them, with the numbers measured and a verdict on each.
+//! A report page: figures, the claims about them, the measured numbers and a verdict on each
+//! claim.
 //!
-//! All figures share one script, a file beside the page; on paper and without it the static figures stand in their places.
+//! All figures share one script, which is a file in the folder of the page. In print, or
+//! without the script, the page shows the static figures instead.
 
 use crate::file::{ReportError, write_file, write_once};
 use crate::html::{document, fragment, script, script_name};
@@ -16,44 +18,44 @@ pub struct Page {
     pub title: String,
     /// Paragraphs before the first section.
     pub introduction: Vec<String>,
-    /// The sections, in order; the page lists them if there are several.
+    /// Sections in order. A page with several sections has a table of contents.
     pub sections: Vec<Section>,
 }
 
-/// A part of a report: text, a figure, claims, tables; each may be absent.
+/// A section of a report: text, a figure, claims, tables. Each part is optional.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Section {
-    /// Heading.
+    /// Heading of the section.
     pub heading: String,
     /// Paragraphs before the figure.
     pub paragraphs: Vec<String>,
-    /// The figure, drawn live.
+    /// The figure, shown interactively.
     pub figure: Option<Figure>,
-    /// What is claimed of the figure, with what was measured.
+    /// Claims about the figure, with measured values.
     pub claims: Vec<Claim>,
     /// Tables after the claims.
     pub tables: Vec<PageTable>,
 }
 
-/// A claim and what became of it.
+/// A claim and its verdict.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Claim {
-    /// What the source says.
+    /// Statement of the source.
     pub text: String,
-    /// What was measured, with units.
+    /// Measured values, with units.
     pub measured: String,
-    /// Whether the claim holds.
+    /// Result of the comparison.
     pub verdict: Verdict,
 }
 
-/// Whether a claim holds.
+/// Result of the comparison of a claim with measured values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
-    /// It does.
+    /// The claim holds.
     Holds,
-    /// It does within limits that `measured` names.
+    /// The claim holds within limits that `measured` names.
     HoldsWithQualification,
-    /// It does not.
+    /// The claim does not hold.
     DoesNotHold,
 }
 
@@ -61,7 +63,7 @@ impl Verdict {
     /// All verdicts.
     pub const ALL: [Verdict; 3] = [Verdict::Holds, Verdict::HoldsWithQualification, Verdict::DoesNotHold];
 
-    /// The verdict in words.
+    /// Returns the verdict as text.
     pub fn words(self) -> &'static str {
         match self {
             Verdict::Holds => "holds",
@@ -87,7 +89,7 @@ impl Verdict {
         }
     }
 
-    /// A sign beside the colour, for print and for eyes that see no difference.
+    /// Returns a sign that accompanies the colour, for print and for colour-blind readers.
     fn sign(self) -> &'static str {
         match self {
             Verdict::Holds => "✓",
@@ -97,19 +99,21 @@ impl Verdict {
     }
 }
 
-/// A table of words and numbers, already formatted.
+/// A table of formatted text and numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PageTable {
-    /// What the table shows; may be empty.
+    /// Caption of the table; may be empty.
     pub caption: String,
-    /// Heads of the columns.
+    /// Column headings.
     pub header: Vec<String>,
-    /// The rows; a missing cell stays empty.
+    /// Rows; a missing cell is shown empty.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Page {
-    /// The page as an HTML document that finds its script beside it; the same page gives the same bytes.
+    /// Returns the page as an HTML document that loads its script from its own folder.
+    ///
+    /// Equal pages give equal bytes.
     pub fn to_html(&self) -> String {
         let title = escape(&self.title);
         let mut body = format!("<header>\n<h1>{title}</h1>\n");
@@ -132,7 +136,8 @@ impl Page {
         document(&title, STYLE, &body, &script_name())
     }
 
-    /// Writes the page, whole or not at all, and the script of its figures beside it if it is not there.
+    /// Writes the page completely or not at all, and the script of its figures if it is
+    /// missing.
     /// # Errors
     /// [`ReportError::Write`] with the path and the cause.
     pub fn write(&self, path: &Path) -> Result<PathBuf, ReportError> {
@@ -140,7 +145,7 @@ impl Page {
         write_file(path, self.to_html().as_bytes())
     }
 
-    /// How many claims got this verdict.
+    /// Returns the number of claims with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         self.sections.iter().flat_map(|section| &section.claims).filter(|claim| claim.verdict == verdict).count()
     }
@@ -165,7 +170,7 @@ impl Section {
         let _ = writeln!(body, "<section id=\"section-{number}\">\n<h2>{}</h2>", escape(&self.heading));
         paragraphs(body, &self.paragraphs);
         if let Some(figure) = &self.figure {
-            // the heading names the figure; its own title only if it says something else
+            // The heading names the figure; its title appears only if it differs.
             if figure.title != self.heading && !figure.title.is_empty() {
                 let _ = writeln!(body, "<h3>{}</h3>", escape(&figure.title));
             }
@@ -198,7 +203,7 @@ impl PageTable {
     fn to_html(&self, body: &mut String) {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0).max(self.header.len());
         let cell = |row: &[String], i: usize| row.get(i).map_or(String::new(), |text| escape(text));
-        // a column of numbers is aligned at its right
+        // A column of numbers is right-aligned.
         let number =
             |text: &String| text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit() || "-−+.–".contains(c));
         let numeric: Vec<bool> =

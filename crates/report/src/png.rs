@@ -1,4 +1,4 @@
-//! The figure as pixels: the SVG drawn at twice its size with the embedded font and nothing else.
+//! Writes the figure as pixels: the SVG at twice its size, with the embedded font only.
 
 use crate::file::{File, Output, ReportError};
 use crate::font::{self, Weight};
@@ -21,7 +21,9 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("figure.png", to_png(&dataset.figure)?)])
 }
 
-/// The figure as a PNG file, twice the size of the SVG, the same on every machine.
+/// Returns the figure as a PNG file with twice the size of the SVG.
+///
+/// The image is the same on every machine.
 /// # Errors
 /// [`ReportError::Encode`] if the figure cannot be drawn, for example because it is too large.
 pub fn to_png(figure: &Figure) -> Result<Vec<u8>, ReportError> {
@@ -65,7 +67,7 @@ mod tests {
 
     #[test]
     fn text_is_drawn_without_the_fonts_of_the_machine() {
-        // dark pixels above the panels: the title
+        // The dark pixels above the panels are the title.
         let pixmap = draw(&samples::response().figure).unwrap();
         let dark = pixmap.pixels().iter().take(pixmap.width() as usize * 70).filter(|p| p.red() < 100).count();
         assert!(dark > 500, "{dark}");

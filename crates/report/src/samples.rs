@@ -1,4 +1,4 @@
-//! Datasets like those of real studies, and worse ones, for the tests.
+//! Datasets for the tests: similar to those of real studies, and extreme ones.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -45,7 +45,7 @@ pub(crate) fn all() -> Vec<Dataset> {
     ]
 }
 
-/// A ring: what its joints do over the frequency, and how it stands at one.
+/// A ring: slip of its joints over frequency, and its deflection at one frequency.
 pub(crate) fn ring() -> Dataset {
     let x: Vec<f64> = (0..=60).map(|i| 110.0 + 0.2 * f64::from(i)).collect();
     let shade = |joint: f64, x: f64| 100.0 * (-((x - 114.0 - 0.4 * joint) / 1.5).powi(2)).exp();
@@ -84,7 +84,7 @@ pub(crate) fn ring() -> Dataset {
     dataset
 }
 
-/// Response curves of two weakly coupled blades and their contact: four limits of friction.
+/// Response curves of two weakly coupled blades and their contact, for four slip limits.
 pub(crate) fn response() -> Dataset {
     let resonance =
         |f: f64, f0: f64, zeta: f64| 1.0 / ((1.0 - (f / f0).powi(2)).powi(2) + (2.0 * zeta * f / f0).powi(2)).sqrt();
@@ -168,7 +168,7 @@ pub(crate) fn hysteresis() -> Dataset {
     let mut panels = Vec::new();
     let (mut stiffness, mut amplitude, mut loss) = (vec![], vec![], vec![]);
     for kt in [2.0, 10.0] {
-        let limit = 2.0; // mN, displacements in mm
+        let limit = 2.0; // In mN; displacements are in mm.
         let mut list = Vec::new();
         for (k, a) in [1.0, 1.5, 2.5].into_iter().enumerate() {
             let slip = f64::min(2.0 * limit / kt, 2.0 * a);
@@ -209,7 +209,8 @@ pub(crate) fn hysteresis() -> Dataset {
     }
 }
 
-/// Gaps, failures, empty and constant curves, huge and tiny values, signs that files must escape.
+/// Gaps, failures, empty and constant curves, huge and tiny values, characters that need
+/// escaping.
 pub(crate) fn hostile() -> Dataset {
     let x: Vec<f64> = (0..60).map(|i| f64::from(i) / 10.0).collect();
     let gap = |i: usize| (20..26).contains(&i) || i == 40 || i == 42;
@@ -323,7 +324,8 @@ fn bare(name: &str, title: &str, panels: Vec<Panel>) -> Dataset {
     }
 }
 
-/// Overlaid response curves of this many slip limits with their peaks, between the free and the stuck one.
+/// Overlaid response curves for `count` slip limits with peaks, between the free and the stuck
+/// curve.
 pub(crate) fn cases(count: usize) -> Dataset {
     let f: Vec<f64> = (0..300).map(|i| 100.0 + 0.2 * f64::from(i)).collect();
     let curve = |f0: f64, zeta: f64| f.iter().map(|f| 0.1 * resonance(*f, f0, zeta)).collect::<Vec<f64>>();
@@ -351,7 +353,10 @@ pub(crate) fn cases(count: usize) -> Dataset {
     dataset
 }
 
-/// Two panels by mass on the same axes, coloured by twelve contact stiffnesses in equal ratios; the labels name the masses.
+/// Panels by mass on common axes, coloured by twelve contact stiffnesses in a geometric
+/// sequence.
+///
+/// The labels name the masses.
 pub(crate) fn masses() -> Dataset {
     let f: Vec<f64> = (0..300).map(|i| 100.0 + 0.2 * f64::from(i)).collect();
     let panel = |name: &str, height: f64| {
@@ -374,8 +379,9 @@ pub(crate) fn masses() -> Dataset {
     dataset
 }
 
-/// The largest of many blades and the single ones behind it on a logarithmic axis of a fixed range; percentiles of a
-/// random sample beside it.
+/// The largest of many blades over the single blades, on a logarithmic axis with a fixed range.
+///
+/// A second panel shows percentiles of a random sample.
 pub(crate) fn envelope() -> Dataset {
     let f: Vec<f64> = (0..300).map(|i| 100.0 + 0.2 * f64::from(i)).collect();
     let blades: Vec<Vec<f64>> = (0..48)
@@ -423,7 +429,7 @@ pub(crate) fn spectrum() -> Dataset {
     bare("spectrum", "Harmonics of the motion", vec![panel])
 }
 
-/// Frequency, damping and stiffness of nonlinear modes over four decades of amplitude.
+/// Frequency, damping and dissipation of nonlinear modes over four decades of amplitude.
 pub(crate) fn modes() -> Dataset {
     let a: Vec<f64> = (0..=80).map(|i| 10f64.powf(-2.0 + f64::from(i) / 20.0)).collect();
     let panel = |quantity: &str, unit: &str, y: &dyn Fn(f64) -> f64| Panel {

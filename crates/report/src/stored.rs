@@ -1,7 +1,8 @@
-//! Results read from their folder: `record.json` and the tables beside it, and the figure that the study draws of them.
+//! Reads the results of a run from their folder and draws their figure again.
 //!
-//! Numbers are written with all their digits, so that what is read is what was computed, bit for bit. A table that does not fit its record,
-//! because somebody changed it by hand, is an error with its file and line.
+//! Tables hold numbers with all digits, so the values read are bit for bit the computed ones. A
+//! table that does not match its record was changed by hand. It gives an error with file and
+//! line.
 
 use crate::file::{File, ReportError, file_name, write_once};
 use crate::folder::{self, RECORD};
@@ -11,34 +12,34 @@ use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Column, Dataset, Record, Table, Values};
 use stickslip_study::{Study, StudyError, read_stored, run};
 
-/// The kind of a dataset that compares runs; it has no study.
+/// Kind of a dataset that compares runs. Such a dataset has no study.
 pub const COMPARISON: &str = "comparison";
 
 /// The results of one run.
 #[derive(Debug, Clone)]
 pub struct Stored {
-    /// Where they are.
+    /// Folder of the results.
     pub folder: PathBuf,
     /// The study, read again from the record.
     pub study: Study,
-    /// The results, with a figure drawn anew.
+    /// The results, with a newly drawn figure.
     pub dataset: Dataset,
-    /// The record as it stands in the folder.
+    /// The record in the folder.
     record: Value,
 }
 
-/// Why results cannot be read.
+/// Reason why results cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum StoredError {
-    /// There is no record.
+    /// The folder has no record.
     #[error("there are no results in {}: it has no record.json{}", folder.display(), beside(.inside))]
     Nothing {
         /// The folder.
         folder: PathBuf,
-        /// Folders inside that have results.
+        /// Folders inside it that have results.
         inside: Vec<PathBuf>,
     },
-    /// A comparison, which has no study to draw it.
+    /// The folder holds a comparison, which has no study that could draw it.
     #[error("{} holds a comparison; name the folders of the runs that it compares", folder.display())]
     Comparison {
         /// The folder.
@@ -49,42 +50,42 @@ pub enum StoredError {
     Read {
         /// The file.
         path: PathBuf,
-        /// The reason of the operating system.
+        /// Error of the operating system.
         #[source]
         cause: std::io::Error,
     },
-    /// The record is not one.
+    /// The record is not valid.
     #[error("{}: {reason}", path.display())]
     Record {
-        /// The file.
+        /// Path of the record.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the error.
         reason: String,
     },
-    /// A table that the record lists was not written, or is gone.
+    /// The file of a table in the record does not exist.
     #[error("{} is not there, and figures are drawn from the tables: {reason}", path.display())]
     NoTable {
-        /// The file.
+        /// Path of the table.
         path: PathBuf,
-        /// Why, and what to do.
+        /// The cause, and the remedy.
         reason: &'static str,
     },
-    /// A table does not fit its record.
+    /// A table does not match its record.
     #[error("{}, line {line}: {reason}; the file was changed after the run, run the study again", path.display())]
     Table {
-        /// The file.
+        /// Path of the table.
         path: PathBuf,
-        /// The line, from 1.
+        /// Line number, from 1.
         line: u64,
-        /// What is wrong.
+        /// Description of the error.
         reason: String,
     },
     /// The study in the record cannot be read.
     #[error("{}: the study in it cannot be read: {cause}", path.display())]
     Study {
-        /// The record.
+        /// Path of the record.
         path: PathBuf,
-        /// What is wrong in the study.
+        /// Error in the study.
         cause: Box<StudyError>,
     },
 }
@@ -94,13 +95,14 @@ fn beside(inside: &[PathBuf]) -> String {
     if names.is_empty() { String::new() } else { format!("; there are results in {}", names.join(", ")) }
 }
 
-/// Folders that are named to somebody who has named the one above them.
+/// Maximum number of subfolders with results that an error message names.
 const MOST_INSIDE: usize = 5;
 
 /// Reads the results in `folder`.
 ///
 /// # Errors
-/// [`StoredError`]: there are none, they are of a newer version, or a table does not fit its record.
+/// [`StoredError`] if there are no results, if a newer version wrote them, or if a table does
+/// not match its record.
 pub fn read(folder: &Path) -> Result<Stored, StoredError> {
     let path = folder.join(RECORD);
     if !path.is_file() {
@@ -162,16 +164,18 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
     Ok(Stored { folder: folder.to_owned(), study, dataset, record })
 }
 
-/// A version as numbers, for comparison.
+/// Splits a version into numbers for comparison.
 fn numbers(version: &str) -> Vec<u64> {
     let release = version.split(['-', '+']).next().unwrap_or(version);
     release.split('.').map(|part| part.parse().unwrap_or(0)).collect()
 }
 
-/// The study of a record, which was found at `path`: its text, the values from outside the file, the method from outside the file.
+/// Reads the study of a record: its text, its overrides and the method set on the command line.
+///
+/// `path` is the path of the record, for error messages.
 ///
 /// # Errors
-/// [`StoredError`]: there is none, or it cannot be read.
+/// [`StoredError`] if the record has no study or the study cannot be read.
 pub fn study_of(stored: &Value, path: &Path) -> Result<Study, StoredError> {
     let wrong = |reason: &str| StoredError::Record { path: path.to_owned(), reason: reason.to_owned() };
     let (Some(name), Some(text)) = (stored["name"].as_str(), stored["file"].as_str()) else {
@@ -186,7 +190,7 @@ pub fn study_of(stored: &Value, path: &Path) -> Result<Study, StoredError> {
     }
 }
 
-/// One table, against what the record says of it.
+/// Reads one table and compares it with the record.
 fn table(
     folder: &Path,
     entry: &Value,
@@ -247,7 +251,7 @@ fn table(
     Ok(Table { name: name.to_owned(), columns })
 }
 
-/// What is wrong with the header of a table.
+/// Compares the header of a table with the record. The error describes the difference.
 fn header(names: &[String], cells: &::csv::StringRecord) -> Result<(), String> {
     if let Some((i, (cell, name))) = cells.iter().zip(names).enumerate().find(|(_, (cell, name))| cell != name) {
         return Err(format!("column {} is `{cell}`, it was `{name}`", i + 1));
@@ -268,7 +272,7 @@ fn empty(sort: &str) -> Option<Values> {
     })
 }
 
-/// Adds a cell, or says what it ought to be.
+/// Adds a cell, or returns the name of the expected type.
 fn push(values: &mut Values, cell: &str) -> Result<(), &'static str> {
     match values {
         Values::Number(v) if cell.is_empty() => v.push(f64::NAN),
@@ -286,10 +290,12 @@ fn push(values: &mut Values, cell: &str) -> Result<(), &'static str> {
 }
 
 impl Stored {
-    /// Writes the figure in place of the one in the folder; tables stay, and the record lists what is there. Returns the figure's files.
+    /// Replaces the figure in the folder and returns the figure's files.
+    ///
+    /// The tables stay. The record then lists the figure's files as well.
     ///
     /// # Errors
-    /// [`ReportError`] says which file and why; what was there before stays.
+    /// [`ReportError`] names the file and the cause. The earlier files then stay.
     pub fn write_figure(&self, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
         let mut files = Vec::new();
         for output in outputs.iter().filter(|output| FIGURES.contains(&output.name)) {
@@ -308,7 +314,7 @@ impl Stored {
         let text = serde_json::to_string_pretty(&record).map_err(|e| ReportError::encode(RECORD, e))?;
         files.push(File::new(RECORD, text + "\n"));
         let above = match self.folder.parent() {
-            // a folder without a name, such as `..`, has its parent elsewhere
+            // A path without a file name, such as `..`, has its parent elsewhere.
             Some(above) if self.folder.file_name().is_some() => above.to_owned(),
             _ => self.folder.join(".."),
         };
@@ -320,13 +326,15 @@ impl Stored {
         Ok(written)
     }
 
-    /// The values from outside the file with which the study was run.
+    /// Returns the overrides of the study's values with which the run was started.
     pub fn overrides(&self) -> Vec<(String, String)> {
         serde_json::from_value(self.record["study"]["set"].clone()).unwrap_or_default()
     }
 
-    /// Draws the figure as another state of the study file says, with its title and its `[figure]`. Returns whether that file still states
-    /// what was computed.
+    /// Draws the figure with the title and the `[figure]` table of another version of the study
+    /// file.
+    ///
+    /// Returns `true` if that version still describes the stored results.
     pub fn draw_like(&mut self, like: &Study) -> bool {
         let cases = |study: &Study| study.resolved()["cases"].take();
         let same = like.kind().name == self.study.kind().name && cases(like) == cases(&self.study);
@@ -346,7 +354,7 @@ mod tests {
     use stickslip_study::run::Context;
     use tempfile::TempDir;
 
-    /// One mass that rubs on the ground.
+    /// One mass with friction to the ground.
     const STUDY: &str = r#"
 schema = 1
 title = "Rubbing"
@@ -368,7 +376,7 @@ on = "body"
 amplitude = "2 N"
 "#;
 
-    /// What can be asked of it, one of every kind.
+    /// One study of every kind.
     const KINDS: [&str; 7] = [
         "kind = \"response\"\nfrequency = { from = \"14 Hz\", to = \"19 Hz\", points = 9 }\nvary = { Ft = [\"1 N\", \"2 N\"] }",
         "kind = \"orbit\"\nfrequency = \"16.5 Hz\"\nsamples = 24",
@@ -400,7 +408,7 @@ amplitude = "2 N"
             let stored = read(&out.path().join("rub")).unwrap();
             assert!(!dataset.figure.panels.is_empty(), "{kind}");
             assert_eq!(crate::svg::to_svg(&stored.dataset.figure), crate::svg::to_svg(&dataset.figure));
-            // a number that does not exist equals none, its cell does
+            // Comparing numbers would fail for NaN; comparing cells does not.
             assert_eq!(stored.dataset.tables.len(), dataset.tables.len());
             for (a, b) in stored.dataset.tables.iter().zip(&dataset.tables) {
                 assert_eq!(crate::csv::to_csv(a).unwrap(), crate::csv::to_csv(b).unwrap(), "{kind}");
@@ -420,7 +428,7 @@ amplitude = "2 N"
         assert_eq!(files, [folder.join("figure.svg")]);
         let linear = fs::read_to_string(&files[0]).unwrap();
         assert!(linear.contains("</svg>"));
-        // the same record, bit for bit
+        // The record is the same, bit for bit.
         assert_eq!(
             [fs::read(folder.join("curve.csv")).unwrap(), fs::read(folder.join("record.json")).unwrap()],
             before
@@ -433,7 +441,7 @@ amplitude = "2 N"
         let record: Value = serde_json::from_slice(&fs::read(folder.join("record.json")).unwrap()).unwrap();
         let listed = serde_json::json!(["curve.csv", "peaks.csv", "figure.svg", "record.json", "figure.png"]);
         assert_eq!(record["files"], listed);
-        // a model that has changed is told
+        // `draw_like` reports a changed model.
         assert!(!stored.draw_like(&read_study("rub.toml", &text.replace("1 kg", "2 kg"), &[]).unwrap()));
     }
 
@@ -506,7 +514,7 @@ amplitude = "2 N"
             let stored = read(&folder).unwrap();
             for (t, table) in stored.dataset.tables.iter().enumerate() {
                 for column in 0..table.columns.len() {
-                    // the record and the table agree, but are of no run
+                    // The record and the table agree, but they belong to no possible run.
                     let mut cut = table.clone();
                     cut.columns.remove(column);
                     let mut tables = stored.dataset.tables.clone();

@@ -1,7 +1,9 @@
-//! A run whose results go to the disk while it goes on, which a later run can take up, and of which a part may be computed elsewhere.
+//! Runs that write their results to disk while they compute, can be resumed, and can be split
+//! into shards.
 //!
-//! While the run of `NAME` goes on, its [`Journal`] stands in `out/NAME.running/`; [`assemble`](crate::assemble::assemble) makes the results of it.
-//! The journal of a shard stays, in `out/NAME.shard-3-of-16/`, until all are [`merged`].
+//! A run of `NAME` keeps its [`Journal`] in `out/NAME.running/`.
+//! [`assemble`](crate::assemble::assemble) makes the results from it. The journal of a shard
+//! stays in `out/NAME.shard-3-of-16/` until all shards are [`merged`].
 
 use crate::file::{ReportError, file_name};
 use crate::journal::{FILE, Head, Journal, JournalError};
@@ -12,20 +14,20 @@ use std::str::FromStr;
 use stickslip_study::block::Block;
 use stickslip_study::run::{Checked, Context};
 
-/// Part `number` of `of` of the units of a study.
+/// One of several parts of the units of a study: number and total.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     number: usize,
     of: usize,
 }
 
-/// Most shards of a study.
+/// Maximum number of shards of a study.
 const MOST_SHARDS: usize = 1_000_000;
 
 impl FromStr for Shard {
     type Err = String;
 
-    /// From `3/16`.
+    /// Parses a shard such as `3/16`.
     fn from_str(text: &str) -> Result<Shard, String> {
         let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
         match parts {
@@ -44,7 +46,9 @@ impl fmt::Display for Shard {
 }
 
 impl Shard {
-    /// Its units, of so many; none if there are fewer units than shards.
+    /// Returns the range of units of this shard when the study has `all` units.
+    ///
+    /// The range can be empty if there are fewer units than shards.
     ///
     /// # Example
     /// ```
@@ -63,73 +67,74 @@ impl Shard {
     }
 }
 
-/// Where a run begins.
+/// Unit at which a run starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// At the first unit; an unfinished run that took long is not thrown away.
+    /// Starts at the first unit, but does not discard a long unfinished run.
     First,
-    /// At the first unit, whatever is there.
+    /// Starts at the first unit and discards any earlier journal.
     Anew,
-    /// Where an unfinished run has stopped; at the first unit if there is none.
+    /// Resumes an unfinished run. Starts at the first unit if there is none.
     Resume,
 }
 
-/// An unfinished run of so many seconds is not thrown away without a word.
+/// An unfinished run of at least this many seconds is discarded only on request.
 const WORTH: f64 = 60.0;
 
-/// Why a run cannot begin, or ends.
+/// Reason why a run cannot start, or why it ends.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
-    /// The journal.
+    /// The journal cannot be used.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// The name of the study names no folder.
+    /// The name of the study cannot be a folder name.
     #[error(transparent)]
     Name(#[from] ReportError),
-    /// What is there is of another run.
+    /// The journal in the folder belongs to a different run.
     #[error(
         "{} cannot be gone on with: {difference}. Run that again, or begin anew without --resume{}",
         folder.display(),
         if *long { " and with --restart" } else { "" }
     )]
     Other {
-        /// The folder.
+        /// Folder of the journal.
         folder: PathBuf,
-        /// What differs.
+        /// Description of the difference.
         difference: String,
-        /// Whether it took long.
+        /// `true` if the earlier run took long.
         long: bool,
     },
-    /// What is there took long.
+    /// The folder holds a long unfinished run.
     #[error(
         "{} holds {units} of {of} units of an earlier run, {minutes:.0} minutes of work: go on with --resume, or throw it away with --restart",
         folder.display()
     )]
     Unfinished {
-        /// The folder.
+        /// Folder of the journal.
         folder: PathBuf,
-        /// Units that are kept.
+        /// Number of units in the journal.
         units: usize,
-        /// Of so many.
+        /// Number of units of the run.
         of: usize,
-        /// What they took.
+        /// Computing time of the units in the journal, in minutes.
         minutes: f64,
     },
 }
 
-/// The folder of the journal of a run of the study `name`.
+/// Returns the journal folder of a run of the study `name`.
 ///
 /// # Errors
-/// [`ReportError::Name`]: it names no folder.
+/// [`ReportError::Name`] if the name cannot be a folder name.
 pub fn folder(out: &Path, name: &str, shard: Option<Shard>) -> Result<PathBuf, ReportError> {
     let name = file_name(name, "study")?;
     Ok(out.join(shard.map_or_else(|| format!("{name}.running"), |shard| shard.folder(name))))
 }
 
-/// Opens the journal of a run, or begins one.
+/// Opens the journal of a run, or creates one.
 ///
 /// # Errors
-/// [`StreamError`]: the file system refuses, another run is under way, or what is there is of another run.
+/// [`StreamError`] if the file system fails, if another run is in progress, or if the journal
+/// belongs to a different run.
 pub fn begin(
     checked: &Checked,
     out: &Path,
@@ -166,11 +171,14 @@ pub fn begin(
     }
 }
 
-/// Computes what is missing in a journal. Returns what a run that was stopped has yielded beyond the first unit that it did not finish;
-/// `kept` is told whenever more is on the disk for sure.
+/// Computes the missing units of a journal.
+///
+/// If the run is stopped, the result holds the blocks from the first unfinished unit on. The
+/// function calls `kept` whenever further units are safely on disk.
 ///
 /// # Errors
-/// [`StreamError`]: the study cannot be computed, or the file system refuses; what was kept before stays.
+/// [`StreamError`] if the study cannot be computed or the file system fails. Earlier units
+/// stay.
 pub fn compute(
     checked: &Checked,
     journal: &mut Journal,
@@ -200,63 +208,65 @@ pub fn compute(
     Ok(rest.into_iter().collect())
 }
 
-/// Why parts cannot be joined.
+/// Reason why shards cannot be merged.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
     /// A journal cannot be read.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// There is none.
+    /// The folder contains no shard.
     #[error("there is no part of a study in {}: name the folders that `stickslip run --shard` has written", .0.display())]
     Nothing(PathBuf),
-    /// A part is of another run.
+    /// A shard belongs to a different run.
     #[error("{} does not belong to {}: {difference}", folder.display(), first.display())]
     Other {
-        /// The folder.
+        /// Folder of the shard.
         folder: PathBuf,
-        /// What it is compared with.
+        /// Folder of the shard it is compared with.
         first: PathBuf,
-        /// What differs.
+        /// Description of the difference.
         difference: String,
     },
-    /// A part did not end.
+    /// A shard is unfinished.
     #[error("{} is unfinished, {units} of its {of} units are there: run it again with --resume", folder.display())]
     Unfinished {
-        /// The folder.
+        /// Folder of the shard.
         folder: PathBuf,
-        /// Units that are kept.
+        /// Number of units in the journal.
         units: usize,
-        /// Of so many.
+        /// Number of units of the shard.
         of: usize,
     },
-    /// Two parts have the same units.
+    /// Two shards contain the same unit.
     #[error("{} and {} both have unit {unit}: name each part once", a.display(), b.display())]
     Overlap {
-        /// A folder.
+        /// Folder of the first shard.
         a: PathBuf,
-        /// Another one.
+        /// Folder of the second shard.
         b: PathBuf,
-        /// The first unit that both have, from 1.
+        /// First common unit, from 1.
         unit: usize,
     },
-    /// A part is missing.
+    /// Some units are in no shard.
     #[error("units {} to {to} of {units} are in none of the parts{after}: run the shard that has them, or name its folder", from + 1)]
     Missing {
-        /// First unit that is missing, from 0.
+        /// First missing unit, from 0.
         from: usize,
-        /// Where the missing ones end.
+        /// End of the missing units (exclusive).
         to: usize,
-        /// Units of the study.
+        /// Number of units of the study.
         units: usize,
-        /// After which part, in words.
+        /// Text that names the preceding shard; may be empty.
         after: String,
     },
 }
 
-/// The parts of one study, in their order: complete, each once, none missing. Of a folder that is no part the parts inside it are taken.
+/// Returns the shards of one study in order. Together they contain each unit exactly once.
+///
+/// For a folder without a journal, the function reads the shards inside it.
 ///
 /// # Errors
-/// [`MergeError`]: they are not the parts of one run.
+/// [`MergeError`] if the shards are not the complete parts of one run.
 pub fn merged(folders: &[PathBuf]) -> Result<Vec<Journal>, MergeError> {
     let mut parts = Vec::new();
     for folder in folders {
@@ -284,7 +294,7 @@ pub fn merged(folders: &[PathBuf]) -> Result<Vec<Journal>, MergeError> {
     let (mut reached, mut last): (usize, Option<PathBuf>) = (0, None);
     let after =
         |last: &Option<PathBuf>| last.as_ref().map_or(String::new(), |last| format!(", after {}", last.display()));
-    // a part without units belongs anywhere
+    // A shard without units fits anywhere.
     for part in parts.iter().filter(|part| !part.units().is_empty()) {
         let range = part.units();
         match &last {
@@ -304,7 +314,7 @@ pub fn merged(folders: &[PathBuf]) -> Result<Vec<Journal>, MergeError> {
     Ok(parts)
 }
 
-/// The folder itself if it has a journal, else those inside that have.
+/// Returns the folder if it has a journal, otherwise the folders inside it that have one.
 fn inside(folder: &Path) -> Vec<PathBuf> {
     if folder.join(FILE).is_file() {
         return vec![folder.to_owned()];

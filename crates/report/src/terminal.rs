@@ -1,4 +1,4 @@
-//! A dataset for the terminal: what was computed, the small tables, what failed, where the files are.
+//! Summary of a dataset for the terminal: small tables, points, notes, failures and file names.
 
 use crate::answers::worst_first;
 use crate::stored::COMPARISON;
@@ -9,34 +9,37 @@ use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Column, Dataset, Table, Values};
 use stickslip_study::units;
 
-/// How the text is made.
+/// Format of the text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Terminal {
-    /// Whether to use colours (ANSI escape sequences).
+    /// `true` to use colours (ANSI escape sequences).
     pub colour: bool,
-    /// Characters in a line, if sentences are to be broken between words and tables to be made narrower.
+    /// Line width in characters. `None` neither wraps sentences nor narrows tables below the
+    /// default.
     pub width: Option<usize>,
 }
 
-/// Tables longer than this are left to their files, or cut if they hold the main numbers of a study.
+/// Longer tables are not shown; a table with main results is cut to this number of rows.
 const ROWS: usize = 20;
-/// Tables with the main numbers: these, and all whose names end in `_summary`.
+/// Names of the tables with main results, in addition to all names that end in `_summary`.
 const MAIN: [&str; 6] = ["summary", "peaks", "optimum", "turns", "orbits", "differences"];
-/// Widest table, in characters, where the width of a line is unknown or larger.
+/// Maximum width of a table in characters.
 const WIDTH: usize = 120;
-/// Narrowest line that is taken seriously.
+/// Minimum line width in characters.
 const NARROWEST: usize = 40;
-/// Columns that a table loses first where it is too wide: evidence, which `record.json` and the file keep.
+/// Columns that a wide table loses first. `record.json` and the table's file keep these error
+/// measures.
 const EVIDENCE: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
-/// Notes printed; of more than these only the number is told.
+/// Maximum number of printed notes. Only the number of further notes is printed.
 const NOTES: usize = 8;
-/// Headings and words longer than this are cut in their middle where a table is too wide: more than any of Stickslip's own.
+/// Headings and texts longer than this lose their middle in a wide table. All names that
+/// Stickslip defines are shorter.
 const LONG: usize = 28;
-/// Failures named one by one; of more than these only the number is told.
+/// Maximum number of printed failures. Only the number of further failures is printed.
 const FAILURES: usize = 5;
 
 impl Terminal {
-    /// The text, with a final line feed. `files` are the paths that were written; none if nothing was.
+    /// Returns the text with a final line feed. `files` are the paths of the written files.
     pub fn text(self, dataset: &Dataset, files: &[PathBuf]) -> String {
         let mut out = String::new();
         for line in self.wrapped(&clean(&dataset.title), "") {
@@ -61,7 +64,7 @@ impl Terminal {
         let points = dataset.record.points.iter().map(|(status, count)| format!("{count} {}", clean(status)));
         let points = points.collect::<Vec<_>>().join(", ");
         let time = duration(dataset.record.wall_time_s);
-        // a comparison has no points of its own
+        // A comparison has no points.
         if dataset.kind != COMPARISON {
             let _ = writeln!(
                 out,
@@ -74,7 +77,7 @@ impl Terminal {
                 }
             );
         }
-        // warnings have been said on standard error
+        // Warnings were already printed on standard error.
         let notes: Vec<&String> = dataset.notes.iter().filter(|note| !note.starts_with("warning")).collect();
         for note in notes.iter().take(NOTES) {
             for line in self.wrapped(&format!("note: {}", clean(note)), "      ") {
@@ -91,7 +94,7 @@ impl Terminal {
                     Some(rest) => writeln!(out, "{}{rest}", self.paint("31", "failed")),
                     None => writeln!(out, "{line}"),
                 }
-                .unwrap_or(()); // writing into a string cannot fail
+                .unwrap_or(()); // Writing to a string cannot fail.
             }
         }
         if let Some(more @ 1..) = dataset.failures.len().checked_sub(FAILURES) {
@@ -106,13 +109,14 @@ impl Terminal {
         out
     }
 
-    /// Where files are: the folder once, then the names.
+    /// Returns the location of files: each folder once, then the file names.
     pub fn files(self, files: &[PathBuf]) -> String {
         places(files)
     }
 
-    /// A text in lines no longer than the width, broken between words; all but the first begin with `indent`. A longer
-    /// word stands alone.
+    /// Wraps a text between words to the line width. Lines after the first start with `indent`.
+    ///
+    /// A word longer than a line has a line alone.
     fn wrapped(self, text: &str, indent: &str) -> Vec<String> {
         let Some(width) = self.width.map(|width| width.max(NARROWEST)) else { return vec![text.to_owned()] };
         let mut lines: Vec<String> = Vec::new();
@@ -138,7 +142,7 @@ fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-/// Where the files are: the folder once, then the names.
+/// Returns the location of files: each folder once, then the file names.
 fn places(files: &[PathBuf]) -> String {
     let mut folders: Vec<(&Path, Vec<String>)> = Vec::new();
     for file in files {
@@ -152,7 +156,7 @@ fn places(files: &[PathBuf]) -> String {
     folders.iter().map(|(folder, names)| format!("{}: {}\n", folder.join("").display(), names.join(", "))).collect()
 }
 
-/// Text without control characters: a title cannot move the cursor.
+/// Replaces control characters by spaces, so that a title cannot move the cursor.
 fn clean(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
@@ -161,7 +165,7 @@ fn duration(seconds: f64) -> String {
     if seconds < 1.0 { format!("{:.0} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") }
 }
 
-/// Units at the end of a column's name, with the prefix chosen for the size of its values.
+/// Suffixes of column names and their units.
 const UNITS: [(&str, &str); 16] = [
     ("_N_m_per_rad", "N m/rad"),
     ("_N_per_m", "N/m"),
@@ -181,10 +185,10 @@ const UNITS: [(&str, &str); 16] = [
     ("_W", "W"),
 ];
 
-/// Prefixes for the units that take one here.
+/// Powers of ten and their SI prefixes, for the units that take a prefix.
 const PREFIXES: [(i32, &str); 7] = [(9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n")];
 
-/// Unit and prefixed power of ten for the values of a column with this name, and the name without its unit.
+/// Returns the name without its unit, the unit, and the power of ten and prefix for `largest`.
 fn unit_of(name: &str, largest: f64) -> (&str, &'static str, i32, &'static str) {
     let (quantity, unit) = UNITS
         .iter()
@@ -198,7 +202,8 @@ fn unit_of(name: &str, largest: f64) -> (&str, &'static str, i32, &'static str) 
     (quantity, unit, power, prefix)
 }
 
-/// A table with those columns in the units in which the study states them for which `written` has one.
+/// Converts columns of a table to the units that the study uses. `written` maps columns to
+/// units.
 fn in_written_units<'t>(table: &'t Table, written: &'t Json) -> Vec<Written<'t>> {
     let one = |column: &'t Column| {
         let unit = written[&column.name].as_str();
@@ -213,7 +218,7 @@ fn in_written_units<'t>(table: &'t Table, written: &'t Json) -> Vec<Written<'t>>
     table.columns.iter().map(one).collect()
 }
 
-/// A column, with its values in another unit if the study states them in one.
+/// A column, with converted values if the study uses another unit.
 struct Written<'t> {
     column: &'t Column,
     converted: Option<(Values, &'t str)>,
@@ -225,24 +230,24 @@ impl Written<'_> {
     }
 }
 
-/// A number without the rounding of a change of units.
+/// Rounds to 13 digits, which removes the rounding error of a unit conversion.
 fn rounded(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
 }
 
-/// One value of a column with this name, rounded, with its unit.
+/// Formats one value of a column with its unit, rounded.
 pub(crate) fn quantity(name: &str, value: f64) -> String {
     let (_, unit, power, prefix) = unit_of(name, value.abs());
     let number = engineering(&[value / 10f64.powi(power)], DIFFERENCE_DIGITS).remove(0);
     format!("{number} {prefix}{unit}").trim_end().to_owned()
 }
 
-/// Digits of a quantity in the unit of the study: frequencies need them.
+/// Digits of a quantity in the study's unit, as frequencies require.
 const WRITTEN_DIGITS: i32 = 7;
 /// Digits of a difference.
 const DIFFERENCE_DIGITS: i32 = 3;
 
-/// Heading and cells of a column for people.
+/// Returns heading and formatted cells of a column.
 fn column(name: &str, values: &Values, written: Option<&str>) -> (String, Vec<String>) {
     let Values::Number(numbers) = values else {
         return (name.replace('_', " "), (0..values.len()).map(|row| clean(&crate::csv::cell(values, row))).collect());
@@ -262,8 +267,10 @@ fn column(name: &str, values: &Values, written: Option<&str>) -> (String, Vec<St
     (heading, engineering(&scaled, significant))
 }
 
-/// Numbers of one column with the same decimals; the largest has at most `significant` digits, and no zeros stand at the
-/// end of all of them. A column that spans too much is written with exponents.
+/// Formats the numbers of one column with a common number of decimals.
+///
+/// The largest number has at most `significant` digits, and trailing zeros common to all are
+/// dropped. A column with a very large range of values uses exponents.
 fn engineering(values: &[f64], significant: i32) -> Vec<String> {
     let finite = || values.iter().map(|v| v.abs()).filter(|v| v.is_finite() && *v > 0.0);
     let (largest, smallest) = (finite().fold(0.0, f64::max), finite().fold(f64::INFINITY, f64::min));
@@ -284,17 +291,19 @@ fn engineering(values: &[f64], significant: i32) -> Vec<String> {
     write(&|v| format!("{v:.decimals$}"))
 }
 
-/// A column ready to be written: its head and its cells, all of one width.
+/// A formatted column: heading and cells with a common width.
 struct Shown<'a> {
     name: &'a str,
     heading: String,
     cells: Vec<String>,
-    /// Numbers stand at the right, words at the left.
+    /// `true` aligns right (numbers), `false` aligns left (text).
     right: bool,
     width: usize,
 }
 
-/// The first rows of a table with aligned columns, no wider than `limit`, and what is left out.
+/// Formats the first rows of a table with aligned columns, at most `limit` characters wide.
+///
+/// A last line counts the omitted rows and columns.
 fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
     let all_rows = table.first().map_or(0, |one| one.values().len());
     let rows = all_rows.min(ROWS);
@@ -310,7 +319,7 @@ fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
         })
         .collect();
     let all = columns.len();
-    // a line begins with two spaces, and two stand between columns
+    // A line starts with two spaces, and two spaces separate columns.
     let too_wide = |columns: &[Shown<'_>]| columns.iter().map(|c| c.width + 2).sum::<usize>() > limit;
     if too_wide(&columns) {
         shorten(&mut columns);
@@ -338,7 +347,7 @@ fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
     out
 }
 
-/// Cuts long names in headings and cells; those that could not be told apart any more stay.
+/// Shortens long headings and cells, unless they would become equal.
 fn shorten(columns: &mut [Shown<'_>]) {
     let headings = cut(columns.iter().map(|column| column.heading.as_str()).collect());
     for (column, heading) in columns.iter_mut().zip(headings) {
@@ -351,7 +360,10 @@ fn shorten(columns: &mut [Shown<'_>]) {
     }
 }
 
-/// The texts, each no longer than [`LONG`]: the middle gives way, as names differ at their ends and units stand there.
+/// Removes the middle of texts longer than [`LONG`].
+///
+/// Names differ at their ends, and units are there. All texts stay unchanged if two would
+/// become equal.
 fn cut(texts: Vec<&str>) -> Vec<String> {
     let short = |text: &str| {
         let all: Vec<char> = text.chars().collect();
@@ -364,7 +376,7 @@ fn cut(texts: Vec<&str>) -> Vec<String> {
     if same { all } else { texts.into_iter().map(str::to_owned).collect() }
 }
 
-/// The first values of a column.
+/// Returns the first `rows` values of a column.
 fn head(values: &Values, rows: usize) -> Values {
     match values {
         Values::Number(v) => Values::Number(v.iter().take(rows).copied().collect()),
@@ -424,7 +436,7 @@ results/fig02/: loops_summary.csv, figure.svg
             assert!(lines[0].contains("frequency (Hz)") && lines[0].contains("…amplitude (mm)"), "{text}");
             assert!(lines[1].contains("_left ") && lines[2].contains("_right "), "{text}");
         }
-        // what could not be told apart stays as it is
+        // Texts that would become equal stay unchanged.
         let texts = [format!("{0}1{0}", "x".repeat(20)), format!("{0}2{0}", "x".repeat(20))];
         assert_eq!(cut(texts.iter().map(String::as_str).collect()), texts);
         let long = "abcdefghijklmnopqrstuvwxyz0123456789 (N/m)";
@@ -470,7 +482,8 @@ results/fig02/: loops_summary.csv, figure.svg
         let table: Vec<&str> =
             text.lines().skip_while(|l| *l != "peaks").skip(1).take_while(|l| !l.is_empty()).collect();
         assert_eq!(table.len(), 1 + ROWS + 1, "{text}");
-        // evidence goes first, then what stands last: 16 + 16 for the first two leave room for three of 26
+        // Error measures are dropped first, then the last columns: 16 + 16 for the first two
+        // leave room for three of 26.
         assert!(table[0].contains("amplitude (mm)") && table[0].contains("name 2") && !table[0].contains("name 3"));
         assert!(!table[0].contains("residual") && !table[0].contains("iterations"), "{}", table[0]);
         assert_eq!(*table.last().unwrap(), "  … and 10 more rows, 7 more columns in peaks.csv");
@@ -478,11 +491,12 @@ results/fig02/: loops_summary.csv, figure.svg
         assert!(table[20].contains("20"), "{}", table[20]);
         let narrow = Terminal { width: Some(60), ..Terminal::default() }.text(&long("loops_summary", 2), &[]);
         assert!(narrow.contains("in loops_summary.csv") && narrow.lines().all(|l| l.chars().count() <= 60), "{narrow}");
-        // other long tables stay in their files
+        // Other long tables are not shown.
         assert!(!Terminal::default().text(&long("curve", 30), &[]).contains("amplitude (mm)"));
     }
 
-    /// Speeds and stiffnesses stand as the study states them; what it does not state has a unit by size.
+    /// Speeds and stiffnesses have the units of the study; other columns have a unit that fits
+    /// their size.
     #[test]
     fn columns_have_the_units_of_the_study() {
         let one = |name: &str, value: f64| Column::numbers(name, vec![value]);
@@ -498,7 +512,7 @@ results/fig02/: loops_summary.csv, figure.svg
             table.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
         };
         assert_eq!(lines(&dataset), ["n (rpm) kt (N/mm) frequency (rpm) amplitude (mm)", "3000 8 3240 2"]);
-        // a record without them leaves SI
+        // A record without units leaves SI units.
         dataset.record.study = Json::Null;
         assert_eq!(lines(&dataset), ["n (Hz) kt (kN/m) frequency (Hz) amplitude (mm)", "50 8 54 2"]);
     }

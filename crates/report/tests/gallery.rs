@@ -1,6 +1,7 @@
-//! The gallery: the studies under `studies/gallery/`, their page in the book, and their pictures.
+//! Tests of the gallery: the studies under `studies/gallery/`, their page in the book, their
+//! pictures.
 //!
-//! Write the page and the pictures anew, at full size (half a minute):
+//! To write the page and the pictures again at full size (half a minute):
 //! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test gallery`
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -14,7 +15,7 @@ use stickslip_study::{Study, read_study};
 const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test gallery";
 
-/// The studies, in the order of the page.
+/// The studies in the order of the page.
 const STUDIES: [&str; 30] = [
     "underplatform_damper",
     "best_slip_force",
@@ -48,7 +49,7 @@ const STUDIES: [&str; 30] = [
     "contact_mass_balance",
 ];
 
-/// Frequencies of a range in a reduced study.
+/// Number of frequencies of a range in a reduced study.
 const FEW: usize = 9;
 
 fn root() -> PathBuf {
@@ -64,7 +65,7 @@ fn study(name: &str, text: &str) -> Study {
     read_study(&format!("{name}.toml"), text, &[]).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// The study with [`FEW`] frequencies in its range.
+/// Returns the study with [`FEW`] frequencies in its range.
 fn reduced(text: &str) -> String {
     let line = |line: &str| match line.strip_prefix("frequency = {").and_then(|rest| rest.rsplit_once(',')) {
         Some((ends, _)) => format!("frequency = {{{ends}, points = {FEW} }}\n"),
@@ -84,7 +85,7 @@ fn picture(dataset: &Dataset) -> String {
     String::from_utf8(file.content.clone()).unwrap()
 }
 
-/// What stands above the first key of a study: what it is, and what one learns from it.
+/// Returns the description above the first key of a study, in two parts.
 fn words(name: &str, text: &str) -> (String, String) {
     let comment: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# ")).collect();
     let comment = comment.join(" ");
@@ -141,19 +142,19 @@ fn every_study_has_its_sentence_and_its_picture() {
     }
 }
 
-/// Whether a note of a study warns of what its reader is not told on purpose: flutter is about unstable orbits.
+/// Returns `true` for an unexpected warning. The flutter study intends its unstable orbits.
 fn is_wrong(name: &str, note: &str) -> bool {
     note.starts_with("warning") && !(name == "flutter" && note.contains("unstable"))
 }
 
-/// Every study runs without failure and warning, and draws something, at reduced size.
+/// Every study runs at reduced size without failures and warnings, and draws something.
 #[test]
 fn every_study_runs() {
     for name in STUDIES {
         let few = dataset(name, &reduced(&text(name)));
         assert!(few.failures.is_empty(), "{name}: {:?}", few.failures);
         assert!(few.record.points.keys().all(|status| status == "converged"), "{name}: {:?}", few.record.points);
-        // few points step over resonances, and it is said with the number that would do
+        // Few points step over resonances, and a warning states the sufficient number.
         let wrong = |note: &String| is_wrong(name, note) && !note.contains("would do");
         assert!(!few.notes.iter().any(wrong), "{name}: {:?}", few.notes);
         assert!(!few.figure.panels.is_empty(), "{name}");
@@ -173,7 +174,7 @@ fn close(found: f64, expected: f64, share: f64) {
     assert!((found - expected).abs() <= share * expected.abs(), "{found} instead of {expected}");
 }
 
-/// Masing's rule: each slider of stiffness `kt` loses `4 Ft (a - Ft/kt)` per cycle.
+/// Masing's rule: each slider of stiffness `kt` dissipates `4 Ft (a - Ft/kt)` per cycle.
 #[test]
 fn the_bolted_joint_loses_what_its_sliders_lose() {
     let found = dataset("bolted_joint", &text("bolted_joint"));
@@ -187,11 +188,11 @@ fn the_bolted_joint_loses_what_its_sliders_lose() {
     }
 }
 
-/// One-term harmonic balance of a damper against the ground: best limit `π/2 F0`, peak `π F0/kt`.
+/// One-term harmonic balance of a damper to ground: best limit `π/2 F0`, peak `π F0/kt`.
 #[test]
 fn the_best_slip_force_is_that_of_the_closed_form() {
     let found = dataset("best_slip_force", &text("best_slip_force"));
-    // the closed form has one harmonic, the study all: they differ by 0.2 % here
+    // The closed form has one harmonic, the study all: the difference is 0.2 % here.
     let limits = column(&found, "optimum", "Ft_N");
     let peaks = column(&found, "optimum", "amplitude_m");
     assert_eq!((limits.len(), peaks.len()), (2, 2));
@@ -201,41 +202,46 @@ fn the_best_slip_force_is_that_of_the_closed_form() {
     }
 }
 
-/// The same for blades with their neighbours under engine order 3 of 12: `π F0/(4 kt sin²(θ/2))` with θ = 90°.
+/// The closed form for blades with neighbours under engine order 3 of 12.
+///
+/// The peak is `π F0/(4 kt sin²(θ/2))` with θ = 90°.
 #[test]
 fn the_ring_of_blades_has_the_peak_of_the_closed_form() {
     let found = dataset("ring_of_blades", &text("ring_of_blades"));
     let limits = column(&found, "peaks", "Ft_N");
     let at = limits.iter().position(|limit| *limit == 5.6).unwrap();
-    // a little viscous damping and higher harmonics lower the peak by 0.5 %
+    // A little viscous damping and higher harmonics lower the peak by 0.5 %.
     close(column(&found, "peaks", "amplitude_m")[at], PI * 5.0 / (4.0 * 1e4 * 0.5), 1e-2);
 }
 
-/// While the lap joint sticks the decay is linear: `ζ = c/(2 √((k + kt) m))`, `f = √((k + kt)/m)/2π`.
+/// While the lap joint sticks, the decay is linear: `ζ = c/(2 √((k + kt) m))`,
+/// `f = √((k + kt)/m)/2π`.
 #[test]
 fn the_ring_down_ends_with_the_viscous_damping() {
     let found = dataset("ring_down", &text("ring_down"));
     let number = |name: &str| column(&found, "decay_summary", name)[0];
-    // turning points between samples a 56th of a period apart
+    // The turning points lie between samples at a distance of 1/56 period.
     close(number("last_damping_ratio"), 0.8 / (2.0 * (100e3f64 * 2.0).sqrt()), 1e-3);
     close(number("last_frequency_Hz"), (100e3f64 / 2.0).sqrt() / TAU, 1e-4);
-    // a one-term describing function at twice the amplitude of first slip; the amplitude falls by a quarter per cycle, which smears it
+    // The value is a one-term describing function at twice the amplitude of first slip. The
+    // amplitude falls by a quarter per cycle, which blurs it.
     close(number("largest_damping_ratio"), 20e3 / (PI * 2.0 * 90e3) + 0.8 / (2.0 * (90e3f64 * 2.0).sqrt()), 0.15);
 }
 
-/// The describing function of the joint at twice the amplitude of first slip: `k + kt/2`, `ω c = kt/π`.
+/// The describing function of the joint at twice the amplitude of first slip: `k + kt/2`,
+/// `ω c = kt/π`.
 #[test]
 fn the_nonlinear_mode_is_damped_most_near_twice_the_first_slip() {
     let found = dataset("nonlinear_modes", &text("nonlinear_modes"));
     let number = |name: &str| column(&found, "modes_summary", name)[0];
-    // the largest ratio stands a little beside twice the first slip, and there are higher harmonics: 1 %
+    // The largest ratio is close to twice the first slip, and higher harmonics exist: 1 %.
     let stiffness = 100e3 + 15e3;
     let viscous = 0.2 / (2.0 * (stiffness * 0.2f64).sqrt());
     close(number("largest_damping_ratio"), 30e3 / (PI * 2.0 * stiffness) + viscous, 2e-2);
     close(number("small_end_frequency_Hz"), (130e3f64 / 0.2).sqrt() / TAU, 1e-6);
 }
 
-/// A joint that slips both ways carries no constant force: the spring does.
+/// A joint that slips in both directions carries no constant force; the spring carries it.
 #[test]
 fn the_preload_shifts_the_mean_by_force_over_stiffness() {
     let found = dataset("preload", &text("preload"));
@@ -244,7 +250,7 @@ fn the_preload_shifts_the_mean_by_force_over_stiffness() {
     close(means[1], 40.0 / 200e3, 1e-9);
 }
 
-/// Two methods on one structure: the peaks of the blade.
+/// Two methods give the same peaks of the blade on one structure.
 #[test]
 fn the_contact_mass_has_the_same_peaks_by_both_methods() {
     let [exact, balance] = ["contact_mass_exact", "contact_mass_balance"].map(|name| {
@@ -254,7 +260,7 @@ fn the_contact_mass_has_the_same_peaks_by_both_methods() {
         let Values::Text(masses) = &column.values else { panic!("masses have names") };
         let heights = peaks.numbers("amplitude_m").unwrap();
         let of_blade = masses.iter().zip(heights).filter(|(mass, _)| *mass == "blade1");
-        // what stands at the end of the range, at 119 Hz, is no resonance
+        // The maximum at the end of the range, at 119 Hz, is not a resonance.
         of_blade.map(|(_, height)| *height).filter(|height| *height > 1e-3).collect::<Vec<f64>>()
     });
     assert_eq!((exact.len(), balance.len()), (3, 3));
@@ -263,7 +269,8 @@ fn the_contact_mass_has_the_same_peaks_by_both_methods() {
     }
 }
 
-/// The pads break loose where the inertia of the machine that rides along reaches their limit: `m ω² a = Ft`.
+/// The pads start to slip when the inertia force of the machine reaches their limit:
+/// `m ω² a = Ft`.
 #[test]
 fn the_isolator_breaks_loose_where_inertia_reaches_the_limit() {
     let found = dataset("isolator", &text("isolator"));
@@ -272,19 +279,21 @@ fn the_isolator_breaks_loose_where_inertia_reaches_the_limit() {
     let mut seen = [0, 0];
     for ((limit, frequency), slip) in limits.iter().zip(frequencies).zip(slip).filter(|row| *row.0.0 > 0.0) {
         let loose = (limit / (400.0 * 0.5e-3)).sqrt() / TAU;
-        // not decided within rounding
+        // Rounding decides the points at the limit.
         if (frequency / loose - 1.0).abs() > 1e-6 {
             assert_eq!(*slip > 0.0, *frequency > loose, "Ft = {limit} N, {frequency} Hz, loose at {loose} Hz");
             seen[usize::from(*frequency > loose)] += 1;
         }
     }
     assert!(seen.iter().all(|count| *count > 20), "{seen:?}");
-    // riding along with the floor, by 0.5 mm, is level and has no peak
+    // The machine that moves with the floor, by 0.5 mm, has a constant amplitude without a
+    // peak.
     let peaks = column(&found, "peaks", "amplitude_m");
     assert!(peaks.len() == 4 && peaks.iter().all(|peak| (peak - 0.5e-3).abs() > 1e-5), "{peaks:?}");
 }
 
-/// Where the branch of the flutter study turns: where `F0(A) = A |k + keq - m ω² + j (ω c + ω ceq)|` of one harmonic does.
+/// The flutter branch turns at the same excitation as the one-harmonic curve
+/// `F0(A) = A |k + keq - m ω² + j (ω c + ω ceq)|`.
 #[test]
 fn the_flutter_branch_turns_where_one_harmonic_says() {
     let found = dataset("flutter", &text("flutter"));
@@ -302,7 +311,7 @@ fn the_flutter_branch_turns_where_one_harmonic_says() {
     let found = column(&found, "turns", "F0_N");
     assert_eq!((expected.len(), found.len()), (2, 2));
     for (found, expected) in found.iter().zip(expected) {
-        // the joint has higher harmonics, which the mass hardly follows
+        // The joint has higher harmonics, which hardly move the mass.
         close(*found, expected, 5e-3);
     }
 }
@@ -316,7 +325,7 @@ fn figures_say_what_they_show() {
     let ring = titles("mistuned_ring");
     assert_eq!(ring[0], "spread = 0 %, all are alike");
     assert!(ring[1].starts_with("spread = 2 %, worst is blade"), "{ring:?}");
-    // the refined optimum is a point of its curve
+    // The refined optimum is a point of its curve.
     let best = dataset("best_slip_force", &text("best_slip_force"));
     for (series, limit) in best.figure.panels[0].series.iter().zip(column(&best, "optimum", "Ft_N")) {
         assert!(series.x.contains(limit) && series.x.is_sorted(), "{limit} {:?}", series.x);

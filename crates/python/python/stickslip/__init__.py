@@ -1,7 +1,8 @@
-"""How structures with dry-friction joints vibrate: exact, fast, with evidence on every number.
+"""Vibration of structures with dry-friction joints: exact and fast, with error measures.
 
-A :class:`Study` is what a study file asks for; a :class:`Model` is stated by calls. Both give a :class:`Result`: tables that pandas, polars and NumPy
-read without a copy, a figure, and the record of the run.
+A :class:`Study` is read from a study file; a :class:`Model` is built by method calls. Both give a
+:class:`Result`: tables that pandas, polars and NumPy read without a copy, a figure, and the record
+of the run.
 
 >>> import stickslip
 >>> result = stickslip.Study.from_template("blade-couple-massless", Ft="2 N").run()

@@ -1,6 +1,6 @@
-"""Campaigns: the units of a study on many processes or machines, kept part by part, so that nothing is computed twice.
+"""Campaigns: computation of a study on many processes or machines, stored batch by batch.
 
-`_folder.py` says what stands in a campaign's folder.
+No unit is computed twice. `_folder.py` describes the folder of a campaign.
 """
 
 from __future__ import annotations
@@ -38,17 +38,19 @@ if TYPE_CHECKING:
     Progress = bool | Callable[[int, int], object] | None
     Percent = float | Sequence[float] | NDArray[np.float64]
 
-#: How long a batch should take, s: a task of Dask costs some milliseconds, and what a killed worker loses is one batch.
+#: Target duration of a batch in s: a Dask task costs a few milliseconds, and a killed worker
+#: loses one batch.
 BATCH_SECONDS = 5.0
-#: Batches that wait or run for each thread of the workers: enough that none is idle, few enough to keep the sizes up to date.
+#: Number of waiting or running batches per worker thread: no thread is idle, and batch sizes
+#: stay up to date.
 AHEAD = 2
-#: Largest growth of a batch from one to the next: costs differ along a curve.
+#: Maximum growth factor from one batch to the next, because costs differ along a curve.
 GROWTH = 4
-#: Times that a batch is tried, the later ones elsewhere where there is an elsewhere.
+#: Maximum number of attempts per batch; later attempts use another worker if there is one.
 TRIES = 2
-#: The name of the processes that compute.
+#: Name of the worker processes.
 WORKER = "stickslip-campaign"
-#: What a script without its guard is told.
+#: Error message for a script without the `__main__` guard.
 GUARD = (
     'a script has to start a campaign under `if __name__ == "__main__":`, because every process that computes reads the script again; '
     "a campaign cannot be started by a script that comes from standard input"
@@ -65,17 +67,23 @@ def campaign(
     progress: Progress = None,
     retry: bool = True,
 ) -> Campaign:
-    """Computes all units of ``study`` that ``out`` does not hold yet, and returns the :class:`Campaign`.
+    """Computes the units of ``study`` that are missing in ``out``. Returns the :class:`Campaign`.
 
-    ``client``: a Dask client (``distributed.Client``); workers need this package, not this folder. Without one ``processes`` processes of this
-    machine compute (all cores if that is not said); start it then under ``if __name__ == "__main__":`` in a script.
-    ``seconds``: how long a batch should take; its size follows the measured cost. ``progress``: ``True`` for a bar by tqdm, or a function of the
-    units done and of all.
+    - ``client``: a Dask client (``distributed.Client``). Its workers need this package, but not this
+      folder.
+    - ``processes``: number of processes on this machine if there is no client; by default all cores.
+      A script must then start the campaign under ``if __name__ == "__main__":``.
+    - ``seconds``: target duration of a batch. The batch size follows the measured cost.
+    - ``progress``: ``True`` for a bar of tqdm, or a function of the number of finished units and of
+      all units.
+    - ``retry``: ``False`` does not repeat units that failed in an earlier call.
 
-    A unit that fails is tried once more, elsewhere, and is then kept with its reason: :attr:`Campaign.failed`. The next call tries those units
-    again unless ``retry=False``. A campaign that was interrupted, killed or short of workers goes on when it is called again, and ends with the
-    same numbers, which are those of the command bit for bit. Parts that are missing or damaged are computed again, with a warning. One campaign at a
-    time writes into a folder: a second one is refused.
+    A failed unit is repeated once, on another worker if possible. If it fails again, it is stored with
+    the reason: :attr:`Campaign.failed`.
+
+    After an interruption, a kill or a loss of workers, the next call resumes the campaign. The results
+    are the same, bit for bit equal to those of the command. Missing or damaged parts are computed
+    again, with a warning. Only one campaign at a time can write into a folder; a second one is refused.
     """
     from ._core import Study as Known
 
@@ -106,7 +114,7 @@ def campaign(
 
 
 def _count(value: SupportsIndex) -> int:
-    """A whole number, or 0 for what is none."""
+    """Returns a whole number, or 0 for other values."""
     try:
         return operator.index(value)
     except TypeError:
@@ -114,11 +122,11 @@ def _count(value: SupportsIndex) -> int:
 
 
 def _must_not_be_a_worker() -> None:
-    """A process that reads the script of its parent again must not start a campaign."""
+    """Refuses a campaign in a worker process that imports the script of its parent."""
     process = multiprocessing.current_process()
     if getattr(process, "_inheriting", False):
         if process.name == WORKER:
-            raise SystemExit(1)  # the parent says why
+            raise SystemExit(1)  # the parent process reports the reason
         raise CampaignError(GUARD)
 
 
@@ -145,7 +153,7 @@ def _progress(progress: Progress, name: str) -> Callable[[int, int], object] | N
 
 
 class _Batches:
-    """The ranges to compute, in batches of a size that follows what units cost."""
+    """The ranges of units to compute, in batches whose size follows the measured cost."""
 
     def __init__(self, todo: Iterable[tuple[int, int]], seconds: float) -> None:
         self._todo, self._seconds = deque(todo), seconds
@@ -153,19 +161,19 @@ class _Batches:
         self._cost: float | None = None
 
     def measured(self, units: int, seconds: float) -> None:
-        """Units of a batch that is done, and what they took."""
+        """Records the number of units and the duration of a finished batch."""
         cost = seconds / units
-        # the dear ones count: a batch may last long, and may be short
+        # expensive units dominate the estimate: a long batch is acceptable, and so is a short one
         self._cost = cost if self._cost is None else max(cost, 0.7 * self._cost + 0.3 * cost)
         wanted = int(self._seconds / max(self._cost, 1e-9))
         self._size = max(1, min(wanted, GROWTH * self._size))
 
     def next(self, threads: int) -> tuple[int, int] | None:
-        """The next range for one of so many threads; ``None`` if there is no more."""
+        """Returns the next range for one of ``threads`` threads; ``None`` after the last."""
         if not self._todo:
             return None
         left = sum(stop - start for start, stop in self._todo)
-        # towards the end smaller, so that all threads end together
+        # smaller batches towards the end let all threads finish together
         size = max(1, min(self._size, -(-left // (2 * threads))))
         start, stop = self._todo.popleft()
         if stop - start > size:
@@ -175,23 +183,23 @@ class _Batches:
 
 
 class _Workers(Protocol):
-    """What computes batches."""
+    """Interface of workers that compute batches."""
 
     @property
     def threads(self) -> int:
-        """Batches that it computes beside each other."""
+        """Number of batches computed in parallel."""
 
     def submit(self, start: int, stop: int, tries: int, avoid: str | None) -> Any:
-        """Begins a batch, if possible not where it is to be avoided; a future."""
+        """Starts a batch, if possible not on worker ``avoid``, and returns its future."""
 
     def wait(self, running: list[Any]) -> Iterable[Any]:
-        """Futures that have finished, one or more."""
+        """Waits, and returns one or more finished futures."""
 
     def answer(self, future: Any) -> dict[str, Any]:
-        """What a batch yielded, or its exception."""
+        """Returns the result of a batch, or raises its exception."""
 
     def close(self, at_once: bool) -> None:
-        """Ends it, with what is running or after that."""
+        """Shuts down, either at once or after the running batches."""
 
 
 def _compute(
@@ -219,12 +227,12 @@ def _compute(
                 answer = workers.answer(future)
             except CampaignError:
                 raise
-            except Exception as error:  # whatever a worker or its death makes of it
+            except Exception as error:  # any error of a worker, including its death
                 tries, where = tries + 1, getattr(error, "where", None)
                 if tries < TRIES:
                     begin(start, stop, tries, where)
                 elif stop - start > 1:
-                    # one of them is to blame: halves find it, each with the last try
+                    # one unit causes the failure: bisection finds it, with one attempt per half
                     middle = (start + stop) // 2
                     begin(start, middle, tries - 1, where)
                     begin(middle, stop, tries - 1, where)
@@ -246,18 +254,18 @@ def _reason(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
-#: The studies that a worker has checked, by their pickles: checking prepares every case. The last few are kept.
+#: Recently checked studies of a worker by their pickles, because a check prepares every case.
 _STUDIES: dict[bytes, Study] = {}
 _MOST_STUDIES = 4
 
 
 def _pickled(study: Study) -> bytes:
-    """What a worker needs, and by which it sees that the files which it reads are the same."""
+    """Pickled study for a worker, with an identification of the matrix files that it reads."""
     return pickle.dumps((study, study._matrices))
 
 
 def _unpickled(pickled: bytes) -> Study:
-    """The study on a worker."""
+    """Returns the checked study on a worker."""
     study, matrices = pickle.loads(pickled)
     if study._matrices != matrices:
         raise CampaignError("the files of [structure] hold other matrices than where the campaign began")
@@ -265,14 +273,14 @@ def _unpickled(pickled: bytes) -> Study:
 
 
 def _work(pickled: bytes, start: int, stop: int) -> dict[str, Any]:
-    """Computes units on a worker: the tables as Parquet, and what is to be said of them."""
+    """Computes units on a worker. Returns the tables as Parquet, and the record of the batch."""
     pyarrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     study = _STUDIES.get(pickled)
     if study is None:
         while len(_STUDIES) >= _MOST_STUDIES:
             _STUDIES.pop(next(iter(_STUDIES)))
         study = _unpickled(pickled)
-        study._batch(0, 0)  # checks it: no cost of a batch
+        study._batch(0, 0)  # checks the study, so that the check does not count as batch time
         _STUDIES[pickled] = study
     begin = time.perf_counter()
     batch = study._batch(start, stop)
@@ -285,7 +293,7 @@ def _work(pickled: bytes, start: int, stop: int) -> dict[str, Any]:
 
 
 class _Failed(Exception):
-    """What went wrong on a worker, and on which."""
+    """An error on a worker, with the address of the worker."""
 
     def __init__(self, reason: str, where: str | None) -> None:
         super().__init__(reason)
@@ -293,14 +301,14 @@ class _Failed(Exception):
 
 
 def _work_on_dask(pickled: bytes, start: int, stop: int) -> dict[str, Any]:
-    """The same, but an error comes back with the worker's address."""
+    """Computes units on a Dask worker; an error is returned with the worker's address."""
     try:
         return _work(pickled, start, stop)
     except Exception as error:
         return {"error": _reason(error), "where": importlib.import_module("distributed").get_worker().address}
 
 
-#: How long the number of a cluster's threads is taken as known, s; clusters grow and shrink.
+#: Validity of the number of a cluster's threads in s, because clusters grow and shrink.
 KNOWN_SECONDS = 2.0
 
 
@@ -315,7 +323,7 @@ class _Dask:
 
     @property
     def threads(self) -> int:
-        """Threads of all workers; one while there is none yet."""
+        """Number of threads of all workers, at least one."""
         if time.monotonic() > self._known + KNOWN_SECONDS:
             self._known, self._threads = time.monotonic(), max(1, sum(self._client.nthreads().values()))
         return self._threads
@@ -323,7 +331,7 @@ class _Dask:
     def submit(self, start: int, stop: int, tries: int, avoid: str | None) -> Any:
         others = [worker for worker in self._client.nthreads() if worker != avoid]
         elsewhere = {"workers": others, "allow_other_workers": True} if avoid and others else {}
-        # the name is what the dashboard shows
+        # the dashboard shows the name
         key = f"stickslip-{self._name}-{start}-{stop}-{tries}-{time.monotonic_ns()}"
         future = self._client.submit(_work_on_dask, self._study, start, stop, key=key, pure=False, retries=0, **elsewhere)
         self._finished.add(future)
@@ -337,7 +345,7 @@ class _Dask:
         self._running.discard(future)
         try:
             answer = future.result()
-        except Exception as error:  # the worker itself is gone
+        except Exception as error:  # the worker died
             raise _Failed(_reason(error), getattr(getattr(error, "last_worker", None), "address", None)) from error
         future.release()
         if "error" in answer:
@@ -350,14 +358,14 @@ class _Dask:
 
 
 class _Worker(SpawnProcess):
-    """A process that computes, known by its name while it reads the script of its parent."""
+    """A worker process. Its name identifies it while it imports the script of its parent."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **{**options, "name": WORKER})
 
 
 class _Spawn(SpawnContext):
-    """Processes that begin anew: a fork would have the locks of this process, and none of its threads."""
+    """Starts new processes: a fork would inherit the locks of this process, but not its threads."""
 
     Process = _Worker
 
@@ -367,13 +375,13 @@ def _leave_ctrl_c_to_the_parent() -> None:
 
 
 def _ready(pickled: bytes) -> None:
-    """Whether a process can compute batches of this study."""
+    """Checks that a process can compute batches of this study."""
     importlib.import_module("pyarrow.parquet")
     _unpickled(pickled)
 
 
 class _Local:
-    """Processes of this machine."""
+    """Worker processes on this machine."""
 
     def __init__(self, processes: SupportsIndex | None, study: Study) -> None:
         self.threads = os.cpu_count() or 1 if processes is None else operator.index(processes)
@@ -381,7 +389,11 @@ class _Local:
         self._pool: ProcessPoolExecutor | None = None
 
     def _begun(self) -> ProcessPoolExecutor:
-        """New processes. What keeps one of them from its work would keep all, and is no fault of a unit: it ends the campaign."""
+        """Starts new processes.
+
+        An error that prevents one process from working affects all of them. It is not a failure of a
+        unit, and ends the campaign.
+        """
         pool = ProcessPoolExecutor(self.threads, mp_context=_Spawn(), initializer=_leave_ctrl_c_to_the_parent)
         self._pool = pool
         try:
@@ -397,7 +409,7 @@ class _Local:
             try:
                 return (self._pool or self._begun()).submit(_work, self._study, start, stop)
             except BrokenProcessPool:
-                # a process died, and all that ran fails; new ones take over
+                # a process died, and all running batches fail; new processes replace it
                 self.close(at_once=True)
         raise CampaignError("processes of this machine cannot be started")
 
@@ -418,9 +430,10 @@ class _Local:
 
 
 class Campaign:
-    """The results of a campaign in its folder, whole or as far as it is.
+    """The results of a complete or unfinished campaign in its folder.
 
-    ``campaign.table("curve")`` reads all parts lazily; :meth:`result` joins them and draws the figure of the study.
+    ``campaign.table("curve")`` reads all parts lazily. :meth:`result` loads them and draws the figure
+    of the study.
     """
 
     def __init__(self, out: str | os.PathLike[str]) -> None:
@@ -439,7 +452,7 @@ class Campaign:
 
     @classmethod
     def _begin(cls, study: Study, out: Path, *, retry: bool = False) -> Campaign:
-        """The campaign of a study in a folder that this process has locked, with nothing in it that is not whole."""
+        """Opens the campaign of a study in a locked folder, and removes incomplete files."""
         head = {
             "format": FORMAT,
             "version": study.version,
@@ -482,12 +495,12 @@ class Campaign:
 
     @property
     def units(self) -> int:
-        """Units of the study."""
+        """Number of units of the study."""
         return int(self._head["units"])
 
     @property
     def study(self) -> Study:
-        """The study, as it was computed."""
+        """The study of the campaign."""
         from ._core import _study
 
         file, text, overrides, method = self._head["study"]
@@ -495,22 +508,22 @@ class Campaign:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every unit was computed or given up."""
+        """``True`` if every unit was computed or has failed."""
         return not self._missing()
 
     @property
     def damaged(self) -> int:
-        """Batches that are damaged or lack a part; the next call of `campaign` computes their units again."""
+        """Batches with damaged or missing parts. The next call of `campaign` repeats their units."""
         return len(self._useless)
 
     @property
     def failed(self) -> dict[int, str]:
-        """Units that were given up, with the reason."""
+        """Failed units, with the reason."""
         return {batch.start: batch.told["failed"] for batch in self._done if batch.told.get("failed")}
 
     @property
     def points(self) -> dict[str, int]:
-        """Points by status."""
+        """Number of points by status."""
         points: dict[str, int] = {}
         for batch in self._done:
             for status, count in batch.told.get("points", {}).items():
@@ -519,7 +532,7 @@ class Campaign:
 
     @property
     def seconds(self) -> float:
-        """Time that the workers spent on it, s."""
+        """Total computing time of the workers in s."""
         return float(sum(batch.told.get("seconds", 0.0) for batch in self._done))
 
     @property
@@ -528,7 +541,7 @@ class Campaign:
         return sorted(folder.name for folder in (self.folder / "parts").iterdir() if folder.is_dir())
 
     def files(self, table: str) -> list[Path]:
-        """The Parquet files of a table, in the order of the units."""
+        """Returns the Parquet files of a table, in the order of the units."""
         folder = self.folder / "parts" / table
         found = [folder / f"{batch.stem}.parquet" for batch in self._done if table in batch.told["parts"]]
         if not found:
@@ -536,9 +549,10 @@ class Campaign:
         return found
 
     def table(self, name: str | None = None, *, library: Literal["polars", "pyarrow"] = "polars") -> Any:
-        """All parts of a table, lazily and in order: a ``polars.LazyFrame``, or with ``library="pyarrow"`` a ``pyarrow.dataset.Dataset``.
+        """Returns all parts of a table in order, read lazily.
 
-        ``name`` is the main table of the study without it.
+        The type is ``polars.LazyFrame``, or ``pyarrow.dataset.Dataset`` with ``library="pyarrow"``.
+        ``name`` is by default the main table of the study.
         """
         files = self.files(name or self._main())
         if library == "polars":
@@ -563,9 +577,10 @@ class Campaign:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
     def percentiles(self, column: str, percent: Percent = (5, 50, 95), *, by: str | None = None, table: str | None = None) -> Any:
-        """Percentiles of a column over all points that have a value; with ``by`` at each value of another column.
+        """Returns percentiles of a column over all points with a value.
 
-        Returns an array (percent), or the values of ``by`` (n) and an array (n, percent).
+        With ``by``, the percentiles are computed for each value of another column. Returns an array
+        (percent), or the values of ``by`` (n) and an array (n, percent).
         """
         values = self._column(column, table)
         if by is None:
@@ -576,13 +591,16 @@ class Campaign:
         return groups, np.array([np.nanpercentile(part, percent) for part in parts])
 
     def exceedance(self, column: str, levels: ArrayLike, *, table: str | None = None) -> NDArray[np.float64]:
-        """The share of points whose value is above each of the levels; points without a value count for nothing."""
+        """Returns the fraction of points above each level, without points that have no value."""
         from .statistics import exceedance
 
         return exceedance(self._column(column, table), levels)
 
     def sensitivity(self, column: str, inputs: Iterable[str], *, table: str | None = None) -> dict[str, float]:
-        """First-order Sobol indices of a column by the given columns of inputs, see :func:`stickslip.statistics.first_order`."""
+        """Returns first-order Sobol indices of a column with respect to columns of inputs.
+
+        See :func:`stickslip.statistics.first_order`.
+        """
         from .statistics import first_order
 
         return {one: first_order(self._column(one, table), self._column(column, table)) for one in inputs}
@@ -590,7 +608,7 @@ class Campaign:
     def plot(
         self, column: str, *, by: str, percent: Sequence[float] = (5, 25, 50, 75, 95), table: str | None = None, axes: Any = None
     ) -> Any:
-        """Percentiles of a column over another one as bands, drawn with matplotlib; returns its ``Figure``."""
+        """Draws percentiles of a column over another column as bands with matplotlib."""
         x, bands = self.percentiles(column, percent, by=by, table=table)
         if axes is None:
             _, axes = importlib.import_module("matplotlib.pyplot").subplots(layout="constrained")
@@ -607,8 +625,9 @@ class Campaign:
         return axes.figure
 
     def result(self) -> Result:
-        """All parts joined in memory, with the figure of the study: the :class:`Result` that :meth:`Study.run` gives, and the files that the
-        command writes.
+        """Loads all parts and draws the figure of the study.
+
+        The :class:`Result` equals that of :meth:`Study.run`, and its files equal those of the command.
         """
         from ._core import _joined
 
@@ -633,7 +652,10 @@ class Campaign:
 
 
 def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str | None:
-    """What the campaign in a folder has that differs from this one, in words; the study's file may have moved."""
+    """Describes the difference between the campaign in a folder and this one.
+
+    The path of the study file may differ.
+    """
     (_, text, overrides, method), (_, our_text, our_overrides, our_method) = theirs["study"], ours["study"]
     if theirs["version"] != ours["version"]:
         return f"another version: {theirs['version']}, and this is {ours['version']}"
@@ -653,7 +675,7 @@ def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str | Non
 
 
 def _plain(column: Any) -> Any:
-    """A column as Rust takes it: an array of numbers, or a list."""
+    """Converts a column for Rust: to an array of numbers, or to a list."""
     kind = str(column.type)
     if kind == "double":
         return column.to_numpy()

@@ -1,4 +1,4 @@
-"""Types of the part in Rust."""
+"""Types of the Rust part."""
 
 from __future__ import annotations
 

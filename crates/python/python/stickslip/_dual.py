@@ -1,4 +1,4 @@
-"""Dual arrays: arrays with their derivatives by some arguments, which operators and NumPy's functions carry along."""
+"""Dual arrays: arrays with derivatives, which operators and NumPy functions propagate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 UNKNOWN = "no derivative of numpy.{} is known: give the law's `derivatives`"
 
-#: Derivatives of functions of one argument x, from x and their value y.
+#: Derivatives of functions of one argument x, in terms of x and the value y.
 _ONE: dict[Any, Callable[..., Any]] = {
     np.negative: lambda x, y: -1.0,
     np.positive: lambda x, y: 1.0,
@@ -53,7 +53,7 @@ def _power(x: Any, n: Any, y: Any) -> Any:
     return by_base, by_exponent
 
 
-#: Derivatives of functions of two arguments by both, from the arguments and their value.
+#: Partial derivatives of functions of two arguments, in terms of the arguments and the value.
 _TWO: dict[Any, Callable[..., Any]] = {
     np.add: lambda a, b, y: (1.0, 1.0),
     np.subtract: lambda a, b, y: (1.0, -1.0),
@@ -72,7 +72,7 @@ _TWO: dict[Any, Callable[..., Any]] = {
     np.copysign: lambda a, b, y: (np.sign(a) * np.where(np.signbit(b), -1.0, 1.0), 0.0),
 }
 
-#: Functions without a derivative, of which the value is what is asked for.
+#: Functions without a derivative; their value alone is used.
 _PLAIN: set[Any] = {
     np.greater,
     np.greater_equal,
@@ -88,10 +88,10 @@ _PLAIN: set[Any] = {
 
 
 class Dual(np.lib.mixins.NDArrayOperatorsMixin):
-    """Values of any shape with their derivatives by some arguments, (arguments, *shape)."""
+    """Values of any shape, with derivatives with respect to arguments: (arguments, *shape)."""
 
     __array_priority__ = 1000
-    # assignments change it
+    # assignments change a dual array
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, value: Any, slope: Any) -> None:
@@ -100,7 +100,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
 
     @classmethod
     def seeded(cls, arguments: Any) -> Dual:
-        """The arguments (arguments, n) as functions of themselves."""
+        """Returns the arguments (arguments, n) as dual arrays with unit derivatives."""
         count, n = arguments.shape
         return cls(arguments, np.eye(count)[:, :, None] + np.zeros((count, count, n)))
 
@@ -198,7 +198,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 def _behind(index: Any, dual: Dual) -> Any:
-    """The same index behind the axis of arguments."""
+    """Returns the index for derivatives, whose first axis is that of the arguments."""
     if isinstance(index, tuple):
         return (slice(None), *index)
     return (slice(None), index)
@@ -217,7 +217,7 @@ def _slope(one: Any, count: int) -> Any:
 
 
 def _lifted(slope: Any, ndim: int) -> Any:
-    """Derivatives of an array of fewer axes, to be broadcast behind the axis of arguments."""
+    """Reshapes derivatives for broadcasting to ``ndim`` axes after the axis of arguments."""
     return slope.reshape((len(slope),) + (1,) * (ndim - (slope.ndim - 1)) + slope.shape[1:])
 
 
@@ -238,12 +238,12 @@ def _applied(function: Any, inputs: Sequence[Any]) -> Any:
 
 
 def _spread(slope: Any, shape: tuple[int, ...]) -> Any:
-    """Derivatives for all values of an array; they may be written."""
+    """Broadcasts derivatives to the shape of an array; the result is writable."""
     return slope if slope.shape[1:] == shape else np.broadcast_to(slope, (len(slope), *shape)).copy()
 
 
 def _matmul(a: Any, b: Any) -> Dual:
-    """Products of a matrix and an array of which one depends on the arguments, or both."""
+    """Returns the matrix product of two arrays, at least one of which is dual."""
     value = np.matmul(_value(a), _value(b))
     slope: Any = 0.0
     if isinstance(a, Dual):
@@ -260,7 +260,7 @@ def _sum(dual: Any, axis: Any = None, dtype: Any = None, out: Any = None, keepdi
 
 
 def _joined(join: Callable[..., Any]) -> Callable[..., Dual]:
-    """Of a function that joins arrays along an axis."""
+    """Wraps a function that joins arrays along an axis."""
 
     def joined(parts: Any, axis: int = 0, **_: Any) -> Dual:
         parts = list(parts)
@@ -321,7 +321,7 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     if ord not in (None, 2) or axis is None:
         raise TypeError(UNKNOWN.format("linalg.norm other than the length along an axis"))
     length = np.sqrt(np.sum(_value(x) ** 2, axis=axis, keepdims=True))
-    # at rest the length has no derivative; that of zero leaves it out
+    # the norm has no derivative at zero; the value 0 is used there
     share = np.divide(_value(x), length, out=np.zeros_like(_value(x)), where=length > 0.0)
     slope = np.sum(share * x.slope, axis=1 + axis % x.ndim, keepdims=keepdims)
     return Dual(length if keepdims else np.squeeze(length, axis=axis), slope)
@@ -343,7 +343,7 @@ def _einsum(subscripts: str, *operands: Any, **_: Any) -> Dual:
 
 
 def _shaped(function: Callable[..., Any]) -> Callable[..., Dual]:
-    """Of a function that moves values, the same for each derivative."""
+    """Wraps a function that rearranges values, and applies it to each derivative."""
 
     def shaped(dual: Dual, *arguments: Any, **options: Any) -> Dual:
         return Dual(function(dual.value, *arguments, **options), np.stack([function(part, *arguments, **options) for part in dual.slope]))
@@ -366,7 +366,7 @@ def _select(conditions: Any, choices: Any, default: Any = 0.0) -> Any:
     return default
 
 
-#: What NumPy's functions other than operators do with dual arrays.
+#: Implementations of NumPy functions, other than operators, for dual arrays.
 _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _where,
     np.clip: _clip,

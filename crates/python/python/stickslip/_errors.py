@@ -1,4 +1,4 @@
-"""The exceptions of the package; their text is what the command prints."""
+"""The exceptions of the package; their text equals that of the command."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 
 
 class StickslipError(Exception):
-    """What all exceptions of the package are."""
+    """Base class of all exceptions of the package."""
 
 
 class StudyError(StickslipError, ValueError):
-    """A study that cannot be read or run: where in its file, what was expected, what to do."""
+    """A study cannot be read or run: location in the file, expected value, remedy."""
 
     def __init__(
         self,
@@ -30,11 +30,11 @@ class StudyError(StickslipError, ValueError):
         #: Line and column of the wrong value, from 1; ``None`` for a file that cannot be read.
         self.line = line
         self.column = column
-        #: The key that is wrong.
+        #: The wrong key.
         self.key = key
-        #: What is wrong and what was expected, in one line.
+        #: The error and the expected value, in one line.
         self.reason = reason
-        #: What to do.
+        #: The remedy.
         self.help = help
 
     def __reduce__(self) -> tuple[Callable[..., StudyError], tuple[str, dict[str, Any]]]:
@@ -46,16 +46,16 @@ def _study_error(message: str, attributes: dict[str, Any]) -> StudyError:
 
 
 class ModelError(StickslipError, ValueError):
-    """A model, a law or a quantity that is refused."""
+    """A model, a law or a quantity is invalid."""
 
 
 class MethodError(StickslipError, ValueError):
-    """A model that a method cannot take; says which methods can."""
+    """A method cannot solve a model; the text names the methods that can."""
 
 
 class OrbitError(StickslipError, ArithmeticError):
-    """No orbit was found: how far the method got, and what to try."""
+    """No orbit was found: the progress of the method, and suggestions."""
 
 
 class ReportError(StickslipError, OSError):
-    """Results that cannot be written."""
+    """Results cannot be written."""

@@ -1,7 +1,10 @@
-"""The folder of a campaign: what stands in it, its lock, and which of its parts are whole.
+"""The folder of a campaign: its files, its lock, and the completeness of its parts.
 
-``campaign.json`` holds the study, ``parts/`` for each batch of units one Parquet file for each table, ``done/`` what is to be said of a batch with
-the sizes and checksums of its parts, written last: a batch without it counts as never computed. ``lock`` is held by the campaign that writes.
+- ``campaign.json`` contains the study.
+- ``parts/`` contains one Parquet file per batch of units and table.
+- ``done/`` contains one record per batch, with the sizes and checksums of its parts. The record is
+  written last; a batch without a record counts as not computed.
+- ``lock`` is locked by the campaign that writes.
 """
 
 from __future__ import annotations
@@ -15,16 +18,16 @@ from typing import Any, NamedTuple
 
 from ._errors import StickslipError
 
-#: The version of the folder's layout.
+#: Version of the folder layout.
 FORMAT = 2
 
 
 class CampaignError(StickslipError):
-    """A campaign that cannot begin or go on."""
+    """A campaign cannot start or continue."""
 
 
 class Batch(NamedTuple):
-    """Units ``start`` to ``stop`` (excluded), and what is to be said of them."""
+    """Units ``start`` to ``stop`` (exclusive), and their record."""
 
     start: int
     stop: int
@@ -32,17 +35,17 @@ class Batch(NamedTuple):
 
     @property
     def stem(self) -> str:
-        """The name of its files."""
+        """Stem of its file names."""
         return stem(self.start, self.stop)
 
 
 def stem(start: int, stop: int) -> str:
-    """The name of the files of a batch: sorted by name they are sorted by units."""
+    """Returns the stem of the file names of a batch. Sorting by name sorts by units."""
     return f"{start:012}-{stop:012}"
 
 
 def write(path: Path, data: bytes) -> None:
-    """Writes a file that is there whole or not at all, also after a power failure."""
+    """Writes a file completely or not at all, even in case of a power failure."""
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     with open(aside, "wb") as file:
         file.write(data)
@@ -52,7 +55,7 @@ def write(path: Path, data: bytes) -> None:
 
 
 def lock(out: Path) -> Any:
-    """Locks the folder for the campaign that writes into it; ``release()`` frees it, and so does the end of the process."""
+    """Locks the folder for a writing campaign, until ``release()`` or the end of the process."""
     from ._core import _lock
 
     held = _lock(out / "lock")
@@ -62,7 +65,7 @@ def lock(out: Path) -> Any:
 
 
 def keep(out: Path, start: int, stop: int, told: Mapping[str, Any], tables: Mapping[str, bytes]) -> None:
-    """Keeps a batch: its tables, then what is to be said of it."""
+    """Stores a batch: its tables, then its record."""
     parts = {}
     for name, data in tables.items():
         folder = out / "parts" / name
@@ -73,9 +76,10 @@ def keep(out: Path, start: int, stop: int, told: Mapping[str, Any], tables: Mapp
 
 
 def read(out: Path, units: int, *, checksums: bool = False) -> tuple[list[Batch], list[Path]]:
-    """The batches that are whole, by rising units, and the files in ``done/`` that stand for none.
+    """Returns the complete batches by ascending units, and the invalid files in ``done/``.
 
-    A batch is whole where its parts have their sizes, and with ``checksums`` their contents. Of two batches that hold a unit the first counts.
+    A batch is complete if its parts have the recorded sizes, and with ``checksums`` the recorded
+    contents. If two batches contain the same unit, the first one counts.
     """
     batches: list[Batch] = []
     useless: list[Path] = []
@@ -91,7 +95,7 @@ def read(out: Path, units: int, *, checksums: bool = False) -> tuple[list[Batch]
 
 
 def clear(out: Path) -> None:
-    """Removes what an interrupted writer left aside."""
+    """Removes temporary files of an interrupted writer."""
     for folder in (out, out / "done", *(out / "parts").iterdir()):
         for file in folder.glob(".*.*"):
             if file.suffix[1:].isdigit():
@@ -99,7 +103,7 @@ def clear(out: Path) -> None:
 
 
 def missing(batches: list[Batch], units: int) -> Iterator[tuple[int, int]]:
-    """The ranges of units that no batch holds."""
+    """Returns the ranges of units that are in no batch."""
     at = 0
     for batch in batches:
         if batch.start > at:

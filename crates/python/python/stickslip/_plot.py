@@ -1,4 +1,4 @@
-"""Figures by matplotlib."""
+"""Figures with matplotlib."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def plot(figure: dict[str, Any], axes: Any = None) -> Any:
-    """Draws the figure of a result, one pair of axes for each panel, and returns matplotlib's ``Figure``."""
+    """Draws the figure of a result, one axes object per panel. Returns matplotlib's ``Figure``."""
     plt = importlib.import_module("matplotlib.pyplot")
     panels = figure["panels"]
     if axes is None:
@@ -34,7 +34,7 @@ def plot(figure: dict[str, Any], axes: Any = None) -> Any:
 def _panel(panel: dict[str, Any], axes: Any) -> None:
     labels: set[str] = set()
     for series in panel["series"]:
-        # a number that does not exist interrupts a curve
+        # NaN interrupts a curve
         x, y, base = ([math.nan if value is None else value for value in series[key]] for key in ("x", "y", "base"))
         label = series["label"] if series["label"] not in labels else ""
         labels.add(label)

@@ -1,4 +1,4 @@
-"""A bar by tqdm, if it is installed."""
+"""A progress bar of tqdm, if it is installed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def bar(name: str) -> Callable[[int, int | None], object] | None:
-    """A function of the points done and of all that draws a bar; ``None`` without tqdm."""
+    """Returns a function of the finished and of all points that draws a bar; ``None`` without tqdm."""
     try:
         tqdm = importlib.import_module("tqdm.auto").tqdm
     except ImportError:

@@ -1,4 +1,4 @@
-"""Laws written in Python: force and rates as a function of arrays, with exact derivatives by dual arrays (`_dual.py`)."""
+"""Laws written in Python: force and rates over arrays, with exact derivatives (`_dual.py`)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Steps of difference quotients, relative to the size of an argument: the cube root of rounding, where central differences are best.
+#: Relative step of central differences: the cube root of machine epsilon, where they are most
+#: accurate.
 DIFFERENCE = 1e-5
 
 
@@ -68,22 +69,31 @@ def rate_law(
     passive: bool = False,
     name: str | None = None,
 ) -> Law | Callable[[Callable[..., Any]], Law]:
-    """A law in rate form: ``f, dz = function(u, v, z)``.
+    """Creates a law in rate form: ``f, dz = function(u, v, z)``.
 
-    ``u`` (m) and ``v = u'`` (m/s) are arrays of n instants, of shape (n,) for one direction, else (directions, n); ``z`` has shape (states, n), in
-    your units. Return the force ``f`` (N, the shape of ``u``) and the rates ``dz`` (states, n), or ``f`` alone without states; a list of rows will do
-    for an array, and a number for a row. Write them with operators and NumPy's functions, for all instants alike: derivatives are then exact, by
-    dual arrays.
+    ``u`` (m) and ``v = u'`` (m/s) are arrays over n points in time. Their shape is (n,) for one
+    direction, otherwise (directions, n). ``z`` has the shape (states, n), in your units. The function
+    returns the force ``f`` (N, in the shape of ``u``) and the rates ``dz`` (states, n), or ``f`` alone
+    without states. A list of rows may replace an array, and a number may replace a row.
 
-    ``parameters``: names and values, numbers in SI or strings with units. The function gets them as keyword arguments, and ``Model.set`` and
-    ``vary`` know them as ``JOINT.NAME``.
-    ``derivatives(u, v, z)`` returns the derivatives instead: shape (directions + states, 2 directions + states, n), row by row those of ``f`` and
-    ``dz`` by ``u``, ``v`` and ``z``. :meth:`Law.check_derivatives` compares them with difference quotients.
-    ``scale``: the size of its forces, N, such as a slip limit; ``state_scale``: that of its states; each a number or the name of a parameter.
-    ``odd``: ``f(-u) = -f(u)`` for whole histories; ``passive``: two motions under it never gain energy from their difference. Claim neither where
-    you are not sure: they speed up, and wrong claims make wrong orbits.
+    The function must consist of operators and NumPy functions that act equally on all points. Its
+    derivatives are then exact, computed with dual arrays.
 
-    The law lives in harmonic balance, shooting and transients. Usable as a decorator.
+    - ``parameters``: names and values, numbers in SI units or strings with units. The function
+      receives them as keyword arguments. ``Model.set`` and ``vary`` use the names ``JOINT.NAME``.
+    - ``derivatives(u, v, z)``: returns the derivatives instead of dual arrays. The shape is
+      (directions + states, 2 directions + states, n): rows are ``f`` and ``dz``, columns are ``u``,
+      ``v`` and ``z``. :meth:`Law.check_derivatives` compares them with difference quotients.
+    - ``scale``: magnitude of the forces in N, such as a slip limit, as a number or the name of a
+      parameter.
+    - ``state_scale``: magnitude of the states, as a number or the name of a parameter.
+    - ``odd``: ``f(-u) = -f(u)`` for whole histories.
+    - ``passive``: two motions never gain energy from their difference.
+
+    ``odd`` and ``passive`` speed up the solution, but a wrong value gives wrong orbits. Do not set them
+    if you are not sure.
+
+    Harmonic balance, shooting and transients can use the law. The function can be used as a decorator.
 
     >>> import numpy as np, stickslip
     >>> @stickslip.rate_law(states=1, parameters={"stiffness": "10 N/mm", "limit": "2 N"}, scale="limit", odd=True)
@@ -127,7 +137,7 @@ def rate_law(
 
 
 def _by_name(module: str, name: str) -> Any:
-    """What a module calls by this name, for pickles."""
+    """Returns the object with this name in a module, for pickles."""
     found: Any = importlib.import_module(module)
     for part in name.split("."):
         found = getattr(found, part)
@@ -135,7 +145,10 @@ def _by_name(module: str, name: str) -> Any:
 
 
 class _Kernel:
-    """A law as Rust calls it: arguments (rows, n) and values of parameters, answers (directions + states, n)."""
+    """A law as called from Rust.
+
+    It takes arguments (rows, n) and the values of parameters, and returns (directions + states, n).
+    """
 
     def __init__(
         self, function: Callable[..., Any], derivatives: Callable[..., Any] | None, directions: int, states: int, parameters: tuple[str, ...]
@@ -145,7 +158,7 @@ class _Kernel:
         self.name = str(getattr(function, "__name__", "law"))
 
     def pickled(self, law: Law) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """How a pickle finds the law: by the name of its function in a module, where it is the law, or its function."""
+        """Returns the pickle of a law: the module that contains it, and its name there."""
         module, name = getattr(self._function, "__module__", None), getattr(self._function, "__qualname__", "")
         try:
             found = _by_name(module or "", name)
@@ -157,14 +170,14 @@ class _Kernel:
         raise _pickling_error(message)
 
     def _call(self, u: Any, v: Any, z: Any, values: Sequence[float]) -> list[Any]:
-        """The rows of forces and rates."""
+        """Returns the rows of forces and rates."""
         if self._directions == 1:
             u, v = u[0], v[0]
         force, rates = self._parts(self._function(u, v, z, **dict(zip(self._parameters, values))))
         return self._rows(force, self._directions, "force") + self._rows(rates, self._states, "rates")
 
     def _parts(self, answer: Any) -> tuple[Any, Any]:
-        """Force and rates of what the function returned."""
+        """Splits the return value of the function into force and rates."""
         pair = answer if isinstance(answer, tuple) else (answer, ())
         if pair[0] is None:
             raise TypeError(f"`{self.name}` returned None: return the force, or force and rates")
@@ -174,7 +187,7 @@ class _Kernel:
         return pair[0], pair[1]
 
     def _rows(self, answer: Any, count: int, what: str) -> list[Any]:
-        """The rows of an answer, each a number or an array of n instants."""
+        """Splits a return value into rows, each a number or an array over n points."""
         if isinstance(answer, (list, tuple)):
             rows = list(answer)
             if count == 1 and rows and all(np.ndim(row) == 0 for row in rows):
@@ -189,7 +202,7 @@ class _Kernel:
         return rows
 
     def must_be_odd(self, law: Law) -> None:
-        """Tries the claim at some instants: who is not odd there is not odd."""
+        """Tests the property `odd` at several points."""
         n, shape = 13, (self._directions, 13)
         size = np.logspace(-6.0, 0.0, n)
         u, v = size * np.where(np.arange(n) % 2, 1.0, -1.0) + np.zeros(shape), 10.0 * size[::-1] + np.zeros(shape)
@@ -220,11 +233,11 @@ class _Kernel:
             if isinstance(answer, Dual):
                 out[row], slopes[row] = answer.value, answer.slope
             else:
-                out[row] = np.asarray(answer, float)  # it depends on nothing
+                out[row] = np.asarray(answer, float)  # a constant
         return out, slopes.reshape(rows * arguments, n)
 
     def check_derivatives(self, law: Law, u: ArrayLike | None, v: ArrayLike | None, z: ArrayLike | None, tolerance: float) -> float:
-        """The largest error of a derivative, see `Law.check_derivatives`."""
+        """Returns the largest error of a derivative; see `Law.check_derivatives`."""
         instants = self._instants(law, u, v, z)
         n, d, m = instants.shape[1], self._directions, self._states
         values = tuple(law.parameters.values())
@@ -241,7 +254,7 @@ class _Kernel:
             width = (instants + step)[argument] - (instants - step)[argument]
             ahead, behind = self.value(*split(instants + step), values)[0], self.value(*split(instants - step), values)[0]
             quotient = (ahead - behind) / width
-            # what rounding makes of a quotient
+            # rounding error of a difference quotient
             rounding = 10.0 * np.finfo(float).eps * np.abs(out).max(axis=1, keepdims=True) / width
             size = np.maximum(np.abs(slopes[:, argument]), np.abs(quotient)).max(axis=1, keepdims=True)
             error = np.maximum(np.abs(slopes[:, argument] - quotient) - rounding, 0.0) / np.where(size > 0.0, size, 1.0)
@@ -255,7 +268,7 @@ class _Kernel:
         return worst[0]
 
     def _instants(self, law: Law, u: ArrayLike | None, v: ArrayLike | None, z: ArrayLike | None) -> Array:
-        """Arguments (rows, n): those that are given, and others drawn at random."""
+        """Returns arguments (rows, n): the given ones, and random values for the others."""
         n = max([1] + [np.asarray(given).shape[-1] for given in (u, v, z) if given is not None and np.ndim(given)])
         n = n if n > 1 else 64
         random = np.random.default_rng(1)
@@ -280,7 +293,7 @@ class _Kernel:
 
 
 def _renewed(module: str, name: str, parameters: dict[str, float]) -> Law:
-    """The law of a pickle, with the values that it had."""
+    """Recreates the law of a pickle with its values."""
     law: Law = _by_name(module, name)
     return law._with(parameters)
 

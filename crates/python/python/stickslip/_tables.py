@@ -1,4 +1,4 @@
-"""Tables in other libraries, each of which is imported only when it is asked for."""
+"""Conversion of tables to other libraries, which are imported on demand."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
     from ._core import Table
 
-#: Rows that a notebook shows of a table, half of them from each end.
+#: Number of table rows in a notebook, half from each end.
 SHOWN = 10
 
 
 class Mapped(dict[str, Any]):
-    """What a table says that it is to those that ask whether it is a dictionary; there are none of these."""
+    """Class that a table reports to code that tests for a dictionary. It has no instances."""
 
 
 def to_arrow(table: Table) -> Any:
@@ -30,7 +30,7 @@ def to_pandas(table: Table) -> Any:
 
 
 class _Stream:
-    """A table that shows nothing but its stream of Arrow: polars copies the columns of mappings."""
+    """A table that only offers its Arrow stream, because polars copies the columns of mappings."""
 
     def __init__(self, table: Table) -> None:
         self._table = table
@@ -44,7 +44,10 @@ def to_polars(table: Table) -> Any:
 
 
 def to_array(table: Table, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-    """An array of the table's shape: of real numbers, or of objects where a column holds something else."""
+    """Returns an array of the table's shape.
+
+    It contains real numbers, or objects if a column contains other values.
+    """
     if copy is False:
         raise ValueError("a table holds its columns one after the other: an array of it is a copy")
     columns = [table[name] for name in table.columns]
@@ -56,7 +59,7 @@ def to_array(table: Table, dtype: Any = None, copy: bool | None = None) -> NDArr
 
 
 def to_html(table: Table) -> str:
-    """The first and the last rows, for a notebook."""
+    """Returns the first and the last rows for a notebook."""
     rows, _ = table.shape
     half = SHOWN // 2
     shown = list(range(rows)) if rows <= SHOWN else [*range(half), None, *range(rows - half, rows)]

@@ -1,4 +1,4 @@
-"""A study file from a dictionary."""
+"""Conversion of a dictionary to a study file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def text(tables: Mapping[str, Any]) -> str:
-    """The text of a study file with these tables and keys.
+    """Returns the text of a study file with these tables and keys.
 
     >>> print(text({"schema": 1, "parameters": {"Ft": "2 N"}, "mass": [{"name": "a", "mass": 0.1}]}), end="")
     schema = 1
@@ -46,7 +46,7 @@ def _is_list(value: Any) -> bool:
 
 
 def _text(value: str) -> str:
-    # strings of JSON are strings of TOML, but for two halves of a character and for the byte 7f
+    # a JSON string is a TOML string, except for surrogate pairs and the byte 7f
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -1,4 +1,4 @@
-"""Statistics of samples: exceedance and sensitivity. All take arrays, whatever they come from."""
+"""Statistics of samples: exceedance and sensitivity. All functions take arrays from any source."""
 
 from __future__ import annotations
 
@@ -12,15 +12,18 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    #: The range of an input: lowest and highest value, or a function from (0, 1) to values.
+    #: Range of an input: lowest and highest value, or a function from (0, 1) to values.
     Bound = Sequence[float] | NDArray[Any] | Callable[[NDArray[np.float64]], ArrayLike]
 
-#: Most values of an input that are looked at together in `first_order`: fewer make the mean of each group better, more follow the curve better.
+#: Maximum number of groups in `first_order`: fewer groups have more accurate means, more groups
+#: follow the curve better.
 MOST_GROUPS = 48
 
 
 def exceedance(values: ArrayLike, levels: ArrayLike) -> NDArray[np.float64]:
-    """The share of the values that are above each of the levels. NaN counts for nothing; the share is NaN where there is no value at all.
+    """Returns the fraction of the values above each level.
+
+    NaN is ignored. Without any value, the fraction is NaN.
 
     >>> from stickslip.statistics import exceedance
     >>> exceedance([1.0, 2.0, 3.0, 4.0], [0.0, 2.0, 3.5]).tolist()
@@ -34,10 +37,13 @@ def exceedance(values: ArrayLike, levels: ArrayLike) -> NDArray[np.float64]:
 
 
 def first_order(values: ArrayLike, output: ArrayLike, *, groups: int | None = None) -> float:
-    """First-order Sobol index of an input, from any sample of independent inputs: the variance of ``E[output | input]`` over that of ``output``.
+    """Returns the first-order Sobol index of an input from any sample of independent inputs.
 
-    The sample is cut into groups of neighbouring values of the input, and the scatter of the means that the rest of the inputs leaves in finite
-    groups is subtracted. Good to about ``1/sqrt(n)``. Pairs in which one is NaN count for nothing; without any pair the index is NaN.
+    The index is the variance of ``E[output | input]`` divided by that of ``output``. The function
+    divides the sample into groups of adjacent values of the input. It subtracts the scatter of the
+    group means due to the other inputs. The error is about ``1/sqrt(n)``. Pairs with NaN are
+    ignored; without any pair, the index is NaN.
+
     Source: Plischke, Borgonovo, Smith (2013).
     """
     x, y = np.ravel(np.asarray(values, float)), np.ravel(np.asarray(output, float))
@@ -60,13 +66,17 @@ def first_order(values: ArrayLike, output: ArrayLike, *, groups: int | None = No
 def sobol(
     function: Callable[[NDArray[np.float64]], ArrayLike], bounds: Sequence[Bound], *, count: int = 1024, seed: int = 0
 ) -> dict[str, NDArray[np.float64]]:
-    """First-order and total Sobol indices of ``function`` over independent uniform inputs.
+    """Returns first-order and total Sobol indices of ``function`` over independent uniform inputs.
 
-    ``function`` takes an array (n, inputs) and returns n values: one vectorised call for all points. ``bounds``: pairs of lowest and highest, or
-    functions from (0, 1) to values such as ``scipy.stats.norm(2, 0.2).ppf``. Takes ``count (inputs + 2)`` points; ``count`` is a power of two.
-    Returns a dictionary with arrays ``first`` and ``total`` (inputs). Where a value is not finite, the index is that of the other points,
-    and a warning says how many were left out. Needs SciPy.
-    Source: Saltelli et al. (2010), of values about their mean, with Jansen's total index.
+    - ``function`` takes an array (n, inputs) and returns n values; one call computes all points.
+    - ``bounds`` are pairs of lowest and highest value, or functions from (0, 1) to values such as
+      ``scipy.stats.norm(2, 0.2).ppf``.
+    - ``count`` is a power of two. The function evaluates ``count (inputs + 2)`` points.
+
+    The result is a dictionary with arrays ``first`` and ``total`` (inputs). Points with a non-finite
+    value are ignored, and a warning states their number. The function requires SciPy.
+
+    Source: Saltelli et al. (2010), for values relative to their mean, with Jansen's total index.
 
     >>> from stickslip.statistics import sobol
     >>> indices = sobol(lambda p: 121.0 + p[:, 0] + 2 * p[:, 1], [(0, 1), (0, 1)])
@@ -80,7 +90,7 @@ def sobol(
     if count < 2 or count & (count - 1):
         raise ValueError(f"count must be a power of two, found {count}")
     both = qmc.Sobol(2 * d, seed=seed).random(count)
-    # the quantile of 0 or 1 may be infinite
+    # the quantiles of 0 and 1 may be infinite
     both = np.clip(both, 1e-9, 1 - 1e-9)
 
     def scaled(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,10 +116,13 @@ def sobol(
 
 
 def _indices(fa: NDArray[np.float64], fb: NDArray[np.float64], mixed: NDArray[np.float64]) -> tuple[float, float]:
-    """First-order and total index of an input, which ``mixed`` has from the second sample and the rest from the first."""
+    """Returns the first-order and the total index of an input.
+
+    ``mixed`` has this input from the second sample and the other inputs from the first.
+    """
     if not len(fa):
         return float("nan"), float("nan")
-    # of values about their mean: a large mean would multiply the error of the sample
+    # values relative to their mean: a large mean would amplify the sampling error
     mean = np.concatenate([fa, fb]).mean()
     fa, fb, mixed = fa - mean, fb - mean, mixed - mean
     variance = np.concatenate([fa, fb]).var()

@@ -1,29 +1,30 @@
-//! How far the numbers of two runs lie apart: the largest difference in every column, and peaks and optima one by one.
+//! Differences between runs: the largest in every column, and all differences of peaks and
+//! optima.
 
 use super::pairs::{Pair, difference, pairs};
 use super::reading::{Reading, completed};
 use crate::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
-/// How columns with the values of the first run begin.
+/// Prefix of columns with values of the first run.
 pub(super) const FIRST: &str = "first_";
-/// The table of the largest differences.
+/// Name of the table of the largest differences.
 pub(super) const DIFFERENCES: &str = "differences";
-/// Tables whose rows are compared one by one in a table of their own: what a designer looks at first.
+/// Tables whose rows are also compared one by one in a separate table.
 const ONE_BY_ONE: [&str; 2] = ["peaks", "optimum"];
 
 /// The largest difference in a column.
 #[derive(Debug, Default)]
 struct Largest {
     difference: f64,
-    /// Largest size in the first run.
+    /// Largest absolute value in the first run.
     size: f64,
     at: String,
     values: (f64, f64),
     points: u64,
 }
 
-/// The tables of differences, which grow run by run.
+/// The tables of differences, extended with every run.
 #[derive(Debug, Default)]
 pub(super) struct Differences {
     rows: Vec<Row>,
@@ -144,7 +145,7 @@ impl Differences {
         }
     }
 
-    /// Every peak or optimum beside the one of the first run.
+    /// Compares every peak or optimum with that of the first run.
     fn found(
         &mut self,
         (table, with): (&Table, &Table),
@@ -170,7 +171,7 @@ impl Differences {
         }
         match self.found.iter_mut().find(|t| t.name == table.name) {
             None => self.found.push(Table { name: table.name.clone(), columns: made }),
-            // a run may lack a column that others have
+            // A run with different columns is omitted.
             Some(t) if t.columns.iter().map(|c| &c.name).ne(made.iter().map(|c| &c.name)) => {}
             Some(t) => {
                 for (column, more) in t.columns.iter_mut().zip(made) {
@@ -208,7 +209,7 @@ impl Differences {
     }
 }
 
-/// The rows of peaks inside the range; all rows of other tables.
+/// Returns the rows of peaks inside the frequency range, or all rows of other tables.
 fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
     match table.column("at_range_end").map(|column| &column.values) {
         Some(Values::Flag(ends)) if table.name == "peaks" => {
@@ -218,7 +219,7 @@ fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
     }
 }
 
-/// The name of a column without its unit.
+/// Returns the name of a column without its unit.
 fn stem(name: &str) -> &str {
     ["_Hz", "_m", "_N", "_rad"].iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name)
 }
@@ -252,7 +253,7 @@ mod tests {
         assert_eq!((largest.difference, largest.points), (2.0, 1));
         largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
         assert_eq!(largest.points, 1);
-        // between two points of a curve, too
+        // This also holds between two points of a curve.
         let half = Pair { first: 0, other: (0, 1, 0.5) };
         assert_eq!(half.value("blade_phase_deg", &[179.0, -179.0]), 180.0);
         assert_eq!(half.value("blade_amplitude_m", &[179.0, -179.0]), 0.0);

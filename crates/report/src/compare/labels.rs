@@ -1,23 +1,26 @@
-//! What tells runs apart: parameters, the method and its options, or else the folder.
+//! Labels of runs: the parameters, methods and options in which they differ, otherwise the
+//! folder.
 
 use crate::stored::Stored;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
-/// The name of a folder.
+/// Returns the name of a folder.
 pub(super) fn folder_name(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     whole.file_name().map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().trim_matches('.').to_owned())
 }
 
-/// Parameters in a label; runs that differ in more are called by their folders.
+/// Maximum number of parameters in a label. Runs that differ in more have folder names as
+/// labels.
 const MOST_PARAMETERS: usize = 3;
 
-/// What tells each run apart: parameters, the method and its options, or else the folder.
+/// Returns a label for each run: differing parameters, methods and options, otherwise the
+/// folder.
 pub(super) fn labels(runs: &[Stored]) -> Vec<String> {
     let cases: Vec<&Value> = runs.iter().map(|run| &run.dataset.record.study["cases"][0]).collect();
     let mut parts = parameters(&cases);
-    // kinds that find their orbits without a method name none
+    // Study kinds that compute orbits without a method have no method name.
     let methods: Vec<Option<String>> = runs.iter().map(methods).collect();
     if differ(&methods) {
         parts.iter_mut().zip(methods).for_each(|(parts, method)| parts.extend(method));
@@ -32,7 +35,9 @@ pub(super) fn labels(runs: &[Stored]) -> Vec<String> {
     with_folders(runs, &labels)
 }
 
-/// The parameters that are not varied and differ from run to run, for each run; none where there are too many to read.
+/// Returns the parameters that differ between runs, without varied ones, for each run.
+///
+/// The lists are empty if more than [`MOST_PARAMETERS`] differ.
 fn parameters(cases: &[&Value]) -> Vec<Vec<String>> {
     let mut parts: Vec<Vec<String>> = vec![Vec::new(); cases.len()];
     let mut known = keys(cases, |case| &case["parameters"]);
@@ -46,12 +51,12 @@ fn parameters(cases: &[&Value]) -> Vec<Vec<String>> {
     parts
 }
 
-/// The keys of an object of any case.
+/// Returns the keys of an object over all cases.
 fn keys(cases: &[&Value], object: impl Fn(&Value) -> &Value) -> BTreeSet<String> {
     cases.iter().flat_map(|case| object(case).as_object().into_iter().flat_map(|map| map.keys().cloned())).collect()
 }
 
-/// Adds `key = value` for the keys whose values are not the same in all cases; their number.
+/// Adds `key = value` for the keys whose values differ between cases. Returns their number.
 fn add_differing(
     parts: &mut [Vec<String>],
     cases: &[&Value],
@@ -79,14 +84,16 @@ fn unique(labels: &[String]) -> bool {
     labels.iter().collect::<BTreeSet<_>>().len() == labels.len()
 }
 
-/// The methods of a run, without why they were chosen.
+/// Returns the methods of a run without the reasons for their choice.
 fn methods(run: &Stored) -> Option<String> {
     let names = run.dataset.record.methods.iter().map(|choice| choice.split(" (").next().unwrap_or(choice));
     let names: BTreeSet<&str> = names.collect();
     (!names.is_empty()).then(|| names.into_iter().collect::<Vec<_>>().join(" and "))
 }
 
-/// Labels with the names of the folders, with their paths if those are the same, and with numbers if these are too.
+/// Adds folder names to the labels.
+///
+/// Equal names are replaced by paths, and equal paths by numbered labels.
 fn with_folders(runs: &[Stored], labels: &[String]) -> Vec<String> {
     let with = |name: &dyn Fn(&Stored) -> String| -> Vec<String> {
         let runs = runs.iter().zip(labels);

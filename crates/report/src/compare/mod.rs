@@ -1,9 +1,12 @@
-//! Several runs of one kind beside each other: their curves in one figure, and how far their numbers lie apart.
+//! Compares several runs of one kind: their curves in one figure, and the differences of their
+//! numbers.
 //!
-//! Every run is compared with the first. Rows that stand for the same thing (same varied parameters, mass, joint) are told by the
-//! columns that say so. Where both runs have the same abscissae, rows are compared one by one; where they have not, the later
-//! run is interpolated linearly to the abscissae of the first, which the table says. A relative difference is one relative to the largest size
-//! in that column of the first run, so that a zero of a curve is no infinity.
+//! - Every run is compared with the first.
+//! - Rows match if they have the same varied parameters, mass and joint.
+//! - If the abscissae are equal, rows are compared one by one. Otherwise the later run is
+//!   interpolated linearly to the abscissae of the first, and the table states this.
+//! - A relative difference refers to the largest absolute value in that column of the first
+//!   run, so that it stays finite at a zero of the curve.
 
 mod differences;
 mod labels;
@@ -23,30 +26,33 @@ use overlay::overlay;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Figure, Record};
-/// Why runs cannot be compared.
+/// Reason why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// One run alone.
+    /// Only one run was given.
     #[error("a comparison needs two runs: name the folders of both")]
     Single,
-    /// Runs of different kinds.
+    /// The runs have different kinds.
     #[error("{} holds results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
     Kinds {
-        /// The folder of the first run.
+        /// Folder of the first run.
         folder: PathBuf,
-        /// Its kind.
+        /// Kind of the first run.
         kind: String,
-        /// The folder of the other.
+        /// Folder of the other run.
         other: PathBuf,
-        /// Its kind.
+        /// Kind of the other run.
         other_kind: String,
     },
 }
 
-/// The runs in one figure, and tables of their differences: `differences`, and the `peaks` or optima one by one.
+/// Returns the runs in one figure, with tables of their differences.
+///
+/// The table `differences` has the largest difference in every column. Peaks and optima are
+/// also compared one by one.
 ///
 /// # Errors
-/// [`CompareError`]: there is only one, or their kinds differ.
+/// [`CompareError`] if there is only one run or if the kinds differ.
 pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
     let [first, others @ ..] = runs else { return Err(CompareError::Single) };
     if others.is_empty() {
@@ -108,23 +114,23 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
         },
     })
 }
-/// Writes a comparison into `out/NAME/`, which must be free or hold a comparison.
+/// Writes a comparison into `out/NAME/`, which must be absent or hold a comparison.
 ///
 /// # Errors
-/// In words: the folder holds a run, or a file cannot be written.
+/// [`ReportError`] if the folder holds a run or a file cannot be written.
 pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
     let folder = out.join(file_name(&comparison.name, "comparison")?);
     match crate::stored::read(&folder) {
-        // what cannot be read may be a run all the same
+        // Unreadable results may still be a run.
         Err(StoredError::Nothing { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
         _ => Err(ReportError::Write { path: folder, cause: std::io::Error::other("the results of a run are there") }),
     }
 }
 
-/// Names of runs in the name of their comparison; more are counted.
+/// Maximum number of run names in the name of a comparison. Further runs are counted.
 const MOST_NAMES: usize = 2;
 
-/// The names of the folders, joined.
+/// Joins the names of the folders.
 fn name(runs: &[Stored]) -> String {
     let mut names: Vec<String> = runs.iter().take(MOST_NAMES).map(|run| folder_name(&run.folder)).collect();
     if runs.len() > MOST_NAMES {

@@ -1,13 +1,15 @@
-//! The figures of several runs in one.
+//! Combines the figures of several runs in one.
 
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 use stickslip_study::units;
-/// Line styles of the runs, in turn: a curve that hides another lets it through.
+/// Line styles of successive runs: a dashed curve does not hide a curve below it.
 const STYLES: [Style; 3] = [Style::Solid, Style::Dashed, Style::Dotted];
-/// Colours of the palette.
+/// Number of colours of the palette.
 const COLOURS: usize = crate::colour::PALETTE.len();
 
-/// Figures in one: panels of the same title and quantities become one. The title says which run has which dashes, where colours tell curves apart.
+/// Combines figures. Panels with the same title and quantities become one.
+///
+/// If there are several curve names, the title assigns a line style to each run.
 pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
     let names = curve_names(figures);
     let mut panels: Vec<Panel> = Vec::new();
@@ -26,7 +28,7 @@ pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
             run.add(panel, target);
         }
     }
-    // curves of one name have one colour, and the runs their dashes
+    // Curves with the same name have the same colour, and each run has its line style.
     let title = if names.len() > 1 { style_key(figures) } else { String::new() };
     Figure { title, panels, sharing: figures[0].1.sharing, varied: figures[0].1.varied.clone() }
 }
@@ -35,7 +37,7 @@ fn is_curve(series: &Series) -> bool {
     !matches!(series.style, Style::Marks | Style::Missing) && !series.emphasis.is_reference()
 }
 
-/// The labels of all curves, each once.
+/// Returns the labels of all curves without repetition.
 fn curve_names<'f>(figures: &[(&str, &'f Figure)]) -> Vec<&'f str> {
     let mut names: Vec<&str> = Vec::new();
     let panels = figures.iter().flat_map(|(_, figure)| &figure.panels);
@@ -47,8 +49,10 @@ fn curve_names<'f>(figures: &[(&str, &'f Figure)]) -> Vec<&'f str> {
     names
 }
 
-/// The known panel that each panel of a figure belongs to, if any, and whether they go by their order: titles that all differ
-/// name what the runs differ in.
+/// Assigns the panels of a figure to known panels.
+///
+/// If all titles differ but the axes agree, panels are assigned in order, and the flag is
+/// `true`: the titles then name what differs between the runs.
 fn places(known: &[Panel], figure: &Figure) -> (Vec<Option<usize>>, bool) {
     let key = |panel: &Panel| (panel.title.clone(), panel.x.quantity.clone(), panel.y.quantity.clone());
     let fits =
@@ -61,7 +65,7 @@ fn places(known: &[Panel], figure: &Figure) -> (Vec<Option<usize>>, bool) {
     if by_order { ((0..known.len()).map(Some).collect(), true) } else { (found, false) }
 }
 
-/// The styles of the runs in words.
+/// Returns the line styles of the runs as text.
 fn style_key(figures: &[(&str, &Figure)]) -> String {
     let words = |style: &Style| match style {
         Style::Dashed => "dashed",
@@ -72,16 +76,16 @@ fn style_key(figures: &[(&str, &Figure)]) -> String {
     styles.map(|((label, _), style)| format!("{}: {label}", words(style))).collect::<Vec<_>>().join(", ")
 }
 
-/// One of the runs in a figure of several.
+/// One of the runs in a combined figure.
 struct Run<'f> {
     index: usize,
     label: &'f str,
-    /// The labels of the curves of all runs.
+    /// Labels of the curves of all runs.
     names: &'f [&'f str],
 }
 
 impl Run<'_> {
-    /// Draws a panel of this run into the one of all runs.
+    /// Adds a panel of this run to the common panel.
     fn add(&self, panel: &Panel, target: &mut Panel) {
         let Some(factors) = factors(panel, target) else { return };
         if target.x.range != panel.x.range || target.y.range != panel.y.range {
@@ -98,7 +102,7 @@ impl Run<'_> {
         }
     }
 
-    /// The linear structure is the same one, or one more.
+    /// Adds a reference, unless an equal one is already there.
     fn add_reference(&self, series: Series, target: &mut Panel) {
         if target.series.iter().any(|known| is_same_line(known, &series)) {
             return;
@@ -108,8 +112,10 @@ impl Run<'_> {
         target.series.push(Series { label, ..series });
     }
 
-    /// That of the curve's name; a lone curve has another one in every run, and so have runs that have no dashes of their own. Marks have the colour of
-    /// the curve that they stand on.
+    /// Returns the colour of the curve's name.
+    ///
+    /// A figure with one curve name has one colour per run. Runs beyond the number of line
+    /// styles also have other colours. Marks have the colour of their curve.
     fn colour(&self, series: &Series, panel: &Panel) -> usize {
         let owner = if is_curve(series) {
             Some(series)
@@ -130,7 +136,7 @@ impl Run<'_> {
                 (Style::Marks, _) => series.label.clone(),
                 (Style::Missing, _) => format!("{}, {}", series.label, self.label),
                 (_, 1) => self.label.to_owned(),
-                // runs beyond the dashes have colours of their own
+                // Runs beyond the number of line styles have separate legend entries.
                 (_, _) if self.index >= STYLES.len() => format!("{}, {}", series.label, self.label),
                 (_, _) => series.label.clone(),
             },
@@ -141,10 +147,10 @@ impl Run<'_> {
     }
 }
 
-/// Relative difference up to which two methods draw one line.
+/// Relative difference up to which two references count as one line.
 const ONE_LINE: f64 = 1e-6;
 
-/// Whether two references cannot be told apart.
+/// Returns `true` if two references look the same.
 fn is_same_line(a: &Series, b: &Series) -> bool {
     let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= ONE_LINE * a.abs().max(b.abs());
     let all = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(near);
@@ -152,7 +158,7 @@ fn is_same_line(a: &Series, b: &Series) -> bool {
     look(a) == look(b) && all(&a.x, &b.x) && all(&a.y, &b.y)
 }
 
-/// Factors from the units of one panel to those of another; `None` if these measure something else.
+/// Returns the factors between the units of two panels, or `None` for different dimensions.
 fn factors(from: &Panel, to: &Panel) -> Option<(f64, f64)> {
     let of = |from: &Axis, to: &Axis| units::ratio(&from.unit, &to.unit);
     Some((of(&from.x, &to.x)?, of(&from.y, &to.y)?))
@@ -194,10 +200,10 @@ mod tests {
         assert_eq!(lines[0], ("exact", 2.0, Style::Solid));
         assert_eq!(lines[3].0, "series");
         assert!((lines[3].1 - 2.5).abs() < 1e-15 && lines[3].2 == Style::Dashed, "{lines:?}");
-        // marks have the colour of their curve, which is not that of the other run
+        // Marks have the colour of their curve, which differs from that of the other run.
         assert_eq!((series[1].colour, series[4].colour), (series[0].colour, series[3].colour));
         assert_ne!(series[0].colour, series[3].colour);
-        // titles that name what differs: by order; other quantities: panels of their own
+        // Panels with different titles combine in order; other quantities get separate panels.
         assert_eq!(
             overlay(&[("a", &figure("1 N", "mm", 2.0)), ("b", &figure("2 N", "mm", 2.0))]).panels[0].title,
             "1 N | 2 N"
@@ -205,7 +211,7 @@ mod tests {
         assert_eq!(overlay(&[("a", &figure("", "mm", 2.0)), ("b", &figure("", "N", 2.0))]).panels.len(), 2);
     }
 
-    /// Of the linear structures of three cases each run has one line, unless they differ.
+    /// Each case has one line per reference, unless the references of two runs differ.
     #[test]
     fn references_of_the_cases_stand_once() {
         let cases = |factor: f64| {
@@ -226,7 +232,7 @@ mod tests {
         assert_eq!(labels(1.5)[3..], vec!["all joints free, of each case, series"; 3]);
     }
 
-    /// Colour is the case, dashes are the run, and the title says which.
+    /// Colours show cases, line styles show runs, and the title explains the line styles.
     #[test]
     fn cases_keep_their_colours_in_every_run() {
         let cases = |y: f64| {

@@ -1,7 +1,7 @@
-//! Which rows of two runs stand for the same thing.
+//! Finds the matching rows of two runs.
 
 use stickslip_study::dataset::Table;
-/// A row of the first run and what it is compared with: two rows of the other run and the share of the second.
+/// A row of the first run, and two rows of the other run with the weight of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pair {
     pub(super) first: usize,
@@ -19,7 +19,7 @@ impl Pair {
     }
 }
 
-/// Rows along a curve, cut where its abscissa turns.
+/// Splits the rows of a curve into pieces with monotonic abscissa.
 fn pieces(x: &[f64], rows: &[usize]) -> Vec<Vec<usize>> {
     let mut pieces: Vec<Vec<usize>> = Vec::new();
     for &row in rows.iter().filter(|row| x[**row].is_finite()) {
@@ -36,7 +36,7 @@ fn pieces(x: &[f64], rows: &[usize]) -> Vec<Vec<usize>> {
     pieces
 }
 
-/// The other run at the abscissae of the first, where both have any.
+/// Interpolates the other run at the abscissae of the first within their common range.
 fn interpolated(x: (&[f64], &[f64]), first: &[usize], other: &[usize]) -> Vec<Pair> {
     let mut sorted = other.to_vec();
     sorted.sort_by(|a, b| x.1[*a].total_cmp(&x.1[*b]));
@@ -53,7 +53,9 @@ fn interpolated(x: (&[f64], &[f64]), first: &[usize], other: &[usize]) -> Vec<Pa
     first.iter().filter_map(pair).collect()
 }
 
-/// The rows of two groups that stand for the same thing, and whether values are interpolated.
+/// Returns the matching rows of two groups, and `true` if values are interpolated.
+///
+/// Returns `None` if the curves have different numbers of monotonic pieces.
 pub(super) fn pairs(
     tables: (&Table, &Table),
     abscissa: Option<&str>,
@@ -66,7 +68,7 @@ pub(super) fn pairs(
         if first.len() == other.len() {
             return Some((one_by_one(), false));
         }
-        // the peak that stands nearest, each once
+        // Match each peak with the nearest unmatched peak.
         let x = both("frequency_Hz")?;
         let mut left = other.to_vec();
         let mut found = Vec::new();
@@ -86,7 +88,7 @@ pub(super) fn pairs(
     (a.len() == b.len()).then(|| (a.iter().zip(&b).flat_map(|(a, b)| interpolated(x, a, b)).collect(), true))
 }
 
-/// How far `b` lies beyond `a` in this column: angles go the short way around the circle.
+/// Returns `b - a`. Differences of angles (columns in degrees) are between -180 and 180.
 pub(super) fn difference(column: &str, a: f64, b: f64) -> f64 {
     let difference = b - a;
     if column.ends_with("_deg") { difference - 360.0 * (difference / 360.0).round() } else { difference }

@@ -1,9 +1,10 @@
-//! A comparison for people: differences in their units and in percent, without what is the same in all runs.
+//! A comparison for the terminal: differences with units and in percent, without equal columns.
 
 use super::differences::{DIFFERENCES, FIRST};
 use crate::terminal;
 use stickslip_study::dataset::{Column, Dataset, Table, Values};
-/// The same comparison with differences in their units and in percent, and without what is the same in all runs.
+/// Returns the comparison with units and percentages. Quantities that are equal in all runs are
+/// omitted.
 #[must_use]
 pub fn for_people(comparison: &Dataset) -> Dataset {
     let mut people = comparison.clone();
@@ -13,7 +14,7 @@ pub fn for_people(comparison: &Dataset) -> Dataset {
             _ => false,
         });
         table.columns.retain(|column| several || column.name != "run");
-        // a narrow terminal cuts what stands last
+        // A narrow terminal drops the last columns.
         table.columns.sort_by_key(|column| column.name.starts_with(FIRST));
         for column in &mut table.columns {
             if let (Values::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
@@ -30,7 +31,7 @@ pub fn for_people(comparison: &Dataset) -> Dataset {
     people
 }
 
-/// Makes the differences readable; returns what has none.
+/// Formats the differences. Returns the names of columns without any difference.
 fn shown_differences(table: &mut Table) -> Vec<String> {
     let words = |name: &str| match table.column(name).map(|column| &column.values) {
         Some(Values::Text(words)) => words.clone(),
@@ -55,10 +56,10 @@ fn shown_differences(table: &mut Table) -> Vec<String> {
     names
 }
 
-/// Digits of a place for people; the table has all.
+/// Digits of abscissa and parameter values; the table file has all digits.
 const PLACE_DIGITS: usize = 7;
 
-/// The text with its numbers rounded.
+/// Rounds the numbers in a text.
 fn rounded(text: &str) -> String {
     let word = |word: &str| match word.trim_end_matches(',').parse::<f64>() {
         Ok(value) => {
@@ -71,12 +72,12 @@ fn rounded(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// A share in percent with three digits.
+/// Formats a ratio in percent with three digits.
 fn percent(share: f64, signed: bool) -> String {
     let percent = 100.0 * share;
     let decimals = match percent.abs() {
         size if size == 0.0 || size >= 100.0 => 0,
-        // a rounding error of the machine is nothing to read digits of
+        // A very small percentage is a rounding error; its digits are not shown.
         size => (2 - size.log10().floor() as i32).clamp(0, 9) as usize,
     };
     match signed && percent > 0.0 {

@@ -1,20 +1,20 @@
-//! How the rows of a table are to be read: which columns tell them apart, and along which the others are curves.
+//! Roles of the columns of a table: keys that identify rows, and the abscissa of its curves.
 
 use crate::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
 use stickslip_study::{Case, VariedValue};
-/// Columns that say how well a number is known, not what it is.
+/// Columns with error measures instead of results.
 const EVIDENCE: [&str; 3] = ["residual", "energy_gap", "truncation"];
-/// Columns of words and counts that tell rows apart.
+/// Columns with texts and counts that identify rows.
 const KEYS: [&str; 5] = ["mass", "joint", "loop", "index", "stretch"];
-/// Tables whose rows are told apart by the drive frequency.
+/// Tables whose rows are identified by the excitation frequency.
 const BY_FREQUENCY: [&str; 5] = ["orbit", "orbits", "multipliers", "loops", "loops_summary"];
-/// How the rows of a table are to be read.
+/// Roles of the columns of a table.
 pub(super) struct Reading {
-    /// Columns that tell rows apart.
+    /// Columns that identify rows.
     pub(super) keys: Vec<String>,
-    /// The column along which the other ones are curves.
+    /// Abscissa of the curves in the other columns.
     pub(super) abscissa: Option<String>,
 }
 
@@ -25,9 +25,9 @@ impl Reading {
         let names = |values: &[VariedValue]| values.iter().map(|value| value.column().0).collect::<Vec<_>>();
         let varied = case.as_ref().map(|case| names(&case.varied)).unwrap_or_default();
         let last = varied.last().cloned();
-        // a value that another run varies stands in a column too
+        // A parameter that only another run varies is also a column.
         let fixed = case.as_ref().map(|case| names(&fixed(case))).unwrap_or_default();
-        // a branch along a parameter, an optimum: the last parameter is found, not given
+        // For a branch along a parameter and for an optimum, the last parameter is a result.
         let along = run.dataset.kind == "branch" && !has("frequency_Hz");
         let abscissa = match table.name.as_str() {
             "curve" | "references" => Some("frequency_Hz".to_owned()),
@@ -47,7 +47,7 @@ impl Reading {
         Reading { keys, abscissa: abscissa.filter(|name| has(name)) }
     }
 
-    /// The rows of each group, in the order of the table.
+    /// Returns the rows of each group, in the order of the table.
     pub(super) fn groups(&self, table: &Table) -> Vec<(String, Vec<usize>)> {
         let columns: Vec<&Column> = self.keys.iter().filter_map(|key| table.column(key)).collect();
         let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
@@ -67,7 +67,7 @@ impl Reading {
         groups
     }
 
-    /// The columns to be compared.
+    /// Returns the columns to compare.
     pub(super) fn values<'t>(&self, table: &'t Table) -> Vec<&'t str> {
         let wanted = |column: &&Column| {
             matches!(column.values, Values::Number(_))
@@ -79,7 +79,7 @@ impl Reading {
     }
 }
 
-/// The parameters of a case that are not varied, each with its column.
+/// Returns the parameters of a case that are not varied, with their columns.
 fn fixed(case: &Case) -> Vec<VariedValue> {
     let fixed = case.parameters.iter().filter(|(name, _)| case.varied.iter().all(|varied| varied.name != **name));
     fixed
@@ -93,7 +93,7 @@ fn fixed(case: &Case) -> Vec<VariedValue> {
         .collect()
 }
 
-/// The table with a column for every parameter that the other run varies and this one does not.
+/// Returns the table with a column for every parameter that only the other run varies.
 pub(super) fn completed(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
     let mut table = table.clone();
     let (Ok(case), Ok(varied)) = (run.study.case(0), other.study.case(0).map(|case| case.varied)) else { return table };

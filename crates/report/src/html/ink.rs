@@ -1,4 +1,5 @@
-//! What traces and layout share: colours with their partners on dark, names of axes, text shown literally.
+//! Helpers shared by traces and layout: colours for light and dark pages, axis names, literal
+//! text.
 
 use crate::axis::{self, Range};
 use crate::colour::Colour;
@@ -7,7 +8,8 @@ use crate::svg::escape;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::Figure;
 
-/// Colours of all that is no curve, and their partners on dark: text, background, axes, grid, fine grid, zero.
+/// Colours of text, background, axes, grid, fine grid and zero line, with their dark
+/// counterparts.
 pub(super) const TEXT: &str = "#1a1a1a";
 pub(super) const GROUND: &str = "#ffffff";
 pub(super) const LINE: &str = "#444444";
@@ -23,7 +25,7 @@ const DARK: [[&str; 2]; 6] = [
     [ZERO, "#5a606a"],
 ];
 
-/// The colours of a figure on white, and what they become on dark.
+/// Colours of a figure: shades on white, and the map to their dark counterparts.
 pub(super) struct Ink {
     pub(super) shades: Shades,
     pub(super) dark: BTreeMap<String, String>,
@@ -35,13 +37,13 @@ impl Ink {
         Ink { shades: Shades::of(figure), dark }
     }
 
-    /// The colour as the script takes it, its partner noted.
+    /// Returns the colour for the script and records its dark counterpart.
     pub(super) fn use_of(&mut self, colour: &Colour) -> String {
         self.dark.insert(colour.light.clone(), colour.dark.clone());
         colour.light.clone()
     }
 
-    /// The same, transparent.
+    /// Returns the transparent colour of an area and records its dark counterpart.
     pub(super) fn area(&mut self, colour: &Colour) -> String {
         let [light, dark] = [&colour.light, &colour.dark].map(|c| format!("{c}{:02x}", (AREA * 255.0).round() as u8));
         self.dark.insert(light.clone(), dark);
@@ -49,17 +51,17 @@ impl Ink {
     }
 }
 
-/// Names the axis of a panel the way plotly counts: x, x2, x3, …
+/// Returns the name of a panel's axis in plotly's numbering: x, x2, x3, …
 pub(super) fn axis_name(letter: &str, panel: usize) -> String {
     if panel == 0 { letter.to_owned() } else { format!("{letter}{}", panel + 1) }
 }
 
-/// Text that plotly, which reads some tags and templates, shows literally.
+/// Escapes text so that plotly does not interpret tags or templates in it.
 pub(super) fn plain(text: &str) -> String {
     escape(text).replace("&quot;", "\"").replace("&#39;", "'").replace("%{", "%\u{200b}{")
 }
 
-/// The power of ten that the axis of this range takes out, the same as in the static figure.
+/// Returns the power of ten factored out of an axis, as in the static figure.
 pub(super) fn power(range: Range) -> i32 {
     axis::ticks(range, 6.0).power
 }

@@ -1,4 +1,4 @@
-//! Panels, axes, titles and the colour bar, as the script takes them.
+//! Layout of the interactive figure in plotly's format: panels, axes, titles and colour bar.
 
 use super::ink::{FINE_GRID, GRID, GROUND, Ink, LINE, TEXT, ZERO, axis_name, plain, power};
 use crate::axis::{self, Range};
@@ -8,7 +8,7 @@ use crate::frame::{self, Axes};
 use serde_json::{Value, json};
 use stickslip_study::dataset::{Axis, Figure, Panel, Scale};
 
-/// Sizes of the interactive figure, px. The toolbar stands in the upper margin, above the titles of the panels.
+/// Sizes in px. The toolbar is in the upper margin, above the titles of the panels.
 const TOOLBAR: f64 = 36.0;
 const BOTTOM: f64 = 60.0;
 const ROW_GAP: f64 = 92.0;
@@ -16,18 +16,22 @@ const COLUMN_GAP: f64 = 85.0;
 const TITLE: f64 = 15.0;
 const LABEL: f64 = 14.0;
 const TICK: f64 = 13.0;
-/// Height of a line of text, part of its size.
+/// Line height relative to the text size.
 const LEADING: f64 = 1.3;
-/// Pages narrower than this have one column, by the columns of the wide figure; a wide figure is at least as wide less
-/// the margins of the page and of its outer axes.
+/// Page widths below which the layout has one column, by the number of columns of the wide
+/// layout.
+///
+/// The plots of a wide layout have at least this width minus the margins of the page and of the
+/// outer axes.
 pub(super) const NARROW: [f64; 3] = [600.0, 900.0, 1100.0];
 const PAGE_MARGINS: f64 = 150.0;
-/// Longest line of a title above or below a panel of a narrow page, which may be 390 wide.
+/// Maximum line length of a panel title on a narrow page, which can have a width of 390.
 const NARROW_LINE: f64 = 250.0;
-/// Height that the colour bar needs below the panels of a narrow page.
+/// Height of the colour bar below the panels of a narrow page.
 const BAR: f64 = 90.0;
 
-/// The title of an axis in lines; a panel that does not share the axis of its like says so.
+/// Returns the title of an axis in lines. A range that differs from that of similar panels is
+/// stated.
 fn axis_title(shown: &Axis, range: Range, own: bool, limit: f64) -> Vec<String> {
     let own = if own { ", own range" } else { "" };
     let text = format!("{}{own}", axis::axis_title(shown, power(range)));
@@ -38,14 +42,14 @@ fn broken(lines: &[String]) -> String {
     lines.iter().map(|l| plain(l)).collect::<Vec<_>>().join("<br>")
 }
 
-/// Numbers on an axis that has names, of which twice as many fit.
+/// Number of ticks of an axis with names, on which twice as many fit.
 const NAMED: f64 = 6.0;
 
-/// The page that a layout is for.
+/// Page width that a layout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Page {
     Wide,
-    /// One panel below the other.
+    /// Panels are in one column.
     Narrow,
 }
 
@@ -78,7 +82,7 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.x, a.x, a.own_x, limit)).collect();
     let titles: Vec<Vec<String>> =
         figure.panels.iter().map(|p| font::wrap(&p.title, TITLE, font::Weight::Bold, limit)).collect();
-    // titles of several lines push the rows apart
+    // Titles with several lines increase the distance between rows.
     let titled = if titles.iter().all(Vec::is_empty) { 0.0 } else { LEADING * TITLE * (1.0 + most(&titles)) };
     let below = LEADING * LABEL * most(&x_titles);
     let bar = if narrow && ink.shades.bar.is_some() { BAR } else { 0.0 };
@@ -93,9 +97,9 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         "hoverlabel": { "bgcolor": GROUND, "font": { "size": TICK, "color": TEXT } },
         "modebar": { "orientation": "h", "bgcolor": GROUND, "color": LINE, "activecolor": TEXT },
         "barmode": "group", "bargap": 0.2, "showlegend": false, "separators": ".",
-        // showing and hiding keeps what the reader has zoomed into
+        // Showing and hiding curves keeps the zoom.
         "uirevision": 1,
-        // for images: below the panels
+        // The legend of saved images, below the panels.
         "legend": { "orientation": "h", "x": 0.5, "xanchor": "center", "y": -(bottom + 4.0) / inside, "yanchor": "top", "font": { "size": LABEL } },
     });
     let mut notes = Vec::new();
@@ -158,7 +162,8 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
     layout
 }
 
-/// The colour bar: upright at the right, or lying below the panels of a narrow page.
+/// Returns the colour bar: vertical at the right, or horizontal below the panels of a narrow
+/// page.
 fn colour_axis(shown: &Axis, range: Range, narrow: bool, below: f64, ink: &mut Ink) -> Value {
     const STEPS: u32 = 16;
     let scale: Vec<Value> = (0..=STEPS)
@@ -183,13 +188,15 @@ fn colour_axis(shown: &Axis, range: Range, narrow: bool, below: f64, ink: &mut I
     json!({ "cmin": range.measure(range.from), "cmax": range.measure(range.to), "colorscale": scale, "colorbar": bar })
 }
 
-/// The shortest distance between labels at 1, 2 and 5 times a power of ten, decades.
+/// Smallest distance between labels at 1, 2 and 5 times a power of ten, in decades.
 const FINEST: f64 = 0.301;
-/// Room that a label needs beside the next, across and upright, px.
+/// Space for a label along the horizontal and the vertical axis, in px.
 const ROOM: [f64; 2] = [42.0, 18.0];
 
-/// An axis; `partner` is the earlier axis of the same quantity and range that it zooms with. `length` and the room of a
-/// label are in px.
+/// Returns an axis. It zooms together with `partner`, an earlier axis of the same quantity and
+/// range.
+///
+/// `length` and `room` (the space for a label) are in px.
 fn axis(range: Range, domain: [f64; 2], anchor: String, partner: Option<String>, [length, room]: [f64; 2]) -> Value {
     let power = power(range);
     let log = range.scale == Scale::Log;
@@ -202,7 +209,8 @@ fn axis(range: Range, domain: [f64; 2], anchor: String, partner: Option<String>,
         "nticks": 8, "automargin": true, "zeroline": !log && range.from < 0.0, "tickfont": { "size": TICK },
     });
     if log {
-        // the script chooses steps of whole decades beyond 0.7 decades per tick, 1, 2 and 5 beyond 0.3
+        // plotly uses steps of whole decades above 0.7 decades per tick, and steps at 1, 2 and
+        // 5 above 0.3.
         let digits = FINEST * length / range.span() >= room;
         value["nticks"] = json!((range.span() / if digits { 0.31 } else { 0.71 }).floor().clamp(2.0, 8.0));
         if range.from >= 1e-3 && range.to <= 1e4 {

@@ -1,9 +1,12 @@
-//! The interactive figure as a page: zoom, pan, values under the pointer; works offline, in light and in dark.
+//! Writes the interactive figure as a page with zoom, pan and values under the pointer.
 //!
-//! The plotting script (plotly.js, MIT) comes embedded in the `plotly` crate and is written once per output folder;
-//! pages refer to it by its relative path, and show the static figure where it is missing. The figure itself is plain
-//! data for the script, written here because the crate's layout knows eight axes at most. The legend is part of the
-//! page, not of the plot: it breaks into lines at any width, and nothing lies above it.
+//! The page works offline and in light and dark mode. The `plotly` crate carries the plotting
+//! script (plotly.js, MIT). The script is written once per output folder, and pages load it by
+//! a relative path. A page without the script shows the static figure.
+//!
+//! This module writes the figure's data as JSON, because the layout types of the crate have at
+//! most eight axes. The legend is part of the page and not of the plot: it wraps at any width
+//! and covers nothing.
 
 mod ink;
 mod layout;
@@ -34,7 +37,9 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("figure.html", page), File::shared(script_name(), script())])
 }
 
-/// The figure as a complete page. `script_path` leads from the page to the script, a file named [`script_name`] of the
+/// Returns the figure as a complete page.
+///
+/// `script_path` is the path from the page to a file with the name [`script_name`] and the
 /// content [`script`].
 pub fn to_html(figure: &Figure, script_path: &str) -> String {
     let title = escape(&figure.title);
@@ -42,7 +47,7 @@ pub fn to_html(figure: &Figure, script_path: &str) -> String {
     document(&title, "body { max-width: 1280px; } h1 { text-align: center; }", &body, script_path)
 }
 
-/// A whole page around a body that contains figures. `title` is already escaped.
+/// Returns a complete page around a body with figures. `title` must already be escaped.
 pub(crate) fn document(title: &str, style: &str, body: &str, script_path: &str) -> String {
     let path = escape(script_path);
     format!(
@@ -58,7 +63,7 @@ pub(crate) fn document(title: &str, style: &str, body: &str, script_path: &str) 
     )
 }
 
-// the scroll bar has its place from the start: figures take the width that is there when they are drawn
+// The scroll bar is always visible, because figures use the page width at the time of drawing.
 const STYLE: &str = "\
 html { overflow-y: scroll; }
 body { margin: 0 auto; padding: 1.5rem; font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif; color: #1a1a1a; background: #fff; }
@@ -83,8 +88,9 @@ h1 { font-size: 1.45rem; line-height: 1.25; margin: 0 0 .75rem; overflow-wrap: a
 @media print { .live, .legend, .lost { display: none !important; } .still { display: block; } }
 ";
 
-/// Draws a figure into its place: the same panels below each other where the page is narrow, in the colours that the
-/// reader's screen asks for. An image taken of it has title and legend, and is light.
+/// Draws a figure in its element: in one column on a narrow page, and in light or dark colours.
+///
+/// A saved image has a title and a legend, and is light.
 const DRAW: &str = "
 function stickslip(id, figure) {
   const place = document.getElementById(id);
@@ -128,7 +134,7 @@ function stickslip(id, figure) {
 }
 ";
 
-/// plotly.js without the mathematics typesetter (2 MB) that the crate puts behind it.
+/// Returns plotly.js without the mathematics typesetter (2 MB) that the crate appends.
 pub fn script() -> &'static str {
     static SCRIPT: OnceLock<String> = OnceLock::new();
     SCRIPT.get_or_init(|| {
@@ -138,7 +144,7 @@ pub fn script() -> &'static str {
     })
 }
 
-/// Name of the script's file: `plotly-3.0.1.min.js`, with the version that the script itself tells.
+/// Returns the script's file name with its version: `plotly-3.0.1.min.js`.
 pub fn script_name() -> String {
     let version = script().split_once("plotly.js v").map_or("", |(_, rest)| rest);
     let end = version.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(0);
@@ -148,7 +154,7 @@ pub fn script_name() -> String {
     }
 }
 
-/// The figure inside a page: live on the screen, static on paper and where no script runs.
+/// Returns the figure for a page: interactive on screen, static in print or without the script.
 pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
     let (columns, _) = frame::grid(figure);
     let mut ink = Ink::new(figure);
@@ -160,7 +166,7 @@ pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
         "data": data, "wide": wide, "narrow": narrow, "dark": ink.dark, "title": plain(&figure.title),
         "break": NARROW[columns.clamp(1, 3) - 1],
     });
-    // `<` would let a label end the script element
+    // A `<` in a label could close the script element.
     let data = data.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
     format!(
         "<div class=\"figure\">\n{}<div id=\"{id}\" class=\"live\" style=\"min-height: {height}px\"></div>\n\
@@ -170,7 +176,7 @@ pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
     )
 }
 
-/// The legend: buttons that show and hide what they name.
+/// Returns the legend: buttons that show and hide curves.
 fn legend(figure: &Figure, id: &str) -> String {
     let (entries, more) = frame::legend(figure);
     if entries.is_empty() {
@@ -194,7 +200,7 @@ fn legend(figure: &Figure, id: &str) -> String {
     out
 }
 
-/// What the curves of a legend entry look like, as a small drawing in the colour of the page.
+/// Returns the sample of a legend entry as a small drawing.
 fn sample(entry: &Entry) -> String {
     let mut out = "<svg width=\"30\" height=\"14\" aria-hidden=\"true\">".to_owned();
     let opacity = if entry.pale { PALE } else { 1.0 };
@@ -239,13 +245,13 @@ pub(crate) mod tests {
     use serde_json::Value;
     use std::collections::BTreeSet;
 
-    /// The figure as the script gets it.
+    /// Returns traces, wide layout and narrow layout, as the script receives them.
     fn made(figure: &Figure) -> (Vec<Value>, Value, Value) {
         let mut ink = Ink::new(figure);
         (traces(figure, &mut ink), layout(figure, Page::Wide, &mut ink), layout(figure, Page::Narrow, &mut ink))
     }
 
-    /// What stands outside of the scripts: nothing there may load anything.
+    /// Returns the page without its scripts; nothing in this part may load a resource.
     pub(crate) fn markup(html: &str) -> String {
         let (first, others) = html.split_once("<script>").unwrap_or((html, ""));
         let after = others.split("<script>").map(|part| part.split_once("</script>").map_or(part, |(_, rest)| rest));
@@ -271,7 +277,8 @@ pub(crate) mod tests {
 
     #[test]
     fn pages_are_small() {
-        // the curves twice: as numbers for the script, and as the static figure
+        // The page contains the curves twice: as numbers for the script and in the static
+        // figure.
         let size = |figure: &Figure| to_html(figure, "").len();
         assert!(size(&samples::response().figure) < 150_000, "{}", size(&samples::response().figure));
         let many = size(&samples::cases(400).figure);
@@ -340,7 +347,7 @@ pub(crate) mod tests {
         assert_eq!((&wide["coloraxis"]["cmin"], &wide["coloraxis"]["cmax"]), (&json!(1.0), &json!(400.0)));
         assert_eq!(narrow["coloraxis"]["colorbar"]["orientation"], "h");
         assert_eq!(traces.iter().filter(|t| t["marker"]["coloraxis"] == "coloraxis").count(), 1);
-        // where the labels name something else, the value stands under the pointer
+        // If the labels name something else, the pointer shows the value.
         let (traces, wide, _) = made(&samples::masses().figure);
         let hover = |text: &str| {
             traces.iter().filter(|t| t["hovertemplate"].as_str().is_some_and(|h| h.contains(text))).count()

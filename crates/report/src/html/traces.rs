@@ -1,4 +1,4 @@
-//! The curves, as the script takes them.
+//! The curves of the interactive figure as plotly traces.
 
 use super::ink::{GROUND, Ink, axis_name, plain, power};
 use crate::axis::{self, Range};
@@ -10,7 +10,8 @@ use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sty
 
 pub(super) fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
     let (entries, _) = frame::legend(figure);
-    // in an image, a label of several colours stands in the legend in grey, as a trace without points
+    // In an image, a label with several colours has a grey legend entry from a trace without
+    // points.
     let several: Vec<&Entry> = entries.iter().filter(|entry| entry.colour == Colour::many()).collect();
     let mut traces: Vec<Value> = several.iter().map(|entry| legend_trace(entry, ink)).collect();
     let mut seen: BTreeSet<&str> = several.iter().map(|entry| entry.label.as_str()).collect();
@@ -28,7 +29,7 @@ pub(super) fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
     traces
 }
 
-/// A trace without points for the legend of an image.
+/// Returns a trace without points for the legend of an image.
 fn legend_trace(entry: &Entry, ink: &mut Ink) -> Value {
     let mode = match (entry.line, entry.marks) {
         (None, _) => "markers",
@@ -44,7 +45,7 @@ fn legend_trace(entry: &Entry, ink: &mut Ink) -> Value {
     })
 }
 
-/// A trace without points that carries the colour bar.
+/// Returns a trace without points that carries the colour bar.
 fn bar_trace(range: Range) -> Value {
     let value = range.measure(range.from);
     json!({
@@ -53,10 +54,10 @@ fn bar_trace(range: Range) -> Value {
     })
 }
 
-/// Curves of more points are drawn by the graphics processor.
+/// The graphics processor draws curves with more points than this.
 const MANY_POINTS: usize = 5000;
 
-/// How far a stripe lies under the next one, so that no seam shows.
+/// Overlap of stripes, which hides seams.
 const OVERLAP: f64 = 0.03;
 
 /// A panel whose curves are drawn.
@@ -64,14 +65,14 @@ struct Drawn<'f> {
     index: usize,
     panel: &'f Panel,
     axes: Axes,
-    /// Whether it is the only one.
+    /// `true` if the figure has no other panel.
     alone: bool,
     x: Form,
     y: Form,
 }
 
 impl Drawn<'_> {
-    /// The trace of a series; a line with lonely points has one more, before it.
+    /// Returns the trace of a series, after a trace with the isolated points of a line.
     fn traces(&self, series: &Series, named: bool, ink: &mut Ink) -> Vec<Value> {
         let mut trace = self.trace(series, named, ink);
         let shade = ink.shades.colour(series);
@@ -113,7 +114,7 @@ impl Drawn<'_> {
         vec![trace]
     }
 
-    /// What traces of all styles have: points, names, what the pointer shows.
+    /// Returns the part common to all styles: points, names and hover text.
     fn trace(&self, series: &Series, named: bool, ink: &Ink) -> Value {
         let panel = self.panel;
         let said = panel.title.is_empty() || panel.title == series.label;
@@ -154,7 +155,7 @@ impl Drawn<'_> {
         if series.base.is_empty() {
             return;
         }
-        // the script counts the bar from its foot
+        // plotly measures the height of a bar from its foot.
         let feet = |i: usize| frame::base(self.panel, series, i).unwrap_or(self.axes.y.from);
         let count = series.x.len().min(series.y.len());
         trace["base"] = json!(self.y.numbers((0..count).map(feet)));
@@ -162,7 +163,7 @@ impl Drawn<'_> {
         trace["y"] = json!(self.y.numbers(heights));
     }
 
-    /// A stripe as a map of one row.
+    /// Returns a stripe as a heat map with one row.
     fn stripe(&self, series: &Series, ink: &Ink) -> Option<Value> {
         let ((shown, range), y) = (ink.shades.bar.as_ref()?, series.y.first()?);
         let count = series.x.len().min(series.shades.len());
@@ -177,7 +178,7 @@ impl Drawn<'_> {
         }))
     }
 
-    /// Points that a line alone would not show.
+    /// Returns a trace of the points that a line does not show.
     fn lonely_points(&self, series: &Series, trace: &Value, colour: &str) -> Option<Value> {
         let points = lonely(self.panel, series);
         if points.is_empty() {
@@ -193,7 +194,9 @@ impl Drawn<'_> {
     }
 }
 
-/// The outlines of the pieces of a band: along the upper edge, back along the lower, a gap.
+/// Returns the outlines of the pieces of a band.
+///
+/// An outline follows the upper edge, returns along the lower edge, and ends with a gap.
 fn outline(panel: &Panel, series: &Series, range: Range) -> (Vec<f64>, Vec<f64>) {
     let points: Vec<(usize, (f64, f64))> = frame::points(panel, series).enumerate().collect();
     let (mut x, mut y) = (Vec::new(), Vec::new());
@@ -207,7 +210,7 @@ fn outline(panel: &Panel, series: &Series, range: Range) -> (Vec<f64>, Vec<f64>)
     (x, y)
 }
 
-/// The dashes of the static figure, in the words of plotly.
+/// Returns the dash pattern of the static figure in plotly's format.
 fn dash(style: Style) -> &'static str {
     match style {
         Style::Dashed => "7px,4px",
@@ -216,7 +219,7 @@ fn dash(style: Style) -> &'static str {
     }
 }
 
-/// The points with gaps on both sides: a line alone would not show them.
+/// Returns the points between two gaps, which a line does not show.
 fn lonely(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = frame::points(panel, series).collect();
     points
@@ -225,17 +228,18 @@ fn lonely(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// How the numbers of an axis are written.
+/// Number format of an axis.
 struct Form {
-    /// The power of ten taken out of them, the same as in the static figure.
+    /// Power of ten factored out, as in the static figure.
     power: i32,
-    /// Digits after the point; on a logarithmic axis all digits after the first.
+    /// Digits after the decimal point. On a logarithmic axis: digits after the leading one.
     digits: usize,
     scale: Scale,
 }
 
-/// Digits of a number, counted from the first digit of the length of its axis: a reader may zoom in ten thousand times
-/// before a thousandth of the picture moves.
+/// Digits of a number, counted from the leading digit of the axis length.
+///
+/// A reader can zoom in by 10,000 before a point moves by a thousandth of the picture.
 const DIGITS: i32 = 8;
 
 impl Form {
@@ -249,7 +253,7 @@ impl Form {
         Form { power, digits: digits as usize, scale: range.scale }
     }
 
-    /// Numbers for the page; what does not exist is null and interrupts the curve.
+    /// Formats numbers for the page. Non-finite values become null, which interrupts a curve.
     fn numbers(&self, values: impl Iterator<Item = f64>) -> Vec<Value> {
         let digits = self.digits;
         let number = |v: f64| {
@@ -257,13 +261,13 @@ impl Form {
             let text = if self.scale == Scale::Log { format!("{v:.digits$e}") } else { format!("{v:.digits$}") };
             text.parse::<f64>().ok().filter(|v| v.is_finite()).map(|v| v + 0.0)
         };
-        // a whole number without its point is shorter
+        // An integer without a decimal point is shorter.
         let value = |v: f64| if v.abs() < 1e15 && v.fract() == 0.0 { Value::from(v as i64) } else { Value::from(v) };
         values.map(|v| number(v).map_or(Value::Null, value)).collect()
     }
 }
 
-/// `frequency = 121.25 Hz` for the value under the pointer.
+/// Returns the hover template of a value, such as `frequency = 121.25 Hz`.
 fn hover(letter: &str, shown: &Axis, power: i32) -> String {
     let quantity = if shown.quantity.trim().is_empty() { letter } else { shown.quantity.trim() };
     format!("{} = %{{{letter}:.6~g}} {}", plain(quantity), plain(&axis::unit(shown, power)))
@@ -282,7 +286,7 @@ mod tests {
         );
         let log = Form::of(Range { from: 1e-9, to: 1e3, scale: Scale::Log });
         assert_eq!(json!(log.numbers([1.234_567_891e-9, 100.0].into_iter())), json!([1.2345679e-9, 100]));
-        // an offset takes no digits away from what is seen
+        // An offset does not reduce the visible digits.
         let offset = Form::of(Range { from: 1e6, to: 1e6 + 1e-3, scale: Scale::Linear });
         let values: Vec<f64> = offset.numbers([1e6 + 3e-7].into_iter()).iter().filter_map(Value::as_f64).collect();
         assert!((values[0] - (1e6 + 3e-7)).abs() < 2e-10);

@@ -1,9 +1,9 @@
-//! A block of results as bytes, and back: numbers by their bits, words once for each run of them.
+//! Binary form of a result block: numbers by their bits, equal consecutive texts once.
 
 use stickslip_study::block::Block;
 use stickslip_study::dataset::{Column, Table, Values};
 
-/// Adds a block and the time until it was finished, s.
+/// Appends a block and its wall time in s.
 pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
     let number = |out: &mut Vec<u8>, value: usize| out.extend((value as u64).to_le_bytes());
     let text = |out: &mut Vec<u8>, text: &str| {
@@ -13,7 +13,7 @@ pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
     number(out, block.units.start);
     number(out, block.units.end);
     out.extend(time.to_le_bytes());
-    // maps of texts and numbers are JSON always
+    // Maps of texts and numbers always convert to JSON.
     text(out, &serde_json::to_string(&block.tally).unwrap_or_default());
     number(out, block.tables.len());
     for table in &block.tables {
@@ -37,7 +37,7 @@ pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
                 }
                 Values::Text(values) => {
                     out.push(3);
-                    // the same word follows itself for most of a table
+                    // Consecutive rows mostly have equal texts.
                     for run in values.chunk_by(|a, b| a == b) {
                         number(out, run.len());
                         text(out, &run[0]);
@@ -48,7 +48,7 @@ pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
     }
 }
 
-/// A block and its time; `None` if the bytes are none.
+/// Decodes a block and its time. Returns `None` for invalid bytes.
 pub(super) fn read(mut bytes: &[u8]) -> Option<(Block, f64)> {
     let from = &mut bytes;
     let units = number(from)?..number(from)?;

@@ -1,10 +1,10 @@
-//! Frames of a journal: a length, a check, and what they hold, so that a torn one is known.
+//! Frames of a journal: length, checksum and payload, so that an incomplete frame is detected.
 
 use std::io::Read;
 
-/// No frame is longer: a length beyond it is none.
+/// Limit of the length of a frame; a larger length is invalid.
 pub(super) const LONGEST: u32 = 1 << 31;
-/// Bytes before the payload of a frame.
+/// Number of bytes before the payload of a frame.
 pub(super) const PREFIX: u64 = 8;
 
 pub(super) fn check(length: u32, payload: &[u8]) -> u32 {
@@ -14,7 +14,9 @@ pub(super) fn check(length: u32, payload: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-/// The payload of the next frame, of which so many bytes are left in the file; `None` if there is no whole one.
+/// Reads the payload of the next frame. Returns `None` if there is no complete, valid frame.
+///
+/// `left` is the number of remaining bytes in the file.
 pub(super) fn frame(reader: &mut impl Read, left: u64) -> std::io::Result<Option<Vec<u8>>> {
     if left < PREFIX {
         return Ok(None);

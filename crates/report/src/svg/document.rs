@@ -1,11 +1,11 @@
-//! An SVG document as it grows: lines, areas, marks, text.
+//! Incremental writer of an SVG document: lines, areas, marks and text.
 
 use super::style::{AXIS, CROSS, LABEL, MARK, TEXT};
 use crate::clip::Point;
 use crate::font::{self, Weight};
 use std::fmt::Write;
 
-/// How a line is drawn.
+/// Style of a line.
 pub(super) struct Pen<'a> {
     pub(super) colour: &'a str,
     pub(super) width: f64,
@@ -13,7 +13,7 @@ pub(super) struct Pen<'a> {
     pub(super) opacity: f64,
 }
 
-/// A line of text: where and how.
+/// Position and style of a line of text.
 pub(super) struct Text {
     pub(super) x: f64,
     pub(super) y: f64,
@@ -21,18 +21,18 @@ pub(super) struct Text {
     pub(super) weight: Weight,
     pub(super) anchor: &'static str,
     pub(super) colour: &'static str,
-    /// Reads from below.
+    /// `true` rotates the text by 90° to read upwards.
     pub(super) upright: bool,
 }
 
 impl Text {
-    /// Centred on x, its baseline at y.
+    /// Centres the text at x, with the baseline at y.
     pub(super) fn at(x: f64, y: f64) -> Text {
         Text { x, y, size: LABEL, weight: Weight::Regular, anchor: "middle", colour: TEXT, upright: false }
     }
 }
 
-/// The document. Writing into a string cannot fail, so the results of `write!` are dropped.
+/// The document. Writing to a string cannot fail, so results of `write!` are ignored.
 pub(super) struct Svg(String);
 
 impl Svg {
@@ -90,7 +90,7 @@ impl Svg {
         self.0.push_str("/>\n");
     }
 
-    /// A filled polygon.
+    /// Writes a filled polygon.
     pub(super) fn area(&mut self, points: &[Point], colour: &str, opacity: f64) {
         if points.len() < 3 {
             return;
@@ -103,7 +103,7 @@ impl Svg {
         self.0.push_str("/>\n");
     }
 
-    /// A filled polygon without seams to its neighbours.
+    /// Writes a filled polygon without visible seams to adjacent polygons.
     pub(super) fn tile(&mut self, points: &[Point], colour: &str) {
         if points.len() >= 3 {
             self.path(points);
@@ -111,14 +111,14 @@ impl Svg {
         }
     }
 
-    /// The beginning of a path, up to its last point.
+    /// Writes the start of a path element, up to its last point.
     pub(super) fn path(&mut self, points: &[Point]) {
         self.0.push_str("<path d=\"");
         let mut last = None;
         for (i, point) in points.iter().enumerate() {
             let now = (short(point.0), short(point.1));
             if last.as_ref() == Some(&now) && i + 1 < points.len() {
-                continue; // not visible
+                continue; // The point is not visible.
             }
             let _ = write!(self.0, "{}{} {}", if i == 0 { 'M' } else { 'L' }, now.0, now.1);
             last = Some(now);
@@ -134,7 +134,7 @@ impl Svg {
         );
     }
 
-    /// A cross: a point without a value.
+    /// Writes a cross, which marks a point without a value.
     pub(super) fn cross(&mut self, (x, y): Point, colour: &str) {
         let [left, right, top, bottom] = [x - CROSS, x + CROSS, y - CROSS, y + CROSS].map(short);
         let _ = writeln!(
@@ -162,13 +162,13 @@ impl Svg {
     }
 }
 
-/// A length to a hundredth of a pixel.
+/// Formats a length to 0.01 px.
 fn short(value: f64) -> String {
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Text that XML and HTML take literally; signs that XML 1.0 forbids are left out.
+/// Escapes text for XML and HTML, and removes characters that XML 1.0 forbids.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

@@ -1,4 +1,4 @@
-//! Where everything in a figure stands: every text is measured before it is placed.
+//! Layout of a figure: positions of all parts. Every text is measured before it is placed.
 
 use super::style::{BAR, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
 use crate::axis::{self, Range, Ticks};
@@ -8,7 +8,7 @@ use crate::font::{self, Weight};
 use crate::frame::{self, Axes, Entry, Shades};
 use stickslip_study::dataset::{Axis, Figure, Panel};
 
-/// Where everything stands.
+/// Positions of all parts of a figure.
 pub(super) struct Layout {
     pub(super) width: f64,
     pub(super) height: f64,
@@ -72,14 +72,15 @@ impl Layout {
             .zip(frame::axes(figure))
             .map(|(panel, axes)| PlotArea::new(panel, &axes, plot_width, plot_height))
             .collect();
-        // where neighbours have the same axis, its title stands once, at the outside
+        // Adjacent panels with the same axis share one title at the outer edge.
         for i in 0..panels.len() {
             if i + columns < panels.len() && !panels[i].own_x && panels[i].x_title == panels[i + columns].x_title {
                 panels[i].x_title.clear();
             }
         }
         for i in (0..panels.len()).rev() {
-            // beside another quantity along x a reader does not look for it there
+            // Panels with a different x quantity keep their y titles, because a reader expects
+            // them there.
             let same = i > 0 && frame::alike(&figure.panels[i].x, &figure.panels[i - 1].x);
             if same && i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
                 panels[i].y_title.clear();
@@ -127,7 +128,8 @@ fn widest(ticks: &Ticks) -> f64 {
     ticks.labels.iter().map(|l| font::width(l, TICK, Weight::Regular)).fold(0.0, f64::max)
 }
 
-/// The title of an axis; a panel that does not share the axis of its like says so.
+/// Returns the title of an axis in lines. A range that differs from that of similar panels is
+/// stated.
 fn title(axis: &Axis, ticks: &Ticks, own: bool, limit: f64) -> Vec<String> {
     let own = if own { ", own range" } else { "" };
     font::wrap(&format!("{}{own}", axis::axis_title(axis, ticks.power)), LABEL, Weight::Regular, limit)
@@ -153,7 +155,7 @@ impl PlotArea {
         }
         let Axes { x, y, own_x, own_y } = *axes;
         let y_ticks = axis::ticks_of(&panel.y, y, height / 46.0);
-        // as many ticks as their labels leave room for
+        // Uses as many ticks as the widths of their labels allow.
         let fits =
             |ticks: &Ticks| (widest(ticks) + 16.0) * ticks.labels.len() as f64 <= width && apart(ticks, x, width);
         let x_ticks = (3..=8).rev().map(|n| axis::ticks_of(&panel.x, x, f64::from(n))).find(fits);
@@ -177,7 +179,7 @@ impl PlotArea {
         }
     }
 
-    /// Of a picture: equal lengths on both axes, and nothing beside it.
+    /// Lays out a picture: equal scales on both axes, without ticks and titles.
     fn of_picture(panel: &Panel, axes: &Axes, width: f64, height: f64) -> PlotArea {
         let (x, y) = frame::level(axes.x, axes.y, width / height);
         PlotArea {
@@ -198,25 +200,26 @@ impl PlotArea {
         }
     }
 
-    /// Space that the y axis needs left of the plot area.
+    /// Returns the space that the y axis needs left of the plot area.
     pub(super) fn left_side(&self) -> f64 {
         self.y_title_offset + LABEL * LEADING * self.y_title.len() as f64
     }
 
-    /// Space that the x axis needs below the plot area.
+    /// Returns the space that the x axis needs below the plot area.
     pub(super) fn bottom_side(&self) -> f64 {
         let title = if self.x_title.is_empty() { 0.0 } else { 5.0 + LABEL * LEADING * self.x_title.len() as f64 };
         TICK_LENGTH + 3.0 + TICK * LEADING + title
     }
 
-    /// How far the last x label reaches beyond the plot area.
+    /// Returns the length by which the last x label extends beyond the plot area.
     pub(super) fn overhang(&self) -> f64 {
         let (Some(at), Some(label)) = (self.x_ticks.at.last(), self.x_ticks.labels.last()) else { return 0.0 };
         (self.map((*at, self.y.from)).0 - self.left + 0.5 * font::width(label, TICK, Weight::Regular) - self.width)
             .max(0.0)
     }
 
-    /// The place of a point; far outside it is near enough to infinity for a straight line.
+    /// Returns the page position of a point. Distant points are moved closer, without visible
+    /// effect on lines.
     pub(super) fn map(&self, (x, y): Point) -> Point {
         let part = |v: f64, r: Range| r.part(v).clamp(-FAR, FAR);
         (self.left + self.width * part(x, self.x), self.top + self.height * (1.0 - part(y, self.y)))
@@ -227,10 +230,10 @@ impl PlotArea {
     }
 }
 
-/// Lengths of an axis beyond which all points are equally far.
+/// Maximum distance of a point from the plot area, in axis lengths.
 const FAR: f64 = 1e6;
 
-/// Whether the labels of an uneven axis stand clear of each other.
+/// Returns `true` if labels at unequal distances do not touch each other.
 fn apart(ticks: &Ticks, range: Range, width: f64) -> bool {
     let edges: Vec<(f64, f64)> = (ticks.at.iter().zip(&ticks.labels))
         .map(|(at, label)| (width * range.part(*at), 0.5 * font::width(label, TICK, Weight::Regular)))
@@ -238,10 +241,10 @@ fn apart(ticks: &Ticks, range: Range, width: f64) -> bool {
     edges.windows(2).all(|w| w[1].0 - w[1].1 - (w[0].0 + w[0].1) >= 8.0)
 }
 
-/// Length of the line before a label, space after it and between entries, px.
+/// Line sample before a label, space after the sample, and space between entries, in px.
 pub(super) const SAMPLE: (f64, f64, f64) = (30.0, 7.0, 24.0);
 
-/// Entries in centred rows below `top`; returns them and the lower edge.
+/// Places legend entries in centred rows below `top`. Returns them and the lower edge.
 fn place_legend((entries, more): (Vec<Entry>, usize), width: f64, top: f64) -> (Vec<Placed>, f64) {
     let limit = width - 2.0 * MARGIN;
     let before = SAMPLE.0 + SAMPLE.1;

@@ -1,8 +1,13 @@
-//! The figure as SVG: panels in a grid, one legend above them, text as text.
+//! Writes the figure as SVG: panels in a grid below one legend, with text as text elements.
 //!
-//! Written here and not through a plotting library because the bytes must not depend on what else the process has
-//! drawn (kuva 0.6 counts its clip paths per process), ranges below 2e-16 must not collapse, `$` in a title must stay,
-//! and the legend must stand in rows beside no curve. Every text is measured in the embedded font before it is placed.
+//! The crate writes SVG itself instead of using a plotting library, for these reasons:
+//! - The bytes must not depend on earlier drawings of the process; kuva 0.6 numbers its clip
+//!   paths per process.
+//! - Ranges below 2e-16 must not collapse.
+//! - A `$` in a title must stay.
+//! - The legend must have rows and must not cover curves.
+//!
+//! Every text is measured in the embedded font before it is placed.
 
 mod document;
 mod layout;
@@ -31,7 +36,7 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("figure.svg", to_svg(&dataset.figure))])
 }
 
-/// The figure as a complete SVG document; the same figure gives the same bytes.
+/// Returns the figure as a complete SVG document. Equal figures give equal bytes.
 pub fn to_svg(figure: &Figure) -> String {
     let layout = Layout::new(figure);
     let mut svg = Svg::new(layout.width, layout.height, &figure.title);
@@ -51,7 +56,7 @@ pub fn to_svg(figure: &Figure) -> String {
     svg.finish()
 }
 
-/// The dashes of a line style, if it has any.
+/// Returns the dash pattern of a line style, if it has one.
 fn dashes(style: Style) -> Option<&'static str> {
     match style {
         Style::Solid | Style::Marks | Style::Missing | Style::Band | Style::Bars | Style::Stripe => None,
@@ -88,7 +93,7 @@ fn box_around(x: f64, y: f64, width: f64, height: f64) -> [Point; 4] {
 
 fn draw_bar(svg: &mut Svg, bar: &Bar) {
     svg.open("colours");
-    // from the lower end up, every step to the upper end: no seams
+    // Each step extends to the upper end and the next covers it, which avoids seams.
     for i in 0..BAR_STEPS {
         let part = |i: usize| i as f64 / BAR_STEPS as f64;
         let colour = Colour::sequential((i as f64 + 0.5) / BAR_STEPS as f64).light;
@@ -131,7 +136,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
             svg.line((plot.left, y), (right, y), colour);
         }
     }
-    // the axes through zero of a loop
+    // The zero lines of a loop.
     let zeros = if panel.picture { 0 } else { 2 };
     for (inside, from, to) in [
         (plot.x.from < 0.0 && plot.x.to > 0.0, plot.map((0.0, plot.y.from)), plot.map((0.0, plot.y.to))),
@@ -213,7 +218,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
     svg.close();
 }
 
-/// The pieces between the gaps of a curve; a piece of one point is a dot.
+/// Draws the pieces of a curve between its gaps. A single point becomes a dot.
 fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen: &Pen<'_>) {
     let points: Vec<Point> = frame::points(panel, series).collect();
     for piece in points.split(|p| !frame::drawable(*p)) {
@@ -231,7 +236,7 @@ fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen
     }
 }
 
-/// The pieces between the gaps of a band, each as an area.
+/// Draws the pieces of a band between its gaps as areas.
 fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, colour: &str) {
     let floor = plot.top + plot.height;
     let points: Vec<(Point, f64)> = frame::points(panel, series)
@@ -249,7 +254,7 @@ fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, col
     }
 }
 
-/// The cells of a stripe, as high as the distance to the next one.
+/// Draws the cells of a stripe, as high as the distance between stripes.
 fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, shades: &Shades) {
     let Some(y) = series.y.first() else { return };
     for ((from, to, _), colour) in frame::cells(series, plot.x, shades) {
@@ -259,7 +264,7 @@ fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, shades: &Shades)
     }
 }
 
-/// A bar's width, and its left edge from its abscissa, in the measure of the axis.
+/// Width of a bar, and offset of its left edge from the abscissa, in axis measure.
 struct Slot {
     width: f64,
     shift: f64,
@@ -308,7 +313,7 @@ mod tests {
         figure.title.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// The figure's texts, without its tags.
+    /// Returns the texts of the figure without tags.
     fn texts(figure: &Figure) -> Vec<String> {
         let svg = to_svg(figure);
         let document = roxmltree::Document::parse(&svg).unwrap();
@@ -326,7 +331,8 @@ mod tests {
         assert!(!all.iter().any(|t| t.starts_with("Ft =")));
         let few = texts(&samples::cases(5).figure);
         assert!(!few.contains(&"Ft (N)".to_owned()) && few.contains(&"Ft = 3 N".to_owned()), "{few:?}");
-        // 400 curves of 300 points each, twice: the page stays small because what nobody sees is left out
+        // The figure has 400 curves of 300 points. The file stays small because invisible
+        // points are removed.
         let size = to_svg(&samples::cases(400).figure).len();
         assert!(size < 1_500_000, "{size}");
     }
@@ -338,7 +344,7 @@ mod tests {
         for tick in ["0.01", "0.1", "1", "10", "10⁻¹⁰"] {
             assert!(all.contains(&tick.to_owned()), "{tick}: {all:?}");
         }
-        // three panels over four decades: 37 lines each, less the nine at labels
+        // Three panels over four decades have 37 lines each, less nine at labels.
         let fine = to_svg(&figure).matches(FINE_GRID).count();
         assert!(fine >= 3 * 28, "{fine}");
     }
@@ -385,7 +391,7 @@ mod tests {
             if !path.attribute("d").unwrap().ends_with('Z')
                 || path.parent().is_some_and(|p| p.is_root() || !p.has_tag_name("g"))
             {
-                continue; // the samples of the legend
+                continue; // These are legend samples.
             }
             let n: Vec<f64> =
                 path.attribute("d").unwrap().split(['M', 'L', 'Z', ' ']).filter_map(|t| t.parse().ok()).collect();
@@ -406,7 +412,7 @@ mod tests {
     fn axes_have_units_and_lines_their_dashes() {
         let svg = to_svg(&samples::response().figure);
         assert!(svg.contains(">frequency (Hz)<") && svg.contains(">amplitude (cm)<"));
-        assert_eq!(svg.matches("stroke-dasharray=\"7 4\"").count(), 4 + 1); // panels and legend
+        assert_eq!(svg.matches("stroke-dasharray=\"7 4\"").count(), 4 + 1); // Panels and legend.
         let svg = to_svg(&samples::hysteresis().figure);
         assert_eq!(svg.matches("stroke-dasharray=\"2 3\"").count(), 2 + 1);
     }
@@ -414,7 +420,8 @@ mod tests {
     #[test]
     fn a_gap_interrupts_the_curve() {
         let svg = to_svg(&Figure { panels: samples::hostile().figure.panels[..1].to_vec(), ..Figure::default() });
-        // before the gap, after it, after the two single failures; the point between these is a dot; and the legend
+        // The curve has three pieces: before the gap, after it, and after the two single
+        // failures. The point between the failures is a dot. The legend adds one line.
         assert_eq!(svg.matches("fill=\"none\" stroke=\"#0072b2\"").count(), 3 + 1);
         assert_eq!(svg.matches("r=\"2\"").count(), 1);
     }
