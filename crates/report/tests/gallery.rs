@@ -103,7 +103,7 @@ fn page() -> String {
         let text = text(name);
         let (what, learn) = words(name, &text);
         let title = study(name, &text).title().to_owned();
-        page += &format!("\n## {title}\n\n{what} *Result:* {learn}\n\n![{name}.toml](images/gallery/{name}.svg)\n");
+        page += &format!("\n## {title}\n\n{what} {learn}\n\n![{name}.toml](images/gallery/{name}.svg)\n");
     }
     page
 }
