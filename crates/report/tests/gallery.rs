@@ -96,17 +96,15 @@ fn words(name: &str, text: &str) -> (String, String) {
 fn page() -> String {
     let mut page =
         "<!-- Generated from studies/gallery/ by crates/report/tests/gallery.rs; do not edit. -->\n\n# Gallery\n\n\
-         Small studies of a designer's kind, each with what one learns from it. All of them in ten seconds:\n\n\
+         I want to start from a similar problem. All studies of this page run in ten seconds:\n\n\
          ```sh\nstickslip run studies/gallery/*.toml --out gallery\n```\n\n\
-         Take the nearest one, change the numbers, and run it.\n"
+         Copy the closest one from `studies/gallery/`, change the numbers, and run it.\n"
             .to_owned();
     for name in STUDIES {
         let text = text(name);
         let (what, learn) = words(name, &text);
         let title = study(name, &text).title().to_owned();
-        page += &format!(
-            "\n## {title}\n\n{what} *Learn:* {learn}\n\n![{title}](images/gallery/{name}.svg)\n\nThe study: `studies/gallery/{name}.toml`.\n"
-        );
+        page += &format!("\n## {title}\n\n{what} {learn}\n\n![{name}.toml](images/gallery/{name}.svg)\n");
     }
     page
 }
