@@ -12,7 +12,7 @@ use super::{
 };
 use crate::law::Law;
 use crate::model::System;
-use crate::orbit::{Orbit, OrbitError};
+use crate::orbit::{Course, Orbit, OrbitError};
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -187,7 +187,7 @@ impl<'a> WithSecond<'a> {
             self.second = Some(self.next());
         }
         let Some((name, second)) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
-        let near = start.filter(|start| self.last.as_deref() == Some(*start));
+        let near = start.filter(|start| self.last.as_deref() == Some(*start)).or(error.candidate());
         let found = by(&mut **second, near);
         self.effort += second.effort();
         let mut orbit = found.map_err(|_| error.after(name))?;
@@ -210,6 +210,7 @@ fn misses(error: &OrbitError) -> bool {
             | OrbitError::Breakdown { .. }
             | OrbitError::Evidence { .. }
             | OrbitError::Truncation { .. }
+            | OrbitError::NoOrbit { course: Course::Settles | Course::Settling { .. }, .. }
     )
 }
 

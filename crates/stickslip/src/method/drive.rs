@@ -62,6 +62,14 @@ impl Drive {
         drive
     }
 
+    /// Returns the excitation with all harmonics multiplied by `share`; the constant parts stay.
+    pub fn scaled(&self, share: f64) -> Self {
+        let mut scaled = self.clone();
+        scaled.forces.iter_mut().for_each(|force| *force *= Complex64::new(share, 0.0));
+        scaled.imposed.iter_mut().flatten().for_each(|motion| *motion *= share);
+        scaled
+    }
+
     /// Returns the square root of an energy that the loads can supply to a structure with these
     /// matrices, √J. It scales vibrations near rest. Constant forces count only if no other
     /// force acts.

@@ -247,6 +247,8 @@ pub enum OrbitError {
         estimate: f64,
         /// The permitted error.
         tolerance: f64,
+        /// State at t = 0 of the longest series, see [`OrbitError::candidate`].
+        state: Vec<f64>,
         /// Advice about other methods, as text that follows a comma; empty if no method was
         /// asked or none applies.
         instead: String,
@@ -278,6 +280,8 @@ pub enum OrbitError {
         omega: f64,
         /// Behaviour of the integrated motion.
         course: Course,
+        /// State at t = 0 of the integrated motion at its end, see [`OrbitError::candidate`].
+        state: Vec<f64>,
     },
     /// The motion of the structure without its joints is unbounded.
     #[error(
@@ -440,6 +444,16 @@ impl OrbitError {
             _ => {}
         }
         self
+    }
+
+    /// Returns a state at t = 0 from which another method may find the orbit that this one missed.
+    pub(crate) fn candidate(&self) -> Option<&[f64]> {
+        match self {
+            OrbitError::Truncation { state, .. } | OrbitError::NoOrbit { state, .. } if !state.is_empty() => {
+                Some(state)
+            }
+            _ => None,
+        }
     }
 
     /// Returns the error of a motion that drifts.

@@ -63,7 +63,7 @@ pub(super) struct Balance {
     /// A state, perhaps of none of these, from which others are sought, and its frequency, rad/s.
     pub(super) begun: Option<(f64, Vec<f64>)>,
     /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
-    pub(super) followed: Vec<(f64, Course)>,
+    pub(super) followed: Vec<(f64, Course, Vec<f64>)>,
     /// How often it was followed to find one.
     pub(super) tried_in_time: usize,
     /// By the highest harmonic, of many contacts the last solution that was compared with one of twice the harmonics, and that.
@@ -258,11 +258,27 @@ impl Balance {
         path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion).map_err(Lost::at)
     }
 
+    /// The orbit of a solution with its evidence; the next searches begin with it.
     pub(super) fn finish(
         &mut self,
         top: usize,
         omega: f64,
         motion: Solution,
+        x: Vec<DVector<Complex64>>,
+        truncation: Option<f64>,
+    ) -> Result<Orbit, OrbitError> {
+        let orbit = self.orbit_of(top, omega, &motion, x, truncation)?;
+        self.recent.truncate(RECENT - 1);
+        self.recent.push_front(Recent { start: orbit.start.clone(), omega, top, motion });
+        Ok(orbit)
+    }
+
+    /// The orbit of a solution with its evidence.
+    pub(super) fn orbit_of(
+        &mut self,
+        top: usize,
+        omega: f64,
+        motion: &Solution,
         x: Vec<DVector<Complex64>>,
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
@@ -278,13 +294,11 @@ impl Balance {
             judge: Some(&mut self.judge),
         };
         let level = self.levels.get_mut(&top).expect("solved");
-        let orbit = path::orbit(setting, level, &motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
+        let orbit = path::orbit(setting, level, motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
         if !path::balances(&self.system, &orbit) {
             let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
             return Err(self.lost(lost));
         }
-        self.recent.truncate(RECENT - 1);
-        self.recent.push_front(Recent { start: orbit.start.clone(), omega, top, motion });
         Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
     }
 

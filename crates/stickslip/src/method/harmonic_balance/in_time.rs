@@ -96,14 +96,14 @@ impl Balance {
             return None;
         }
         let drive = self.drive;
-        let no_orbit = |course| Some(Err(OrbitError::NoOrbit { method: NAME, omega: drive, course }));
-        if let Some((_, course)) = self.followed.iter().find(|(at, _)| *at == omega) {
-            return no_orbit(course.clone());
+        let no_orbit = |course, state| Some(Err(OrbitError::NoOrbit { method: NAME, omega: drive, course, state }));
+        if let Some((_, course, state)) = self.followed.iter().find(|(at, ..)| *at == omega) {
+            return no_orbit(course.clone(), state.clone());
         }
         if self.followed.len() >= MOST_FOLLOWED {
             return None;
         }
-        let (course, path) = course(&self.system, omega, self.standing())?;
+        let (course, path, state) = course(&self.system, omega, self.standing())?;
         if matches!(course, Course::Settles | Course::Settling { .. }) {
             // contacts that part and close again may have no solution with few harmonics
             let mut top = top;
@@ -120,7 +120,7 @@ impl Balance {
                 top = self.kept.double(top);
             }
         }
-        self.followed.push((omega, course.clone()));
-        no_orbit(course)
+        self.followed.push((omega, course.clone(), state.clone()));
+        no_orbit(course, state)
     }
 }

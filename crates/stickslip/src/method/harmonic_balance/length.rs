@@ -153,7 +153,7 @@ impl Balance {
             // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
             let shown = top > first || !(self.steep && self.ports.has_falling());
             if error <= tolerance && shown {
-                let orbit = self.finish(top, omega, motion, x, Some(error))?;
+                let orbit = self.finish(top, omega, motion.clone(), x.clone(), Some(error))?;
                 let judged = orbit.evidence.truncation.unwrap_or(error);
                 let before = returned.as_ref().and_then(|orbit| orbit.evidence.truncation);
                 let closer = before.is_none_or(|before| judged <= 0.5 * before);
@@ -177,6 +177,7 @@ impl Balance {
             x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         }
         let harmonics = checked / self.periods;
+        let state = self.orbit_of(top, omega, &motion, x, None).map_or_else(|_| Vec::new(), |orbit| orbit.start);
         Err(OrbitError::Truncation {
             method: NAME,
             omega: self.drive,
@@ -184,6 +185,7 @@ impl Balance {
             needed: needed.map(|needed| needed / self.periods),
             estimate,
             tolerance,
+            state,
             instead: String::new(),
         })
     }

@@ -161,11 +161,13 @@ pub(super) fn orbit(
     let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
     let Judged { derivative, defect } = judge
         .map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start, &path.stuck()));
-    // where contacts part and close again a series with twice the harmonics may be as wrong as the shorter one: the return
-    // tells, unless the orbit is unstable, so that a return multiplies its error
-    let opens = measured.joints.iter().any(|joint| joint.open_fraction > 0.0 && joint.open_fraction < 1.0);
+    // Where a normal force changes the slip limit, or vanishes, a series with twice the harmonics may
+    // be as wrong as the shorter one. The return defect shows it, except on an unstable orbit, whose
+    // return multiplies the error.
+    let joints = system.joints().iter().zip(&measured.joints);
+    let rubs = joints.filter(|(joint, _)| joint.law().normal().is_some()).any(|(_, moved)| moved.stick_fraction < 1.0);
     let repels = derivative.as_ref().is_some_and(|map| eigen::largest_modulus(map).is_none_or(|modulus| modulus > 1.0));
-    let returned = defect.filter(|_| opens && !repels).unwrap_or(0.0);
+    let returned = defect.filter(|_| rubs && !repels).unwrap_or(0.0);
     let truncation = truncation.map(|error| error.max(returned));
     Some(Orbit {
         method: super::NAME,
