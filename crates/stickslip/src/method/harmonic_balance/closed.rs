@@ -180,9 +180,9 @@ mod tests {
         }
     }
 
-    /// Friction carries a constant load along the face below the limit. The mean is at the
-    /// spring force of that load, and the vibration about it is the same: `Q/kt + F/|kt - m Ω²|
-    /// cos Ωt`. The load may reach the limit together with the vibration.
+    /// Friction carries a constant load `Q` along the face below the limit. The mean is `Q/kt`, and
+    /// the vibration about it is the same as without the load: `F/|kt - m Ω²| cos Ωt`. The load
+    /// may reach the limit together with the vibration.
     #[test]
     fn friction_carries_a_constant_load() {
         let (pressed, limit) = (10.0, 5.0);

@@ -205,8 +205,8 @@ pub(super) fn orbit(
     })
 }
 
-/// Joint forces and contact states at the samples of a period, and the internal states at t =
-/// 0.
+/// Joint forces and contact states at the samples of a period, and the internal states at
+/// t = 0.
 struct Samples {
     force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
     contact: Vec<Vec<Contact>>,
