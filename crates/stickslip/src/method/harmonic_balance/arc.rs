@@ -2,8 +2,10 @@
 //!
 //! The amplitude `a` is an unknown, so the curve may have turning points in it. The unknowns
 //! are the shape `y = x/a`, the forces along laws of velocity, ω, ζ and `ln a`.
-//! [`ModeEquations::weigh`] defines the arc length. Source: Keller (1977); Allgower and Georg,
-//! "Introduction to Numerical Continuation Methods" (2003), Ch. 6.
+//! [`ModeEquations::weigh`] defines the arc length.
+//!
+//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
+//! (2003), Ch. 6.
 
 use super::mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
 use super::open::{open, shorten};

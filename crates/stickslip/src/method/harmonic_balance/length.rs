@@ -21,9 +21,9 @@ const MOST: usize = 511;
 /// sufficient series is refused: 80 masses had an error of 3.0e-3 with 31 harmonics and less
 /// than 1e-3 with 63.
 const ORDER: f64 = 2.0;
-/// Least ratio of the distances of two successive doublings that is believed for rigid or steep
-/// friction. Two solutions may be close by chance: a distance of 1.3e-3 was seen with an error
-/// of 1e-2.
+/// Least share of the previous error estimate that remains after a doubling with rigid or steep
+/// friction. A smaller distance is not believed, because two solutions may be close by chance: a
+/// distance of 1.3e-3 was seen with an error of 1e-2.
 const CHANCE: f64 = 0.1;
 /// Reduction of the residual to which the finer solution of an error estimate is solved. The
 /// relative error of the estimate is about as large. With elastic friction one Newton step

@@ -7,10 +7,11 @@
 //! self-excited orbit.
 //!
 //! The unknowns are the harmonics of all places, the harmonics of the forces λ of the force
-//! ports, ω and ζ. The modal amplitude `a` is given by `X₁ᴴ M X₁ = a²`. Each force has the same
-//! equation as in forced vibration, `λ - P J(λ + ε c') = 0`, with `c = wᵀx - λ/k` behind a
-//! spring `k`. Rigid friction is not smoothed, and a sticking contact is a constraint. Source:
-//! Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the
+//! ports, ω and ζ. The modal amplitude `a` is given by `X₁ᴴ M X₁ = a²`. Forces have the same
+//! equation as in forced vibration, `λ - P J(λ + ε c') = 0`. Behind a spring `k` the motion is
+//! `c = wᵀx - λ/k`. Rigid friction is not smoothed, and a sticking contact is a constraint.
+//!
+//! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the
 //! periodic motion concept".
 
 mod linear;

@@ -17,8 +17,8 @@ use stickslip_numerics::{dense, interrupt};
 
 /// Newton iterations; 3 to 15 are usual.
 const ITERATIONS: usize = 60;
-/// Total Newton iterations while slip limits are raised. One is enough at limits that hold all
-/// joints.
+/// Total Newton iterations while slip limits are raised. One is enough at limits at which all
+/// joints stick.
 const MOST_RAISING: usize = 200;
 /// Newton iterations at one raised limit if only contacts support the structure. One iteration
 /// from static equilibrium reaches the solution in which all joints stick, if the limits are
@@ -50,20 +50,23 @@ const KEPT: f64 = 0.1;
 ///
 /// At the onset of slip and of opening, residuals rise before the solution is reached, and
 /// monotone steps become short and many. Four residuals save a third of the steps at the onset
-/// of slip of 16 to 300 nodes. Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line
-/// search technique for Newton's method".
+/// of slip of 16 to 300 nodes.
+///
+/// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for
+/// Newton's method".
 const REMEMBERED: usize = 4;
 /// Halvings of a step in the line search.
 pub(super) const HALVINGS: usize = 7;
 /// Growth of the residual in one step beyond which the search has diverged.
 pub(super) const GROWS: f64 = 100.0;
-/// Sufficient decrease: the residual must fall by this share of the step fraction.
+/// Sufficient decrease in the line search: a step of fraction `t` must reduce the residual to at
+/// most `1 - t SHORTENS` of its value.
 pub(super) const SHORTENS: f64 = 1e-3;
 /// Mean displacement, relative to the extent of the motion, beyond which a body has left the
 /// contacts that alone support it. The mean of a supported body stays within about its
 /// vibration amplitude.
 const AWAY: f64 = 10.0;
-/// Stiffness of the springs that regularize the mean in a too long step, relative to closed
+/// Stiffness of the springs that regularize a step whose mean is too long, relative to closed
 /// contacts.
 const HELD: [f64; 6] = [0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0];
 /// Share of the residual below which even a long step counts as leading to the solution.
@@ -95,7 +98,7 @@ const PRODUCTS: f64 = 30.0;
 /// Residual at which a search ends.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Goal {
-    /// The tolerance of a solution.
+    /// The tolerance [`SOLVED`].
     Solved,
     /// This residual, on coarse samples.
     Rough(f64),
@@ -281,7 +284,7 @@ impl Level {
     /// If only contacts support a body, a step that opens all of them, or slips in all, loses
     /// the restoring stiffness. A step that moves the mean far is then compared with
     /// regularized ones, in which springs hold the mean. Their stiffness rises from soft to
-    /// stiff. The step with the least residual wins.
+    /// stiff. The step with the least residual is taken.
     fn bounded_step(&mut self, ports: &Ports, (omega, ease): (f64, Ease), motion: &mut Solution, at: Near) -> bool {
         if !self.newton_step(ports, omega, ease, at) {
             return false;
@@ -485,7 +488,7 @@ impl Level {
         }
     }
 
-    /// Homotopy in the slip limits, from limits that hold all joints to the given ones.
+    /// Homotopy in the slip limits, from limits at which all joints stick to the given ones.
     fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
         let mut good = Solution { iterations: motion.iterations, ..self.unhindered() };
         let mut limits: f64 = 1.0;

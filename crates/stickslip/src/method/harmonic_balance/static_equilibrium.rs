@@ -95,8 +95,9 @@ pub(super) fn static_equilibrium(
 /// Each proximal point is the equilibrium of the structure on springs that tie it to the
 /// previous point. The springs become softer after each success. A body may so slide far along
 /// a soft direction and turn slightly between its contacts. The path is that of an overdamped
-/// structure that sinks under its load. Source: Rockafellar, "Monotone operators and the
-/// proximal point algorithm" (1976).
+/// structure that sinks under its load.
+///
+/// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
 fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) -> Option<()> {
     let begin = solution.clone();
     if level.polish(ports, omega, solution, ITERATIONS).is_ok() {

@@ -166,11 +166,10 @@ impl ModeEquations<'_> {
         Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
     }
 
-    /// Returns the modal amplitude, m √kg, above which friction is weak in the linear mode
-    /// `index`.
+    /// Returns the modal amplitude, m √kg, above which friction is weak in the linear mode `index`.
     ///
-    /// There the first harmonic of friction is at most a share of the inertia forces, and at
-    /// most a share of the difference to every other mode.
+    /// There the first harmonic of friction is at most `share` of the inertia forces. It is also at
+    /// most `apart` times the difference of squared frequencies to every other mode.
     pub fn faint(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
         let Some(mode) = modes.get(index) else { return 0.0 };
         // the force of an unbounded law is weak at small amplitudes, if at all

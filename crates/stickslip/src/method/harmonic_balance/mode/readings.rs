@@ -103,7 +103,9 @@ impl ModeEquations<'_> {
     ///
     /// It is one if all places move in phase or in opposite phase. It is zero if two modes of
     /// the symmetric complex eigenvalue problem of the first harmonic coalesce: their shape is
-    /// orthogonal to itself. Source: Heiss (2012), "The physics of exceptional points".
+    /// orthogonal to itself.
+    ///
+    /// Source: Heiss (2012), "The physics of exceptional points".
     pub fn rigidity(&self, state: &ModeState) -> f64 {
         let x = self.first(state);
         let conjugate: Vec<Complex64> = x.iter().map(Complex64::conj).collect();
