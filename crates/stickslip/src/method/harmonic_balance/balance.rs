@@ -194,7 +194,7 @@ impl Balance {
     }
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in
-    /// the memory and in the budget of a point that has used `taken`.
+    /// memory. The budget of a point that has used `taken` must cover it too.
     pub(super) fn can_compare(&self, top: usize, taken: Work) -> bool {
         let harmonics = self.kept.up_to(self.kept.double(top)).len();
         let axes = self.ports.count();
