@@ -1,8 +1,11 @@
-//! Steps along the curve of a nonlinear mode: tangent, arc length, corrector.
+//! Arc-length continuation of a nonlinear mode: predictor along the tangent, corrector.
 //!
-//! Along the curve the amplitude `a` is an unknown like the others, so that it may turn. Unknown are the shape `y = x/a`, the forces along
-//! laws of velocity, ω, ζ and `ln a`; the arc length between two points is measured by [`ModeEquations::weigh`].
-//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 6.
+//! The amplitude `a` is an unknown, so the curve may have turning points in it. The unknowns
+//! are the shape `y = x/a`, the forces along laws of velocity, ω, ζ and `ln a`.
+//! [`ModeEquations::weigh`] defines the arc length.
+//!
+//! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
+//! (2003), Ch. 6.
 
 use super::mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
 use super::open::{open, shorten};
@@ -10,32 +13,37 @@ use super::solve::{GROWS, HALVINGS, SHORTENS};
 use num_complex::Complex64;
 use stickslip_numerics::{dense, interrupt};
 
-/// Weight of `ln a` in the arc length: a tenth of the shape counts as much as a fifth of the amplitude.
+/// Weight of `ln a` in the arc length. A tenth of the shape counts as much as a fifth of the
+/// amplitude.
 const AMPLITUDE: f64 = 0.5;
 
-/// Relative motion below which its changes do not count, relative to the modal amplitude (1/√kg): rounding makes some.
+/// Relative motion below which its changes do not count, relative to the modal amplitude
+/// (1/√kg). It is above rounding.
 const SMALL: f64 = 1e-6;
 
-/// A point of the curve: modal amplitude, m √kg, and motion.
+/// Point of the curve: modal amplitude, m √kg, and motion.
 #[derive(Debug, Clone)]
 pub(crate) struct ModeArc {
     pub amplitude: f64,
     pub state: ModeState,
-    /// Unit tangent: by shape, forces, ω, ζ and `ln a`.
+    /// Unit tangent by shape, forces, ω, ζ and `ln a`.
     pub tangent: Vec<f64>,
-    /// Sign of the determinant of the derivative above the tangent. It stays along a smooth curve; where it changes, another curve has been
-    /// crossed, or the step has led to another one. Zero where the equations leave a direction open and the determinant is rounding.
+    /// Sign of the determinant of the Jacobian bordered by the tangent.
+    ///
+    /// It is constant along a smooth curve. A change means that another branch was crossed, or
+    /// that the step has jumped to one. It is zero if the equations are singular and the
+    /// determinant is rounding.
     pub side: f64,
 }
 
 impl ModeArc {
-    /// The same point on the way back.
+    /// Returns the same point with the curve followed in the opposite direction.
     pub fn reversed(&self) -> ModeArc {
         let tangent = self.tangent.iter().map(|t| -t).collect();
         ModeArc { tangent, side: -self.side, ..self.clone() }
     }
 
-    /// The point a length further along the tangent; the tangent stays.
+    /// Returns the point at arc length `length` along the tangent, with the same tangent.
     fn predicted(&self, length: f64) -> ModeArc {
         let mut next = self.clone();
         next.shift(&self.tangent, length);
@@ -58,7 +66,7 @@ impl ModeArc {
         self.amplitude = after;
     }
 
-    /// What leads from here to `other`, in the unknowns of the tangent.
+    /// Returns the difference from here to `other`, in the unknowns of the tangent.
     fn towards(&self, other: &ModeArc) -> Vec<f64> {
         let mut way = Vec::with_capacity(self.tangent.len());
         let shapes = self.state.x.iter().zip(&other.state.x);
@@ -74,7 +82,7 @@ impl ModeArc {
         way
     }
 
-    /// The point at amplitude `a` on the straight line between two.
+    /// Returns the point at amplitude `a` on the straight line between two points.
     pub fn between(&self, other: &ModeArc, a: f64) -> ModeState {
         let whole = (other.amplitude / self.amplitude).ln();
         let share = if whole == 0.0 { 0.0 } else { (a / self.amplitude).ln() / whole };
@@ -84,19 +92,20 @@ impl ModeArc {
     }
 }
 
-/// A step that was taken.
+/// Result of a step.
 pub(crate) struct Step {
     pub to: ModeArc,
     /// Newton iterations.
     pub iterations: usize,
-    /// Distance from where the tangent pointed.
+    /// Distance between the predicted and the corrected point.
     pub off: f64,
-    /// Cosine between the tangents at both ends.
+    /// Cosine of the angle between the tangents at both ends.
     pub straight: f64,
 }
 
 impl ModeEquations<'_> {
-    /// A solved point becomes the beginning of a curve towards smaller amplitudes. `None` if the point is singular.
+    /// Starts a curve towards smaller amplitudes from a solution. Returns `None` if the point
+    /// is singular.
     pub fn begin(&mut self, state: &ModeState, amplitude: f64) -> Option<ModeArc> {
         let mut row = vec![0.0; self.size() + 1];
         row[self.size()] = -1.0;
@@ -104,8 +113,10 @@ impl ModeEquations<'_> {
         self.correct_along(point, &row, false).map(|(point, _)| point)
     }
 
-    /// A step of the given arc length. `None` if the corrector does not arrive. A bold one takes Newton's whole step where no part of it comes
-    /// closer: that leads over kinks, but in a long step also to another branch nearby.
+    /// Takes a step of the given arc length. Returns `None` if the corrector does not converge.
+    ///
+    /// A `bold` step takes the full Newton step if no fraction of it reduces the residual. This
+    /// passes over kinks, but a long step may then jump to another branch.
     pub fn step(&mut self, from: &ModeArc, length: f64, bold: bool) -> Option<Step> {
         let row = self.weigh(from, &from.tangent);
         let predicted = from.predicted(length);
@@ -118,25 +129,29 @@ impl ModeEquations<'_> {
         Some(Step { to, iterations, off, straight })
     }
 
-    /// Arc length from a point to a motion, along the straight line.
+    /// Returns the arc length from a point to a motion along the straight line.
     pub fn distance(&self, from: &ModeArc, state: &ModeState, amplitude: f64) -> f64 {
         let to = ModeArc { amplitude, state: state.clone(), tangent: Vec::new(), side: 1.0 };
         self.length(from, &from.towards(&to))
     }
 
-    /// Length of a direction at a point.
+    /// Returns the length of a direction at a point.
     fn length(&self, at: &ModeArc, direction: &[f64]) -> f64 {
         self.inner(at, direction, direction).max(0.0).sqrt()
     }
 
-    /// The inner product of two directions at a point, that of the arc length.
+    /// Returns the inner product of two directions at a point in the metric of the arc length.
     pub(super) fn inner(&self, at: &ModeArc, one: &[f64], other: &[f64]) -> f64 {
         dot(&self.weigh(at, one), other)
     }
 
-    /// The metric of the arc length times a direction. It measures the shape by the kinetic energy of its change, forces by the slip limits,
-    /// relative motions of sliders behind springs by their size or, if they are smaller, by the reach of the spring, ω and 1 + ζ relatively,
-    /// and the amplitude by its logarithm. Without the forces and the relative motions, begin and end of slip would be corners.
+    /// Returns the metric of the arc length times a direction.
+    ///
+    /// The metric measures the shape by the kinetic energy of its change, and forces by the
+    /// slip limits. It measures the relative motion of sliders behind springs by its size, or
+    /// by the reach of the spring if that is larger. ω and 1 + ζ count relatively, and the
+    /// amplitude by its logarithm. Without the terms for forces and relative motions, the onset
+    /// and the end of slip would be corners of the curve.
     fn weigh(&self, at: &ModeArc, direction: &[f64]) -> Vec<f64> {
         let (n, last) = (self.system.dofs(), self.size());
         let nh = self.alternation.harmonics.len();
@@ -182,8 +197,10 @@ impl ModeEquations<'_> {
         out
     }
 
-    /// Newton's method in the plane through `point` that `row` is normal to, in halved steps as in [`ModeEquations::solve`]; with the unit
-    /// tangent at the solution, on the side of `row`, and the iterations.
+    /// Newton's method in the plane through `point` with the normal `row`.
+    ///
+    /// The line search halves steps as in [`ModeEquations::solve`]. Returns the solution with
+    /// its unit tangent, on the side of `row`, and the iterations.
     fn correct_along(&mut self, mut point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
         let size = self.size();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
@@ -232,7 +249,7 @@ impl ModeEquations<'_> {
             for halving in 0..=HALVINGS + 1 {
                 if halving > HALVINGS {
                     if now <= ROUNDED {
-                        // rounding lets it come no closer
+                        // rounding prevents a smaller residual
                         enough = ROUNDED;
                         now = evaluate(self, &point, &mut residual, &mut jacobian);
                         break;
@@ -256,7 +273,8 @@ impl ModeEquations<'_> {
         None
     }
 
-    /// The derivative by shape, forces, ω, ζ and `ln a`, in units of `scale`, above `row`.
+    /// Sets `out` to the Jacobian by shape, forces, ω, ζ and `ln a`, in units of `scale`, with
+    /// the last row `row`.
     fn border(&self, (point, scale): (&ModeArc, &[f64]), jacobian: &[f64], row: &[f64], out: &mut [f64]) {
         let size = self.size();
         let motions = 2 * point.state.x.len();
@@ -270,7 +288,7 @@ impl ModeEquations<'_> {
             for k in 0..size {
                 to[k] = from[k] / scale[i] * if k < motions { point.amplitude } else { 1.0 };
             }
-            // amplitude and phase are conditions on the shape alone
+            // amplitude and phase conditions depend on the shape alone
             to[size] = if i + 2 < size { by_amplitude / scale[i] } else { 0.0 };
         }
         out[size * (size + 1)..].copy_from_slice(row);

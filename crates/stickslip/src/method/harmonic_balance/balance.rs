@@ -1,4 +1,4 @@
-//! The solver: searches for the harmonics of one orbit after the other.
+//! The solver of harmonic balance: one orbit after another, with warm starts.
 
 use super::budget::{self, POINT, Work, is_affordable};
 use super::equations::{self, Level, Solution};
@@ -23,50 +23,65 @@ use num_complex::Complex64;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-/// Newton iterations from a neighbouring orbit, which take 2 to 5.
+/// Newton iterations from a warm start; 2 to 5 are usual.
 const NEARBY: usize = 20;
-/// Laws of velocity begin with this many harmonics at most, and double them from there: the sets of slipping samples are then nearly
-/// known.
+/// Highest harmonic of a cold start with force ports. Longer series start from the solution
+/// with half the harmonics, in which the slipping samples are nearly known.
 const COLD: usize = 15;
-/// Unknowns beyond which no error is estimated by elimination: one would take seconds, and a search takes ten and more.
+/// Number of unknowns beyond which elimination is too slow for an error estimate. One
+/// elimination would take seconds, and a search takes ten or more.
 pub(super) const LARGEST: usize = 2600;
-/// Harmonics times axes squared up to which products with all of them take a tenth of a second, so that an error is estimated.
+/// Largest number of harmonics times squared number of axes for which an error is estimated
+/// with GMRES. Products with all of them then take a tenth of a second.
 const ESTIMATED: f64 = 1e7;
 
-/// The solver of a system.
+/// Solver of a system.
 pub(super) struct Balance {
     pub(super) system: Arc<System>,
     pub(super) method: HarmonicBalance,
-    /// Periods of the drive in one of the motion; harmonics count those of the motion.
+    /// Number of excitation periods in one period of the orbit. Harmonics are multiples of the
+    /// orbit's frequency.
     pub(super) periods: usize,
-    /// The drive's frequency, rad/s; that of the motion is `omega` everywhere here.
+    /// Frequency of the excitation, rad/s. In this method, `omega` is the frequency of the
+    /// orbit.
     pub(super) drive: f64,
-    /// Of a ring in a travelling wave those of the first sector.
+    /// Ports. For a ring in a travelling wave, those of the first sector.
     pub(super) ports: Ports,
-    /// And those of the whole ring.
+    /// Ports of the whole ring, for a travelling wave.
     pub(super) around: Option<Ports>,
+    /// Receptance of the linear part.
     pub(super) rest: Rest,
-    /// One harmonic in banded form, of which the others need multiples, if that is the system's.
+    /// One harmonic in banded form, if the system has that form. It sizes the work and memory
+    /// of longer series.
     pub(super) banded: Option<Sparse>,
+    /// Set of harmonics in a series.
     pub(super) kept: Kept,
+    /// Highest harmonic of the first series.
     pub(super) first: usize,
-    /// Whether a law was met whose force samples see as a jump.
+    /// True once a law was met whose force jumps between two samples.
     pub(super) steep: bool,
+    /// Check of orbits by time integration.
     pub(super) judge: Judge,
-    /// The state of static equilibrium: displacements, velocities (zero), states of the joints.
+    /// State in static equilibrium: displacements, velocities (zero), internal states of the
+    /// joints.
     pub(super) static_start: Option<Vec<f64>>,
+    /// Equations by their highest harmonic.
     pub(super) levels: BTreeMap<usize, Level>,
-    /// Points in a row, the last ones, whose searches took long and found nothing, see [`budget::ENOUGH`].
+    /// Number of consecutive failed points that used much of the work limit, see
+    /// [`budget::ENOUGH`].
     pub(super) in_vain: usize,
-    /// The last orbits, the newest first.
+    /// The last orbits, newest first.
     pub(super) recent: VecDeque<Recent>,
-    /// A state, perhaps of none of these, from which others are sought, and its frequency, rad/s.
+    /// Frequency (rad/s) and state from which the next searches continue, see
+    /// [`Solver::begin_at`].
     pub(super) begun: Option<(f64, Vec<f64>)>,
-    /// Frequencies (rad/s) at which the motion was followed and no orbit was found, and what it did.
+    /// Frequencies (rad/s) without an orbit at which the motion was integrated in time, and how
+    /// that motion behaved and ended.
     pub(super) followed: Vec<(f64, Course, Vec<f64>)>,
-    /// How often it was followed to find one.
+    /// Number of time integrations that were made to find an orbit.
     pub(super) tried_in_time: usize,
-    /// By the highest harmonic, of many contacts the last solution that was compared with one of twice the harmonics, and that.
+    /// By highest harmonic, in systems with many contacts: the last solution whose error was
+    /// estimated, and the finer solution with twice the harmonics.
     pub(super) compared: BTreeMap<usize, [Solution; 2]>,
 }
 
@@ -124,7 +139,7 @@ impl Balance {
         })
     }
 
-    /// The level of highest harmonic `top`, ready for `omega`.
+    /// Returns the equations up to harmonic `top`, prepared for `omega`.
     ///
     /// # Errors
     /// A resonance without damping.
@@ -144,29 +159,31 @@ impl Balance {
         Ok(level)
     }
 
-    /// Begins a point.
+    /// Resets the work counters for a new point.
     pub(super) fn begin_point(&mut self, drive: f64) {
         self.drive = drive;
         self.levels.values_mut().for_each(Level::begin_point);
     }
 
-    /// What the searches of the point have taken, but those with harmonics up to one number.
+    /// Returns the work of the point so far, without that of the equations up to harmonic
+    /// `but`.
     pub(super) fn taken(&self, but: Option<usize>) -> Work {
         let counted = self.levels.iter().filter(|(top, _)| but != Some(**top));
         counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(Work::default(), Work::and)
     }
 
-    /// What the searches of the point may take.
+    /// Returns the work limit of the point.
     fn allowed(&self) -> Work {
         budget::allowed_after(self.in_vain)
     }
 
-    /// Whether they have taken all that they may.
+    /// Returns true if the point has used its work limit.
     pub(super) fn is_spent(&self) -> bool {
         self.taken(None).is_beyond(self.allowed())
     }
 
-    /// Ends a point: what the next one may take.
+    /// Ends a point. Counts consecutive expensive failures, which shrink the limit of the next
+    /// point.
     fn end_point(&mut self, found: Result<Orbit, OrbitError>) -> Result<Orbit, OrbitError> {
         match &found {
             Ok(_) => self.in_vain = 0,
@@ -176,7 +193,8 @@ impl Balance {
         found
     }
 
-    /// Whether a solution with twice the harmonics takes no more than seconds, of a point that has taken so much.
+    /// Returns true if a solution with twice the harmonics takes at most seconds and fits in
+    /// memory. The budget of a point that has used `taken` must cover it too.
     pub(super) fn can_compare(&self, top: usize, taken: Work) -> bool {
         let harmonics = self.kept.up_to(self.kept.double(top)).len();
         let axes = self.ports.count();
@@ -190,14 +208,17 @@ impl Balance {
         let bounded = self.banded.is_some() || self.ports.has_forces();
         let affordable =
             !bounded || is_affordable(work::step(self.banded.as_ref(), &self.ports, harmonics), taken, self.allowed());
-        // it is compared with twice the samples, too
+        // the error estimate also takes twice the samples
         let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports, self.steep);
         let fits = level_memory(self.banded.as_ref(), &self.ports, &self.rest, (harmonics, samples)) <= MEMORY;
         few && affordable && fits
     }
 
-    /// Solves at `top`, from a motion at another number of harmonics or from the first guess. Where that shows that a law is steep, it is solved by the
-    /// samples that such laws need, as is all that follows.
+    /// Solves with harmonics up to `top`, from a solution with another number of harmonics or
+    /// from an initial guess.
+    ///
+    /// If the solution shows that a law is steep, the method solves again with the samples that
+    /// steep laws need. All later solutions use these samples too.
     pub(super) fn solve(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
         let motion = self.solve_as_known(top, omega, from)?;
         if self.steep || !self.levels[&top].jumps(&self.ports, &motion) {
@@ -209,6 +230,7 @@ impl Balance {
         self.solve_as_known(top, omega, Some((top, &motion)))
     }
 
+    /// Solves with the number of samples that is set.
     fn solve_as_known(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
         let start = match from {
             Some((other, motion)) => {
@@ -220,7 +242,8 @@ impl Balance {
                 return self.solve(top, omega, Some((top / 2, &coarse)));
             }
             None => {
-                // the guess solves the whole structure densely: large systems begin without friction
+                // the initial guess solves the whole structure densely; large systems start
+                // without friction
                 let guess = (self.system.dofs() < sparse::GUESSED).then(|| Guess::new(&self.system, omega));
                 self.level(top, omega)?;
                 let begun = self.levels[&top].begin(&self.system, &self.ports, guess.as_ref(), omega);
@@ -231,6 +254,7 @@ impl Balance {
         level.solve(&self.ports, omega, start)
     }
 
+    /// Converts the failure of a search to the error of the method.
     pub(super) fn lost(&self, lost: Lost) -> OrbitError {
         if let Some(resonance) = lost.resonance {
             return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
@@ -248,7 +272,7 @@ impl Balance {
         }
     }
 
-    /// Harmonics of the places.
+    /// Returns the harmonics of all places.
     pub(super) fn places(
         &mut self,
         top: usize,
@@ -258,7 +282,7 @@ impl Balance {
         path::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion).map_err(Lost::at)
     }
 
-    /// The orbit of a solution with its evidence; the next searches begin with it.
+    /// Makes the orbit of a solution, checks its energy balance, and keeps it for warm starts.
     pub(super) fn finish(
         &mut self,
         top: usize,
@@ -273,7 +297,7 @@ impl Balance {
         Ok(orbit)
     }
 
-    /// The orbit of a solution with its evidence.
+    /// Makes the orbit of a solution and checks its energy balance.
     pub(super) fn orbit_of(
         &mut self,
         top: usize,
@@ -302,8 +326,10 @@ impl Balance {
         Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
     }
 
-    /// The solution near another one, without an estimate of its error, and without the long ways of [`Level::solve`]: a search that asks
-    /// for it can do without.
+    /// Finds the solution near another one, without an error estimate and without the
+    /// slip-limit homotopy of [`Level::solve`].
+    ///
+    /// Searches between orbits use it. They can do without a failed point.
     pub(super) fn nearby(&mut self, top: usize, omega: f64, near: &Solution) -> Result<Orbit, OrbitError> {
         self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
         let mut motion = Solution { iterations: 0, ..near.clone() };
@@ -324,7 +350,8 @@ impl Balance {
         self.finish(top, omega, motion, x, None)
     }
 
-    /// The user's number of harmonics, or as many as are needed, from `first` on.
+    /// Finds the orbit with the user's number of harmonics. Without one, doubles the harmonics
+    /// from `first` until the tolerance is met.
     pub(super) fn from(
         &mut self,
         first: usize,
@@ -337,26 +364,38 @@ impl Balance {
         }
     }
 
-    /// Whether a search begins on the line through the last two motions: of many contacts, and of elastic ones where motions do not separate, so that whatever
-    /// it begins with leads to the same orbit. Rigid friction jumps from one set of slipping samples to the next.
+    /// Returns true if warm starts extrapolate the last two orbits (secant predictor).
+    ///
+    /// This holds in systems with many contacts. It also holds for elastic friction if no two
+    /// motions separate, because every initial guess then leads to the same orbit. With rigid
+    /// friction the set of slipping samples changes abruptly, and extrapolation does not help.
     pub(super) fn goes_ahead(&self, top: usize) -> bool {
         let unique = self.judge.proves() && !self.ports.has_forces();
         unique || self.levels.get(&top).is_some_and(Level::is_coupled)
     }
 
-    /// Where a search begins: with an orbit of its own; where several orbits exist, with what the state of another solver's orbit leads to.
+    /// Returns the initial guess.
+    ///
+    /// If `start` belongs to an orbit of this solver, the guess is a warm start. If it belongs
+    /// to an orbit of another solver and several orbits may exist, the guess comes from a time
+    /// integration that begins there.
     pub(super) fn near(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
         let foreign = start.filter(|start| self.recent.iter().all(|recent| recent.start != *start));
         let led = foreign.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.led(start, omega));
         led.or_else(|| self.warm(start, omega))
     }
 
-    /// Which of the last orbits has this start.
+    /// Returns the index of the recent orbit with this start.
     fn same(&self, start: &[f64]) -> Option<usize> {
         self.recent.iter().position(|recent| recent.start == start)
     }
 
-    /// Which of the last orbits knows what harmonics one beside `start` needs: that one itself, or one of them that is nearer than it.
+    /// Returns the index of the recent orbit that tells how many harmonics a search from
+    /// `start` needs.
+    ///
+    /// This is the orbit with that start. Otherwise, if `start` is the announced state of
+    /// [`Solver::begin_at`], it is the orbit at the nearest frequency, provided that it is
+    /// nearer than that state.
     fn neighbour(&self, start: &[f64], omega: f64) -> Option<usize> {
         let distance = |at: &usize| (self.recent[*at].omega - omega).abs();
         let nearer = || {
@@ -367,12 +406,13 @@ impl Balance {
         self.same(start).or_else(nearer)
     }
 
-    /// The harmonics of a neighbouring orbit are at hand if it is one of the last; any of these is nearer than a guess.
+    /// Returns the warm start from the recent orbit with this start, or otherwise from the last
+    /// orbit. Both are closer than an initial guess.
     pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
         self.warm_by(self.same(start?).unwrap_or(0), omega)
     }
 
-    /// Those of one of the last orbits.
+    /// Returns the warm start from a recent orbit.
     fn warm_by(&self, at: usize, omega: f64) -> Option<(usize, Solution)> {
         let near = self.recent.get(at)?;
         let before = self.recent.iter().skip(at + 1).find(|recent| recent.top == near.top);
@@ -409,13 +449,13 @@ impl Solver for Balance {
         let at = omega / self.periods as f64;
         let known = start.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.neighbour(start, at));
         match known.and_then(|known| self.warm_by(known, at)) {
-            // the harmonics that the neighbour needed are enough
+            // the number of harmonics of the neighbouring orbit is sufficient
             Some((top, motion)) => {
                 self.begin_point(omega);
                 let found = self.nearby(top, at, &motion);
                 self.end_point(found)
             }
-            // what another orbit needed, far away or of another solver, tells nothing
+            // no suitable orbit is known, so the number of harmonics is chosen anew
             _ => self.orbit(omega, start),
         }
     }
@@ -438,8 +478,9 @@ mod tests {
     use crate::method::event_driven::EventDriven;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
 
-    /// At the end of a curve the joint sticks, and few harmonics are enough: an orbit that is sought back at its peak, where it slips, has as many as it
-    /// needs there. It had those of the last orbit, and was 2.4 % too low.
+    /// Near the end of a curve the joint sticks, and few harmonics suffice. A later search at
+    /// the peak, where the joint slips, uses the harmonics of the peak. With those of the last
+    /// orbit the peak was 2.4 % too low.
     #[test]
     fn a_peak_that_is_sought_after_the_curve_has_its_own_harmonics() {
         let spring = |on: &str, stiffness, damping| Spring { between: [on.into(), GROUND.into()], stiffness, damping };
@@ -469,7 +510,7 @@ mod tests {
         assert!(error < 1e-3, "{error:.1e} with {:?} harmonics", between.evidence.harmonics);
     }
 
-    /// Points that take long in vain leave less to those that follow, and an orbit gives it back.
+    /// Expensive failed points shrink the work limit of the next point. A success restores it.
     #[test]
     fn points_in_vain_leave_less_to_the_next() {
         let system = example::blade_couple_massless().assemble().unwrap();

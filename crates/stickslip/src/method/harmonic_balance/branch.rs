@@ -19,19 +19,22 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::continuation::Equations;
 
-/// Harmonics when none are given.
+/// Default number of harmonics, in units of the excitation's greatest common divisor.
 const HARMONICS: usize = 15;
-/// Step of the difference with respect to the parameter, relative to it or to its range, the larger of the two: near the cube root of
-/// rounding, for central differences.
+/// Step of the central difference with respect to the parameter, relative to the larger of the
+/// parameter and its range. It is near the cube root of rounding.
 const DIFFERENCE: f64 = 1e-6;
 
-/// Newton iterations for the solution that tells the error.
+/// Newton iterations of the solution for the error estimate.
 const CHECK: usize = 30;
-/// Motions grow towards resonance: the unknowns are measured by this many times the first motion, so that they stay of order one.
+/// Unit of the unknowns relative to the first motion. Motions grow towards a resonance, and the
+/// unknowns then stay of order one.
 const RESONANCE: f64 = 30.0;
 
-/// The equations; unknowns are the harmonics of the joints' motions, relative to the size of the first orbit.
+/// Equations whose unknowns are the harmonics along the joints, relative to the size of the
+/// first orbit.
 pub(crate) struct BranchEquations<'a> {
+    /// Returns the system and the excitation frequency (rad/s) for a value of the parameter.
     at: &'a dyn Fn(f64) -> (System, f64),
     system: Arc<System>,
     omega: f64,
@@ -40,9 +43,10 @@ pub(crate) struct BranchEquations<'a> {
     ports: Ports,
     around: Option<Ports>,
     rest: Rest,
+    /// System to which `rest` belongs.
     rest_of: Arc<System>,
     level: Level,
-    /// Twice the harmonics, which tell the error, unless they are too many.
+    /// Equations with twice the harmonics for the error estimate, unless they are too large.
     finer: Option<Level>,
     tolerance: f64,
     motion: Solution,
@@ -53,7 +57,7 @@ pub(crate) struct BranchEquations<'a> {
 }
 
 impl<'a> BranchEquations<'a> {
-    /// Along a range that begins at `range.0`.
+    /// Makes the equations for a range of the parameter that begins at `range.0`.
     pub fn new(
         at: &'a dyn Fn(f64) -> (System, f64),
         method: HarmonicBalance,
@@ -61,7 +65,7 @@ impl<'a> BranchEquations<'a> {
     ) -> Result<Self, MethodError> {
         let (system, omega) = at(range.0);
         let system = Arc::new(system);
-        // a force that is zero at the first value may not be so later
+        // a force that is zero at the first value may be nonzero later
         let kept = Kept::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
@@ -96,8 +100,11 @@ impl<'a> BranchEquations<'a> {
         })
     }
 
-    /// Makes everything that depends on the parameter. False if there is no drive, or if a joint has gone or has another law, so that the
-    /// unknowns are others.
+    /// Updates all data that depend on the parameter.
+    ///
+    /// Returns false if the frequency is not positive, or if the joints or their kinds of law
+    /// have changed, so that the unknowns differ. Returns false at a resonance without damping
+    /// too.
     fn set(&mut self, value: f64) -> bool {
         if value == self.value {
             return true;
@@ -130,16 +137,18 @@ impl<'a> BranchEquations<'a> {
         true
     }
 
+    /// Returns the error for a search that did not converge.
     fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
         OrbitError::not_converged(super::NAME, self.omega, iterations, residual)
     }
 
-    /// The first point, found from the describing function.
+    /// Finds the first point from the describing functions.
     pub fn start(&mut self, value: f64) -> Result<Vec<f64>, OrbitError> {
         if !self.set(value) {
             return Err(OrbitError::Frequency { omega: self.omega });
         }
-        // as in a point: the guess solves the whole structure, and large ones begin without friction
+        // as for a single point: the initial guess solves the whole structure; large systems
+        // start without friction
         let guess = (self.system.dofs() < GUESSED).then(|| Guess::new(&self.system, self.omega));
         let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
         self.level.begin_point();
@@ -151,7 +160,7 @@ impl<'a> BranchEquations<'a> {
         Ok(self.level.pack(&self.ports, &self.motion, self.length))
     }
 
-    /// The orbit of a point of the branch.
+    /// Returns the orbit of a point of the branch.
     pub fn orbit(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
         if !self.set(value) {
             return None;
@@ -163,7 +172,7 @@ impl<'a> BranchEquations<'a> {
         let truncation = self.finer.as_mut().and_then(|finer| {
             finer.drive(&self.system, &self.ports, &self.rest, self.omega).ok()?;
             let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics());
-            // Newton's method alone: a search would find another branch where this one turns
+            // Newton's method alone: a search would find another branch near a turning point
             finer.begin_point();
             finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
             let better = path::places(finer, &self.rest, self.omega, &motion).ok()?;
@@ -186,7 +195,7 @@ impl<'a> BranchEquations<'a> {
         path::orbit(setting, &mut self.level, &self.motion, places).filter(|orbit| path::balances(&self.system, orbit))
     }
 
-    /// The orbit at `value` that Newton's method finds from the point `x` nearby.
+    /// Returns the orbit at `value` that the solver finds from the nearby point `x`.
     pub fn near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
         let mut x = x.to_vec();
         self.leap(&mut x, value).then(|| self.orbit(&x, value))?

@@ -1,53 +1,69 @@
-//! What searches may take: the work that ends a search, and that which ends a point.
+//! Work limits: when a search ends, and when a point is given up.
 
-/// What one search may take, and what all searches of a point may take, from the first to those of the estimate: Newton's method, interior points, and
-/// proximal points with the limits that are lowered after them, eliminate as much as one each; laws with a memory are followed as far as for one search in
-/// all. Measured: of 173 random points, with half of [`WORK`], those that were found took 1.01 of the three at most, all but one 0.4.
+/// Work limit of one search, relative to [`WORK`].
 pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
+/// Work limit of all searches of a point, including those of the error estimate.
+///
+/// Newton's method, the interior point method, and the proximal point method with the
+/// slip-limit homotopy after it may each use the eliminations of one search. All together may
+/// use the time steps of one search. Measured on 173 random points with half of [`WORK`]:
+/// converged points used at most 1.01 of the 3.0 eliminations, all but one at most 0.4.
 pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
 
-/// Points in a row that took more than this share of what a point may, and found nothing, after which the next ones of the same solver may take no more
-/// than that: nearly all that are found take less, and a curve without orbits is to end. Whatever is found gives back all.
+/// Number of consecutive failed points, each with more than [`ENOUGH`] of the work limit, after
+/// which the next points of the same solver get a smaller limit. One success restores the full
+/// limit.
 const IN_VAIN: usize = 2;
+/// Share of the work limit that points get after such failures. Nearly all converged points use
+/// less, and a curve without orbits ends soon.
 pub(super) const ENOUGH: f64 = 0.1;
 
-/// Multiplications of one search, about four seconds of one core.
+/// Multiplications of one search; about four seconds on one core.
 pub(super) const WORK: f64 = 2e10;
-/// Eliminations of a search in any case, where nothing shorter was solved before or where laws are smooth: one that is to end takes a few of them.
+/// Least number of eliminations in the work limit of a search. A converging search takes a few.
+/// It does not apply to a series with force ports that refines a shorter one.
 pub(super) const FEWEST: f64 = 40.0;
-/// Steps for which a point must have work left where a longer series is begun. From a shorter one it takes 6 to 25 in banded form, and by products, whose
-/// steps are then short, as much as three counted ones: `coulomb-2d` at 4 contacts has its 1023 harmonics within 0.3 s.
+/// Newton steps that the remaining budget of a point must cover before a longer series is
+/// begun. Refining a shorter series takes 6 to 25 steps in banded form. With GMRES the steps
+/// are then short, and the total is at most three counted steps: `coulomb-2d` with 4 contacts
+/// reaches its 1023 harmonics within 0.3 s.
 const BEGUN: f64 = 3.0;
 
-/// Whether a series whose steps take so many multiplications is begun by a point that has taken so much of what it may.
+/// Returns true if the remaining budget of a point covers a longer series.
+///
+/// `step` is the number of multiplications of one of its Newton steps, `taken` the work used by
+/// the point, and `allowed` its limit.
 pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
     BEGUN * step <= WORK * (allowed.eliminated - taken.eliminated)
 }
 
-/// What a point may take after so many in a row that found nothing with more than [`ENOUGH`].
+/// Returns the work limit of the next point after this number of consecutive failed points that
+/// used more than [`ENOUGH`].
 pub(super) fn allowed_after(in_vain: usize) -> Work {
     if in_vain < IN_VAIN { POINT } else { POINT.times(ENOUGH) }
 }
 
-/// Work, relative to that of one search: eliminations, and steps of laws with a memory.
+/// Work relative to the limit of one search.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Work {
+    /// Multiplications of Newton steps and evaluations.
     pub eliminated: f64,
+    /// Time steps of laws with memory.
     pub marched: f64,
 }
 
 impl Work {
-    /// Both together.
+    /// Returns the sum.
     pub fn and(self, other: Work) -> Work {
         Work { eliminated: self.eliminated + other.eliminated, marched: self.marched + other.marched }
     }
 
-    /// A share of both.
+    /// Returns both parts multiplied by `share`.
     pub fn times(self, share: f64) -> Work {
         Work { eliminated: share * self.eliminated, marched: share * self.marched }
     }
 
-    /// Whether there is more of one or the other than so much.
+    /// Returns true if either part exceeds that of `limit`.
     pub fn is_beyond(self, limit: Work) -> bool {
         self.eliminated > limit.eliminated || self.marched > limit.marched
     }

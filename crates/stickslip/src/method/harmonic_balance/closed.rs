@@ -1,13 +1,17 @@
-//! Bodies that nothing but contacts holds: the structure at rest with its contacts closed.
+//! Mean position of bodies that only contacts support: the structure at rest with closed
+//! contacts.
 //!
-//! The static receptance `R` of a structure that can move freely is that of the soft springs ([`HOLD`]) that stand for what is missing, ten orders
-//! above the compliance of contacts: mean positions would be the small difference of large ones, and residuals their rounding. So the springs `k`
-//! that the joints are while they stick, faces closed, are added to the structure, and taken off the forces:
+//! The static receptance of an unsupported structure is that of the regularizing springs
+//! ([`HOLD`]), ten orders of magnitude above the compliance of contacts. Mean positions would
+//! be small differences of large numbers, and residuals their rounding. For the mean, the
+//! contact stiffness `k` of sticking joints with closed faces is added to the structure and
+//! subtracted from the forces:
 //!
-//! `(K + W k Wᵀ) x = F - W (f - k u)`, `u = Wᵀ x`,
+//! `(K + W k Wᵀ) x = F - W (f - k u)`, `u = Wᵀ x`.
 //!
-//! for the mean alone. That is the same equation for any `k`; all that is in it now has the size of the motion. A joint that sticks makes
-//! `f - k u` constant, so that static rest is one Newton step away.
+//! This is the same equation for any `k`, and all its terms have the size of the motion. For a
+//! sticking joint `f - k u` is constant, so one Newton step finds the static equilibrium with
+//! all joints stuck.
 
 use super::hold::HOLD;
 use super::ports::Ports;
@@ -18,19 +22,23 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use stickslip_numerics::dense::{Lu, multiply_in_blocks};
 
-/// Receptance of the structure alone, relative to the compliance of a closed contact, below which springs hold it well enough: two digits are lost.
+/// Receptance of the structure, relative to the compliance of a closed contact, up to which the
+/// structure is well supported. Two digits are lost at this value.
 const SOFT: f64 = 1e2;
-/// A direction is held by [`HOLD`] alone if it moves so many times less at twice the frequency, where these springs are four times as stiff.
+/// Ratio of the receptances at the frequency and at twice the frequency above which [`HOLD`]
+/// alone supports a direction. Its springs are four times as stiff at twice the frequency.
 const FREE: f64 = 2.0;
 
-/// Stiffness along the axes of closed contacts, N/m.
+/// Returns the stiffness of closed contacts along the axes, N/m.
 pub(super) fn springs(ports: &Ports) -> Vec<f64> {
     let all = ports.iter().flat_map(|port| (0..port.axes).map(|axis| port.closed(axis)));
     all.map(|k| if k.is_finite() && k > 0.0 { k } else { 0.0 }).collect()
 }
 
-/// Whether contacts of these stiffnesses hold what nothing else does: `own` are receptances at rest along each axis alone, with
-/// [`HOLD`] of a frequency.
+/// Returns true if contacts with these stiffnesses support a direction that nothing else
+/// supports.
+///
+/// `own` returns the static receptance of each axis alone, with [`HOLD`] of a frequency.
 pub(super) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, Resonant>, omega: f64) -> bool {
     if springs.iter().all(|k| *k == 0.0) {
         return false;
@@ -44,30 +52,30 @@ pub(super) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, Resona
     springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > SOFT)
 }
 
-/// Of a structure in modes: these are coupled by the contacts.
+/// Structure in uncoupled modes, which the closed contacts couple.
 #[derive(Debug, Clone)]
 pub(super) struct Modes {
     structure: Arc<Uncoupled>,
-    /// `Φᵀ k Φ`.
+    /// Modal stiffness of the closed contacts, `Φᵀ k Φ`.
     coupling: Vec<f64>,
     factor: RefCell<Option<(f64, Arc<Lu<f64>>)>>,
 }
 
 impl Modes {
-    /// Of a structure in modes, with these springs along the axes, N/m.
+    /// Makes the modal stiffness of a structure with these springs along the axes, N/m.
     pub fn new(springs: &[f64], structure: &Arc<Uncoupled>) -> Self {
         let (p, n) = (structure.axes, structure.own().len());
         let weighted: Vec<f64> =
             structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(springs).map(|(a, k)| a * k)).collect();
         let mut coupling = vec![0.0; n * n];
-        // the columns of `at` are its modes, so that the first factor stands transposed
+        // the columns of `at` are modes, so the first factor is transposed
         let rows: Vec<f64> =
             (0..p).flat_map(|q| (0..n).map(move |m| (q, m))).map(|(q, m)| weighted[m * p + q]).collect();
         multiply_in_blocks(&rows, &structure.at, &mut coupling, (n, p, n), false);
         Modes { structure: structure.clone(), coupling, factor: RefCell::default() }
     }
 
-    /// The stiffness between modes. Kept as long as the drive frequency stays.
+    /// Returns the factored modal stiffness. It is kept until the excitation frequency changes.
     pub fn factor(&self, omega: f64) -> Result<Arc<Lu<f64>>, Resonant> {
         let mut kept = self.factor.borrow_mut();
         if let Some((of, factor)) = &*kept
@@ -85,7 +93,7 @@ impl Modes {
         Ok(factor)
     }
 
-    /// Displacements of all places (m) under constant forces on them, N.
+    /// Returns the displacements of all places (m) under constant forces on them, N.
     pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
         let factor = self.factor(omega)?;
         // a mean has no imaginary part
@@ -94,7 +102,7 @@ impl Modes {
         Ok(self.structure.of_modes(&modal).map(|x| Complex64::new(x, 0.0)))
     }
 
-    /// Displacements along the axes under unit forces along them, m/N.
+    /// Returns the displacements along the axes under unit forces along them, m/N.
     pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let factor = self.factor(omega)?;
         let (p, n) = (self.structure.axes, self.structure.own().len());
@@ -132,7 +140,7 @@ mod tests {
         damped(mass, stiffness, 0.0)
     }
 
-    /// With a damping of its free motions, 1/s, too.
+    /// Returns a structure whose free motions are damped too, at `rate` (1/s).
     fn damped(mass: DMatrix<f64>, stiffness: DMatrix<f64>, rate: f64) -> Structure {
         let n = mass.nrows();
         let names = (0..n).map(|i| i.to_string()).collect();
@@ -145,7 +153,8 @@ mod tests {
         method.solver(system).unwrap().orbit(omega, None)
     }
 
-    /// A mass along (x, z) on one contact of preload 10 N with the ground, with constant forces and a harmonic one along x.
+    /// Returns a mass along (x, z) on one contact with the ground. The preload is 10 N.
+    /// Constant forces act along both directions and a harmonic one along x.
     fn block(constant: [f64; 2], amplitude: f64) -> System {
         let structure = structure(DMatrix::identity(2, 2) * 0.7, DMatrix::zeros(2, 2));
         let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
@@ -155,8 +164,8 @@ mod tests {
         builder.force(0, 1, Complex64::new(amplitude, 0.0)).build().unwrap()
     }
 
-    /// While the contact sticks, a free block is an oscillator on its springs: `F/|kt - m Ω²|`, below and above its resonance, and the normal
-    /// force is what presses it, to rounding.
+    /// While the contact sticks, a free block is an oscillator on its springs: `F/|kt - m Ω²|`,
+    /// below and above its resonance. The normal force equals the applied force to rounding.
     #[test]
     fn a_free_block_on_a_contact_that_sticks() {
         for (pressed, ratio) in [(10.0, 0.01), (10.0, 0.6), (10.0, 1.7), (10.0, 20.0), (25.0, 0.6), (4.0, 0.6)] {
@@ -171,19 +180,20 @@ mod tests {
         }
     }
 
-    /// A constant load along the face below the limit is carried by friction: rest is where its spring holds that, and the motion about it is the same,
-    /// `Q/kt + F/|kt - m Ω²| cos Ωt`. The load may reach the limit together with what the motion asks for.
+    /// Friction carries a constant load `Q` along the face below the limit. The mean is `Q/kt`, and
+    /// the vibration about it is the same as without the load: `F/|kt - m Ω²| cos Ωt`. The load
+    /// may reach the limit together with the vibration.
     #[test]
     fn friction_carries_a_constant_load() {
         let (pressed, limit) = (10.0, 5.0);
         for (load, ratio) in [(3.0f64, 0.6), (-4.2, 0.6), (4.99, 0.01), (2.0, 1.7), (-1.0, 20.0)] {
             let omega = ratio * (TANGENTIAL / 0.7).sqrt();
             let amplitude = 0.3 / (TANGENTIAL - 0.7 * omega * omega).abs();
-            // a harmonic load that leaves a hundredth of the limit
+            // choose a harmonic load that leaves one hundredth of the limit
             let share = 0.99f64.min((limit - load.abs()) / (TANGENTIAL * amplitude));
             let found = orbit(&block([load, pressed], 0.3 * share), 3, omega).unwrap();
             let (x, z) = (&found.places[0], &found.places[1]);
-            // what keeps a free mean in place holds (1e-5 Ω)² m of it
+            // the spring that regularizes a free mean carries (1e-5 Ω)² m of it
             let held = 1e-9 + 2e-10 * ratio * ratio;
             assert!((x.mean * TANGENTIAL / load - 1.0).abs() < held, "{load}, {ratio}: {}", x.mean * TANGENTIAL);
             assert!((x.amplitude() / (share * amplitude) - 1.0).abs() < 1e-6, "{load}, {ratio}: {}", x.amplitude());
@@ -192,12 +202,14 @@ mod tests {
         }
     }
 
-    /// Of two contacts on a body one is loaded while the other is unloaded. Both slip at first, and then carry opposite mean forces with which neither
-    /// slips any more: the body shakes down, and its motion is that of its springs. Where each alone would come to rest their means do not balance.
+    /// A body on two contacts shakes down: one contact is loaded while the other is unloaded.
+    /// Both slip at first, then carry opposite mean forces, and neither slips any more. The
+    /// motion is then that of the springs. The mean forces that each contact would reach alone
+    /// do not balance.
     #[test]
     fn a_body_on_two_contacts_shakes_down() {
         let (mass, sides, pressed) = (0.7, [1.0, -0.9], 10.0);
-        // along x and z, and a turn
+        // along x and z, and a rotation
         let body = structure(DMatrix::identity(3, 3) * mass, DMatrix::zeros(3, 3));
         let mut builder = System::builder(body);
         for (i, side) in sides.into_iter().enumerate() {
@@ -208,7 +220,8 @@ mod tests {
         for (row, power) in [(1, 0), (2, 1)] {
             builder = builder.force(row, 0, Complex64::new(pressed * sum(power), 0.0));
         }
-        // what moves the springs in phase by 4.5 N along x, and by 8 N and -7.2 N across the faces
+        // loads that move the springs in phase, by 4.5 N along x, and by 8 N and -7.2 N across
+        // the faces
         let (pull, swing) = (4.5, 8.0);
         let omega = 0.5 * (TANGENTIAL / mass).sqrt();
         let [x, turned] = [pull / TANGENTIAL, swing / NORMAL];
@@ -225,7 +238,7 @@ mod tests {
         for (i, side) in sides.into_iter().enumerate() {
             let force = |k: usize| found.sample(found.period() * k as f64 / samples as f64).joints[i].force[0];
             let mean = (0..samples).map(force).sum::<f64>() / samples as f64;
-            // |T + 4.5 c| <= μ (10 + 8 side c) at both ends c = ±1 of the swing
+            // |T + 4.5 c| <= μ (10 + 8 side c) at both ends c = ±1 of the vibration
             let ends = [-1.0, 1.0].map(|c: f64| (FRICTION * (pressed + swing * side * c), pull * c));
             let low = ends.iter().fold(f64::NEG_INFINITY, |m, (limit, pull)| m.max(-limit - pull));
             let high = ends.iter().fold(f64::INFINITY, |m, (limit, pull)| m.min(limit - pull));
@@ -236,7 +249,8 @@ mod tests {
         assert!(alone.abs() > 0.3, "{alone}");
     }
 
-    /// What presses it away, or drags it more than friction can, is no rest.
+    /// A load that lifts the block, or drags it by more than the friction limit, has no
+    /// equilibrium.
     #[test]
     fn loads_that_no_contact_carries_are_refused() {
         for constant in [[0.0, -1.0], [6.0, 10.0]] {
@@ -245,8 +259,10 @@ mod tests {
         }
     }
 
-    /// Normal forces of a wedge in static equilibrium under `pull` along z: of the nine ways in which its faces may stick or
-    /// slip to either side the one that friction allows. The faces have the axes `face` (tangent, normal) along x and z.
+    /// Returns the normal forces of a wedge in static equilibrium under `pull` along z.
+    ///
+    /// Each face may stick or slip to either side. Friction allows one of these nine
+    /// combinations. The faces have the axes `face` (tangent, normal) along x and z.
     fn pressed_wedge(faces: &[[[f64; 2]; 2]; 2], preloads: [f64; 2], pull: f64) -> [f64; 2] {
         for slips in 0..9 {
             // 0: sticks; 1 and 2: slips with a friction force of this sign
@@ -272,8 +288,9 @@ mod tests {
         panic!("no equilibrium");
     }
 
-    /// A wedge between two faces at the angles `a` to the circumference, whether the faces are pressed as much before as by the
-    /// load, `N1 = C sin a2/sin(a1 + a2)`, otherwise, or not at all: the load grows from zero, and friction carries its part.
+    /// A wedge between two faces at the angles `a` to the circumference. The preloads equal the
+    /// reactions to the load, `N1 = C sin a2/sin(a1 + a2)`, differ from them, or are zero. The
+    /// load grows from zero, and friction carries its part.
     #[test]
     fn a_wedge_between_two_faces() {
         let (angles, pull) = ([0.4f64, 0.7], 30.0);
@@ -303,14 +320,15 @@ mod tests {
                 let samples = 64;
                 let force = |k: usize| found.sample(found.period() * k as f64 / samples as f64).joints[i].force[1];
                 let mean = (0..samples).map(force).sum::<f64>() / samples as f64;
-                // the vibration shifts what slips in static equilibrium by its own size
+                // the vibration changes the slip of the static equilibrium by its own size
                 assert!((mean / expected - 1.0).abs() < allowed, "{preloads:?}: {mean} {expected}");
             }
         }
     }
 
-    /// Small motion about rest on closed contacts of preload 10 N, one equation for the mean and one for the first harmonic: what the series of one
-    /// harmonic is while all stick.
+    /// Checks small vibration on closed contacts with a preload of 10 N. While all contacts
+    /// stick, the series with one harmonic solves one equation for the mean and one for the
+    /// first harmonic.
     fn stands(what: &str, system: &System, omega: f64) {
         let structure = system.structure();
         let n = structure.dofs();
@@ -343,12 +361,12 @@ mod tests {
         }
     }
 
-    /// Each contact is pressed by other than its preload.
+    /// Returns a normal load that differs from the preload.
     fn pressed(i: usize) -> Complex64 {
         Complex64::new(10.0 + ((i * 7) % 5) as f64, 0.0)
     }
 
-    /// Free chains along (x, z) on contacts, in every form that receptances are kept in.
+    /// Free chains along (x, z) on contacts, with every form of the receptance.
     #[test]
     fn chains_stand_on_their_contacts() {
         for (masses, every, damping, banded) in
@@ -373,7 +391,8 @@ mod tests {
         }
     }
 
-    /// A free bar in its modes, along (x, z): `cos πmξ`, also where so many contacts stand on it that receptances are not formed.
+    /// A free bar in its modes `cos πmξ` along (x, z), also with a number of contacts for which
+    /// receptances are not formed.
     #[test]
     fn modes_stand_on_their_contacts() {
         let modes = 30;

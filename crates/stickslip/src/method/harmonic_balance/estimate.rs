@@ -1,4 +1,4 @@
-//! The error of a motion by a finer one.
+//! Truncation error of a solution, from a second solution with twice the harmonics.
 
 use super::ease::SOLVED;
 use super::equations::{Level, Solution};
@@ -9,25 +9,33 @@ use crate::model::Axis;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
-/// The error relative to the distance from the solution with twice the harmonics. Where rigid friction makes accelerations jump, the
-/// doubling leaves four tenths of the error, between order 1 (one half) and 3/2 (a third): both are observed.
+/// Ratio of the error to the distance between the two solutions for rigid friction. Friction
+/// makes accelerations jump, and a doubling leaves four tenths of the error. This lies between
+/// the observed orders 1 (one half) and 3/2 (one third).
 const RIGID_SHARE: f64 = 1.7;
-/// The same of laws that are steep: until the series resolves their layer they leave half of it, as order 1 does, and where friction falls with
-/// velocity no less. Elsewhere the doubling leaves next to nothing.
+/// The ratio for steep laws. Until the series resolves their transition layer, a doubling
+/// leaves half of the error, as order 1 does. Friction that falls with velocity leaves no less.
+/// With all other laws a doubling leaves almost nothing.
 const STEEP_SHARE: f64 = 2.0;
-/// A motion that is less than this share of what it would be without the joints is rest: equations count as solved where they leave a tenth of that.
+/// Smallest size of a motion, relative to the motion without joints. Equations are solved to a
+/// tenth of it.
 const CANCELS: f64 = 10.0 * SOLVED;
 
-/// A motion for the comparison with a finer one: its harmonics and, per harmonic, the motions of the places and along the axes of the ports.
+/// A solution for the comparison: its harmonics, and per harmonic the motions of the places and
+/// along the axes of the ports.
 pub(super) struct Compared<'a> {
     pub harmonics: &'a [usize],
     pub places: &'a [DVector<Complex64>],
     pub along: &'a [Complex64],
 }
 
-/// The error of a motion by a finer one: their distance, as the largest of the places and of the inner sliders behind springs, relative to
-/// the largest of these motions, without means ([`CANCELS`]), times the share that the finer one may be off itself. What the finer one lacks at
-/// resonances above its own harmonics counts too. The finer one is its level, its motion and, per harmonic, the motions of the places.
+/// Returns the truncation error of `coarse`, relative to the largest motion.
+///
+/// The error is the largest distance between both solutions, over the places and the sliders
+/// behind springs. It is divided by the largest of these motions, at least [`CANCELS`], without
+/// means. The factor accounts for the error of the finer solution. Resonances above the
+/// harmonics of the finer solution count too. The finer solution consists of its equations, its
+/// harmonics and, per harmonic, the motions of the places.
 pub(super) fn estimate(
     seen: &[Axis],
     ports: &Ports,
@@ -72,12 +80,13 @@ pub(super) fn estimate(
     if size > 0.0 { share * (distance / size).sqrt() } else { 0.0 }
 }
 
-/// The motion of a place as a length, m.
+/// Returns the motion of a place as a length, m.
 fn length(place: &Axis, motion: &DVector<Complex64>) -> Complex64 {
     place.along_complex(motion) * place.length()
 }
 
-/// What a solution lacks at the resonances above its harmonics: the motions of the places there, under the forces that it has.
+/// Returns the motions of the places at the resonances above the harmonics of a solution, under
+/// its forces.
 fn above(
     level: &mut Level,
     rest: &Rest,

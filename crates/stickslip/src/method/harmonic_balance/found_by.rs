@@ -1,23 +1,24 @@
 //! The search that found a solution.
 
-/// The search that found a solution, from the usual one to the last resort.
+/// The search that found a solution, in the order in which the searches are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum FoundBy {
-    /// Newton's method from a guess or from a neighbouring orbit.
+    /// Newton's method from an initial guess or a warm start.
     #[default]
     Newton,
-    /// An interior-point path along all rigid joints, then Newton's method.
+    /// Interior point method for rigid friction, then Newton's method.
     InteriorPoints,
-    /// Proximal points for friction forces that the equations leave open.
+    /// Proximal point method for friction forces that the equations leave undetermined.
     ProximalPoints,
-    /// Slip limits lowered from values at which everything sticks.
+    /// Homotopy in the slip limits, from limits at which all joints stick.
     SlipLimitHomotopy,
-    /// Newton's method from a motion that was followed in time.
+    /// Newton's method from a time integration.
     TimeIntegration,
 }
 
 impl FoundBy {
-    /// The name in tables and in [`Evidence::found_by`](crate::orbit::Evidence::found_by).
+    /// Returns the name in tables and in
+    /// [`Evidence::found_by`](crate::orbit::Evidence::found_by).
     pub fn name(self) -> &'static str {
         match self {
             FoundBy::Newton => "newton",

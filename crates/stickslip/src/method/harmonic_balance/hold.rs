@@ -1,23 +1,28 @@
-//! What keeps the equations regular where the model decides nothing.
+//! Regularization of equations that the model leaves singular.
 
 use num_complex::Complex64;
 
-/// A direction that nothing holds gets, for its mean position only, a spring that makes it as slow as this fraction of the drive
-/// frequency: its mean is arbitrary otherwise. The motion changes by the square of it.
+/// Frequency, relative to the excitation frequency, that a regularizing spring gives to an
+/// unsupported direction. The spring acts on the mean position alone, which is otherwise
+/// undetermined. It changes the motion by the square of this number.
 pub(super) const HOLD: f64 = 1e-5;
 
-/// The spring of such a direction at a rate, 1/s² times its mass: at rest only.
+/// Returns the regularizing stiffness per mass, 1/s², at the complex rate `s`. It is zero
+/// unless `s` is zero.
 pub(super) fn soft_spring(s: Complex64, omega: f64) -> f64 {
     if s == Complex64::ZERO { (HOLD * omega).powi(2) } else { 0.0 }
 }
 
-/// How far ε stays above the least one at which a resolvent is single-valued: nearer, its slope grows without bound.
+/// Least ratio of ε to the value at which the resolvent becomes single-valued. Closer to that
+/// value the slope of the resolvent grows without bound.
 pub(super) const CLEAR: f64 = 2.0;
-/// What is added to the diagonal of the force equations, so that forces which nothing decides stay as they are: the mean in a contact
-/// that sticks all the time, and forces in redundant contacts. Newton's method leaves this share of the force as an error.
+/// Regularization on the diagonal of the force equations: for the mean, and for the other
+/// harmonics. It keeps undetermined forces at their values: the mean force of a permanently
+/// stuck contact, and the forces of redundant contacts. Newton's method leaves this share of
+/// the force as an error.
 const STAY: [f64; 2] = [1e-9, 1e-12];
 
-/// See [`STAY`].
+/// Returns the regularization of a force equation at harmonic `h`, see [`STAY`].
 pub(super) fn stay(h: usize) -> f64 {
     STAY[h.min(1)]
 }

@@ -1,4 +1,5 @@
-//! Starts from motions that were followed in time, where no neighbour and no guess leads to an orbit.
+//! Initial guesses from time integration, if neither warm starts nor describing functions lead
+//! to an orbit.
 
 use super::NAME;
 use super::balance::Balance;
@@ -12,27 +13,35 @@ use crate::orbit::{Course, JointSample, Orbit, Path};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Frequencies without an orbit at which the motion is followed, for seconds each, to say what it does; of a sweep in every one of its blocks.
+/// Largest number of frequencies at which the motion is integrated after a failure, in each
+/// block of a sweep. Each integration takes seconds.
 const MOST_FOLLOWED: usize = 8;
-/// Degrees of freedom up to which it is followed to find an orbit: steps of integrations multiply full matrices.
+/// Largest number of degrees of freedom for time integration. Its steps multiply full matrices.
 const MOST_DOFS_IN_TIME: usize = 60;
-/// Series that are tried from a motion that has settled, each with twice the harmonics of the one before.
+/// Number of series lengths that are tried from a settled motion, each with twice the
+/// harmonics.
 const LONGER: usize = 3;
-/// Returns of a motion from the state of a neighbouring orbit before it is read: what it brings along from there, Newton's method does away with.
+/// Number of returns from the state of another solver's orbit before the motion is read.
+/// Newton's method removes the remaining transient.
 const LED: usize = 1;
 
 impl Balance {
-    /// A start near a motion that repeats after several periods: the describing functions know none, and Newton's method would never leave those
-    /// that repeat after one. So the motion is followed in time for a while, if some flow follows the system; where motions do not separate there is
-    /// none to be found.
+    /// Returns an initial guess for an orbit of several excitation periods.
+    ///
+    /// Describing functions know no such orbit, and Newton's method does not leave orbits of one
+    /// period. The guess is the motion after [`APPROACH`] returns of time integration. Returns
+    /// `None` for orbits of one period, if no integration takes the system, or if motions never
+    /// separate, so that no such orbit exists.
     pub(super) fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Solution> {
         let start = guess.filter(|_| self.periods > 1 && !self.judge.proves())?.state(self.system.dofs());
         let path = self.judge.approach(&self.system, omega, start, APPROACH)?;
         self.series_of(&*path, top, omega)
     }
 
-    /// A start near the motion that a state of another solver's orbit leads to. Where motions separate it says which of several orbits is meant; a solver
-    /// knows the harmonics of its own orbits only.
+    /// Returns an initial guess from the state of another solver's orbit.
+    ///
+    /// A solver knows only the harmonics of the orbits that it found. If motions can separate,
+    /// the state selects one of several orbits.
     pub(super) fn led(&mut self, start: &[f64], omega: f64) -> Option<(usize, Solution)> {
         let dofs = self.system.dofs();
         if self.judge.proves() || self.periods > 1 || dofs > MOST_DOFS_IN_TIME || start.len() < 2 * dofs {
@@ -44,10 +53,12 @@ impl Balance {
         Some((top, self.series_of(&*path, top, omega)?))
     }
 
-    /// Where the search has found no orbit: from the motion that rest comes to in time, `None` where it is not followed. Of frequencies at which there is
-    /// more than one orbit it leads to one that attracts. Where springs that carry no mean let it drift, friction carries what it can.
+    /// Searches from the motion that time integration reaches from static equilibrium. Returns
+    /// `None` if the system is not integrated or the search fails.
+    ///
+    /// If several orbits exist at the frequency, the integration leads to a stable one.
     pub(super) fn by_time(&mut self, omega: f64) -> Option<Orbit> {
-        // twice the harmonics, since with few of them there may be a motion that leads nowhere
+        // twice the first harmonics, because a shorter series may have a spurious solution
         let top = self.method.harmonics.unwrap_or(self.kept.double(self.first));
         if self.periods > 1 || self.system.dofs() > MOST_DOFS_IN_TIME || self.tried_in_time >= MOST_FOLLOWED {
             return None;
@@ -59,12 +70,12 @@ impl Balance {
         self.from(top, omega, Some((top, motion))).ok()
     }
 
-    /// The state of static equilibrium, or that of all things unloaded where there is none.
+    /// Returns the state of static equilibrium, or the unloaded state if there is none.
     fn standing(&self) -> Vec<f64> {
         self.static_start.clone().unwrap_or_else(|| vec![0.0; 2 * self.system.dofs()])
     }
 
-    /// The harmonics of a motion that was followed over a period.
+    /// Returns the harmonics of a motion that was integrated over a period.
     pub(super) fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<Solution> {
         let level = self.levels.get_mut(&top)?;
         let (nh, n) = (level.harmonics().len(), level.alternation.samples());
@@ -73,7 +84,7 @@ impl Balance {
         for port in self.ports.iter() {
             for q in port.range() {
                 let (joint, axis) = self.ports.place(q);
-                // what does the work of all
+                // the force of the port does the work of all its joints
                 let work = |now: &[JointSample]| -> f64 {
                     port.members.iter().map(|member| member.factor * now[member.joint].force[axis]).sum()
                 };
@@ -87,8 +98,10 @@ impl Balance {
         Some(motion)
     }
 
-    /// Where contacts alone hold, and no orbit was found: the motion from rest leads to one, or shows what there is instead. `None` where it is
-    /// not followed.
+    /// Integrates in time if only contacts support a body and no orbit was found.
+    ///
+    /// The search continues from the settled motion. If that fails, the error describes the
+    /// motion. Returns `None` if the motion is not integrated.
     pub(super) fn by_its_course(&mut self, omega: f64) -> Option<Result<Orbit, OrbitError>> {
         let top = self.method.harmonics.unwrap_or(self.first);
         let vibrates = self.system.harmonics_of_excitation(|z| z != Complex64::ZERO).iter().any(|h| *h > 0);
@@ -105,7 +118,7 @@ impl Balance {
         }
         let (course, path, state) = course(&self.system, omega, self.standing())?;
         if matches!(course, Course::Settles | Course::Settling { .. }) {
-            // contacts that part and close again may have no solution with few harmonics
+            // contacts that open and close may have no solution with few harmonics
             let mut top = top;
             for _ in 0..LONGER {
                 let found = self.level(top, omega).is_ok().then(|| self.series_of(&*path, top, omega)).flatten();

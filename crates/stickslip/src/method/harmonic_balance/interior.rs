@@ -1,12 +1,19 @@
-//! Interior points: rigid friction of all joints at once, from forces well inside their limits to those that are there.
+//! Interior point method for rigid friction: all slip limits at once.
 //!
-//! Newton's method takes one length of step for all, and where hundreds of instants of many joints change between stick and slip some joint always
-//! asks for a short one: its steps grow in number with the joints. The equations are a variational inequality, though: the forces of a structure that
-//! only dissipates are monotone in the motions. Such are solved along a path on which no instant has decided yet: what decides it, a force off
-//! its limit times what holds it there, is μ > 0 everywhere, see `ports::barrier`. A step looks ahead how far it would come without μ, and takes as
-//! much of it as that asks for. The number of steps hardly knows how many joints there are. From the end of the path Newton's method takes a few
-//! steps to the solution.
-//! Source: Mehrotra (1992), "On the implementation of a primal-dual interior point method"; Wright, "Primal-Dual Interior-Point Methods" (1997).
+//! Newton's method with a line search takes one step length for all joints. Hundreds of samples
+//! of many joints may change between stick and slip, and some sample always asks for a short
+//! step. The number of steps then grows with the number of joints. The equations are a
+//! variational inequality: in a dissipative structure the forces are monotone in the motions.
+//!
+//! The interior point method follows a central path, on which the complementarity products of
+//! all samples equal μ > 0, see `ports::barrier`. A product is the distance of a force from its
+//! limit times the multiplier of that limit. Each step first predicts the decrease of the
+//! products with μ = 0, chooses μ from it, and then corrects. The number of steps hardly depends
+//! on the number of joints. Newton's method takes a few steps from the end of the path to the
+//! solution.
+//!
+//! Sources: Mehrotra (1992), "On the implementation of a primal-dual interior point method";
+//! Wright, "Primal-Dual Interior-Point Methods" (1997).
 
 use super::coupled::Near;
 use super::ease::GIVEN;
@@ -16,40 +23,44 @@ use super::solve::{Goal, Lost};
 use num_complex::Complex64;
 use stickslip_numerics::interrupt;
 
-/// Samples of a period for the wave of the highest harmonic: Newton's method goes on with all of them.
+/// Samples per wave of the highest harmonic on the path. Newton's method continues with all
+/// samples.
 const SAMPLED: usize = 16;
-/// Products, in units of the square of the limit, at which the path ends: nearly all instants have decided.
+/// Complementarity product, in units of the squared limit, at which the path ends. Nearly all
+/// samples are then at a limit or clearly inside.
 const DECIDED: f64 = 1e-4;
-/// Steps at most; 5 to 30 are usual.
+/// Largest number of steps; 5 to 30 are usual.
 const MOST: usize = 60;
-/// Steps without half of the products after which the path leads nowhere: elastic friction beside the rigid one may turn it round, since it has corners that
-/// no products round off.
+/// Steps without halved products after which the path is given up. Elastic friction next to the
+/// rigid one may stop its progress, because its kinks are not smoothed.
 const PATIENCE: usize = 8;
-/// Newton iterations from its end; 1 to 5 are usual.
+/// Newton iterations from the end of the path; 1 to 5 are usual.
 const ITERATIONS: usize = 30;
 
-/// Where a path is.
+/// Point on the path.
 struct Along {
-    /// Of the ports with rigid friction along one axis.
+    /// Barriers of the ports with rigid friction along one axis.
     barriers: Vec<Option<Barrier>>,
     alternation: Alternation,
-    /// Harmonics of the argument of one of them.
+    /// Harmonics of the argument `λ + ε u'` of one barrier.
     y: Vec<Complex64>,
 }
 
 impl Along {
+    /// Returns the barriers that exist.
     fn each(&self) -> impl Iterator<Item = &Barrier> {
         self.barriers.iter().flatten()
     }
 
-    /// The mean of all products after a share of the step.
+    /// Returns the mean complementarity product after a fraction of the step.
     fn gap(&self, share: f64) -> f64 {
         self.each().map(|barrier| barrier.gap(share)).sum::<f64>() / self.each().count() as f64
     }
 }
 
 impl Level {
-    /// The solution by way of interior points, from `motion`, whose forces of rigid friction do not count.
+    /// Solves by the interior point method from `motion`. Its rigid friction forces are
+    /// ignored.
     pub(super) fn by_interior_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
         self.begin_anew(ports);
         if !self.follow_interior(ports, omega, motion) {
@@ -58,7 +69,7 @@ impl Level {
         self.newton(ports, omega, motion, GIVEN, (ITERATIONS, Goal::Solved))
     }
 
-    /// To the end of the path; whether it was reached.
+    /// Follows the path. Returns true if its end was reached.
     fn follow_interior(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> bool {
         let Some(mut along) = self.begin_interior(ports, omega, motion) else { return false };
         let (mut mark, mut waited) = (f64::INFINITY, 0);
@@ -101,7 +112,8 @@ impl Level {
         false
     }
 
-    /// Where a path begins: without rigid friction.
+    /// Returns the first point of the path, without rigid friction. Returns `None` if no port
+    /// has it.
     fn begin_interior(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Option<Along> {
         let nh = self.harmonics().len();
         let top = self.harmonics().last().copied().unwrap_or(0);
@@ -128,8 +140,12 @@ impl Level {
         Some(along)
     }
 
-    /// The whole step to products of `gap`, with what the last one leaves of them unless that is zero, from the residual of the other equations; `motion`
-    /// goes with it. How much of it stays inside, `None` if there is none.
+    /// Solves for the step to complementarity products of `gap`, and moves `motion` by the full
+    /// step.
+    ///
+    /// With `gap` above zero the step contains the second-order correction by the previous
+    /// step. Returns the largest fraction of the step that stays inside all bounds, or `None`
+    /// if there is no step.
     fn interior_step(
         &mut self,
         ports: &Ports,
@@ -173,7 +189,7 @@ impl Level {
     }
 }
 
-/// The harmonics of `λ + ε u'` along the axis of a port of one.
+/// Sets `y` to the harmonics of `λ + ε u'` along the axis of a port with one axis.
 fn argument((level, p, port): (&Level, usize, &Port), omega: f64, motion: &Solution, y: &mut [Complex64]) {
     let at = port.first * y.len();
     let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(level.harmonics());
@@ -193,10 +209,10 @@ mod tests {
     use std::f64::consts::TAU;
     use std::sync::Arc;
 
-    /// Hertz, near the resonances of the blades.
+    /// Frequency near the resonances of the blades, Hz.
     const NEAR: f64 = 16.2;
 
-    /// A ring of blades of 16 Hz, 1 % mistuned, with rigid friction between neighbours.
+    /// Returns a ring of blades at 16 Hz, 1 % mistuned, with rigid friction between neighbours.
     fn ring(blades: usize, limit: f64) -> System {
         let deviations = normal_pattern(blades, 0.01, 7);
         let disk = Disk { sectors: blades, forces: vec![Around::EngineOrder(3)], motions: vec![] };
@@ -217,7 +233,7 @@ mod tests {
         ring.unwrap().assemble().unwrap()
     }
 
-    /// The level of a ring at a frequency, banded where the ring is large.
+    /// Returns the equations of a ring at a frequency, in banded form if the ring is large.
     fn level(system: &System, hertz: f64) -> (Level, Ports) {
         let ports = Ports::new(system).unwrap();
         let harmonics: Vec<usize> = (1..=15).step_by(2).collect();
@@ -226,7 +242,7 @@ mod tests {
         (level, ports)
     }
 
-    /// The motion is the one that proximal points lead to, another way to it.
+    /// The interior point method and the proximal point method find the same solution.
     #[test]
     fn interior_points_lead_to_the_motion_that_proximal_points_find() {
         let system = ring(12, 0.5);
@@ -240,7 +256,8 @@ mod tests {
         assert!(apart < 1e-6 * size, "{apart:.1e} of {size:.1e}");
     }
 
-    /// Eight times the blades take no more than twice the steps, on and beside the resonances, from much slip to much stick.
+    /// Eight times the blades take at most twice the steps: at a resonance and away from it,
+    /// from much slip to much stick.
     #[test]
     fn steps_hardly_grow_with_the_blades() {
         for hertz in [15.5, NEAR, 17.0] {
@@ -258,7 +275,7 @@ mod tests {
         }
     }
 
-    /// Where there is no rigid friction there is no path.
+    /// Without rigid friction there is no path.
     #[test]
     fn elastic_friction_has_no_interior() {
         let mut couple = crate::model::example::blade_couple_massless();

@@ -1,4 +1,5 @@
-//! How many harmonics an orbit has: the user's, or as many as the tolerance needs; and the error that they leave.
+//! Number of harmonics of an orbit: the user's, or doubled until the estimated error meets the
+//! tolerance.
 
 use super::balance::Balance;
 use super::budget::Work;
@@ -13,20 +14,24 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use std::iter::successors;
 
-/// Highest harmonic that the program chooses itself; it is checked with twice as many.
+/// Highest harmonic that the method chooses. The error estimate takes twice as many.
 const MOST: usize = 511;
-/// Power of the number of harmonics by which the error of rigid friction falls at most: no series is refused that may be long enough. Between 1 and 3/2 are
-/// usual, see [`estimate`]; 80 masses left 3.0e-3 with 31 harmonics and less than 1e-3 with 63.
+/// Highest order at which the truncation error of rigid friction decays with the number of
+/// harmonics. Orders of 1 to 3/2 are usual, see [`estimate`]. The larger value avoids that a
+/// sufficient series is refused: 80 masses had an error of 3.0e-3 with 31 harmonics and less
+/// than 1e-3 with 63.
 const ORDER: f64 = 2.0;
-/// Where friction is rigid or steep, one doubling is not believed to have left less than this share of the distance of the one before: two
-/// motions may be near each other by chance, as 1.3e-3 where the error is 1e-2.
+/// Least share of the previous error estimate that remains after a doubling with rigid or steep
+/// friction. A smaller distance is not believed, because two solutions may be close by chance: a
+/// distance of 1.3e-3 was seen with an error of 1e-2.
 const CHANCE: f64 = 0.1;
-/// Share of the residual that a shorter series leaves in the longer one to which that is solved for an estimate of the error: the estimate is off by about as
-/// much of itself. One step of Newton's method leaves less where friction is elastic, so that the second one is spared.
+/// Reduction of the residual to which the finer solution of an error estimate is solved. The
+/// relative error of the estimate is about as large. With elastic friction one Newton step
+/// reaches it.
 const KNOWN: f64 = 1e-3;
 
 impl Balance {
-    /// The user's number of harmonics, with an estimate of its error.
+    /// Finds the orbit with the user's number of harmonics and estimates its error.
     pub(super) fn fixed(
         &mut self,
         top: usize,
@@ -36,7 +41,7 @@ impl Balance {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         let truncation = if self.can_compare(top, Work::default()) {
-            // what was asked for is there: its error may take as much again
+            // the orbit is found; its error estimate gets a budget as large as that of a point
             self.levels.values_mut().for_each(Level::begin_point);
             self.compare(top, omega, &motion, &x).ok().map(|(error, _)| error)
         } else {
@@ -45,7 +50,11 @@ impl Balance {
         self.finish(top, omega, motion, x, truncation)
     }
 
-    /// Error of `motion` by one with twice the harmonics, and of laws with a memory with twice the samples too, which is returned.
+    /// Returns the truncation error of `motion` and the finer solution from which it is
+    /// estimated.
+    ///
+    /// The finer solution has twice the harmonics. For laws with memory it also has twice the
+    /// samples.
     pub(super) fn compare(
         &mut self,
         top: usize,
@@ -80,7 +89,10 @@ impl Balance {
         Ok((error, better))
     }
 
-    /// A start with twice the harmonics: a solution, and what these added to the last one that was compared.
+    /// Returns an initial guess with twice the harmonics.
+    ///
+    /// It is the solution plus the correction that the finer series made at the last
+    /// comparison.
     pub(super) fn refined(&self, top: usize, motion: &Solution) -> Solution {
         let harmonics = |top: usize| self.kept.up_to(top);
         let (few, many) = (harmonics(top), harmonics(self.kept.double(top)));
@@ -96,21 +108,23 @@ impl Balance {
         start
     }
 
-    /// The first of the doubled numbers of harmonics that may leave no more than the tolerance of rigid friction, where `top` leave so many times as much.
+    /// Returns the first doubled number of harmonics that may meet the tolerance with rigid
+    /// friction. `times` is the ratio of the error at `top` to the tolerance.
     pub(super) fn needed(&self, top: usize, times: f64) -> usize {
         let least = top as f64 * times.powf(1.0 / ORDER);
         let doubled = successors(Some(top), |top| Some(self.kept.double(*top)));
         doubled.skip(1).find(|top| *top as f64 >= least || *top > MOST * self.kept.scale).expect("they grow")
     }
 
-    /// Whether a series with twice the harmonics can be solved and compared.
+    /// Returns true if a series with twice the harmonics can be solved and compared.
     fn can_go_on(&self, top: usize) -> bool {
         let double = self.kept.double(top);
         double <= MOST * self.kept.scale && self.can_compare(double, self.taken(None))
     }
 
-    /// As many harmonics as the tolerance needs. The solution that is returned is not the finest that was found, but the one whose error
-    /// is known from it.
+    /// Doubles the harmonics until the tolerance is met.
+    ///
+    /// The result is not the finest solution, but the last one whose error is known.
     pub(super) fn chosen(
         &mut self,
         top: usize,
@@ -118,10 +132,13 @@ impl Balance {
         warm: Option<(usize, Solution)>,
     ) -> Result<Orbit, OrbitError> {
         let mut returned = None;
-        // an orbit whose return is farther away than allowed is better than none, and says so
+        // if the return defect exceeds the tolerance, the orbit is still returned, and its
+        // evidence shows it
         self.doubled(top, omega, warm, &mut returned).or_else(|error| returned.ok_or(error))
     }
 
+    /// Doubles the harmonics. `returned` keeps an orbit whose return defect exceeds the
+    /// tolerance.
     fn doubled(
         &mut self,
         mut top: usize,
@@ -133,13 +150,13 @@ impl Balance {
         let first = top;
         let mut motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let mut x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
-        // nothing is known of the error until two solutions can be compared
+        // the error is unknown until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
         let mut needed = None;
         while top <= MOST * self.kept.scale && self.can_compare(top, self.taken(None)) {
             let (mut error, finer) = match self.compare(top, omega, &motion, &x) {
                 Ok(compared) => compared,
-                // what was found has an error that is known
+                // the error of the last solution is known
                 Err(_) if top > first && self.ports.has_forces() => {
                     needed = self.is_spent().then(|| self.kept.double(top));
                     break;
@@ -150,7 +167,8 @@ impl Balance {
             if (self.ports.has_forces() || self.steep) && top > first {
                 error = error.max(CHANCE * estimate);
             }
-            // where friction falls with velocity chance is frequent: the first distance has none before it that would show it
+            // friction that falls with velocity makes chance agreement frequent, so one
+            // comparison is not enough
             let shown = top > first || !(self.steep && self.ports.has_falling());
             if error <= tolerance && shown {
                 let orbit = self.finish(top, omega, motion.clone(), x.clone(), Some(error))?;
@@ -172,7 +190,7 @@ impl Balance {
                 }
             }
             top = self.kept.double(top);
-            // the finer one is solved as far as the error asks for, or by other samples
+            // the comparison solved the finer series less accurately, or with other samples
             motion = self.solve(top, omega, Some((top, &finer))).map_err(|l| self.lost(l))?;
             x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         }

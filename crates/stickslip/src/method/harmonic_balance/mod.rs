@@ -1,19 +1,57 @@
-//! Harmonic balance: the orbit as a Fourier series, friction sampled over the period.
+//! Harmonic balance: the orbit as a Fourier series, with joint forces by alternating
+//! frequency-time (AFT).
 //!
-//! - `ports`: from the harmonics of relative motions to those of the laws' forces, with the exact derivative;
-//! - `rest`: the receptance of the linear rest, in closed form from its modes;
-//! - `static_equilibrium`: where every vibration begins: the equilibrium under the constant loads;
-//! - `closed`: the mean of bodies that nothing but contacts holds;
-//! - `equations`: those along the joints, and their derivative;
-//! - `linear`: their derivative as a matrix; `coupled`: steps by its products;
-//! - `solve`: Newton's method on them; `estimate`: the error by a finer solution; `sampling`: what samples leave out; `interior`: all rigid joints at once;
-//!   `proximal`: the way to forces that nothing decides;
-//! - `path`: the orbit's numbers from its harmonics.
+//! The equations are written along the joints. Per harmonic, `u = u_lin - R f` relates the
+//! relative motions `u` of the joints, their forces `f` and the receptance `R` of the linear
+//! part. The unknowns are the harmonics of the relative motions, or of the forces of joints
+//! whose force depends on the velocity alone. The cost grows with the number of joints and
+//! harmonics, not with the number of degrees of freedom. Only multiples of the greatest common
+//! divisor of the excitation's harmonics occur. If all of these are odd multiples and all laws
+//! are odd, only odd multiples occur. The truncation error is estimated from a second solution
+//! with twice the harmonics.
 //!
-//! The unknowns are the harmonics of the joints' relative motions, or of their forces where the velocity alone decides them: the cost
-//! follows joints and harmonics, not degrees of freedom. Only multiples of the excitation's common divisor occur, and only the odd ones if
-//! it has no others. The error of a solution is estimated from a second one with twice the harmonics.
-//! Source: Krack and Gross, "Harmonic Balance for Nonlinear Vibration Problems" (2019); Cameron and Griffin (1989).
+//! Sources: Krack and Gross, "Harmonic Balance for Nonlinear Vibration Problems" (2019);
+//! Cameron and Griffin (1989).
+//!
+//! The solver and its options:
+//! - `options`: number of harmonics, number of samples, tolerance;
+//! - `balance`: the solver of a system, with its warm starts;
+//! - `length`: the number of harmonics, doubled until the estimated error meets the tolerance;
+//! - `kept`: the set of harmonics in a series;
+//! - `recent`: the last orbits, for warm starts and the secant predictor;
+//! - `in_time`: initial guesses from time integration;
+//! - `subharmonic`: orbits of several periods of the excitation;
+//! - `static_equilibrium`: the equilibrium under the constant loads, by harmonic 0 alone;
+//! - `other_histories`: sensitivity of amplitudes to the history of permanently stuck joints;
+//! - `budget`, `work`, `storage`: work limits, operation counts, estimates of memory.
+//!
+//! The equations:
+//! - `equations`: residual and Jacobian along the joints;
+//! - `ports`: harmonics of joint forces from harmonics of joint motions, with exact
+//!   derivatives;
+//! - `penalty`, `hold`: parameter ε of rigid contacts; regularization of singular equations;
+//! - `closed`: mean position of bodies that only contacts support;
+//! - `linear`: the Jacobian as a matrix; `sparse`: large systems in banded form;
+//! - `rest`, `receptance`, `modal`, `uncoupled`, `waves`: receptances of the linear part.
+//!
+//! The nonlinear solution:
+//! - `solve`: Newton's method with line search, and the order in which the other searches
+//!   follow;
+//! - `interior`: interior point method for rigid friction;
+//! - `proximal`: proximal point method for forces that the equations leave undetermined;
+//! - `ease`: parameters of the homotopies;
+//! - `coupled`: Newton steps by GMRES;
+//! - `clusters`, `window`: nonlinear elimination of contacts that dominate the residual;
+//! - `found_by`: the search that found a solution.
+//!
+//! Results:
+//! - `estimate`, `sampling`: truncation error; sampling error;
+//! - `path`: displacements, energies and evidence of an orbit from its harmonics.
+//!
+//! Continuation and nonlinear modes:
+//! - `branch`: the equations with a parameter;
+//! - `mode`, `arc`: nonlinear modes and arc-length steps along them;
+//! - `open`: the minimum-norm step of a singular system.
 
 mod arc;
 mod balance;
@@ -68,7 +106,7 @@ pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
 pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 
-/// The row of this method in [`super::TABLE`].
+/// Entry of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
     summary: "Fourier series along the joints, friction sampled over the period, with an error estimate",

@@ -1,11 +1,18 @@
-//! Periodic motion without excitation: the equations of a nonlinear mode.
+//! Equations of a nonlinear mode: periodic motion without excitation.
 //!
-//! `M x'' + (C - 2 ζ ω M) x' + K x + Σ W f = 0`: a motion decays by friction and damping, and the artificial negative damping `2 ζ ω M`
-//! that makes it periodic is its equivalent damping ratio ζ; at ζ = 0 the motion is a self-excited orbit.
-//! Unknown are the harmonics of all places, those of the forces λ of the force ports, ω and ζ, at a given modal amplitude `a`:
-//! `X₁ᴴ M X₁ = a²`. Each force has the equation that it has in forced vibration, `λ - P J(λ + ε c') = 0` with `c = wᵀx - λ/k` behind a
-//! spring `k`: rigid friction is not smoothed, and a contact that sticks is a constraint.
-//! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the periodic motion concept".
+//! `M x'' + (C - 2 ζ ω M) x' + K x + Σ W f = 0`
+//!
+//! Friction and damping let a free motion decay. The artificial negative damping `2 ζ ω M`
+//! makes it periodic, and ζ is the equivalent damping ratio. At ζ = 0 the motion is a
+//! self-excited orbit.
+//!
+//! The unknowns are the harmonics of all places, the harmonics of the forces λ of the force
+//! ports, ω and ζ. The modal amplitude `a` is given by `X₁ᴴ M X₁ = a²`. Forces have the same
+//! equation as in forced vibration, `λ - P J(λ + ε c') = 0`. Behind a spring `k` the motion is
+//! `c = wᵀx - λ/k`. Rigid friction is not smoothed, and a sticking contact is a constraint.
+//!
+//! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the
+//! periodic motion concept".
 
 mod linear;
 mod readings;
@@ -26,46 +33,53 @@ use stickslip_numerics::{dense, interrupt};
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Newton iterations at one amplitude; 2 to 10 are usual.
 pub(super) const ITERATIONS: usize = 60;
-/// Residual relative to the elastic forces, and to the slip limits, at which a motion counts as periodic.
+/// Residual, relative to the elastic forces and to the slip limits, at which a motion counts as
+/// periodic.
 pub(super) const SOLVED: f64 = 1e-11;
-/// The same where rounding lets Newton's method come no closer: a stiff joint between soft springs loses three digits.
+/// The residual at which a stagnating iteration counts as converged. A stiff joint between soft
+/// springs loses three digits to rounding.
 pub(super) const ROUNDED: f64 = 1e-8;
-/// Multiples of a motion that balance too where all smaller ones do.
+/// Factors of smaller motions that test proportionality. If these motions solve the equations,
+/// all smaller ones do.
 const SMALLER: [f64; 3] = [0.7, 0.5, 0.01];
 
-/// A point of a nonlinear mode.
+/// Point of a nonlinear mode.
 #[derive(Debug, Clone)]
 pub(crate) struct ModeState {
-    /// Harmonics of the places, [harmonic][place], m: 1, 3, … if all laws are odd, or else 0, 1, 2, …
+    /// Harmonics of the places, [harmonic][place], m: 1, 3, … if all laws are odd, otherwise 0,
+    /// 1, 2, …
     pub x: Vec<Complex64>,
-    /// The same harmonics of the forces of force ports, [axis][harmonic], N.
+    /// Harmonics of the forces of force ports, [axis][harmonic], N.
     pub force: Vec<Complex64>,
+    /// Frequency, rad/s.
     pub omega: f64,
+    /// Equivalent damping ratio ζ.
     pub damping: f64,
 }
 
-/// The equations.
+/// Equations of a nonlinear mode.
 pub(crate) struct ModeEquations<'a> {
     pub(super) system: &'a System,
     /// Motion ports.
     pub(super) elastic: Vec<Placed>,
-    /// Force ports; their axes are numbered on their own.
+    /// Force ports. Their axes have separate numbers.
     pub(super) contacts: Vec<Placed>,
     pub(super) alternation: Alternation,
-    /// Where the first harmonic is in the list.
+    /// Index of the first harmonic.
     first: usize,
-    /// Whether motions may be mixtures of two equal modes, so that the equations may leave some of them open.
+    /// True if motions may be mixtures of two modes of equal frequency, so that the equations
+    /// may be singular.
     pub mixes: bool,
 }
 
-/// A port with the directions of its axes in the structure.
+/// Port with the directions of its axes in the structure.
 pub(super) struct Placed {
     pub port: Port,
     pub w: Vec<DVector<f64>>,
 }
 
 impl Placed {
-    /// Motions along the axes, [axis][harmonic], of those of the places.
+    /// Returns the motions along the axes, [axis][harmonic], from those of the places.
     fn along(&self, x: &[Complex64], nh: usize) -> Vec<Complex64> {
         let one = |w: &DVector<f64>, k: usize| -> Complex64 {
             x[k * w.len()..(k + 1) * w.len()].iter().zip(w.iter()).map(|(x, w)| x * *w).sum()
@@ -75,8 +89,11 @@ impl Placed {
 }
 
 impl<'a> ModeEquations<'a> {
+    /// Makes the equations.
+    ///
     /// # Errors
-    /// A law with several directions, a place without mass, a mass matrix that is not positive definite.
+    /// A law with several directions, a place without mass, a mass matrix that is not positive
+    /// definite.
     pub fn new(system: &'a System, harmonics: usize, samples: usize) -> Result<Self, MethodError> {
         if let Some(error) = MethodError::too_large("modes", system) {
             return Err(error);
@@ -94,7 +111,8 @@ impl<'a> ModeEquations<'a> {
             if !port.is_force() {
                 elastic.push(Placed { port: port.clone(), w });
             } else if w.iter().any(|w| w.amax() > 0.0) {
-                // between places whose motion is imposed it does nothing to the structure, and nothing in the mode moves it
+                // a contact between imposed places exerts no force on the structure, and the
+                // mode does not move it
                 let first = contacts.last().map_or(0, |last| last.port.first + last.port.axes);
                 let mut port = port.clone();
                 port.first = first;
@@ -108,44 +126,48 @@ impl<'a> ModeEquations<'a> {
         Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd), mixes: false })
     }
 
-    /// Harmonics times samples.
+    /// Returns harmonics times samples.
     pub fn resolution(&self) -> usize {
         self.alternation.resolution()
     }
 
-    /// Steps that laws with memory have been followed for.
+    /// Returns the number of time steps of laws with memory.
     pub fn marched(&self) -> usize {
         self.alternation.marched
     }
 
-    /// Whether there is one mode, on a law with memory.
+    /// Returns true if the system has one degree of freedom and a law with memory.
     pub fn is_alone_with_memory(&self) -> bool {
         self.system.dofs() == 1 && self.elastic.iter().any(|placed| placed.port.marches())
     }
 
-    /// Axes of the force ports.
+    /// Returns the number of axes of the force ports.
     pub(super) fn forces(&self) -> usize {
         self.contacts.last().map_or(0, |last| last.port.first + last.port.axes)
     }
 
-    /// The first harmonic of the places.
+    /// Returns the first harmonic of the places.
     fn first<'s>(&self, state: &'s ModeState) -> &'s [Complex64] {
         let n = self.system.dofs();
         &state.x[self.first * n..(self.first + 1) * n]
     }
 
-    /// Whether the forces of some law are bounded by no limit, so that they do not become faint at large amplitudes.
+    /// Returns true if the force of some law is unbounded, so that it stays significant at
+    /// large amplitudes.
     pub fn is_unbounded(&self) -> bool {
         self.elastic.iter().chain(&self.contacts).any(|placed| !placed.port.scale.is_finite())
     }
 
-    /// Unknowns: real and imaginary parts of motions and forces, ω and ζ.
+    /// Returns the number of unknowns: real and imaginary parts of motions and forces, ω and ζ.
     pub(super) fn size(&self) -> usize {
         2 * self.alternation.harmonics.len() * (self.system.dofs() + self.forces()) + 2
     }
 
-    /// ε of every contact, N s/m, see [`penalty`]. In place of the receptance of the highest harmonic stands that without
-    /// its resonances, `wᵀ (K + h² ω² M)⁻¹ w`: it changes smoothly along the mode, and where the harmonics are many it is the same.
+    /// Returns ε of every contact, N s/m, see [`penalty`].
+    ///
+    /// The receptance is that without resonances, `wᵀ (K + h² ω² M)⁻¹ w`, at the highest
+    /// harmonic `h`. It changes smoothly along the mode. With many harmonics it equals the
+    /// receptance of the structure.
     fn penalties(&self, omega: f64) -> Vec<f64> {
         if self.contacts.is_empty() {
             return Vec::new();
@@ -153,7 +175,8 @@ impl<'a> ModeEquations<'a> {
         let top = self.alternation.harmonics[self.alternation.harmonics.len() - 1];
         let rate = top as f64 * omega;
         let stiff = self.system.structure().stiffness() + self.system.structure().mass() * (rate * rate);
-        // masses are positive: only an ω that overflows has no factor, and its residual is no number either
+        // masses are positive; only an ω that overflows has no factor, and its residual is not
+        // finite either
         let factor = stiff.cholesky();
         let receptance = |w: &DVector<f64>| factor.as_ref().map_or(0.0, |factor| w.dot(&factor.solve(w)));
         self.contacts
@@ -165,7 +188,8 @@ impl<'a> ModeEquations<'a> {
             .collect()
     }
 
-    /// Residual at `state` for amplitude `a`, and its derivative. The phase of the motion is that of `start`.
+    /// Evaluates the residual at `state` for amplitude `a`, and its Jacobian. The phase of the
+    /// motion is that of `start`.
     pub(super) fn evaluate(
         &mut self,
         state: &ModeState,
@@ -221,8 +245,8 @@ impl<'a> ModeEquations<'a> {
         }
         self.add_elastic_forces(state, residual, jacobian.as_deref_mut());
         self.add_contact_forces(state, residual, jacobian.as_deref_mut());
-        // modal amplitude, relative, and phase: no single place may stand for it, as the contact masses that move most when they slip
-        // may stand still when they stick
+        // modal amplitude, relative, and phase; a single place cannot stand for the motion,
+        // because a contact mass that moves most in slip may rest in stick
         let (mut square, mut turned, last) = (0.0, 0.0, size - 2);
         let (now, then) = (self.first(state), self.first(start));
         for i in 0..n {
@@ -246,7 +270,7 @@ impl<'a> ModeEquations<'a> {
         residual[last + 1] = turned;
     }
 
-    /// Forces of motion ports on the places.
+    /// Adds the forces of motion ports on the places.
     fn add_elastic_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
         let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
         for placed in &self.elastic {
@@ -286,10 +310,11 @@ impl<'a> ModeEquations<'a> {
         }
     }
 
-    /// Forces λ of force ports on the places, and the equations of these forces.
+    /// Adds the forces λ of force ports on the places, and the equations of these forces.
     ///
-    /// The derivative leaves out that ε follows ω: λ solves the law for any ε, so that the solution feels ε only through the harmonics
-    /// that are missing, and Newton's method does not miss it.
+    /// The Jacobian ignores that ε depends on ω. The force λ solves the law for any ε, so ε
+    /// affects the solution only through the missing harmonics. Newton's method converges
+    /// without this term.
     fn add_contact_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
         let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
         let penalties = self.penalties(state.omega);
@@ -344,7 +369,8 @@ impl<'a> ModeEquations<'a> {
         }
     }
 
-    /// Units of the residual: elastic forces, slip limits; amplitude and phase are relative.
+    /// Returns the units of the residual: elastic forces and slip limits. The conditions for
+    /// amplitude and phase are dimensionless.
     pub(super) fn units(&self, start: &ModeState, a: f64) -> Vec<f64> {
         let stiffness = self
             .system
@@ -359,7 +385,8 @@ impl<'a> ModeEquations<'a> {
         scale
     }
 
-    /// Whether every smaller motion is a multiple of this one, about the same mean: nothing slips in it, and nothing opens or closes.
+    /// Returns true if every smaller motion is a multiple of this one about the same mean. Then
+    /// no contact slips, opens or closes in it.
     pub fn is_proportional(&mut self, state: &ModeState, a: f64) -> bool {
         let mut residual = vec![0.0; self.size()];
         SMALLER.iter().all(|factor| {
@@ -370,7 +397,7 @@ impl<'a> ModeEquations<'a> {
         })
     }
 
-    /// A multiple of a motion about the same mean.
+    /// Returns a multiple of a motion about the same mean.
     pub fn scaled(&self, state: &ModeState, factor: f64) -> ModeState {
         let (mut scaled, n) = (state.clone(), self.system.dofs());
         let harmonics = &self.alternation.harmonics;
@@ -381,10 +408,12 @@ impl<'a> ModeEquations<'a> {
         scaled
     }
 
-    /// Solves at amplitude `a` from `start`, whose motion is scaled to it; forces along laws of velocity stay, as in slip.
+    /// Solves at amplitude `a` from `start`, whose motion is scaled to `a`. Forces along laws
+    /// of velocity keep their values, as in slip.
     ///
-    /// Newton's method as in forced vibration: the longest of the halved steps that comes closer, and where none does the whole one, which
-    /// may lead out of a set of slipping samples that repeats, and over the amplitude at which two modes become one.
+    /// Newton's method with a line search, as in forced vibration. If no halved step reduces
+    /// the residual, the full step is taken. It may break a cycle of slipping samples, or pass
+    /// the amplitude at which two modes coalesce.
     pub fn solve(&mut self, start: &ModeState, before: f64, a: f64) -> Option<ModeState> {
         let size = self.size();
         let mut start = start.clone();
@@ -447,7 +476,7 @@ impl<'a> ModeEquations<'a> {
     }
 }
 
-/// Length of a residual whose entries have these units.
+/// Returns the norm of a residual whose entries have these units.
 fn size_in(units: &[f64], residual: &[f64]) -> f64 {
     residual.iter().zip(units).map(|(r, unit)| (r / unit) * (r / unit)).sum::<f64>().sqrt()
 }
@@ -459,7 +488,7 @@ mod tests {
     use crate::model::{GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
-    /// A row of masses with a joint of every law.
+    /// Returns a row of masses with a joint of every law.
     fn mixed() -> System {
         let laws: [SharedLaw; 4] = [
             Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }),
@@ -479,7 +508,7 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// One mass on a spring with a law of rates; no viscous damping but the law's.
+    /// Returns one mass on a spring with a rate law and little viscous damping.
     fn rated(law: SharedLaw) -> System {
         let between = || ["m".to_owned(), GROUND.to_owned()];
         let model = Model {
@@ -491,7 +520,8 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// Newton's method squares its residual also where forces depend on how fast a motion is run through: bristles with dampers, creep, viscous parts.
+    /// Newton's method converges quadratically if forces depend on the frequency of the motion:
+    /// bristles with dampers, creep, viscous terms.
     #[test]
     fn newton_is_quadratic_for_laws_of_rates() {
         let laws: [SharedLaw; 3] = [
@@ -528,7 +558,8 @@ mod tests {
                 state.omega -= residual[size - 2];
                 state.damping -= residual[size - 1];
             }
-            // from a percent to rounding in four steps; without the derivative by ω each left a share of the one before
+            // from one percent to rounding in four steps; without the derivative by ω,
+            // convergence is linear
             for pair in norms.windows(2) {
                 assert!(pair[1] <= 30.0 * pair[0] * pair[0] + 1e-11, "{law:?}: {norms:?}");
             }
@@ -536,8 +567,8 @@ mod tests {
         }
     }
 
-    /// The derivative agrees with differences by every unknown. By ω, the equations of the forces are left out: their derivative takes ε
-    /// for constant.
+    /// The Jacobian agrees with finite differences by every unknown. The derivative of the
+    /// force equations by ω is left out, because it treats ε as constant.
     #[test]
     fn the_derivative_agrees_with_differences() {
         let system = mixed();
@@ -553,7 +584,7 @@ mod tests {
         equations.evaluate(&state, (&start, 1.0), &mut residual, Some(&mut jacobian));
         let motions = 2 * state.x.len();
         let step = 1e-6;
-        // a difference is rounded to this share of the largest entry
+        // a difference has a rounding error of this share of the largest entry
         let rounded = 1e-8;
         let largest = jacobian.iter().fold(0.0, |m: f64, j| m.max(j.abs()));
         for column in 0..size {
@@ -579,7 +610,7 @@ mod tests {
         }
     }
 
-    /// A mass of one on a spring of one without damping, with a law to the ground.
+    /// Returns a unit mass on a unit spring without damping, with a law to the ground.
     fn oscillator(law: SharedLaw) -> System {
         let mut model = Model::default();
         let between = || ["m".to_owned(), GROUND.to_owned()];
@@ -589,7 +620,7 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// The mode at an amplitude that is reached in steps.
+    /// Returns the mode at the last of the amplitudes, which are solved one after the other.
     fn mode(system: &System, harmonics: usize, amplitudes: &[f64]) -> (ModeState, f64) {
         let mut equations = ModeEquations::new(system, harmonics, 1024).unwrap();
         let first = &equations.linear_modes()[0];
@@ -602,7 +633,7 @@ mod tests {
         (state, first)
     }
 
-    /// One harmonic of Duffing's oscillator has `ω² = 1 + ¾ b a²`, and no damping.
+    /// With one harmonic, Duffing's oscillator has `ω² = 1 + ¾ b a²` and no damping.
     #[test]
     fn a_cubic_spring_has_its_backbone() {
         let system = oscillator(Arc::new(Cubic { stiffness: 0.5 }));
@@ -614,14 +645,15 @@ mod tests {
         }
     }
 
-    /// Against a stop without a gap a mass swings half a period on the spring and half a period on both: `2/ω = 1/ω₁ + 1/ω₂`. Its mean is
-    /// not zero, and all harmonics are there.
+    /// A mass against a stop without a gap moves half a period on the spring and half a period
+    /// on spring and stop: `2/ω = 1/ω₁ + 1/ω₂`. Its mean is not zero, and all harmonics occur.
     #[test]
     fn a_stop_without_a_gap_has_the_bilinear_frequency() {
         let system = oscillator(Arc::new(Gap { gap: 0.0, stiffness: 1.25 }));
         let (state, _) = mode(&system, 31, &[0.8]);
         let expected = 2.0 / (1.0 + 1.0 / 1.5);
-        // accelerations have kinks: harmonics fall with their third power, and frequencies with the square of that
+        // accelerations have kinks: harmonics decay with their third power, and the frequency
+        // error with the square of that
         assert!((state.omega - expected).abs() < 1e-5, "{}", state.omega);
         assert!(state.damping.abs() < 1e-9 && state.x[0].re < 0.0, "{state:?}");
     }

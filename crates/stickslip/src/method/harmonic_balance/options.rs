@@ -1,33 +1,38 @@
-//! What a user may ask of a series: its length, its samples, its error.
+//! Options of harmonic balance: number of harmonics, number of samples, tolerance.
 
 use super::ports::{Port, Ports};
 use crate::method::{MethodError, Options};
 use crate::model::System;
 
-/// Its name in study files.
+/// Name of the method in study files.
 pub const NAME: &str = "harmonic-balance";
 
-/// Tolerance when none is given.
+/// Default tolerance.
 pub(super) const TOLERANCE: f64 = 1e-3;
-/// First number of harmonics when none is given.
+/// Highest harmonic of the first series if the user gives none.
 pub(super) const FIRST: usize = 7;
-/// Samples per period, at least, and per harmonic. Sliders and stops need them to tell turning points apart only; laws with a memory
-/// need as many as [`samples_for`] the tolerance.
+/// Least number of samples per period. Sliders and stops need samples only to separate turning
+/// points. Laws with memory need [`samples_for`] the tolerance.
 const SAMPLES: usize = 1024;
+/// Least number of samples per harmonic.
 const SAMPLES_PER_HARMONIC: usize = 16;
-/// The same for laws that are steep or turn in a plane, whose samples place a change of sign to a sample only: they then grow with the
-/// harmonics, so that the longer series sees what the samples of the shorter one missed.
+/// Least number of samples per harmonic for laws that are steep or act in a plane. Their
+/// samples resolve a change of sign only to one sample spacing. The number grows with the
+/// harmonics, so that the longer series detects the sampling error of the shorter one.
 const SAMPLES_OF_STEEP: usize = 128;
-/// Error of a motion by 1024 samples, relative, that laws with a memory were seen to have (hysteresis in a plane, contacts that part): as many more are
-/// taken as the tolerance asks for, and the estimate says whether they were enough.
+/// Relative error of the motion that laws with memory showed at [`AT`] samples. Measured on
+/// hysteresis in a plane and on contacts that open. The number of samples grows with the
+/// tolerance from there, and the error estimate includes the rest.
 const SEEN: f64 = 2e-5;
-/// Samples from which that is reckoned, and at most as many.
+/// Number of samples to which [`SEEN`] belongs.
 const AT: f64 = 1024.0;
+/// Largest number of samples that a tolerance asks for.
 const MOST: f64 = 65536.0;
-/// The share of the tolerance that they are to leave, where fewer than that do: beside the harmonics that are missing it is not seen.
+/// Share of the tolerance that the sampling error of laws with a step may use. The truncation
+/// error hides an error of this size.
 pub(super) const LEFT: f64 = 0.05;
 
-/// Harmonic balance.
+/// Harmonic balance: the orbit as a Fourier series.
 ///
 /// # Example
 /// ```
@@ -39,11 +44,13 @@ pub(super) const LEFT: f64 = 0.05;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct HarmonicBalance {
-    /// Highest harmonic; chosen by the estimated error if absent.
+    /// Highest harmonic. If absent, the method chooses it by the estimated error.
     pub harmonics: Option<usize>,
-    /// Samples per period; chosen if absent.
+    /// Samples per period. If absent, the method chooses the number.
     pub samples: Option<usize>,
-    /// Error relative to the largest amplitude: aimed at when `harmonics` is absent; an orbit beyond it is [`Accuracy::Truncated`].
+    /// Error relative to the largest amplitude. If `harmonics` is absent, the method doubles
+    /// the harmonics until the estimated error is below it. An orbit above it is
+    /// [`Accuracy::Truncated`].
     ///
     /// [`Accuracy::Truncated`]: crate::orbit::Accuracy::Truncated
     pub tolerance: Option<f64>,
@@ -61,13 +68,17 @@ impl HarmonicBalance {
         Ok(method)
     }
 
-    /// Whether it has a port for every law of a system.
+    /// Returns true if the method has a port for every law of the system.
     pub(crate) fn takes_laws(system: &System) -> bool {
         Ports::new(system).is_ok()
     }
 
-    /// Samples at a number of harmonics: what the user gave holds for the user's harmonics; the solution that checks it takes as many as
-    /// it needs, so that too few are seen in the estimate. `steep`: see [`Ports::has_steep`] and [`Level::jumps`](equations::Level::jumps).
+    /// Returns the number of samples for a series up to harmonic `top`.
+    ///
+    /// The user's number of samples applies to the user's number of harmonics. The finer
+    /// solution that checks the error takes as many samples as it needs, so that its estimate
+    /// shows if the user's number is too small. For `steep`, see [`Ports::has_steep`] and
+    /// [`Level::jumps`](equations::Level::jumps).
     pub(super) fn samples_at(&self, top: usize, ports: &Ports, steep: bool) -> usize {
         let each = if steep { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
         let remembered = ports.iter().any(Port::marches);
@@ -87,7 +98,7 @@ impl HarmonicBalance {
         }
     }
 
-    /// Whether the options fit each other and excitation up to harmonic `highest`.
+    /// Checks that the options fit each other and an excitation up to harmonic `highest`.
     pub(super) fn check(&self, highest: usize) -> Result<(), MethodError> {
         let option = |key, message| Err(MethodError::option(NAME, key, message));
         if let Some(harmonics) = self.harmonics
@@ -111,12 +122,14 @@ impl HarmonicBalance {
     }
 }
 
-/// Samples per period that laws with a memory need for an error of the motion, relative.
+/// Returns the samples per period that laws with memory need for a relative error of the
+/// motion.
 pub(super) fn samples_for(tolerance: f64) -> usize {
     (AT * (SEEN / tolerance).sqrt().max(1.0)).min(MOST) as usize
 }
 
-/// The same of laws in steps, which are exact on a straight way however long it is: fewer where the tolerance is larger.
+/// Returns the same number for laws with a step only. These are exact along a straight path of
+/// any length, so a larger tolerance needs fewer samples.
 pub(super) fn samples_of_steps(tolerance: f64) -> usize {
     let fewer = (SEEN / (LEFT * tolerance)).sqrt().min(1.0);
     (samples_for(tolerance) as f64 * fewer) as usize

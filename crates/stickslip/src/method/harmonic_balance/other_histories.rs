@@ -1,7 +1,8 @@
-//! How far amplitudes depend on the history of joints that never slip.
+//! Sensitivity of amplitudes to the history of joints that never slip.
 //!
-//! Their residual traction is that of the static equilibrium, by rule. What other histories could give is measured: the same
-//! equations are solved again with the friction forces of static equilibrium taken away, and with the opposite ones.
+//! By convention their residual traction is that of the static equilibrium. To measure the
+//! effect of other histories, the equations are solved again with the friction forces of static
+//! equilibrium removed, and with them reversed.
 
 use super::balance::Balance;
 use super::equations::Solution;
@@ -9,14 +10,17 @@ use crate::orbit::Orbit;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
-/// Factors of the friction forces in static equilibrium.
+/// Factors on the friction forces of static equilibrium.
 const HISTORIES: [f64; 2] = [0.0, -1.0];
-/// Newton iterations from the orbit that was found.
+/// Newton iterations from the orbit.
 const ITERATIONS: usize = 20;
 
 impl Balance {
-    /// The largest change of a place's vibration with another history, relative to the largest vibration; `None` where no
-    /// history is kept, or where no other orbit was found. Where all joints stick the equations are linear, and nothing changes.
+    /// Returns the largest change of a place's vibration under another history, relative to the
+    /// largest vibration.
+    ///
+    /// Returns `None` if the orbit has no history, if all joints stick, or if no other orbit
+    /// was found. With all joints stuck the equations are linear, and nothing changes.
     pub(super) fn history_spread(&mut self, orbit: &Orbit, omega: f64) -> Option<f64> {
         let sticks = orbit.joints.iter().all(|joint| joint.slip_fraction == 0.0 && joint.open_fraction == 0.0);
         if orbit.evidence.history.is_empty() || sticks {
@@ -39,7 +43,8 @@ impl Balance {
         spread
     }
 
-    /// Harmonics of all places in the orbit with the present static states near a motion.
+    /// Returns the harmonics of all places in the orbit near a motion, with the static states
+    /// that are set.
     fn with_history(&mut self, top: usize, omega: f64, motion: &Solution) -> Option<Vec<DVector<Complex64>>> {
         let mut other = Solution { iterations: 0, ..motion.clone() };
         let level = self.levels.get_mut(&top)?;
@@ -47,7 +52,7 @@ impl Balance {
         self.places(top, omega, &other).ok()
     }
 
-    /// The largest change of a place's vibration, relative to the largest vibration of all.
+    /// Returns the largest change of a place's vibration, relative to the largest vibration.
     fn apart(&self, top: usize, one: &[DVector<Complex64>], other: &[DVector<Complex64>]) -> f64 {
         let harmonics = self.kept.up_to(top);
         let moving: Vec<usize> = (0..one.len()).filter(|k| harmonics[*k] > 0).collect();

@@ -1,4 +1,4 @@
-//! The orbit of a solution of harmonic balance.
+//! The orbit of a solution: displacements, energies, evidence, and the motion at any time.
 
 use super::equations::{Level, Solution};
 use super::ports::{Member, Ports};
@@ -18,7 +18,7 @@ use stickslip_numerics::eigen;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Harmonics of all places under the forces of a motion.
+/// Returns the harmonics of all places under the forces of a motion.
 ///
 /// # Errors
 /// A resonance without damping, rad/s.
@@ -52,13 +52,14 @@ pub(super) fn places(
         .collect()
 }
 
-/// Share of the mean forces that may be left over: a direction that nothing holds was given a spring to have a mean position at all, and
-/// what that spring carries is missing elsewhere.
+/// Share of the mean forces that may be unbalanced. The regularizing spring of an unsupported
+/// direction carries the difference.
 const UNHELD: f64 = 1e-6;
-/// What sums of spring forces lose to rounding, in roundings of their largest terms: positions are exact to some of their own.
+/// Rounding error of sums of spring forces, in units of the rounding of their largest terms.
 const ROUNDING: f64 = 1e3;
 
-/// Whether the mean forces balance without the springs that hold free directions.
+/// Returns true if the mean forces balance without the springs that regularize unsupported
+/// directions.
 pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DVector<Complex64>]) -> bool {
     let (system, nh) = (setting.system, level.harmonics().len());
     if level.harmonics()[0] != 0 {
@@ -76,7 +77,7 @@ pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DV
         left -= direction.map(|w| Complex64::new(w * force, 0.0));
         size += direction.norm() * force.abs();
     }
-    // far away the forces of the springs are rounding, where there are any
+    // at large displacements the balance is limited by the rounding of the spring forces
     let (mut held, mut rounding) = (vec![0.0; system.dofs()], vec![0.0; system.dofs()]);
     for (row, column, [.., stiffness]) in system.structure().entries() {
         let force = stiffness * x[0][column].re;
@@ -91,34 +92,36 @@ pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DV
 }
 
 #[derive(Debug, Clone)]
+/// Motion as a Fourier series, with the joint forces at the samples.
 struct Series {
     system: Arc<System>,
     omega: f64,
     harmonics: Vec<usize>,
     x: Vec<DVector<Complex64>>,
-    /// Forces along the axes and contact, per joint and sample.
+    /// Forces along the axes, per joint and sample, N.
     force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
+    /// Contact state per joint and sample.
     contact: Vec<Vec<Contact>>,
 }
 
-/// What the solver knows beside the motion.
+/// Data of the solver for the orbit of a solution.
 pub(super) struct Setting<'a> {
     pub system: &'a Arc<System>,
     pub ports: &'a Ports,
-    /// Those of the whole ring, where one sector of it was solved.
+    /// Ports of the whole ring, if one of its sectors was solved.
     pub around: Option<&'a Ports>,
     pub omega: f64,
-    /// The harmonic that has the drive's frequency.
+    /// Harmonic at the excitation frequency.
     pub first: usize,
+    /// True if the motion changes its sign after half a period.
     pub odd: bool,
     pub truncation: Option<f64>,
-    /// The error that it is compared with.
+    /// Tolerance of the truncation error.
     pub tolerance: f64,
     pub judge: Option<&'a mut Judge>,
 }
 
-/// Makes the orbit.
-/// `None` if it does not stay where it is.
+/// Makes the orbit of a solution. Returns `None` if its mean forces do not balance.
 pub(super) fn orbit(
     setting: Setting,
     level: &mut Level,
@@ -203,7 +206,8 @@ pub(super) fn orbit(
     })
 }
 
-/// What the joints do at the samples of a period, and the states of their laws at its start.
+/// Joint forces and contact states at the samples of a period, and the internal states at
+/// t = 0.
 struct Samples {
     force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
     contact: Vec<Vec<Contact>>,
@@ -219,7 +223,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
     let mut states = Vec::new();
     for (j, joint) in system.joints().iter().enumerate() {
         let (axes, force, contact) = (joint.axes(), &mut force[j], &mut contact[j]);
-        // no port: what holds nothing slips all the time
+        // without a port the joint carries no force and slips permanently
         let mut told = false;
         for (p, port) in ports.iter().enumerate() {
             let Some(&Member { share, .. }) = port.member(j) else { continue };
@@ -240,7 +244,8 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
             match joint.law().rate() {
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
-                    // the sampled force is within the law's bounds, which that of the series may pass
+                    // the sampled force is within the bounds of the law; the truncated series
+                    // may exceed them
                     let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
                     rate.state_under(&now[..port.axes], &mut z);
                     states.extend(z);
@@ -270,12 +275,13 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
     Samples { force, contact, states }
 }
 
-/// Harmonics of the relative displacement along an axis.
+/// Returns the harmonics of the relative displacement along an axis.
 fn relative(axis: &Axis, harmonics: &[usize], x: &[DVector<Complex64>]) -> Vec<Complex64> {
     harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.along_complex(x)).collect()
 }
 
-/// The unknowns that act along each axis, by their numbers among those of all ports, and what the joint has of them.
+/// Returns the unknowns along each axis, by their numbers among all ports, with the share of
+/// the joint.
 fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<(usize, Member)>> {
     let mut firsts = Vec::with_capacity(system.joints().len());
     let mut count = 0;
@@ -292,25 +298,25 @@ fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<(usize, Member)>> {
     of
 }
 
-/// A solution that is measured.
+/// View of a solution for the measurement of its results.
 struct Measuring<'a> {
     axes: Vec<&'a Axis>,
-    /// See [`ports_of_axes`].
+    /// Unknowns along each axis, see [`ports_of_axes`].
     ports: Vec<Vec<(usize, Member)>>,
     motion: &'a Solution,
     x: &'a [DVector<Complex64>],
     harmonics: &'a [usize],
-    /// Per joint and sample of the whole period.
+    /// Contact states per joint and sample of the full period.
     contact: &'a [Vec<Contact>],
     omega: f64,
-    /// Returns in a period.
+    /// Number of returns per period.
     halves: usize,
-    /// Memory of the transforms.
+    /// Scratch memory of the transforms.
     level: RefCell<&'a mut Level>,
 }
 
 impl Measuring<'_> {
-    /// Length of the return, s.
+    /// Returns the duration of a return, s.
     fn length(&self) -> f64 {
         TAU / (self.omega * self.halves as f64)
     }
@@ -326,13 +332,14 @@ impl Measuring<'_> {
         signal
     }
 
-    /// The harmonic of a frequency, rad/s, where the series has it.
+    /// Returns the index of the harmonic at a frequency (rad/s), if the series has it.
     fn harmonic(&self, rate: f64) -> Option<usize> {
         self.harmonics.binary_search(&((rate / self.omega).round() as usize)).ok()
     }
 }
 
-/// Signals are their harmonics. Where there is a half period, all of them are odd, and over it they are orthogonal too.
+/// Signals are lists of harmonics. If the motion has a half-period symmetry, all harmonics are
+/// odd and orthogonal over half a period too.
 impl Signals for Measuring<'_> {
     type Signal = Vec<Complex64>;
     type Error = Infallible;
@@ -340,7 +347,7 @@ impl Signals for Measuring<'_> {
     fn displacement(&self, row: usize) -> Vec<Complex64> {
         self.x.iter().map(|x| x[row]).collect()
     }
-    // places in modes have as many rows as there are modes
+    // with modal coordinates, there is one row for each mode
     fn seen(&self, place: &Axis) -> Vec<Complex64> {
         self.x.iter().map(|x| place.along_complex(x)).collect()
     }
@@ -348,7 +355,8 @@ impl Signals for Measuring<'_> {
         self.derivative(self.displacement(row))
     }
     fn relative_velocity(&self, axis: usize) -> Vec<Complex64> {
-        // the unknown itself, and not what the forces do to the structure: the energies then balance only as well as the equations hold
+        // use the unknown, not the displacement under the forces: the energies then balance
+        // only as well as the equations hold
         let nh = self.harmonics.len();
         let unknown = self.ports[axis].first().map(|(q, Member { factor, .. })| {
             let along = &self.motion.c[q * nh..(q + 1) * nh];
@@ -400,13 +408,14 @@ impl Signals for Measuring<'_> {
     }
 }
 
-/// Energy gap beyond which a solution is no orbit: where the equations hold, energies balance to the residual, but for a resonance without
-/// damping, whose receptance has no number.
+/// Relative energy gap above which a solution is no orbit. Energies balance to the residual,
+/// except at a resonance without damping, where the receptance is infinite.
 const UNBALANCED: f64 = 1e-2;
-/// Energies below this fraction of what the loads could store in the structure are those of rounding: all is stuck.
+/// Energies below this share of the energy that the loads could store in the structure are
+/// rounding: all joints stick.
 const STILL: f64 = 1e-9;
 
-/// Energy (J) that counts as none in a motion at this frequency.
+/// Returns the energy (J) that counts as zero at this frequency.
 fn still(system: &System, omega: f64) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let stiff = stiffness.max(omega * omega * mass);
@@ -414,22 +423,23 @@ fn still(system: &System, omega: f64) -> f64 {
     STILL * loads / stiff.max(f64::MIN_POSITIVE)
 }
 
-/// Whether the energies of an orbit balance, or are none.
+/// Returns true if the energies of an orbit balance, or count as zero.
 pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
     let Energy { work_in, viscous, friction } = orbit.energy;
     orbit.evidence.energy_gap <= UNBALANCED || (work_in - viscous - friction).abs() <= still(system, orbit.omega)
 }
 
-/// Loads and imposed motion by harmonic.
+/// Returns the harmonic `h` of an imposed motion.
 fn moved(place: &MovedPlace, h: usize) -> Complex64 {
     amplitude_at(&place.motion, h)
 }
 
+/// Returns the amplitude of harmonic `h`, or zero.
 fn amplitude_at(harmonics: &[(u32, Complex64)], h: usize) -> Complex64 {
     harmonics.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g)
 }
 
-/// The force that moves a place, without that of the joints.
+/// Returns harmonic `h` of the force that moves a place, without the joint forces.
 fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVector<Complex64>) -> Complex64 {
     let place = &system.moved()[m];
     let mut force = -amplitude_at(&place.force, h);
@@ -443,7 +453,7 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
 }
 
 impl Series {
-    /// The joints that never slip.
+    /// Returns the joints that never slip.
     fn stuck(&self) -> Vec<usize> {
         (0..self.contact.len()).filter(|&joint| sticks(self.contact[joint].iter().copied())).collect()
     }

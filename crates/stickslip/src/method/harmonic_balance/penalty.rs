@@ -1,11 +1,13 @@
-//! The penalty ε of a rigid contact: what of its velocity is added to its force before the slip limit cuts it.
+//! Parameter ε of the force equation `λ = J(λ + ε v)` of a rigid contact with velocity `v`.
 
-/// The penalty ε is the contact's impedance at the highest harmonic times `1 + RIPPLE / highest`. Above that harmonic a series cannot
-/// follow the force: with a larger ε it chatters in stick, with a smaller one a passage through zero is blurred. The second term
-/// makes the passage sharp where the harmonics are few and do not chatter, so that one harmonic is the describing function.
+/// Parameter of `ε = (1 + RIPPLE / H) Z`, with the impedance `Z` of the contact at the highest
+/// harmonic `H`. The series cannot resolve forces above `H`. With a larger ε the force
+/// oscillates in stick; with a smaller one a change of sign is blurred. The second term
+/// sharpens the change of sign if the harmonics are few and do not oscillate. One harmonic then
+/// gives the describing function.
 const RIPPLE: f64 = 30.0;
 
-/// The penalty ε (N s/m) of a contact with the receptance (m/N) of the highest harmonic `top`, see [`RIPPLE`].
+/// Returns ε (N s/m) of a contact with this receptance (m/N) at the highest harmonic `top`.
 pub(super) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
     let impedance = 1.0 / (receptance * top as f64 * omega);
     impedance * (1.0 + RIPPLE / top as f64)

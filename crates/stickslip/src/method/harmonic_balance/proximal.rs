@@ -1,9 +1,15 @@
-//! Proximal points: rigid friction whose forces are drawn to those of the point before, less and less.
+//! Proximal point method for friction forces that the equations leave undetermined.
 //!
-//! Forces that nothing decides, as those of redundant contacts that stick, wander from one Newton step to the next, and with them what slips. A force
-//! equation `λ - P J(λ + ε u') + s (λ - λ₀) = 0` decides them: where much draws, `s` large, the motion is that under the forces λ₀, and where little
-//! does, that of the given equations. As soon as one is solved its forces are the next λ₀, so that `s` need not vanish: what is left of the given
-//! equations is `s |λ - λ₀|`.
+//! Forces of redundant contacts that stick are not unique. They change from one Newton step to
+//! the next, and the set of slipping samples changes with them. A proximal term makes them
+//! unique:
+//!
+//! `λ - P J(λ + ε u') + s (λ - λ₀) = 0`
+//!
+//! With a large `s` the forces stay near λ₀; with a small `s` the equations are nearly the
+//! given ones. The forces of each solution are the next λ₀. `s` need not vanish: the residual
+//! of the given equations is `s |λ - λ₀|`.
+//!
 //! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
 
 use super::ease::{Ease, GIVEN, SOLVED};
@@ -11,26 +17,30 @@ use super::equations::{Level, Slopes, Solution};
 use super::ports::Ports;
 use super::solve::{Goal, Lost};
 
-/// Share of their distance from the point before by which forces are drawn to it, at first.
+/// First value of `s`.
 const PULL: f64 = 1.0;
-/// The same at most: beyond it a point hardly moves.
+/// Largest value of `s`. Beyond it a proximal point hardly moves.
 const MOST_PULL: f64 = 1e4;
-/// What is left of that share at the next point after one that was found quickly: usually, and where points were hard to find before.
+/// Bounds of the factor by which `s` shrinks after a point. The factor is squared after few
+/// Newton iterations, within these bounds; failures increase it.
 const LESS: [f64; 2] = [0.1, 0.3];
-/// Where half and more of it is left, the next try draws as at the point before, and then more.
+/// Factor above which a failure keeps `s` in the next try. A failure with an unchanged `s`
+/// increases it.
 const AGAIN: f64 = 0.5;
-/// Residual with which a point is the solution where the next is not found: what the sum of redundant contacts carries is then known to this share, a
-/// thousandth of what series are usually truncated by, while shares of it still wander among them.
+/// Residual at which the last point counts as the solution if the next one is not found. It is
+/// a thousandth of the usual truncation error. The total force of redundant contacts is then
+/// known to this accuracy; only its distribution among them is not.
 const ENOUGH: f64 = 1e-6;
-/// Points and tries at most; ten are usual.
+/// Largest number of points and tries; ten are usual.
 const MOST: usize = 40;
-/// Newton iterations to one of them; 2 to 10 are usual.
+/// Newton iterations per point; 2 to 10 are usual.
 const ITERATIONS: usize = 30;
-/// Up to so many it was found quickly.
+/// Newton iterations up to which a point was found quickly.
 const QUICK: usize = 8;
 
 impl Level {
-    /// The solution from `motion`, and if there is none the nearest point that was found.
+    /// Solves by the proximal point method from `motion`. If that fails, `motion` is the last
+    /// point found.
     pub(super) fn by_proximal_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
         self.begin_anew(ports);
         self.anchor.clone_from(&motion.force);

@@ -1,25 +1,27 @@
-//! The last orbits, from which their neighbours begin.
+//! The last orbits, for warm starts, with a secant predictor.
 
 use super::equations::Solution;
 use num_complex::Complex64;
 
-/// Orbits whose harmonics are kept as starts for their neighbours: those between which a peak is refined.
+/// Number of orbits that are kept for warm starts. A peak is refined between that many.
 pub(super) const RECENT: usize = 8;
-/// Distance from the last frequency, relative to that between the last two, up to which many contacts begin on the line through both motions.
+/// Largest extrapolation of the secant predictor, relative to the last frequency step.
 const AHEAD: f64 = 1.5;
 
 /// An orbit that was found.
 pub(super) struct Recent {
-    /// Its state at t = 0.
+    /// State at t = 0.
     pub(super) start: Vec<f64>,
+    /// Frequency of the orbit, rad/s.
     pub(super) omega: f64,
-    /// Its highest harmonic.
+    /// Highest harmonic.
     pub(super) top: usize,
     pub(super) motion: Solution,
 }
 
 impl Recent {
-    /// The motion at a frequency on the line through this one and the one before, up to [`AHEAD`] times as far.
+    /// Returns the motion at `omega` on the line through this orbit and the previous one
+    /// (secant predictor). Returns this motion if the extrapolation is longer than [`AHEAD`].
     pub(super) fn towards(&self, before: &Recent, omega: f64) -> Solution {
         let share = (omega - self.omega) / (self.omega - before.omega);
         let mut motion = self.motion.clone();

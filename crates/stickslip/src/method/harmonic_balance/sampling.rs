@@ -1,22 +1,32 @@
-//! What the samples of a solution leave out: laws that are followed through the period, sample by sample, err by the square of its step.
+//! Sampling error: a solution with twice the samples, by a few steps with a fixed Jacobian.
+//!
+//! Laws that are integrated from sample to sample have an error proportional to the square of
+//! the sample spacing.
 
 use super::coupled::Near;
 use super::ease::{GIVEN, SOLVED};
 use super::equations::{Level, Slopes, Solution};
 use super::ports::{Alternation, Beginning, Port, Ports};
 
-/// The last step by twice the samples, at most, as a share of the distance that is to be known: steps leave some hundredths of themselves.
+/// Ratio of the last step to the distance from the coarse solution at which the distance counts
+/// as known. A step leaves an error of a few hundredths of its length.
 const SHARE: f64 = 0.1;
-/// The same of many contacts, of which another step costs as much as the first: one is enough. Measured: of 16 and of 100 nodes the distance
-/// is then known to three hundredths at nearly all points of a curve, and to a tenth at every one.
+/// The ratio for systems with many contacts, in which a second step costs as much as the first.
+/// One step is enough. Measured with 16 and 100 nodes: the distance is then known to 3 % at
+/// nearly all points of a curve, and to 10 % at every point.
 const SHARE_OF_COUPLED: f64 = 3.0;
-/// Steps, and what each is to leave of the one before.
+/// Largest number of steps.
 const MOST_STEPS: usize = 8;
+/// Largest ratio of a step to the previous one.
 const CLOSER: f64 = 0.3;
 
 impl Level {
-    /// The motion near `start` by twice the samples, as exactly as its distance from `coarse` is to be known; `states`, those of the shorter series that is
-    /// `coarse`. `None` where no law is followed through the period, and where it was not found.
+    /// Returns the solution near `start` with twice the samples, accurate enough for its
+    /// distance from `coarse`.
+    ///
+    /// `states` are the periodic states of the shorter series, whose solution is `coarse`.
+    /// Returns `None` if no law is integrated over the period, or if the solution was not
+    /// found.
     pub(super) fn approach_by_twice_the_samples(
         &mut self,
         ports: &Ports,
@@ -33,7 +43,7 @@ impl Level {
             && self.keeps_sketch()
             && ports.iter().all(Port::steps)
         {
-            // fewer samples find states of their own from these
+            // the coarse samples start from these states and find their periodic states
             self.states.clone_from_slice(states);
             self.follow_slopes(ports, omega, &mut start.clone(), (GIVEN, true));
         }
@@ -45,11 +55,15 @@ impl Level {
         found.then_some(motion)
     }
 
-    /// Steps from a motion that was sought last to the one by twice the samples, until the distance from `coarse` is known; and whether it is. `None`
-    /// where no law is followed through the period: other forces are exact, or see their samples in the longer series.
+    /// Steps from the solution of the last search, `near`, to the solution with twice the
+    /// samples.
     ///
-    /// The derivative is the last of the search, by the samples that there are or by fewer: a step leaves some hundredths of itself, and the next one
-    /// shows it.
+    /// Stops when the distance from `coarse` is known. Returns the solution, and true if the
+    /// distance is known. Returns `None` if no law is integrated over the period: other forces
+    /// are exact, or the longer series shows their sampling error.
+    ///
+    /// The Jacobian is that of the last search, on all samples or on the coarse ones. A step
+    /// leaves an error of a few hundredths of its length, and the next step shows it.
     pub(super) fn by_twice_the_samples(
         &mut self,
         ports: &Ports,
@@ -94,13 +108,14 @@ impl Level {
         }
     }
 
-    /// The derivatives of all laws at a motion, from where it is known that they repeat.
+    /// Computes the Jacobians of all laws at a motion, from its periodic states.
     fn linearise_at(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, length: f64) {
         self.evaluate(ports, omega, motion, GIVEN, length, Slopes::Cheap);
         self.follow_slopes(ports, omega, motion, (GIVEN, self.keeps_sketch()));
     }
 
-    /// The distance of the unknowns of two motions, without means, relative to their units.
+    /// Returns the distance between the unknowns of two solutions in their units, without
+    /// means.
     fn apart(&self, ports: &Ports, one: &Solution, other: &Solution, length: f64) -> f64 {
         let nh = self.harmonics().len();
         let moving = |at: &usize| self.harmonics()[at % nh] > 0;
@@ -112,7 +127,7 @@ impl Level {
         squares.sum::<f64>().sqrt()
     }
 
-    /// Twice the samples become what is sampled, and back.
+    /// Exchanges the samples for twice as many, and back.
     fn exchange_for_twice(&mut self) {
         let (harmonics, samples) = (&self.alternation.harmonics, 2 * self.alternation.samples());
         let twice = self.twice.get_or_insert_with(|| Alternation::new(harmonics.clone(), samples));
@@ -134,7 +149,7 @@ mod tests {
     use std::f64::consts::TAU;
     use std::sync::Arc;
 
-    /// A kilogram on springs of 1e4 N/m with a law in one direction or two.
+    /// Returns a mass of 1 kg on springs of 1e4 N/m, with a law in one direction or two.
     fn system(law: SharedLaw) -> System {
         let ground = GROUND.to_owned();
         let directions: Vec<String> = ["x", "z"][..law.directions()].iter().map(|d| (*d).to_owned()).collect();
@@ -154,7 +169,7 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// A row of bodies on springs that rub in a plane, each on the next one.
+    /// Returns a row of bodies on springs. Each rubs on the next one in a plane.
     fn row(bodies: usize) -> System {
         let name = |i: usize| format!("m{i}");
         let ground = GROUND.to_owned();
@@ -176,8 +191,9 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// With a few steps the distance from a motion of half the harmonics and samples is that of the whole solution, also where there are so many contacts
-    /// that derivatives are by fewer samples and one step is enough.
+    /// A few steps find the distance to the full solution, from a solution with half the
+    /// harmonics and samples. With many contacts the Jacobian is on coarse samples and one step
+    /// suffices.
     #[test]
     fn a_few_steps_know_the_distance() {
         for (bodies, share) in [(3, 0.01), (22, 0.03)] {
@@ -210,7 +226,8 @@ mod tests {
         }
     }
 
-    /// States of the shorter series, and what a neighbouring point left of the harmonics above, lead to the same distance.
+    /// The states of the shorter series and the correction of the previous point lead to the
+    /// same distance.
     #[test]
     fn a_neighbour_leaves_what_the_longer_series_adds() {
         let system = row(22);
@@ -243,7 +260,7 @@ mod tests {
         }
     }
 
-    /// The relative distance of the first harmonics.
+    /// Returns the relative distance between the first harmonics.
     fn distance(one: &Orbit, other: &Orbit) -> f64 {
         let pairs = || one.places.iter().zip(&other.places);
         let apart: f64 = pairs().map(|(a, b)| (a.first_harmonic - b.first_harmonic).norm_sqr()).sum();
@@ -259,10 +276,12 @@ mod tests {
         ]
     }
 
-    /// What sixteen times the samples add is in the estimate, where the harmonics leave next to nothing.
+    /// The error estimate contains the sampling error, measured with sixteen times the samples.
+    /// The truncation error is negligible here.
     #[test]
     fn the_estimate_has_the_error_of_the_samples() {
-        // where a turning point lies between two samples decides the error of `valanis`, which 1024 and 4096 may share
+        // the error of `valanis` depends on the position of a turning point between two
+        // samples; 1024 and 4096 samples may share it
         for law in &laws()[..2] {
             let system = system(law.clone());
             let orbit = |samples| {
@@ -276,7 +295,8 @@ mod tests {
         }
     }
 
-    /// Laws in steps take fewer samples at a larger tolerance, and leave their share of it.
+    /// Laws with a step take fewer samples at a larger tolerance, and stay within their share
+    /// of it.
     #[test]
     fn steps_take_few_samples_at_a_large_tolerance() {
         assert_eq!((samples_of_steps(TOLERANCE), samples_of_steps(1e-6)), (647, samples_for(1e-6)));
@@ -294,7 +314,7 @@ mod tests {
         }
     }
 
-    /// A tolerance below the error of 1024 samples takes more of them, and is met.
+    /// A tolerance below the error of 1024 samples takes more samples, and is met.
     #[test]
     fn samples_follow_the_tolerance() {
         for law in laws() {

@@ -1,5 +1,9 @@
-//! The search for a solution: Newton's method with the exact derivative, of many contacts by fewer samples first; where it fails, interior points, then
-//! proximal points, and then slip limits that are lowered from where everything sticks.
+//! Nonlinear solution: Newton's method with line search, and the searches that follow if it
+//! fails.
+//!
+//! Systems with many contacts iterate on coarse samples first. If Newton's method fails on
+//! rigid friction, the interior point method follows, then the proximal point method. The last
+//! search is a homotopy in the slip limits, from the solution in which all joints stick.
 
 use super::budget::{FEWEST, SEARCH, WORK, Work};
 use super::coupled::{FORMED, Near, product_work};
@@ -13,97 +17,123 @@ use stickslip_numerics::{dense, interrupt};
 
 /// Newton iterations; 3 to 15 are usual.
 const ITERATIONS: usize = 60;
-/// Newton iterations in all while slip limits are raised: where they hold, one is enough.
+/// Total Newton iterations while slip limits are raised. One is enough at limits at which all
+/// joints stick.
 const MOST_RAISING: usize = 200;
-/// Newton iterations at one of these, where contacts alone hold: from rest one leads to what sticks under limits that hold.
+/// Newton iterations at one raised limit if only contacts support the structure. One iteration
+/// from static equilibrium reaches the solution in which all joints stick, if the limits are
+/// high enough.
 const STICKS: usize = 6;
-/// Newton iterations in all while they are lowered; a few hundred are usual.
+/// Total Newton iterations while slip limits are lowered; a few hundred are usual.
 const MOST_ITERATIONS: usize = 3000;
-/// Residual at which a search that comes no closer has found all that there is: forces are differentiable functions of the harmonics, and what is
-/// left is the rounding of structures whose springs are far apart.
+/// Residual at which a stagnating search counts as converged. Forces are differentiable
+/// functions of the harmonics, so the remainder is the rounding of structures whose stiffnesses
+/// differ widely.
 const ROUNDED: f64 = 1e-8;
-/// Iterations without half of the least residual after which a search comes no closer.
+/// Iterations without a halved least residual after which a search counts as stagnating.
 const PATIENCE: usize = 8;
-/// Residual with which a search by fewer samples ends where there are 1024 in all, more by the square where there are fewer: what they leave out is of this
+/// Residual at which a search on coarse samples ends, for 1024 full samples. For fewer samples
+/// it grows with the square of their spacing. The sampling error of the coarse samples has this
 /// size.
 const ROUGH: f64 = 8e-4;
-/// Residual from which on a step by sketched derivatives is to leave no more than a share; where it leaves more they are given up.
+/// Residual below which a step with the Jacobian of coarse samples must leave at most
+/// [`SKETCH`].
 const NEAR: f64 = 1e-3;
+/// Largest share of the residual that such a step may leave. A larger share ends the use of
+/// coarse Jacobians.
 const SKETCH: f64 = 0.1;
-/// Share of the residual that a step by sketched derivatives leaves where the next one goes by the same: new ones would leave no less, since what fewer
-/// samples leave out is in them too.
+/// Share of the residual below which the next step reuses the Jacobian of coarse samples. A new
+/// one would have the same sampling error, and would not leave less.
 const KEPT: f64 = 0.1;
-/// Steps by fewer samples, of whose residuals one has only to come below the largest: where contacts begin to slip and to open, the way to the solution
-/// leads over larger ones, and steps that never do are short and many. Four take a third of the steps fewer at the onset of slip of 16 to 300 nodes.
-/// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for Newton's method".
+/// Number of last residuals in the non-monotone line search on coarse samples. A step is
+/// accepted if its residual is below the largest of them.
+///
+/// At the onset of slip and of opening, residuals rise before the solution is reached, and
+/// monotone steps become short and many. Four residuals save a third of the steps at the onset
+/// of slip of 16 to 300 nodes.
+///
+/// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for
+/// Newton's method".
 const REMEMBERED: usize = 4;
-/// Halvings of a step.
+/// Halvings of a step in the line search.
 pub(super) const HALVINGS: usize = 7;
-/// Growth of the residual in a whole step beyond which the search is lost.
+/// Growth of the residual in one step beyond which the search has diverged.
 pub(super) const GROWS: f64 = 100.0;
-/// Share of its length by which a step has to shorten the residual.
+/// Sufficient decrease in the line search: a step of fraction `t` must reduce the residual to at
+/// most `1 - t SHORTENS` of its value.
 pub(super) const SHORTENS: f64 = 1e-3;
-/// Mean beyond which such a motion has left its contacts, relative to the motion: what stands on them goes about as far as it swings.
+/// Mean displacement, relative to the extent of the motion, beyond which a body has left the
+/// contacts that alone support it. The mean of a supported body stays within about its
+/// vibration amplitude.
 const AWAY: f64 = 10.0;
-/// Shares of the stiffness of closed contacts that hold the mean back in a step which goes farther.
+/// Stiffness of the springs that regularize a step whose mean is too long, relative to closed
+/// contacts.
 const HELD: [f64; 6] = [0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0];
-/// Share of the residual that a step leaves which leads nearly to the solution.
+/// Share of the residual below which even a long step counts as leading to the solution.
 const NEARLY: f64 = 0.1;
-/// Mean motion of one step where contacts alone hold, relative to the motion, from which on other steps are tried.
+/// Mean displacement of a step, relative to the extent of the motion, above which regularized
+/// steps are tried too. It applies if only contacts support a body.
 const REACH: f64 = 2.0;
-/// Multiplications of an evaluation, per sample and axis: transforms to and fro, and the law. Measured: 15 µs for 2048 samples.
+/// Multiplications of one evaluation per sample and axis: both Fourier transforms and the law.
+/// Measured: 15 µs for 2048 samples.
 const EVALUATED: f64 = 40.0;
-/// The same of friction that falls with velocity, which is sought at six instants of a sample. Measured: 0.4 µs.
+/// Multiplications per sample and axis for friction that falls with velocity. Its force is
+/// solved for at six instants of each sample. Measured: 0.4 µs.
 const EVALUATED_FALLING: f64 = 2000.0;
-/// Steps of laws with a memory in one search, but for [`EVALUATIONS`] in any case. A search of one joint that is to end takes a few hundred
-/// thousand; where a law is stiff these take ten seconds.
+/// Time steps of laws with memory in the work limit of a search, unless [`EVALUATIONS`] ask for
+/// more. A converging search of one joint takes a few hundred thousand. With a stiff law this
+/// limit takes ten seconds.
 const MARCHED: usize = 3_000_000;
-/// Evaluations of all laws that a search may take in any case: homotopies take hundreds.
+/// Number of evaluations of all laws that the work limit of a search always covers. Homotopies
+/// take hundreds.
 const EVALUATIONS: usize = 800;
-/// Periods that a law with a memory is followed for one of them, roughly.
+/// Rough number of periods over which a law with memory is integrated in one evaluation.
 const PERIODS: usize = 4;
-/// Samples of a period that count for that: series of more are so long that a search of hundreds of evaluations would take minutes.
+/// Largest number of samples per period that enters this limit. With more samples, hundreds of
+/// evaluations would take minutes.
 const SAMPLES: usize = 1024;
-/// Products with the derivative that a step takes, roughly.
+/// Rough number of products with the Jacobian in one step by GMRES.
 const PRODUCTS: f64 = 30.0;
 
-/// Where a search ends.
+/// Residual at which a search ends.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Goal {
-    /// Where the equations count as solved.
+    /// The tolerance [`SOLVED`].
     Solved,
-    /// At a residual, on the way by fewer samples.
+    /// This residual, on coarse samples.
     Rough(f64),
-    /// At this share of the residual that it began with.
+    /// This share of the initial residual.
     Share(f64),
 }
 
-/// The search did not end.
+/// Failure of a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lost {
     pub iterations: usize,
     pub residual: f64,
     /// A resonance without damping, rad/s.
     pub resonance: Option<f64>,
-    /// The mean went away from the contacts that alone hold it.
+    /// True if the mean displacement left the contacts that alone support a body.
     pub away: bool,
 }
 
 impl Lost {
-    /// After so many iterations, with this residual.
+    /// Failure of the iteration after `iterations` with this residual.
     pub fn after(iterations: usize, residual: f64) -> Self {
         Lost { iterations, residual, resonance: None, away: false }
     }
 
-    /// By the structure alone.
+    /// Failure at a resonance without damping, rad/s.
     pub fn at(resonance: f64) -> Self {
         Lost { resonance: Some(resonance), ..Lost::after(0, f64::INFINITY) }
     }
 }
 
 impl Level {
-    /// Newton's method. Where there is a sketch the way to the neighbourhood of the solution is gone with its samples, and from there with its
-    /// derivatives; where that leads nowhere, with all samples.
+    /// Newton's method.
+    ///
+    /// If there are coarse samples, it first iterates on them, and then on all samples with the
+    /// coarse Jacobian. If that fails, it iterates on all samples from the initial guess.
     pub(super) fn newton(
         &mut self,
         ports: &Ports,
@@ -120,7 +150,7 @@ impl Level {
         self.exchange_samples();
         let rough = self.search(ports, omega, motion, ease, (most, Goal::Rough(self.rough())));
         if rough.is_ok() {
-            // from where the motion repeats is known by these samples
+            // the periodic state is known on these samples
             self.follow_slopes(ports, omega, motion, (ease, false));
             self.keeps_slopes = true;
         }
@@ -128,7 +158,7 @@ impl Level {
         if rough.is_ok() && self.search(ports, omega, motion, ease, (most, goal)).is_ok() {
             return Ok(());
         }
-        // once in a search, so that what it took is as much again at most
+        // this retry happens once per search and gets the full work limit again
         let before = self.taken(ports).eliminated;
         (self.assembled, self.eliminated, self.products) = taken;
         self.spent.eliminated += before - self.taken(ports).eliminated;
@@ -137,13 +167,16 @@ impl Level {
         self.search(ports, omega, motion, ease, (most, goal))
     }
 
-    /// See [`ROUGH`].
+    /// Returns the residual at which a search on coarse samples ends, see [`ROUGH`].
     fn rough(&self) -> f64 {
         ROUGH * (SAMPLES as f64 / self.all_samples() as f64).powi(2).max(1.0)
     }
 
-    /// Newton's method to a residual: the longest of the halved steps that comes closer, and where none does the whole one, which may lead out of a
-    /// set of slipping samples that repeats. On the way by fewer samples one comes closer that is below the residuals of the last steps.
+    /// Newton's method with a line search, to a given residual.
+    ///
+    /// The line search halves the step until the residual decreases. If no fraction decreases
+    /// it, the whole step is taken, which may break a cycle of slipping samples. On coarse
+    /// samples the line search is non-monotone, see [`REMEMBERED`].
     fn search(
         &mut self,
         ports: &Ports,
@@ -166,9 +199,9 @@ impl Level {
         let mut rough_slopes = kept;
         let mut recent = [residual; REMEMBERED];
         let mut least = f64::INFINITY;
-        // the residual that is to be halved, and for how long it was not
+        // residual that must be halved, and iterations since it was set
         let (mut mark, mut waited) = (residual, 0);
-        // forces that wander are found by proximal points
+        // the proximal point method finds forces that do not settle
         let hope = if ports.has_forces() { PATIENCE } else { most };
         for _ in 0..most {
             interrupt::check();
@@ -199,7 +232,7 @@ impl Level {
                     break;
                 }
                 if settles && halving == 0 && after.is_finite() {
-                    // most contacts may be where the step leads them: those that are not take steps of their own
+                    // the step may be right for most contacts; solve for the others separately
                     if let Some(settled) = self.settle(ports, (omega, ease), motion, (length, beaten)) {
                         after = settled;
                         break;
@@ -221,7 +254,7 @@ impl Level {
             (mark, waited) = if least < 0.5 * mark { (least, 0) } else { (mark, waited + 1) };
             let now = self.length(motion);
             if now < 0.5 * length || now > 2.0 * length {
-                // the motion was far from what it began with: its own size counts
+                // the motion was far from its initial guess; rescale with its own size
                 length = now;
                 residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
                 recent = [residual; REMEMBERED];
@@ -245,10 +278,13 @@ impl Level {
         }
     }
 
-    /// The Newton step from `self.before` into `self.step`. Where contacts alone hold a body, a step that opens all of them, or
-    /// slips in all, knows of nothing that brings it back: one that leads the mean far is compared with those in which springs
-    /// hold the mean where it is, from soft ones to stiff ones, and the one that leaves the least residual is taken.
-    /// False if there is no step.
+    /// Solves for the Newton step from `self.before` into `self.step`. Returns false if there
+    /// is none.
+    ///
+    /// If only contacts support a body, a step that opens all of them, or slips in all, loses
+    /// the restoring stiffness. A step that moves the mean far is then compared with
+    /// regularized ones, in which springs hold the mean. Their stiffness rises from soft to
+    /// stiff. The step with the least residual is taken.
     fn bounded_step(&mut self, ports: &Ports, (omega, ease): (f64, Ease), motion: &mut Solution, at: Near) -> bool {
         if !self.newton_step(ports, omega, ease, at) {
             return false;
@@ -261,7 +297,8 @@ impl Level {
         let mut held = 0.0;
         for share in HELD {
             if share > 0.0 {
-                // the residual of where the step begins; evaluations without derivatives leave these as they were
+                // restore the residual at the start of the step; evaluations without
+                // derivatives keep the tangents
                 motion.copy(&self.before);
                 self.evaluate(ports, omega, motion, ease, at.length, Slopes::None);
                 for (p, port) in ports.iter().enumerate() {
@@ -274,7 +311,7 @@ impl Level {
             }
             self.advance(ports, motion, 1.0, at.length);
             let after = self.evaluate(ports, omega, motion, ease, at.length, Slopes::None);
-            // a step that leads far away has to lead to the solution, or nearly so
+            // a step that moves the mean far must lead almost to the solution
             let near = self.mean_step(ports, at.length) <= AWAY * extent || after <= NEARLY * at.residual;
             if near && after < best.0 {
                 best = (after, self.step.clone());
@@ -289,14 +326,15 @@ impl Level {
         best.0.is_finite()
     }
 
-    /// How far the step leads the mean along any axis, m.
+    /// Returns the largest change of the mean along any axis in the step, m.
     fn mean_step(&self, ports: &Ports, length: f64) -> f64 {
         let nh = self.harmonics().len();
         let motions = ports.iter().filter(|port| !port.is_force());
         motions.flat_map(|port| port.range()).map(|q| self.step[2 * q * nh].abs() * length).fold(0.0, f64::max)
     }
 
-    /// How far motion on these contacts goes, m: static equilibrium, the motion without friction, the harmonics of this one.
+    /// Returns the extent of a motion, m: the largest of the displacements in static
+    /// equilibrium, the harmonics without joints, and the harmonics of this motion.
     fn extent(&self, motion: &Solution) -> f64 {
         let nh = self.harmonics().len();
         let swing = motion.c.iter().enumerate().filter(|(i, _)| i % nh > 0).map(|(_, c)| c.norm());
@@ -304,14 +342,14 @@ impl Level {
         self.linear.iter().map(|c| c.norm()).chain(swing).chain(still).fold(0.0, f64::max)
     }
 
-    /// Whether the mean of a motion that contacts alone hold has left them.
+    /// Returns true if the mean displacement left the contacts that alone support a body.
     fn is_away(&self, motion: &Solution) -> bool {
         let nh = self.harmonics().len();
         let mean = motion.c.iter().step_by(nh).fold(0.0, |m: f64, c| m.max(c.norm()));
         self.stands() && mean > AWAY * self.extent(motion)
     }
 
-    /// What the present search has taken, relative to what one may take.
+    /// Returns the work of the present search relative to [`WORK`] and [`MARCHED`].
     pub(super) fn taken(&self, ports: &Ports) -> Work {
         let size = self.residual.len() as f64;
         let of_port =
@@ -319,7 +357,7 @@ impl Level {
         let evaluated = (self.all_samples() * self.assembled) as f64 * ports.iter().map(of_port).sum::<f64>();
         let (taken, one, fewest) = match self.sparse {
             Some(ref sparse) => (self.eliminated, sparse.work(self.harmonics().len()), FEWEST),
-            // steps have the products that they take, and shortening them takes none
+            // GMRES counts its products; the line search takes none
             None if self.coupled.is_some() => {
                 (self.products, product_work(ports, self.harmonics().len()), FEWEST * PRODUCTS)
             }
@@ -331,17 +369,17 @@ impl Level {
         Work { eliminated: counted / most, marched: self.alternation.marched as f64 / MARCHED.max(marched) as f64 }
     }
 
-    /// What all searches of the point have taken here.
+    /// Returns the work of all searches of the point on these equations.
     pub(super) fn taken_of_point(&self, ports: &Ports) -> Work {
         self.spent.and(self.taken(ports))
     }
 
-    /// Whether the search has taken all the work that it may, or that its point may.
+    /// Returns true if the search has used its work limit or that of its point.
     pub(super) fn is_exhausted(&self, ports: &Ports) -> bool {
         self.taken(ports).is_beyond(SEARCH) || self.elsewhere.and(self.taken_of_point(ports)).is_beyond(self.allowed)
     }
 
-    /// The Newton step into `self.step`, in the unknowns' units.
+    /// Solves for the Newton step into `self.step`, in units of the unknowns.
     pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
         self.eliminated += 1;
         if let Some(sparse) = &mut self.sparse {
@@ -353,7 +391,8 @@ impl Level {
         self.newton_step_again(ports, omega, ease, near)
     }
 
-    /// The same from another residual by the derivatives of the last step, whose factors there are in banded form.
+    /// Solves for the step of another residual with the Jacobian of the last step. The banded
+    /// form reuses its factors.
     pub(super) fn newton_step_again(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
         let pair = 2 * self.harmonics().len();
         self.step.copy_from_slice(&self.residual);
@@ -384,7 +423,7 @@ impl Level {
         }
     }
 
-    /// `self.before` less a fraction of the step, into `motion`.
+    /// Sets `motion` to `self.before` minus a fraction of the step.
     pub(super) fn advance(&self, ports: &Ports, motion: &mut Solution, fraction: f64, length: f64) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
@@ -398,7 +437,7 @@ impl Level {
         }
     }
 
-    /// A motion near the solution that is near `start`, by fewer samples where there are such.
+    /// Returns an approximate solution near `start`, on the coarse samples if there are any.
     pub fn approach(&mut self, ports: &Ports, omega: f64, start: &Solution) -> Option<Solution> {
         self.begin_anew(ports);
         let mut motion = Solution { iterations: 0, ..start.clone() };
@@ -408,18 +447,19 @@ impl Level {
         (found.is_ok() && !self.is_away(&motion)).then_some(motion)
     }
 
-    /// The solution that Newton's method finds from `motion`, which is nearby.
+    /// Newton's method from a `motion` near the solution, with at most `most` iterations.
     pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, most: usize) -> Result<(), Lost> {
         self.begin_anew(ports);
         self.newton(ports, omega, motion, GIVEN, (most, Goal::Solved))
     }
 
-    /// The solution, from `start`.
+    /// Solves from the initial guess `start`.
     pub fn solve(&mut self, ports: &Ports, omega: f64, start: Solution) -> Result<Solution, Lost> {
         self.solve_to(ports, omega, start, Goal::Solved)
     }
 
-    /// The same where Newton's method leads there by itself to a goal.
+    /// Solves from the initial guess `start`. Newton's method stops at `goal`; the searches that
+    /// follow it ignore `goal`.
     pub fn solve_to(&mut self, ports: &Ports, omega: f64, mut start: Solution, goal: Goal) -> Result<Solution, Lost> {
         start.iterations = 0;
         self.begin_anew(ports);
@@ -448,16 +488,17 @@ impl Level {
         }
     }
 
-    /// From slip limits that hold to those that are given.
+    /// Homotopy in the slip limits, from limits at which all joints stick to the given ones.
     fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
         let mut good = Solution { iterations: motion.iterations, ..self.unhindered() };
         let mut limits: f64 = 1.0;
-        // where everything sticks the equations are linear
+        // with all joints stuck, the equations are linear
         let mut held = Err(Lost::after(good.iterations, f64::INFINITY));
         for attempt in 0..60 {
             limits *= 4.0;
             if attempt == 1 {
-                // steep penalties, as of friction that falls with velocity, take far higher ones
+                // steep friction, such as friction that falls with velocity, needs far higher
+                // limits
                 limits = limits.max(self.sticking(ports));
             }
             let iterations = good.iterations;

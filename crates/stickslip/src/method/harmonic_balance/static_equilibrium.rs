@@ -1,14 +1,16 @@
-//! Static equilibrium under the constant loads: where every vibration begins.
+//! Static equilibrium under the constant loads, where every vibration begins.
 //!
-//! Constant forces, preloads and constant imposed motions grow together from zero, as one ramp. Every joint moves straight
-//! from where it is unloaded to its place in equilibrium, and slips on the way where its limit asks for it:
+//! Constant forces, preloads and constant imposed motions grow together from zero. Every joint
+//! moves along a straight path from its unloaded state to its place in equilibrium, and slips
+//! if its limit asks for it:
 //!
 //! `K x + W f(0 → Wᵀx) = F₀`
 //!
-//! That is harmonic balance with harmonic 0 alone, so that the same equations and the same Newton iteration solve it. Contacts
-//! without a fixed slip limit are homogeneous of degree one, and for these the straight path is the exact result of the ramp.
-//! The place of each slider is kept: a contact that sticks for the whole period goes on carrying the static friction force,
-//! and the mean friction force of one that slips follows from there.
+//! This is harmonic balance with harmonic 0 alone, solved by the same Newton iteration.
+//! Contacts without a fixed slip limit are homogeneous of degree one, and for them the straight
+//! path is the exact result of the ramp. The position of each slider is kept: a permanently
+//! stuck contact keeps its static friction force, and the mean friction force of a slipping
+//! contact follows from it.
 //!
 //! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
 
@@ -21,16 +23,18 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::Arc;
 
-/// Newton iterations: each may change which joints slip, and a handful of changes are usual.
+/// Newton iterations. Each may change which joints slip; a handful of changes are usual.
 const ITERATIONS: usize = 60;
-/// Proximal points, and the stiffness of the springs of the first one, relative to closed contacts: nothing slides far there.
+/// Largest number of proximal points.
 const POINTS: usize = 60;
+/// Stiffness of the springs of the first proximal point, relative to closed contacts. Nothing
+/// slides far at that point.
 const STIFFEST: f64 = 1.0;
-/// Samples of a motion that stands still.
+/// Number of samples of a constant motion.
 const SAMPLES: usize = 8;
 
-/// The static equilibrium of a system, as an orbit on which nothing moves; `None` as of [`static_equilibrium`], and for laws
-/// that harmonic balance does not take.
+/// Returns the static equilibrium of a system, as an orbit at rest. Returns `None` as
+/// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     let (ports, around) = Ports::of_sector(system).ok()?;
     let rest = Rest::new(system, &ports);
@@ -38,15 +42,16 @@ pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     static_equilibrium(&system, (&ports, around.as_ref()), &rest).map(|found| found.orbit)
 }
 
-/// The static equilibrium of a system.
+/// Static equilibrium of a system.
 pub(super) struct SolvedEquilibrium {
-    /// As an orbit on which nothing moves.
+    /// The equilibrium as an orbit at rest.
     pub orbit: Orbit,
-    /// Of each port.
+    /// Displacements and states of each port.
     pub states: Vec<StaticState>,
 }
 
-/// The static equilibrium; `None` where the iteration finds none, as where no joint and no spring carries a constant load.
+/// Returns the static equilibrium. Returns `None` if the iteration finds none, for example if
+/// no joint and no spring carries a constant load.
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, around): (&Ports, Option<&Ports>),
@@ -84,9 +89,14 @@ pub(super) fn static_equilibrium(
     Some(SolvedEquilibrium { orbit, states })
 }
 
-/// Newton's method from closed contacts, and where that fails proximal points: equilibria of a structure that springs tie to
-/// the one before, from which the springs become softer as long as they are found. That is how an overdamped structure sinks
-/// under its load: a body may slide far on soft springs while it turns by little between its contacts.
+/// Newton's method from closed contacts, then the proximal point method if only contacts
+/// support a body.
+///
+/// Each proximal point is the equilibrium of the structure on springs that tie it to the
+/// previous point. The springs become softer after each success. A body may so slide far along
+/// a soft direction and turn slightly between its contacts. The path is that of an overdamped
+/// structure that sinks under its load.
+///
 /// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
 fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) -> Option<()> {
     let begin = solution.clone();
@@ -122,7 +132,8 @@ fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) 
     None
 }
 
-/// A rate of the system itself, 1/s, for equations that need one where nothing moves: that of its largest stiffness and mass.
+/// Returns a rate of the system, 1/s, from its largest stiffness and mass. Equations at rest
+/// need one.
 fn scale_of_rates(system: &System) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let rate = (stiffness / mass).sqrt();
@@ -142,7 +153,8 @@ mod tests {
     const NORMAL: f64 = 20e6;
     const ANGLE: f64 = 40.0;
 
-    /// Half a wedge of 6 g that a load along z presses against one rigid face at [`ANGLE`] to z: symmetry keeps its x at rest.
+    /// Returns half of a wedge of 6 g. A load along z presses it against one rigid face at
+    /// [`ANGLE`] to z. By symmetry its x is zero.
     fn wedge(load: f64, friction: f64) -> Arc<System> {
         let one = DMatrix::identity(1, 1);
         let structure =
@@ -160,7 +172,8 @@ mod tests {
         static_equilibrium(system, (&ports, None), &Rest::new(system, &ports))
     }
 
-    /// Stuck: `z (kn sin² + kt cos²) = Q`; slipping: `z kn (sin² + µ sin cos) = Q`, whichever friction allows.
+    /// In stick, `z (kn sin² + kt cos²) = Q`. In slip, `z kn (sin² + µ sin cos) = Q`. The
+    /// friction coefficient selects the case.
     #[test]
     fn a_wedge_sinks_until_its_faces_carry_the_load() {
         let (sine, cosine) = ANGLE.to_radians().sin_cos();

@@ -1,4 +1,4 @@
-//! The memory that equations take, before they are made.
+//! Estimate of the memory for the equations, before they are built.
 
 use super::ports::{Ports, at_once};
 use super::rest::{CACHED, Rest};
@@ -7,15 +7,17 @@ use super::{NAME, coupled};
 use crate::method::MethodError;
 use crate::method::option::PERIOD;
 
-/// Memory of the equations, bytes, beyond which nothing is begun: 1000 nodes of three directions with five harmonics need half of it without modes.
+/// Memory limit of the equations, bytes. 1000 nodes with three directions and five harmonics
+/// need half of it if no uncoupled modes are used.
 pub(super) const MEMORY: f64 = 4e9;
 
-/// What there may be less of: a motion of several periods of the drive has as many times the harmonics.
+/// Returns the option to reduce, and a hint. An orbit of several excitation periods has that
+/// many times the harmonics.
 fn fewer(periods: usize) -> (&'static str, &'static str) {
     if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }
 }
 
-/// Whether what equations with so many harmonics need, `bytes`, fits into memory.
+/// Returns an error if `bytes` for this number of harmonics exceed the limit.
 pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usize, usize)) -> Result<(), MethodError> {
     if bytes <= MEMORY {
         return Ok(());
@@ -30,20 +32,25 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
     Err(MethodError::option(NAME, key, message))
 }
 
-/// Memory of a level that is not banded, bytes: derivatives of the ports; receptances and what preconditions steps, or modes along the axes with the factor of
-/// what most of them add; and where a matrix may be formed, that.
+/// Returns the memory of equations that are not banded, in bytes.
+///
+/// It includes the Jacobians of the ports, the receptances and the preconditioners. With
+/// uncoupled modes it includes the modes along the axes and their factor instead. `always`
+/// states that the Jacobian is always a matrix; otherwise it is counted if its size allows one.
 pub(super) fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
     let structure = match rest.modes_for(ports).filter(|_| !always) {
         Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
         None => {
-            // the matrices; where they stay in the cache also for products, and for the longer series; and what preconditions steps
+            // the matrices; their copies for products and for the longer series, if they stay
+            // in the cache; and the preconditioner
             let each = if ports.count() <= CACHED { 4.0 } else { 2.0 };
             2.0 * each * harmonics as f64 * axes * axes + coupled::of_lowest(ports, harmonics) as f64
         }
     };
-    // whoever needs it in any case has it beside a factor of it and that of the step before
+    // equations that always use the matrix keep it, its factor and the factor of the previous
+    // step
     let formed = match always {
         true => 3.0 * size * size,
         false if size <= coupled::FORMED as f64 => size * size,
@@ -52,7 +59,8 @@ pub(super) fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool)
     tangents(ports, harmonics) + 8.0 * (structure + formed)
 }
 
-/// Memory of a level, bytes, with so many samples; of one in banded form if one harmonic of that is given.
+/// Returns the memory of the equations with this number of harmonics and samples, in bytes.
+/// `banded` is one harmonic in banded form, if the system has that form.
 pub(super) fn level_memory(
     banded: Option<&Sparse>,
     ports: &Ports,
@@ -66,13 +74,13 @@ pub(super) fn level_memory(
     equations + marched(ports, harmonics, samples)
 }
 
-/// Memory in which laws with memory are followed, one after the other, bytes.
+/// Returns the memory for integrating laws with memory, one after the other, in bytes.
 fn marched(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
     let axes = ports.iter().filter(|port| port.marches()).map(|port| port.axes).max();
     axes.map_or(0.0, |axes| at_once(axes, samples, harmonics).1)
 }
 
-/// Memory of the derivatives of the ports, bytes.
+/// Returns the memory of the Jacobians of the ports, in bytes.
 fn tangents(ports: &Ports, harmonics: usize) -> f64 {
     8.0 * ports.iter().map(|port| (2.0 * (harmonics * port.axes) as f64).powi(2)).sum::<f64>()
 }
@@ -91,7 +99,7 @@ mod tests {
     use num_complex::Complex64;
     use std::sync::Arc;
 
-    /// A row of bodies on springs, every one of which rubs on the ground.
+    /// Returns a row of bodies on springs. Each rubs on the ground.
     fn row(joints: usize, law: &SharedLaw) -> System {
         let (each, n) = (law.directions(), joints * law.directions());
         let stiffness = DMatrix::from_fn(n, n, |i, k| [2.5, -1.0].get(i.abs_diff(k)).copied().unwrap_or(0.0));
@@ -105,7 +113,8 @@ mod tests {
         builder.build().unwrap()
     }
 
-    /// What is kept of receptances and to precondition steps is counted, of matrices that stay in the cache and of larger ones, and with unknown forces.
+    /// The estimate covers the receptances and preconditioners that are kept: matrices that
+    /// stay in the cache, larger ones, and systems with unknown forces.
     #[test]
     fn what_steps_keep_is_counted() {
         let plane: SharedLaw = Arc::new(Jenkins2d { stiffness: 1.0, limit: 0.1 });
@@ -123,7 +132,7 @@ mod tests {
             let coupled = level.coupled.as_ref().expect("by products");
             assert!(coupled.bytes() > 0, "{joints}: none is kept");
             let kept = formed.bytes() + rest.bytes() + coupled.bytes() + size_of_val(&level.tangents[..]);
-            // where a matrix may be formed that is counted too
+            // the estimate also counts a matrix that may be formed
             let size = level.residual.len() as f64;
             let formed = if size <= super::coupled::FORMED as f64 { 8.0 * size * size } else { 0.0 };
             let counted = memory(&ports, &rest, harmonics.len(), false) - formed;

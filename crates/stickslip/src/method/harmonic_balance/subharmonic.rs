@@ -1,4 +1,4 @@
-//! Motions that repeat after several periods of the drive.
+//! Orbits of several periods of the excitation.
 
 use super::balance::Balance;
 use super::kept::Kept;
@@ -9,10 +9,13 @@ use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use num_complex::Complex64;
 
-/// Harmonic balance for motions that repeat after several periods of the drive: a series of its fraction.
+/// Harmonic balance for orbits that repeat after several periods of the excitation.
+///
+/// The series is one of a fraction of the excitation frequency.
 ///
 /// # Example
-/// Friction at a constant limit allows no other motion than one that repeats with the drive, and that is found.
+/// Friction at a constant limit has only orbits that repeat with the excitation, and the method
+/// finds that orbit.
 /// ```
 /// use stickslip::method::{Method, harmonic_balance::{HarmonicBalance, Subharmonic}};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
@@ -23,9 +26,9 @@ use num_complex::Complex64;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subharmonic {
-    /// Its options; harmonics and samples count for one period of the drive.
+    /// Options of the method. Harmonics and samples count for one period of the excitation.
     pub balance: HarmonicBalance,
-    /// Periods of the drive after which the motion repeats.
+    /// Number of excitation periods after which the motion repeats.
     pub period: usize,
 }
 

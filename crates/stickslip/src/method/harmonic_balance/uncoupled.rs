@@ -1,7 +1,9 @@
-//! Large structures in modes that damping leaves uncoupled: their receptance is a product of real matrices, the same at all frequencies, and nothing is
-//! factored at any of them.
+//! Receptance by uncoupled modes, for large structures whose damping does not couple their
+//! modes.
 //!
-//! `R(s) = Φ diag(1 / (m s² + c s + k)) Φᵀ`, with Φ the axes by modes, which the structure keeps.
+//! `R(s) = Φ diag(1 / (m s² + c s + k)) Φᵀ`, with the axes by modes, Φ, which the structure
+//! keeps. Φ is real and the same at all frequencies, and no matrix is factored at any
+//! frequency.
 
 use super::hold::HOLD;
 use crate::structure::{Structure, UncoupledModes};
@@ -12,24 +14,25 @@ use stickslip_numerics::dense::multiply_in_blocks;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// A dynamic stiffness below this share of its parts is their rounding: a resonance without damping.
+/// Ratio of a modal dynamic stiffness to its terms below which it is rounding: a resonance
+/// without damping.
 const RESONANT: f64 = 1e-14;
 
-/// A dynamic stiffness without an inverse: a resonance without damping.
+/// Singular dynamic stiffness: a resonance without damping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Resonant;
 
-/// A structure in its own modes.
+/// Structure in modal coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct Uncoupled {
     modes: Arc<UncoupledModes>,
-    /// The axes by modes, p × n, column after column.
+    /// Axes by modes, p × n, column by column.
     pub at: Vec<f64>,
     pub axes: usize,
 }
 
 impl Uncoupled {
-    /// `None` if damping couples the modes, or if there are too many.
+    /// Returns `None` if damping couples the modes, or if there are too many.
     pub fn new(structure: &Structure, directions: &[Vec<(usize, f64)>]) -> Option<Self> {
         let modes = structure.uncoupled()?.clone();
         let (n, axes) = (structure.dofs(), directions.len());
@@ -44,12 +47,15 @@ impl Uncoupled {
         Some(Uncoupled { modes, at, axes })
     }
 
-    /// Modal mass, damping and stiffness.
+    /// Returns modal mass, damping and stiffness.
     pub fn own(&self) -> &[[f64; 3]] {
         &self.modes.own
     }
 
-    /// `m s² + c s + k` of mode `m`, held as all are at rest; not a number that could be divided by at a resonance without damping.
+    /// Returns `m s² + c s + k` of mode `m`, with the regularizing spring at `s = 0`.
+    ///
+    /// # Errors
+    /// A resonance without damping.
     pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, Resonant> {
         let [mass, damping, stiffness] = self.own()[m];
         let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
@@ -59,12 +65,12 @@ impl Uncoupled {
         if sum.norm() > RESONANT * size { Ok(sum) } else { Err(Resonant) }
     }
 
-    /// The inverse of that, of all modes.
+    /// Returns the inverse modal dynamic stiffness of all modes.
     pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, Resonant> {
         (0..self.own().len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
     }
 
-    /// Receptance of the axes, p × p.
+    /// Returns the receptance of the axes, p × p.
     pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         let (p, n) = (self.axes, self.own().len());
         let gains = self.gains(s, omega)?;
@@ -76,12 +82,12 @@ impl Uncoupled {
             product
         };
         let re = part(|g| g.re);
-        // at rest and along the real axis there is none
+        // at rest and along the real axis the imaginary part is zero
         let im = if gains.iter().all(|g| g.im == 0.0) { vec![0.0; p * p] } else { part(|g| g.im) };
         Ok(DMatrix::from_iterator(p, p, re.into_iter().zip(im).map(|(re, im)| Complex64::new(re, im))))
     }
 
-    /// Its diagonal.
+    /// Returns the diagonal of the receptance.
     pub fn own_receptance(&self, gains: &[Complex64]) -> Vec<Complex64> {
         let mut sum = vec![ZERO; self.axes];
         for (at, gain) in self.at.chunks_exact(self.axes.max(1)).zip(gains) {
@@ -90,17 +96,17 @@ impl Uncoupled {
         sum
     }
 
-    /// Forces on the modes from those on all places.
+    /// Returns the modal forces of forces on all places.
     pub fn onto_modes(&self, force: &DVector<f64>) -> DVector<f64> {
         self.modes.shapes.as_ref().map_or_else(|| force.clone(), |shapes| shapes.tr_mul(force))
     }
 
-    /// Displacements of all places from those of the modes.
+    /// Returns the displacements of all places from modal displacements.
     pub fn of_modes(&self, modal: &DVector<f64>) -> DVector<f64> {
         self.modes.shapes.as_ref().map_or_else(|| modal.clone(), |shapes| shapes * modal)
     }
 
-    /// Displacements of all places under the forces `force` on them.
+    /// Returns the displacements of all places under the forces `force` on them.
     pub fn respond(
         &self,
         s: Complex64,
@@ -128,7 +134,8 @@ mod tests {
         ((i * 7919 + 13) as f64).sin()
     }
 
-    /// Modes answer as the dynamic stiffness does that they are those of: also motions without mass, and free ones; damping that couples them is told.
+    /// Uncoupled modes respond like the dynamic stiffness, with massless and with free
+    /// directions. Damping that couples the modes is detected.
     #[test]
     fn modes_answer_as_the_dynamic_stiffness() {
         let n = 12;
@@ -146,7 +153,7 @@ mod tests {
         let structure = Structure::new(names(), light.clone(), damping.clone(), stiffness.clone()).unwrap();
         let directions = [vec![(0, 1.0), (4, -0.5)], vec![(3, 1.0)], vec![(7, 2.0), (1, 1.0)]];
         let modes = Uncoupled::new(&structure, &directions).unwrap();
-        // whoever asks next has the same modes
+        // later callers get the same modes
         assert!(Arc::ptr_eq(&modes.modes, structure.clone().uncoupled().unwrap()));
         for (s, omega) in
             [(Complex64::new(0.0, 0.8), 0.8), (Complex64::new(0.0, 2.4), 0.8), (Complex64::new(1.5, 0.0), 0.8)]

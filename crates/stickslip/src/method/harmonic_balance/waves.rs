@@ -1,4 +1,4 @@
-//! A tuned ring in travelling waves: what one sector does under harmonic forces, for all.
+//! Dynamic stiffness of a tuned ring in travelling waves, from one sector.
 
 use super::hold::soft_spring;
 use super::uncoupled::Resonant;
@@ -12,7 +12,8 @@ use std::sync::Arc;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// A dynamic stiffness at a rate (1/s), made at a drive frequency (rad/s); singular at a resonance without damping.
+/// Factored dynamic stiffness at a complex rate (1/s), for an excitation frequency (rad/s). It
+/// is singular at a resonance without damping.
 #[derive(Debug, Clone)]
 pub(super) struct Factored<F = DynamicStiffness> {
     pub rate: Complex64,
@@ -20,7 +21,7 @@ pub(super) struct Factored<F = DynamicStiffness> {
     pub factor: Result<Arc<F>, Resonant>,
 }
 
-/// The waves on a ring: one per nodal diameter that a harmonic has met.
+/// Waves on a ring: one for each nodal diameter that a harmonic has used.
 #[derive(Debug, Clone)]
 pub(super) struct Waves {
     pub cyclic: Cyclic,
@@ -35,13 +36,15 @@ impl Waves {
         Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
     }
 
-    /// Displacements of the first sector in a wave under complex forces on it, in place, columns one after the other.
+    /// Replaces complex forces on the first sector by its displacements in a wave, column by
+    /// column.
     fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) -> Result<(), Resonant> {
         self.factor(diameter, s, omega)?.solve(loads);
         Ok(())
     }
 
-    /// Kept as long as the drive frequency stays.
+    /// Returns the factored dynamic stiffness. It is kept until the excitation frequency
+    /// changes.
     fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, Resonant> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|(_, kept)| kept.omega == omega);
@@ -58,7 +61,8 @@ impl Waves {
         factor
     }
 
-    /// `Wᴴ` in a wave: forces on the first sector under unit forces along the axes of its joints and, with their lag, of its neighbours', n × q.
+    /// Returns `Wᴴ` in a wave, n × q: the forces on the first sector under unit forces along
+    /// the axes of its joints. Rows of neighbouring sectors enter with their phase.
     fn columns(&self, diameter: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<Complex64> {
         let n = self.sector.dofs();
         let mut columns = DMatrix::from_element(n, directions.len(), ZERO);
@@ -68,10 +72,12 @@ impl Waves {
         columns
     }
 
+    /// Returns the phase of a sector in a wave.
     fn phase(&self, diameter: usize, sector: usize) -> Complex64 {
         turn((diameter * sector) as i64, self.cyclic.sectors)
     }
 
+    /// Returns the receptance of the axes in a wave, q × q.
     pub fn receptance(
         &self,
         diameter: usize,
@@ -84,12 +90,13 @@ impl Waves {
         Ok(columns.adjoint() * moved)
     }
 
-    /// Displacements along the axes under unit forces along each alone, without its neighbours': the mean of all waves. At a real rate.
+    /// Returns the displacement along each axis under a unit force along that axis alone,
+    /// without forces on the other sectors, at a real rate. It is the mean over all waves.
     pub fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Result<Vec<f64>, Resonant> {
         let sectors = self.cyclic.sectors;
         let mut own = vec![0.0; directions.len()];
         for diameter in 0..=sectors / 2 {
-            // a wave the other way around is as stiff
+            // a wave and its reverse have the same stiffness
             let both = if (2 * diameter).is_multiple_of(sectors) { 1.0 } else { 2.0 };
             let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions)?;
             own.iter_mut().enumerate().for_each(|(q, own)| *own += both * receptance[(q, q)].re / sectors as f64);
@@ -97,7 +104,7 @@ impl Waves {
         Ok(own)
     }
 
-    /// Displacements of the ring under forces on it that travel.
+    /// Returns the displacements of the ring under forces that travel around it.
     pub fn respond(
         &self,
         diameter: usize,

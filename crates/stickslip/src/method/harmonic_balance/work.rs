@@ -1,4 +1,5 @@
-//! What a step of Newton's method costs, and an orbit, by counting: known before anything is computed.
+//! Cost model: multiplications of a Newton step and of an orbit, counted before anything is
+//! computed.
 
 use super::budget::{FEWEST, POINT, WORK};
 use super::coupled::{by_products, step_products};
@@ -10,8 +11,10 @@ use crate::law::Piece;
 use crate::model::System;
 use num_complex::Complex64;
 
-/// Multiplications in a step of Newton's method with harmonics up to `top`, which most of the time of a search goes to; zero for a system that harmonic
-/// balance does not take.
+/// Returns the multiplications of a Newton step with harmonics up to `top`.
+///
+/// Newton steps take most of the time of a search. The result is zero if harmonic balance does
+/// not take the system.
 ///
 /// # Example
 /// ```
@@ -26,7 +29,8 @@ pub fn step_work(system: &System, top: usize) -> f64 {
     step(Sparse::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
 }
 
-/// The same of so many harmonics, in banded form if one of them is given.
+/// Returns the multiplications of a step with this number of harmonics. `banded` is one
+/// harmonic in banded form, if the system has that form.
 pub(super) fn step(banded: Option<&Sparse>, ports: &Ports, harmonics: usize) -> f64 {
     let size = 2 * harmonics * ports.count();
     match banded {
@@ -36,36 +40,45 @@ pub(super) fn step(banded: Option<&Sparse>, ports: &Ports, harmonics: usize) -> 
     }
 }
 
-/// Memory of the dynamic stiffness at one rate, bytes, where it is factored for every harmonic at every frequency: of a sparse structure in all of its
-/// rows. Zero of any other.
+/// Returns the memory of the factored dynamic stiffness of one harmonic, in bytes.
+///
+/// The result is zero unless the whole structure is factored for every harmonic at every
+/// frequency.
 pub fn factor_bytes(system: &System) -> usize {
     let Ok((ports, _)) = Ports::of_sector(system) else { return 0 };
     let is_banded = || Sparse::new(system, &ports, &[1]).is_some();
     if ports.wave().is_some() || is_banded() { 0 } else { system.structure().factor_bytes() }
 }
 
-/// Multiplications of one step at each number of harmonics from the first to `longest`, each twice the one before, and of one at twice each, for its error.
+/// Returns the multiplications of one step at each series length, doubled from the first up to
+/// `longest`, plus one step at twice each length for its error estimate.
 pub fn doubling_work(system: &System, longest: f64) -> f64 {
     let tops = std::iter::successors(Some(FIRST), |top| ((*top as f64) < longest).then_some(2 * top));
     tops.map(|top| step_work(system, top) + step_work(system, 2 * top)).sum()
 }
 
-/// Multiplications after which a search for an orbit of rigid friction ends whose harmonics the method chooses.
+/// Returns the work limit, in multiplications, of a point with rigid friction if the method
+/// chooses the harmonics.
 pub fn most_work(system: &System) -> f64 {
     POINT.eliminated * WORK.max(FEWEST * step_work(system, FIRST))
 }
 
-/// Harmonics that rigid friction needs where none are given, and steps at each number of them. Measured: 14 trees of 8 to 30 masses took 0.02 to 2 s a
-/// point, with 15 to 255; rings of 8 to 24 masses 0.15 to 0.6 s.
+/// Highest harmonic that rigid friction usually needs.
 const USUAL: f64 = 31.0;
+/// Newton steps at each series length. Measured with [`USUAL`]: 14 trees of 8 to 30 masses took
+/// 0.02 to 2 s per point, with 15 to 255 harmonics. Rings of 8 to 24 masses took 0.15 to 0.6 s.
 const STEPS: f64 = 3.0;
-/// Multiplications of all else, per degree of freedom and for every slider and stop: motions and laws at the instants of a period. Measured in sweeps: 5, 7
-/// and 12 ms for rings of 12, 24 and 36 `jenkins`, 7 and 22 ms for an `iwan` of 32 and 100 sliders; 2 and 3 ms for 60 masses with two `jenkins` and
-/// without a joint.
+/// Multiplications per degree of freedom of everything except Newton steps: motions at the
+/// samples of a period.
 const PER_DOF: f64 = 2e5;
+/// Multiplications per slider or stop, for its law at the samples of a period. Measured in
+/// sweeps: rings of 12, 24 and 36 `jenkins` took 5, 7 and 12 ms; an `iwan` of 32 and 100
+/// sliders took 7 and 22 ms. A model of 60 masses took 2 ms with two `jenkins` and 3 ms without
+/// a joint.
 const PER_PIECE: f64 = 7e5;
 
-/// Multiplications for an orbit of a system whose laws are sliders and stops, with as many harmonics as it mostly needs.
+/// Returns the multiplications for an orbit of a system of sliders and stops, with the usual
+/// number of harmonics.
 ///
 /// # Example
 /// ```
@@ -91,7 +104,7 @@ mod tests {
     use crate::model::{GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
-    /// Multiplications per harmonic cubed of a chain with a joint at every mass.
+    /// Returns the multiplications, per harmonic cubed, for a chain with a joint at every mass.
     fn chain(masses: usize) -> f64 {
         let mut model = Model::default();
         for i in 0..masses {
@@ -108,7 +121,8 @@ mod tests {
         step_work(&model.assemble().unwrap(), 100) / 100f64.powi(3)
     }
 
-    /// A chain is banded, so that its work goes with its length; few joints are eliminated together.
+    /// The work of a long chain is proportional to its length, because its equations are
+    /// banded. A short chain is eliminated as a full matrix.
     #[test]
     fn work_goes_with_the_length_of_a_chain() {
         let (long, longer) = (chain(60), chain(120));

@@ -1,36 +1,40 @@
-//! The linear modes of the structure without its joints: where nonlinear modes begin.
+//! Linear modes of the structure without its joints, where nonlinear modes begin.
 
 use super::{ModeEquations, ModeState, Placed, ZERO};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::eigen;
 
-/// Share of the joints' stiffness that tells the equal modes of a structure without joints apart.
+/// Share of the joints' stiffness that separates equal modes of a structure without joints.
 const TRACE: f64 = 1e-9;
-/// Distance of the squares of two frequencies, relative, up to which modes count as equal: well above [`TRACE`].
+/// Relative distance of two squared frequencies up to which modes count as equal. It is well
+/// above [`TRACE`].
 const EQUAL: f64 = 1e-7;
-/// Rounding of the squares of frequencies relative to the largest of them, per degree of freedom.
+/// Rounding error of squared frequencies relative to the largest, per degree of freedom.
 const SQUARE: f64 = 64.0 * f64::EPSILON;
-/// Share of the size of a mode below which nothing is read off it.
+/// Share of the size of a mode below which an entry is ignored.
 const FAINT_PLACE: f64 = 1e-6;
-/// Rounds in which the stiffness of joints in small motion, which may depend on the frequency, and
-/// the frequency find each other.
+/// Iterations between the frequency and the stiffness of joints at small amplitude, which may
+/// depend on the frequency.
 const ROUNDS: usize = 5;
 
-/// A linear mode of the structure without its joints.
+/// Linear mode of the structure without its joints.
 #[derive(Debug, Clone)]
 pub(crate) struct LinearMode {
-    /// Square of the frequency, (rad/s)².
+    /// Squared frequency, (rad/s)².
     pub square: f64,
-    /// Shape φ with φᴴ M φ = 1, 1/√kg: real, or of a pair that neither the structure nor its joints tell apart one of the two waves
-    /// `(φ₁ ± jφ₂)/√2`, which are the same whatever mixtures of the pair φ₁ and φ₂ are.
+    /// Shape φ with φᴴ M φ = 1, 1/√kg.
+    ///
+    /// It is real, unless neither the structure nor its joints separate a pair of equal modes.
+    /// Then it is one of the two travelling waves `(φ₁ ± jφ₂)/√2`. These do not depend on the
+    /// basis φ₁, φ₂ of the pair.
     pub shape: DVector<Complex64>,
-    /// Of such a wave, the member of the pair that it takes the number of: a motion that stands.
+    /// For such a wave, the standing mode of the pair with the same number.
     pub stands: Option<DVector<f64>>,
 }
 
 impl LinearMode {
-    /// In place of a wave, the motion of the pair that stands; `None` if it is no wave.
+    /// Returns the standing mode in place of a wave, or `None` for a mode that is not a wave.
     pub fn standing(&self) -> Option<LinearMode> {
         let shape = real(self.stands.as_ref()?);
         Some(LinearMode { square: self.square, shape, stands: None })
@@ -41,8 +45,10 @@ fn real(shape: &DVector<f64>) -> DVector<Complex64> {
     shape.map(|x| Complex64::new(x, 0.0))
 }
 
-/// The waves of a pair of real modes. In the first a place leads those before it, as it does under a positive engine order where places
-/// stand sector by sector: the first of the places that tells decides.
+/// Returns the travelling waves of a pair of real modes.
+///
+/// In the first wave a place leads the previous ones, as under a positive engine order with
+/// places numbered sector by sector. The first place with a significant phase decides.
 fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
     let size = one.amax().max(other.amax());
     let half = std::f64::consts::FRAC_1_SQRT_2;
@@ -54,14 +60,15 @@ fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
 }
 
 impl ModeEquations<'_> {
-    /// The linear modes of the structure without its joints, by rising frequency.
+    /// Returns the linear modes of the structure without its joints, by rising frequency.
     pub fn linear_modes(&self) -> Vec<LinearMode> {
         let n = self.system.dofs();
         if n == 0 {
             return Vec::new(); // the motion of every place is given
         }
         let mut stiffness = self.system.structure().stiffness().clone();
-        // a trace of the joints stays, so that equal blades move with or against each other as the joints make them
+        // keep a small share of the joints' stiffness, so that equal blades move with or
+        // against each other as the joints couple them
         for Placed { port, w } in self.elastic.iter().chain(&self.contacts) {
             let kt = port.stiffness();
             let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
@@ -100,7 +107,8 @@ impl ModeEquations<'_> {
         found
     }
 
-    /// A linear mode at amplitude `a`; forces along laws of velocity are zero. `None` if it has no frequency.
+    /// Returns a linear mode at amplitude `a`. Forces along laws of velocity are zero. Returns
+    /// `None` if its frequency is zero.
     pub fn linear(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
         let (n, nh) = (self.system.dofs(), self.alternation.harmonics.len());
         let omega = mode.square.sqrt();
@@ -114,9 +122,11 @@ impl ModeEquations<'_> {
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
     }
 
-    /// The linear mode of this number with all joints as they hold in small motion, by rising
-    /// frequency, as a motion of amplitude `a`: the start of a mode
-    /// from its small end. `None` where friction is rigid, which holds without a stiffness.
+    /// Returns the linear mode number `index`, by rising frequency, with all joints at their
+    /// stiffness at small amplitude, as a motion of amplitude `a`.
+    ///
+    /// A mode that begins at its small end starts there. Returns `None` with rigid friction,
+    /// which has no stiffness.
     pub fn at_rest(&self, index: usize, a: f64) -> Option<ModeState> {
         if !self.contacts.is_empty() {
             return None;
@@ -141,7 +151,7 @@ impl ModeEquations<'_> {
             let mut order: Vec<usize> = (0..n).collect();
             order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
             let shape = real(&(inverse.transpose() * eigen.eigenvectors.column(*order.get(index)?)));
-            // φᴴ M φ is one: (ω² + 2 j ζ ω²) = φᴴ (K + j ω C) φ
+            // φᴴ M φ = 1, so ω² + 2 j ζ ω² = φᴴ (K + j ω C) φ
             let whole = shape.dotc(&(stiffness * &shape));
             square = whole.re;
             if square.is_nan() || square <= 0.0 {
@@ -156,11 +166,13 @@ impl ModeEquations<'_> {
         Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
     }
 
-    /// Modal amplitude, m √kg, from which on the first harmonic of friction is at most a share of the forces of inertia of the linear mode
-    /// `index`, and of what distinguishes it from every other mode.
+    /// Returns the modal amplitude, m √kg, above which friction is weak in the linear mode `index`.
+    ///
+    /// There the first harmonic of friction is at most `share` of the inertia forces. It is also at
+    /// most `apart` times the difference of squared frequencies to every other mode.
     pub fn faint(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
         let Some(mode) = modes.get(index) else { return 0.0 };
-        // a law that bounds no force is faint at small amplitudes, if at all
+        // the force of an unbounded law is weak at small amplitudes, if at all
         let bounded = self.elastic.iter().chain(&self.contacts).filter(|placed| placed.port.scale.is_finite());
         let forces: Vec<(&DVector<f64>, f64)> =
             bounded.flat_map(|placed| placed.w.iter().map(|w| (w, placed.port.scale))).collect();

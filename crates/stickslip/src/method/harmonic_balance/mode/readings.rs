@@ -1,4 +1,5 @@
-//! What is read off a point of a nonlinear mode: its shape at the places, how like it is to another, how real, how damped by dampers.
+//! Results of a point of a nonlinear mode: shape at the places, modal assurance, damping by
+//! dampers.
 
 use super::{ModeEquations, ModeState, ZERO};
 use crate::model::Axis;
@@ -6,11 +7,12 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::maximum::maximum;
 
-/// Samples of a period for each of its harmonics, among which the ends of a motion are sought, and how close they are found, as a part of their distance.
+/// Samples per wave of the highest harmonic in which the extremes of a motion are bracketed.
 const SAMPLES: f64 = 16.0;
+/// Accuracy of the extremes, relative to the sample spacing.
 const CLOSE: f64 = 1e-6;
 
-/// Half of the way from the least to the largest value of a sum of harmonics, each with its number.
+/// Returns half the range of a sum of harmonics, each with its number.
 fn half_range(terms: &[(f64, Complex64)]) -> f64 {
     let value = |t: f64| terms.iter().map(|(h, x)| (x * Complex64::from_polar(1.0, h * t)).re).sum::<f64>();
     let highest = terms.iter().map(|(h, _)| *h).fold(1.0, f64::max);
@@ -27,7 +29,7 @@ fn half_range(terms: &[(f64, Complex64)]) -> f64 {
 }
 
 impl ModeEquations<'_> {
-    /// `xᴴ M y` of two shapes.
+    /// Returns the mass inner product `xᴴ M y` of two shapes.
     fn in_masses(&self, x: &[Complex64], y: &[Complex64]) -> Complex64 {
         let (n, mass) = (self.system.dofs(), self.system.structure().mass());
         let mut sum = ZERO;
@@ -39,14 +41,15 @@ impl ModeEquations<'_> {
         sum
     }
 
-    /// Modal assurance of two motions: how much of one first harmonic is in the other, in the mass inner product, from 0 to 1.
+    /// Returns the modal assurance criterion of two motions: their first harmonics in the mass
+    /// inner product, from 0 to 1.
     pub fn assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
         let (one, other) = (self.first(one), self.first(other));
         let squares = [one, other].map(|x| self.in_masses(x, x).re);
         self.in_masses(one, other).norm_sqr() / (squares[0] * squares[1])
     }
 
-    /// The inner product of two changes of motion in the masses, all harmonics together.
+    /// Returns the mass inner product of two changes of motion, summed over all harmonics.
     pub(super) fn kinetic(&self, one: &[f64], other: &[f64]) -> f64 {
         let n = self.system.dofs();
         let shape = |parts: &[f64]| -> Vec<Complex64> {
@@ -56,7 +59,8 @@ impl ModeEquations<'_> {
         harmonics.map(|(one, other)| self.in_masses(&shape(one), &shape(other)).re).sum()
     }
 
-    /// The share of the viscous dampers in the damping ratio: what they lose in a cycle, against what `2 ζ ω M` puts in for ζ = 1.
+    /// Returns the contribution of the viscous dampers to the damping ratio. It is the energy
+    /// that they dissipate per cycle relative to the energy that `2 ζ ω M` supplies for ζ = 1.
     pub fn viscous(&self, state: &ModeState) -> f64 {
         let (n, mut lost, mut whole) = (self.system.dofs(), 0.0, 0.0);
         for (k, &h) in self.alternation.harmonics.iter().enumerate() {
@@ -71,12 +75,12 @@ impl ModeEquations<'_> {
         lost / (2.0 * state.omega * whole)
     }
 
-    /// First harmonic of every place, m.
+    /// Returns the first harmonic of every place, m.
     pub fn places(&self, state: &ModeState) -> Vec<Complex64> {
         self.at_places(self.first(state))
     }
 
-    /// Half of the way that every place covers from one end of its motion to the other, m.
+    /// Returns half the range of motion of every place, m.
     pub fn half_ranges(&self, state: &ModeState) -> Vec<f64> {
         let n = self.system.dofs();
         let series: Vec<Vec<Complex64>> = state.x.chunks_exact(n).map(|x| self.at_places(x)).collect();
@@ -89,14 +93,18 @@ impl ModeEquations<'_> {
         (0..self.system.seen().len()).map(of_place).collect()
     }
 
-    /// What the places see of a motion of all degrees of freedom.
+    /// Returns the displacements of the places from the motion of all degrees of freedom.
     pub fn at_places(&self, x: &[Complex64]) -> Vec<Complex64> {
         let at = |place: &Axis| place.rows().iter().map(|(row, weight)| x[*row] * *weight).sum();
         self.system.seen().iter().map(at).collect()
     }
 
-    /// How real the shape is: `|X₁ᵀ M X₁| / X₁ᴴ M X₁`, one if all places move in phase or against each other. Where two modes of the symmetric
-    /// complex eigenvalue problem that the first harmonic solves become one, it is zero: their shape is orthogonal to itself.
+    /// Returns a measure of how real the shape is: `|X₁ᵀ M X₁| / X₁ᴴ M X₁`.
+    ///
+    /// It is one if all places move in phase or in opposite phase. It is zero if two modes of
+    /// the symmetric complex eigenvalue problem of the first harmonic coalesce: their shape is
+    /// orthogonal to itself.
+    ///
     /// Source: Heiss (2012), "The physics of exceptional points".
     pub fn rigidity(&self, state: &ModeState) -> f64 {
         let x = self.first(state);
@@ -112,11 +120,12 @@ mod tests {
     #[test]
     fn the_way_of_a_motion_has_all_harmonics() {
         let of = |third: f64| half_range(&[(1.0, Complex64::new(0.0, -2.0)), (3.0, Complex64::new(0.0, third))]);
-        // 2 sin t - sin(3t)/5 is largest at 90 degrees, 2 sin t + sin(3t) elsewhere: at sin² t = 5/12, where it is (5 - 5/3) sin t
+        // 2 sin t - sin(3t)/5 has its maximum at 90 degrees; 2 sin t + sin(3t) has it at sin² t
+        // = 5/12, with the value (5 - 5/3) sin t
         assert!((of(0.2) - 2.2).abs() < 1e-12, "{}", of(0.2));
         let expected = (10.0 / 3.0) * (5.0f64 / 12.0).sqrt();
         assert!((of(-1.0) - expected).abs() < 1e-12, "{} {expected}", of(-1.0));
-        // a mean is no motion
+        // a mean is not part of the motion
         let with_mean = half_range(&[(0.0, Complex64::new(5.0, 0.0)), (1.0, Complex64::new(3.0, 4.0))]);
         assert!((with_mean - 5.0).abs() < 1e-12, "{with_mean}");
     }
