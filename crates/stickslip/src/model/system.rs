@@ -278,7 +278,7 @@ pub struct MovedPlace {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SystemError {
     /// A joint has another number of axes than its law has directions.
-    #[error("joint `{joint}` has {axes} axes, and its law `{law}` acts along {directions}")]
+    #[error("joint `{joint}` has {axes} axes, but its law `{law}` has {directions} directions")]
     Axes {
         /// The joint.
         joint: String,
@@ -290,7 +290,7 @@ pub enum SystemError {
         directions: usize,
     },
     /// A degree of freedom does not exist.
-    #[error("{what} names degree of freedom {row}, and there are {dofs}: they count from 0")]
+    #[error("{what} uses degree of freedom {row}, but the system has {dofs}, numbered from 0")]
     Row {
         /// The joint or load.
         what: String,
@@ -300,7 +300,7 @@ pub enum SystemError {
         dofs: usize,
     },
     /// A number is not finite.
-    #[error("{what} has an entry that is not finite")]
+    #[error("{what} contains a number that is not finite")]
     NotFinite {
         /// The joint or load.
         what: String,
@@ -314,7 +314,7 @@ pub enum SystemError {
         error: LawError,
     },
     /// It is not as symmetric as it is said to be.
-    #[error("the sectors are not alike: {0} differ from those of the first sector")]
+    #[error("the sectors are not equal: their {0} differ from those of the first sector")]
     NotCyclic(&'static str),
 }
 

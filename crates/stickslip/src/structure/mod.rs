@@ -84,7 +84,7 @@ const FULL: f64 = 0.3;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StructureError {
     /// A matrix has another size than there are places.
-    #[error("the {matrix} matrix is {rows} x {columns}, and there are {places} places: it must be {places} x {places}")]
+    #[error("the {matrix} matrix is {rows} x {columns}; for {places} places it must be {places} x {places}")]
     Size {
         /// Which matrix.
         matrix: &'static str,
@@ -109,8 +109,8 @@ pub enum StructureError {
     },
     /// A matrix that must be symmetric is not.
     #[error(
-        "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column} and {mirrored:e} across the diagonal; \
-         give both triangles, or their mean if they differ by rounding"
+        "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column}, but {mirrored:e} in the \
+         mirrored entry; provide both triangles, or their mean if they differ by rounding"
     )]
     NotSymmetric {
         /// Which matrix.
@@ -125,10 +125,10 @@ pub enum StructureError {
         mirrored: f64,
     },
     /// The mass matrix has a direction of negative mass.
-    #[error("the mass matrix is not positive semidefinite: some motion has a negative kinetic energy")]
+    #[error("the mass matrix is not positive semidefinite: some motion has negative kinetic energy")]
     NegativeMass,
     /// Two places have one name.
-    #[error("the name `{0}` stands twice among the places")]
+    #[error("the name `{0}` appears twice among the places")]
     Twice(String),
 }
 
