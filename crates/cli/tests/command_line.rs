@@ -451,7 +451,7 @@ fn lists_templates_schema_and_completions() {
     assert!(code(&output) == 2 && stderr(&output).contains("did you mean `bladed-ring`?"), "{}", stderr(&output));
     assert!(!folder.path().join("bladed-rign.toml").exists());
     let output = stickslip(folder.path(), &["inspect", "."]);
-    assert!(code(&output) == 2 && stderr(&output).contains("a folder, a file is needed"), "{}", stderr(&output));
+    assert!(code(&output) == 2 && stderr(&output).contains("the path is a folder, not a file"), "{}", stderr(&output));
 }
 
 #[test]
@@ -847,7 +847,7 @@ fn inspect_leaves_out_what_is_constrained() {
         assert_eq!(said.contains("along x 2.000000e0\n"), kind != "zero", "{kind}: {said}");
     }
     let said = inspect("held", "other");
-    assert!(said.contains("no frequencies: row `7.x` of the matrix is not among the 3 names"), "{said}");
+    assert!(said.contains("no frequencies: row `7.x` of the matrix is not among the 3 given row names"), "{said}");
 }
 
 /// Names identify stiffness and mass before the size of their entries does.
@@ -921,26 +921,26 @@ fn wrong_files_of_matrices_say_what_to_do() {
         (code(&inspected), stderr(&inspected) + &String::from_utf8_lossy(&inspected.stdout))
     };
     for (file, words) in [
-        ("empty.npz", &["empty.npz: the file holds nothing", "export"][..]),
+        ("empty.npz", &["empty.npz: the file contains no matrix", "export"][..]),
         ("bricks.dof", &["bricks.dof: names of rows", "stickslip inspect MATRIX bricks.dof"]),
         ("hbmat.mapping", &["hbmat.mapping: names of rows"]),
         ("coordinate.mtx", &["coordinate.mtx, line 11: the file ends within a line", "copy it again"]),
         ("input.mtx", &["input.mtx, line 8: the file ends within a line"]),
         ("cut.op4", &["cut.op4, byte", "the file ends after", "not complete"]),
         ("cut.full", &["cut.full, byte", "the file ends after", "not complete"]),
-        ("cut.matrix", &["cut.matrix, line 8", "expected a row of every entry, found nothing"]),
-        ("cut73.mat", &["cut73.mat: the HDF5 file cannot be read", "unexpected EOF", "copy it again"]),
-        ("complex.pch", &["complex.pch, `KAAX`: a real matrix was expected, this is complex", "real part"]),
-        ("complex.rua", &["complex.rua: a real matrix was expected, this is complex"]),
-        ("pointers.rua", &["pointers.rua: pointers from 0 to 4 for 4 entries, ascending ones from 0 were expected"]),
-        ("beyond.op4", &["KAA", "beyond.op4, line 4: an entry in row 5", "export it again"]),
+        ("cut.matrix", &["cut.matrix, line 8", "expected a row for every entry, found nothing"]),
+        ("cut73.mat", &["cut73.mat: the HDF5 file cannot be read", "unexpected EOF", "copy the file again"]),
+        ("complex.pch", &["complex.pch, `KAAX`: this is not a real matrix: complex", "real part"]),
+        ("complex.rua", &["complex.rua: this is not a real matrix: complex"]),
+        ("pointers.rua", &["pointers.rua: the pointers run from 0 to 4 for 4 entries; they must begin at 0, ascend"]),
+        ("beyond.op4", &["KAA", "beyond.op4, line 4: the entry in row 5", "export it again"]),
     ] {
         let (status, said) = inspect(&[file]);
         assert!(status == 2 && words.iter().all(|words| said.contains(words)), "{file}: {status}, {said}");
     }
     // Names next to a matrix with other rows, and next to a matrix that is not square.
     let (status, said) = inspect(&["bricks.sti", "hbmat.mapping"]);
-    assert!(status == 2 && said.contains("hbmat.mapping: 6 names for 30 rows"), "{said}");
+    assert!(status == 2 && said.contains("hbmat.mapping: the file has 6 names for 30 rows"), "{said}");
     let (status, said) = inspect(&["general.mtx", "bricks.dof"]);
     assert!(
         status == 2 && said.contains("beside the square matrix whose rows they name") && said.contains("4 x 3"),
@@ -948,7 +948,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
     );
     // A text and complex numbers in the file of a matrix are not errors.
     let (status, said) = inspect(&["v5.mat"]);
-    assert!(status == 0 && said.contains("a real matrix was expected, this is"), "{said}");
+    assert!(status == 0 && said.contains("this is not a real matrix:"), "{said}");
     let check = |stiffness: &str, mass: &str, more: &str| {
         let text = format!(
             "schema = 1\n[structure]\nstiffness = \"{stiffness}\"\nmass = \"{mass}\"\n{more}\n[[place]]\nname = \"tip\"\ndof = 1\n\
@@ -971,18 +971,18 @@ fn wrong_files_of_matrices_say_what_to_do() {
     write("negative.mtx", own("10").replacen("1e-6", "-1e-6", 1).as_bytes());
     let units = "units = \"mm-t-s\"";
     for (stiffness, mass, more, words) in [
-        ("k.mtx", "other.mtx", units, &["other.mtx", "row `11.z`", "same export"][..]),
+        ("k.mtx", "other.mtx", units, &["other.mtx", "row `11.z`", "matrices from one export"][..]),
         ("k.mtx", "negative.mtx", units, &["negative kinetic energy", "a matrix cut short?"]),
         ("k.mtx", "negative.mtx", "", &["`units` is missing", "mm-t-s"]),
         ("complex.pch", "k.mtx", units, &["complex.pch", "KAAX", "real part"]),
         ("general.mtx", "k.mtx", units, &["general.mtx", "4 rows and 3 columns"]),
-        ("empty.npz", "k.mtx", units, &["empty.npz: the file holds nothing", "export the matrix again"]),
+        ("empty.npz", "k.mtx", units, &["empty.npz: the file contains no matrix", "export the matrix again"]),
         ("cut73.mat", "k.mtx", units, &["cut73.mat: the HDF5 file cannot be read"]),
         (
             "bricks.sti",
             "bricks.mas",
             "units = \"mm-t-s\"\ndofs = \"bricks.mas\"",
-            &["bricks.mas, line 1: names of rows were expected"],
+            &["bricks.mas, line 1: expected row names"],
         ),
         ("bricks.sti", "bricks.mas", "units = \"mm-t-s\"\ndofs = \"hbmat.mapping\"", &["6 names for 30 rows"]),
     ] {

@@ -215,7 +215,7 @@ fn read(block: &Block) -> Result<Matrix, Error> {
 }
 
 fn wrong_count(location: Location, expected: usize, found: &str) -> Error {
-    let problem = format!("{expected} numbers were expected for the rows of this element, {found} are there");
+    let problem = format!("the matrix of this element must have {expected} numbers, but it has {found}");
     Error::new(Kind::Count, location, problem, "export the file again")
 }
 

@@ -77,7 +77,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         count += 1;
     }
     if count == 0 {
-        let problem = "the file has no entry, lines `node, dof, node, dof, value` were expected".into();
+        let problem = "the file has no entry; lines `node, dof, node, dof, value` are required".into();
         return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
     must_end_its_lines(bytes)?;
@@ -98,8 +98,8 @@ fn must_be_one(bytes: &[u8]) -> Result<(), Error> {
         keyword.eq_ignore_ascii_case(b"*MATRIXINPUT")
     };
     Lines::new(bytes).filter(begins).nth(1).map_or(Ok(()), |line| {
-        let problem = "a second matrix begins here".into();
-        Err(Error::new(Kind::Unsupported, line.location(), problem, "write every matrix to a file of its own"))
+        let problem = "the file contains a second matrix, which begins here".into();
+        Err(Error::new(Kind::Unsupported, line.location(), problem, "write every matrix to a separate file"))
     })
 }
 

@@ -70,8 +70,8 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
     let words = file.u32()? as usize;
     let flags = file.u32()?;
     if flags & PACKED != 0 {
-        let problem = format!("the record is compressed (flags {flags:#x}), which is not read");
-        let remedy = "switch compression off by /FCOMP before the solution, or export by HBMAT";
+        let problem = format!("the record is compressed (flags {flags:#x}), which is not supported");
+        let remedy = "switch off compression with /FCOMP before the solution, or export with HBMAT";
         return Err(Error::new(Kind::Unsupported, location.location(), problem, remedy));
     }
     let data = file.take(words.saturating_mul(4))?;
@@ -125,13 +125,14 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     if header.len() < item::COUNT {
         return Err(file.malformed(&format!("a header of at least {} items", item::COUNT), header.len()));
     }
-    let refuse =
-        |problem: &str| Err(Error::new(Kind::Unsupported, file.location(), problem.into(), "export by HBMAT instead"));
+    let refuse = |problem: &str| {
+        Err(Error::new(Kind::Unsupported, file.location(), problem.into(), "export with HBMAT instead"))
+    };
     if header[item::ORIGIN] > 0 {
-        return refuse("the file was assembled by the frontal solver, which is not read");
+        return refuse("the file comes from the frontal solver, which is not supported");
     }
     if header[item::UNSYMMETRIC] != 0 {
-        return refuse("the matrices are unsymmetric, which is not read");
+        return refuse("the matrices are unsymmetric, which is not supported");
     }
     if header[item::CONSTRAINTS] != 0 {
         return refuse("the file has constraint equations that are not applied to its matrices");
@@ -190,12 +191,12 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
         let location = file.location();
         let diagonal = reals(&mut file)?;
         if diagonal.len() != system.equations {
-            let problem = format!("{} masses for {} equations", diagonal.len(), system.equations);
+            let problem = format!("the file has {} masses for {} equations", diagonal.len(), system.equations);
             return Err(Error::new(
                 Kind::Count,
                 location,
                 problem,
-                "switch lumped masses off (LUMPM), or export by HBMAT",
+                "switch off lumped masses (LUMPM), or export with HBMAT",
             ));
         }
         for (at, value) in diagonal.into_iter().enumerate() {
@@ -206,8 +207,9 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
             let location = file.clone();
             let (columns, values) = (integers(&mut file)?, reals(&mut file)?);
             if columns.len() != values.len() {
-                let problem = format!("{} columns and {} values in row {}", columns.len(), values.len(), row + 1);
-                return Err(Error::new(Kind::Count, location.location(), problem, "the file is damaged: solve again"));
+                let problem =
+                    format!("the file has {} columns and {} values in row {}", columns.len(), values.len(), row + 1);
+                return Err(Error::new(Kind::Count, location.location(), problem, "the file is damaged; solve again"));
             }
             for (column, value) in columns.into_iter().zip(values) {
                 let column = usize::try_from(column - 1).map_err(|_| location.malformed("a column from 1", column))?;

@@ -44,8 +44,8 @@ impl<'a> Bytes<'a> {
             Error::new(
                 Kind::Truncated,
                 self.location(),
-                format!("{count} bytes were expected, the file ends after {}", self.left()),
-                "it is not complete: export or copy it again",
+                format!("expected {count} more bytes, but the file ends after {}", self.left()),
+                "the file is not complete; export or copy it again",
             )
         })?;
         let taken = &self.all[self.at..end];
@@ -85,8 +85,8 @@ impl<'a> Bytes<'a> {
         Error::new(
             Kind::Malformed,
             self.location(),
-            format!("{expected} was expected, {found} is there"),
-            "the file is damaged or of another format: export it again, or state its format",
+            format!("expected {expected}, found {found}"),
+            "the file is damaged or has another format; export it again, or state its format",
         )
     }
 }

@@ -40,14 +40,14 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         FirstLine::Entry => {}
         FirstLine::Unclear(line) => return Err(unclear(&line)),
         FirstLine::Sizes => {
-            let problem = "the first line states sizes and is no entry".into();
-            let remedy = "leave the format out, or state matrix-market";
+            let problem = "the first line contains sizes, not an entry".into();
+            let remedy = "omit the format, or state matrix-market";
             return Err(Error::new(Kind::Malformed, Location::File, problem, remedy));
         }
     }
     if is_full_of_three(bytes) {
-        let problem = "three lines of three whole numbers are either entries or the rows of a full symmetric matrix";
-        let remedy = "give the values a decimal point, as in `1 1 2.`, or in rows all numbers, as in `2. 1. 0.`";
+        let problem = "three lines of three integers may be entries or the rows of a full symmetric matrix";
+        let remedy = "for entries, write the values with a decimal point (`1 1 2.`); for rows, write all numbers with one (`2. 1. 0.`)";
         return Err(Error::new(Kind::Malformed, Location::File, problem.into(), remedy));
     }
     let (mut size, mut count) = (0, 0);
@@ -57,7 +57,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         count += 1;
     }
     if count == 0 {
-        let problem = "the file has no entry, lines `row column value` were expected".into();
+        let problem = "the file has no entry; lines `row column value` are required".into();
         return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
     must_end_its_lines(bytes)?;

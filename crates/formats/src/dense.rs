@@ -46,8 +46,8 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     for line in rows(bytes) {
         let here = fields(&line).count();
         if size > 0 && here != columns {
-            let remedy = "every row of a full matrix has all its numbers; sizes and titles stand in comments only";
-            let problem = format!("{here} numbers in a row, {columns} in the rows before");
+            let remedy = "write all numbers of every row; put sizes and titles in comments";
+            let problem = format!("this row has {here} numbers, but the rows before have {columns}");
             return Err(Error::new(Kind::Malformed, line.location(), problem, remedy));
         }
         (size, columns) = (size + 1, here);
@@ -57,13 +57,13 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         return fault(Kind::Truncated, "the file has no row of numbers".into(), "export it again");
     }
     if size != columns {
-        let problem = format!("{size} rows of {columns} numbers, as many as rows were expected");
+        let problem = format!("the file has {size} rows of {columns} numbers, but the matrix must be square");
         let remedy = "export a square matrix, without a line of sizes or column numbers and without row numbers";
         return fault(Kind::NotSquare, problem, remedy);
     }
     if columns == 3 && rows(bytes).all(|line| has_indices(&line)) {
-        let problem = "three lines that are either full rows or entries `row column value`".into();
-        let remedy = "give all numbers of full rows a decimal point; write entries without comments and commas";
+        let problem = "the three lines may be full rows or entries `row column value`".into();
+        let remedy = "for full rows, write all numbers with a decimal point; for entries, remove comments and commas";
         return fault(Kind::Malformed, problem, remedy);
     }
     must_end_its_lines(bytes)?;

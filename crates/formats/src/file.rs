@@ -14,13 +14,13 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |error: std::io::Error| io(path, &error);
     let found = std::fs::metadata(path).map_err(failed)?;
     if found.is_dir() {
-        let help = format!("name the files of matrices in it, as in {}", path.join("stiffness.mtx").display());
-        let problem = "this is a folder, a file is needed".to_owned();
+        let help = format!("give the path of a matrix file in it, such as {}", path.join("stiffness.mtx").display());
+        let problem = "the path is a folder, not a file".to_owned();
         return Err(Error::new(Kind::Io, Location::File, problem, help).of(path));
     }
     if !found.is_file() {
-        let problem = "this is a device or a pipe, which has no size".into();
-        return Err(Error::new(Kind::TooLarge, Location::File, problem, "write its content to a file first").of(path));
+        let problem = "the path is a device or a pipe, which has no known size".into();
+        return Err(Error::new(Kind::TooLarge, Location::File, problem, "save its content to a file first").of(path));
     }
     let mut bytes = Vec::new();
     if found.len() <= LARGEST_FILE {
@@ -32,7 +32,7 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     if size <= LARGEST_FILE {
         return Ok(bytes);
     }
-    let problem = format!("the file has {size} bytes, at most {LARGEST_FILE} are read");
+    let problem = format!("the file has {size} bytes; the limit is {LARGEST_FILE} bytes");
     let remedy = "save the matrix in binary (.npz, .mat), or export a smaller structure";
     Err(Error::new(Kind::TooLarge, Location::File, problem, remedy).of(path))
 }

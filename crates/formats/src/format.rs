@@ -40,11 +40,11 @@ impl<'a> Item<'a> {
     pub fn other(name: impl Into<String>, note: impl Into<String>) -> Self {
         let (name, note) = (name.into(), note.into());
         let (kind, remedy) = match note == COMPLEX {
-            true => (Kind::Complex, "save its real part, or name another one"),
-            false => (Kind::Unsupported, "name another one"),
+            true => (Kind::Complex, "save its real part, or select another matrix"),
+            false => (Kind::Unsupported, "select another matrix"),
         };
         let location = if name.is_empty() { Location::File } else { Location::Variable(name.clone()) };
-        let error = Error::new(kind, location, format!("a real matrix was expected, this is {note}"), remedy);
+        let error = Error::new(kind, location, format!("this is not a real matrix: {note}"), remedy);
         let variable = Variable { name, rows: 0, columns: 0, note: Some(note) };
         Self { variable, read: Box::new(move || Err(error.clone())) }
     }

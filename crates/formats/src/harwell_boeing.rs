@@ -79,9 +79,8 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     let mut format = |what: &str| {
         let found = formats.next().unwrap_or_default();
         Fixed::new(found).ok_or_else(|| {
-            let problem = format!("{} is not read as the Fortran format of {what}", shown(found.as_bytes()));
-            let remedy =
-                "formats of whole and real numbers are, such as (8I10), (1X,8I9), (1P,4E20.12): write one of these";
+            let problem = format!("{} is not a supported Fortran format for {what}", shown(found.as_bytes()));
+            let remedy = "use a format of integers or real numbers, such as (8I10), (1X,8I9) or (1P,4E20.12)";
             Error::new(Kind::Malformed, line.location(), problem, remedy)
         })
     };
@@ -97,7 +96,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let header = header(bytes)?;
     Ok(vec![match header.kind {
         [b'C', ..] => Item::other("", COMPLEX),
-        [_, _, b'E'] => Item::other("", "a matrix of elements that are not assembled"),
+        [_, _, b'E'] => Item::other("", "a matrix of unassembled elements"),
         _ => Item::new("", header.rows, header.columns, move || read(bytes)),
     }])
 }
@@ -106,11 +105,11 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     let Header { rows, columns, entries, kind, pointers, indices, values, mut lines } = header(bytes)?;
     let count = columns.saturating_add(1);
     let pointers =
-        pointers.read(&mut lines, count, "a pointer of every column", |field| field.line.index(field.text))?;
-    let indices = indices.read(&mut lines, entries, "a row of every entry", |field| field.line.index(field.text))?;
+        pointers.read(&mut lines, count, "a pointer for every column", |field| field.line.index(field.text))?;
+    let indices = indices.read(&mut lines, entries, "a row for every entry", |field| field.line.index(field.text))?;
     let values = match kind[0] {
         b'P' => vec![1.0; indices.len()],
-        _ => values.read(&mut lines, entries, "a value of every entry", |field| field.real())?,
+        _ => values.read(&mut lines, entries, "a value for every entry", |field| field.real())?,
     };
     let symmetry = match kind[1] {
         // A real Hermitian matrix is symmetric.

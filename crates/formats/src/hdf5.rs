@@ -62,10 +62,10 @@ fn guarded<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Err
     let problem = match answer {
         Ok(Ok(answer)) => return Ok(answer),
         Ok(Err(error)) => error.to_string(),
-        Err(_) => "its numbers contradict each other".into(),
+        Err(_) => "the file is inconsistent".into(),
     };
     let problem = format!("the HDF5 file cannot be read: {problem}");
-    let remedy = "save or copy it again, in MATLAB without -v7.3 if that does not help";
+    let remedy = "save or copy the file again; if this fails in MATLAB, save without -v7.3";
     Err(Error::new(Kind::Malformed, location, problem, remedy))
 }
 
@@ -101,10 +101,13 @@ impl Walk<'_, '_> {
             let attributes = guarded(location(), || inner.attrs())?;
             if attributes.contains_key("OCTAVE_NEW_FORMAT") {
                 // Octave transposes its matrices without marking them.
-                self.items.push(Item::other(full(&name), "in the form of Octave's `save -hdf5` (`save -v7` is read)"));
+                self.items.push(Item::other(
+                    full(&name),
+                    "a matrix in the form of Octave's `save -hdf5`, which is not supported (use `save -v7`)",
+                ));
             } else if let Some(rows) = attributes.get("MATLAB_sparse") {
                 let rows = whole(rows).ok_or_else(|| {
-                    let problem = "the attribute MATLAB_sparse is no number of rows".into();
+                    let problem = "the attribute MATLAB_sparse does not contain the number of rows".into();
                     Error::new(Kind::Malformed, location(), problem, "save the file again")
                 })?;
                 self.items.push(sparse_item(inner, full(&name), rows, self.limit)?);
@@ -137,7 +140,7 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
         DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U8 | DType::U16 | DType::U32 | DType::U64 => None,
         DType::String | DType::VariableLengthString => Some("text"),
         DType::ObjectReference => Some("a cell array or an object"),
-        _ => Some("of a type that is no number"),
+        _ => Some("data of a non-numeric type"),
     };
     let attributes = guarded(location.clone(), || dataset.attrs())?;
     let note = note.or_else(|| of_matlab(&attributes));
@@ -156,7 +159,7 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
     Ok(Item::new(name.clone(), rows, columns, move || {
         let values = numbers(&dataset, limit, &name, Dataset::read_f64)?;
         if rows.checked_mul(columns) != Some(values.len()) {
-            let problem = format!("{} numbers for {rows} x {columns}", values.len());
+            let problem = format!("the dataset has {} numbers, but its size is {rows} x {columns}", values.len());
             return Err(Error::new(Kind::Count, Location::Variable(name.clone()), problem, "save the file again"));
         }
         let along = if matlab { Along::Columns } else { Along::Rows };
@@ -182,8 +185,13 @@ fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
 }
 
 fn too_large(location: Location) -> Error {
-    let problem = "the dataset states more numbers than a file of this length can hold".into();
-    Error::new(Kind::TooLarge, location, problem, "save the file again, without compression if it is right")
+    let problem = "the dataset states more numbers than a file of this size can contain".into();
+    Error::new(
+        Kind::TooLarge,
+        location,
+        problem,
+        "save the file again; if its size is correct, save it without compression",
+    )
 }
 
 /// Reads all numbers of a dataset.

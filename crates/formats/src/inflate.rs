@@ -47,7 +47,8 @@ pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location:
     let (bytes, damage) = up_to(packed, wrapping, most + 1);
     let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, location.clone(), problem, remedy));
     if bytes.len() > most {
-        let problem = format!("{} compressed bytes become more than {most}", packed.len());
+        let problem =
+            format!("{} compressed bytes expand to more than {most} bytes, the limit for this file", packed.len());
         return fault(Kind::TooLarge, problem, "save it as a sparse matrix, or without compression");
     }
     match damage {

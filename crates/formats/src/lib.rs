@@ -143,10 +143,8 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
         Some("mtx") => matrix_market::write(matrix),
         Some("npz") => npz::write(matrix).map_err(|error| error.of(path))?,
         _ => {
-            let problem = "matrices are written as .mtx (Matrix Market) or .npz (SciPy)".into();
-            return Err(
-                Error::new(Kind::Format, Location::File, problem, "give the file one of these endings").of(path)
-            );
+            let problem = "the file extension is neither .mtx (Matrix Market) nor .npz (SciPy)".into();
+            return Err(Error::new(Kind::Format, Location::File, problem, "use one of these extensions").of(path));
         }
     };
     std::fs::write(path, bytes).map_err(|error| io(path, &error))
@@ -163,31 +161,34 @@ fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let fault = |problem, remedy| Error::new(Kind::Format, Location::File, problem, remedy);
     if let Some(name) = name {
         let found = TABLE.iter().find(|format| format.name == name);
-        return found.ok_or_else(|| fault(format!("no format is called `{name}`"), format!("there are {}", names())));
+        return found.ok_or_else(|| fault(format!("there is no format `{name}`"), format!("use one of: {}", names())));
     }
     if bytes.is_empty() {
         return Err(fault("the file is empty".into(), "export or copy it again".into()));
     }
     if bytes.starts_with(&[0x1f, 0x8b]) {
-        return Err(fault("the file is compressed by gzip".into(), "unpack it first: gunzip FILE".into()));
+        return Err(fault("the file is compressed with gzip".into(), "decompress it first: gunzip FILE".into()));
     }
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(fault(
-            "the file is text in UTF-16".into(),
-            "save it as UTF-8: PowerShell's > writes UTF-16".into(),
+            "the file is UTF-16 text".into(),
+            "save it as UTF-8 (the redirection > of PowerShell writes UTF-16)".into(),
         ));
     }
     let found = TABLE.iter().find(|format| (format.sniff)(bytes));
     found.ok_or_else(|| {
         if mat5::is_version_4(bytes) {
             return fault(
-                "the file is of MATLAB version 4".into(),
+                "the file has the format of MATLAB version 4, which is not supported".into(),
                 "save it again: save('matrices.mat', 'K', 'M', '-v7'), or scipy.io.savemat with format='5'".into(),
             );
         }
         fault(
-            "no format is known by this content".into(),
-            format!("state the format if it is one of {}, else export the matrix in one of these", names()),
+            "no known format matches the content of the file".into(),
+            format!(
+                "state the format if it is one of {}; otherwise export the matrix in one of these formats",
+                names()
+            ),
         )
     })
 }
@@ -204,22 +205,23 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
     match (name, matrices.as_slice()) {
         (Some(name), _) => match items.iter().find(|item| item.variable.name == name && !name.is_empty()) {
             Some(item) => Ok(item),
-            None if items.iter().all(|item| item.variable.name.is_empty()) => fault(
-                format!("a file of format {} holds one matrix, which has no name", format.name),
-                "leave the name out",
-            ),
-            None => fault(format!("nothing is called `{name}`, the file holds {}", there()), "take one of these names"),
+            None if items.iter().all(|item| item.variable.name.is_empty()) => {
+                fault(format!("a file of format {} contains one matrix without a name", format.name), "omit the name")
+            }
+            None => {
+                fault(format!("there is no matrix `{name}`; the file contains {}", there()), "use one of these names")
+            }
         },
         (None, [one]) => Ok(one),
         // The error of the item says more than that there is no matrix.
         (None, []) if items.len() == 1 => Ok(&items[0]),
-        (None, []) if items.is_empty() => fault("the file holds nothing".into(), "export the matrix again"),
-        (None, []) => fault(format!("the file holds no real matrix, but {}", there()), "export the matrix again"),
+        (None, []) if items.is_empty() => fault("the file contains no matrix".into(), "export the matrix again"),
+        (None, []) => fault(format!("the file contains no real matrix, only {}", there()), "export the matrix again"),
         (None, several) if several.iter().any(|item| item.variable.name.is_empty()) => fault(
-            format!("the file holds {}", there()),
-            "say which one by its name; export one without a name in a file of its own",
+            format!("the file contains several matrices: {}", there()),
+            "select one by its name; export a matrix without a name to a separate file",
         ),
-        (None, _) => fault(format!("the file holds {}", there()), "say which one by its name"),
+        (None, _) => fault(format!("the file contains several matrices: {}", there()), "select one by its name"),
     }
 }
 
@@ -243,7 +245,7 @@ fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
     Err(Error::new(
         Kind::TooLarge,
         Location::File,
-        format!("{rows} rows and {columns} columns in a file of {length} bytes"),
-        "an index or a size in it is damaged: export it again",
+        format!("the file states {rows} rows and {columns} columns, too many for its {length} bytes"),
+        "an index or a size in the file is damaged; export it again",
     ))
 }

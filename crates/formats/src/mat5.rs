@@ -172,7 +172,7 @@ fn class_name(class: u8) -> Option<&'static str> {
         3 | 17 => Some("an object"),
         4 => Some("text"),
         16 => Some("a function"),
-        _ => Some("of an unknown class"),
+        _ => Some("a variable of unknown class"),
     }
 }
 
@@ -195,7 +195,7 @@ fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
 }
 
 fn damaged(location: &Location) -> Error {
-    let problem = "a compressed variable was expected, its beginning is damaged".into();
+    let problem = "the beginning of a compressed variable is damaged".into();
     Error::new(Kind::Malformed, location.clone(), problem, "save or copy the file again")
 }
 
@@ -314,7 +314,7 @@ fn matrix(bytes: &[u8], order: Order) -> Result<Matrix, Error> {
     let data = Bytes::new(data, order);
     let there = data.left() / number.size();
     if rows.checked_mul(columns) != Some(there) {
-        let problem = format!("{rows} x {columns} numbers were expected, {there} are there");
+        let problem = format!("expected {rows} x {columns} numbers, found {there}");
         return Err(Error::new(Kind::Count, Location::File, problem, "save or copy the file again"));
     }
     dense((rows, columns), Along::Columns, &Location::File, |at| number.real(&mut data.ahead(at * number.size())))

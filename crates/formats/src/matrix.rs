@@ -166,9 +166,9 @@ impl Matrix {
                 Kind::NotSymmetric,
                 Location::File,
                 format!(
-                    "the matrix is not symmetric: its triangles differ by {asymmetry:e}, its largest value is {largest:e}"
+                    "the matrix is not symmetric: its triangles differ by {asymmetry:e}, and its largest value is {largest:e}"
                 ),
-                "export the symmetric matrix of the structure without rotation, follower loads or friction",
+                "export the symmetric matrix: without rotation, follower loads and friction",
             ));
         }
         if self.symmetric {
@@ -204,8 +204,8 @@ impl Matrix {
         Err(Error::new(
             Kind::NotSquare,
             Location::File,
-            format!("the matrix has {} rows and {} columns, a square one was expected", self.rows, self.columns),
-            "name the matrix of the structure: stiffness, mass or damping",
+            format!("the matrix has {} rows and {} columns; it must be square", self.rows, self.columns),
+            "select the stiffness, mass or damping matrix",
         ))
     }
 
@@ -249,7 +249,7 @@ impl Matrix {
                 Kind::Names,
                 Location::File,
                 "the rows of the matrix have no names".into(),
-                "give the file of names that belongs to it",
+                "provide the file of row names that belongs to the matrix",
             )
         })?;
         let place_of = |row: u32| {
@@ -258,11 +258,11 @@ impl Matrix {
                     Kind::Names,
                     Location::File,
                     format!(
-                        "row `{}` of the matrix is not among the {} names it shall follow",
+                        "row `{}` of the matrix is not among the {} given row names",
                         own[row as usize],
                         names.len()
                     ),
-                    "take both matrices from the same export of the same model",
+                    "use matrices from one export of one model",
                 )
             })
         };
@@ -356,15 +356,20 @@ impl Matrix {
 /// Refuses repeated names, and a number of names other than `rows`. Empty names may repeat.
 fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
     let fault = |problem| {
-        Err(Error::new(Kind::Names, Location::File, problem, "give the file of names that was written with the matrix"))
+        Err(Error::new(
+            Kind::Names,
+            Location::File,
+            problem,
+            "provide the file of row names that was written with the matrix",
+        ))
     };
     if names.len() != rows {
-        return fault(format!("{} names for {rows} rows", names.len()));
+        return fault(format!("the file has {} names for {rows} rows", names.len()));
     }
     let mut sorted: Vec<&str> = names.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => fault(format!("the name `{}` stands twice", pair[0])),
+        Some(pair) => fault(format!("the name `{}` appears twice", pair[0])),
         None => Ok(()),
     }
 }
@@ -385,7 +390,7 @@ impl Triplets {
             return Err(Error::new(
                 Kind::TooLarge,
                 location,
-                format!("{rows} rows and {columns} columns, at most {} were expected", u32::MAX),
+                format!("the matrix has {rows} rows and {columns} columns; at most {} of each are supported", u32::MAX),
                 "check the size in the header of the file",
             ));
         }
@@ -399,13 +404,13 @@ impl Triplets {
                 Kind::Count,
                 location,
                 format!(
-                    "an entry in row {}, column {} of a matrix of {} rows and {} columns",
+                    "the entry in row {}, column {} lies outside the matrix of {} rows and {} columns",
                     row.saturating_add(1),
                     column.saturating_add(1),
                     self.rows,
                     self.columns
                 ),
-                "the file is damaged or its header belongs to another matrix: export it again",
+                "the file is damaged, or its header belongs to another matrix; export it again",
             ));
         }
         if !value.is_finite() {
@@ -413,7 +418,7 @@ impl Triplets {
                 Kind::NotFinite,
                 location,
                 format!("the value in row {}, column {} is {value}", row + 1, column + 1),
-                "a structure has finite numbers only: look for elements without material or with negative volume",
+                "all numbers must be finite; check the model for elements without material or with negative volume",
             ));
         }
         if value == 0.0 {
@@ -432,8 +437,8 @@ impl Triplets {
             return Err(Error::new(
                 Kind::NotSquare,
                 Location::File,
-                format!("a symmetric matrix with {} rows and {} columns", self.rows, self.columns),
-                "the header of the file is damaged: export it again",
+                format!("the header states a symmetric matrix with {} rows and {} columns", self.rows, self.columns),
+                "the header is damaged; export the file again",
             ));
         }
         if symmetry == Symmetry::Skew {
@@ -475,7 +480,7 @@ impl Triplets {
             return Err(Error::new(
                 Kind::NotSymmetric,
                 Location::File,
-                "a skew-symmetric matrix with entries in both triangles or on its diagonal".into(),
+                "the skew-symmetric matrix has entries in both triangles or on its diagonal".into(),
                 "store one triangle only",
             ));
         }
@@ -529,9 +534,12 @@ pub(crate) fn compressed(
     outer: usize,
     mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let fault = |problem| Err(Error::new(Kind::Count, Location::File, problem, "the file is damaged: export it again"));
+    let fault = |problem| Err(Error::new(Kind::Count, Location::File, problem, "the file is damaged; export it again"));
     if Some(pointers.len()) != outer.checked_add(1) {
-        return fault(format!("{} pointers for {outer} columns or rows, one more was expected", pointers.len()));
+        return fault(format!(
+            "the file has {} pointers for {outer} columns or rows; it must have one more pointer than columns or rows",
+            pointers.len()
+        ));
     }
     let stored = inner.len().min(values.len());
     let sorted = pointers.first() == Some(&0) && pointers.is_sorted();
@@ -539,7 +547,7 @@ pub(crate) fn compressed(
     if !sorted || last > stored {
         let first = pointers.first().copied().unwrap_or(0);
         return fault(format!(
-            "pointers from {first} to {last} for {stored} entries, ascending ones from 0 were expected, none beyond their number"
+            "the pointers run from {first} to {last} for {stored} entries; they must begin at 0, ascend, and not exceed the number of entries"
         ));
     }
     for (outer, pair) in pointers.windows(2).enumerate() {
@@ -569,8 +577,8 @@ fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
         Some(e) => Err(Error::new(
             Kind::NotFinite,
             Location::File,
-            format!("the entries in row {}, column {} sum up to {}", e.row + 1, e.column + 1, e.value),
-            "a structure has finite numbers only: check its units",
+            format!("the sum of the entries in row {}, column {} is {}", e.row + 1, e.column + 1, e.value),
+            "all numbers must be finite; check the units",
         )),
     }
 }

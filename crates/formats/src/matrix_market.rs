@@ -114,8 +114,8 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
             return Err(Error::new(
                 Kind::Complex,
                 banner.location(),
-                "the matrix is complex, a real one was expected".into(),
-                "write its real part; structural damping is no matrix of a real structure",
+                "the matrix is complex, but it must be real".into(),
+                "write its real part; structural damping is not supported as a complex matrix",
             ));
         }
         other => return Err(banner.malformed("real, integer or pattern", &format!("`{other}`"))),
@@ -132,7 +132,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
 
 /// Returns the number of values that an array of this size stores.
 fn stored(rows: usize, columns: usize, symmetry: Symmetry, line: &Line) -> Result<usize, Error> {
-    let all = rows.checked_mul(columns).ok_or_else(|| line.malformed("a size that a file can hold", "a larger one"))?;
+    let all = rows.checked_mul(columns).ok_or_else(|| line.malformed("a size that fits in a file", "a larger one"))?;
     Ok(match symmetry {
         Symmetry::General | Symmetry::Unsaid => all,
         Symmetry::Symmetric => (all - rows) / 2 + rows,
@@ -206,7 +206,7 @@ fn too_many(location: Location, expected: usize) -> Error {
     Error::new(
         Kind::Count,
         location,
-        format!("more than the {expected} entries that the header states"),
+        format!("the file has more entries than the {expected} that the header states"),
         "correct the line of sizes, or export the file again",
     )
 }

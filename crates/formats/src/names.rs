@@ -76,9 +76,9 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     let mut lines = Lines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let first = lines.expect_filled("names of rows")?;
     let format = TABLE.iter().find(|format| (format.sniff)(&first)).ok_or_else(|| {
-        let problem = format!("names of rows were expected, {} is there", shown(first.text));
+        let problem = format!("expected row names, found {}", shown(first.text));
         let known = TABLE.iter().map(|format| format.summary).collect::<Vec<_>>().join("; ");
-        Error::new(Kind::Format, first.location(), problem, format!("give one of these: {known}"))
+        Error::new(Kind::Format, first.location(), problem, format!("use one of these formats: {known}"))
     })?;
     let mut names = Names { names: Vec::new(), rows };
     for (at, line) in std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
@@ -129,11 +129,11 @@ struct Names {
 impl Names {
     fn put(&mut self, row: usize, name: String, line: &Line) -> Result<(), Error> {
         let fault = |problem| {
-            let remedy = "give the file of names that was written with the matrix";
+            let remedy = "provide the file of row names that was written with the matrix";
             Err(Error::new(Kind::Names, line.location(), problem, remedy))
         };
         if row >= self.rows {
-            return fault(format!("a name for row {} of a matrix of {} rows", row + 1, self.rows));
+            return fault(format!("the file names row {}, but the matrix has {} rows", row + 1, self.rows));
         }
         if name.is_empty() {
             return fault(format!("row {} has an empty name", row + 1));
@@ -154,15 +154,15 @@ impl Names {
             return Err(Error::new(
                 Kind::Names,
                 Location::File,
-                format!("{named} names for {} rows", self.rows),
-                "give the file of names that was written with the matrix",
+                format!("the file has {named} names for {} rows", self.rows),
+                "provide the file of row names that was written with the matrix",
             ));
         }
         let mut order: Vec<usize> = (0..self.names.len()).filter(|row| !self.names[*row].is_empty()).collect();
         order.sort_by(|a, b| self.names[*a].cmp(&self.names[*b]));
         if let Some(&[a, b]) = order.array_windows().find(|[a, b]| self.names[*a] == self.names[*b]) {
-            let problem = format!("rows {} and {} are both called `{}`", a + 1, b + 1, self.names[a]);
-            return Err(Error::new(Kind::Names, Location::File, problem, "give every row a name of its own"));
+            let problem = format!("rows {} and {} have the same name `{}`", a + 1, b + 1, self.names[a]);
+            return Err(Error::new(Kind::Names, Location::File, problem, "give every row a unique name"));
         }
         self.names.resize(self.rows, String::new());
         Ok(self.names)

@@ -151,12 +151,12 @@ fn entries(
 }
 
 fn complex(name: &str, location: Location) -> Error {
-    let problem = format!("the matrix {name} is complex, a real one was expected");
+    let problem = format!("the matrix {name} is complex, but it must be real");
     Error::new(
         Kind::Complex,
         location,
         problem,
-        "export the real stiffness; structural damping is a matrix of its own, K4AAX",
+        "export the real stiffness; structural damping is a separate matrix, K4AAX",
     )
 }
 
@@ -174,7 +174,9 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
                     return Err(line.malformed("form 1, 2, 6 or 9", &form.to_string()));
                 }
                 if found.insert(name.clone(), Found { form, complex, columns, ..Found::default() }).is_some() {
-                    return Err(line.malformed("one first card for every name", &format!("a second one of {name}")));
+                    return Err(
+                        line.malformed("exactly one first card for every name", &format!("a second one of {name}"))
+                    );
                 }
                 order.push(name);
             }

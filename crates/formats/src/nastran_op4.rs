@@ -176,8 +176,8 @@ fn read_text(mut lines: Lines, header: &Header, width: usize) -> Result<Matrix, 
 }
 
 fn wrong_count(line: &Line, words: usize, found: usize) -> Error {
-    let problem = format!("{words} words are stated, {found} numbers follow");
-    Error::new(Kind::Count, line.location(), problem, "the file is damaged: export it again")
+    let problem = format!("the file states {words} words, but {found} numbers follow");
+    Error::new(Kind::Count, line.location(), problem, "the file is damaged; export it again")
 }
 
 /// Returns the first row, counted from zero, and the number of words of a string.
@@ -247,7 +247,7 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<&'a [u8], Error> {
     if behind == length {
         Ok(data)
     } else {
-        Err(file.malformed(&format!("the length {length} behind a record"), behind))
+        Err(file.malformed(&format!("the length {length} after a record"), behind))
     }
 }
 

@@ -87,7 +87,7 @@ impl<'a> Array<'a> {
             Element::Number(_) => {}
             Element::Complex => return Err(COMPLEX.into()),
             Element::Text(_) => return Err("text".into()),
-            Element::Other(name) => return Err(format!("of type {name}")),
+            Element::Other(name) => return Err(format!("an array of type {name}")),
         }
         match self.shape[..] {
             [] => Ok((1, 1)),
@@ -123,8 +123,8 @@ impl<'a> Array<'a> {
             _ => Err(Error::new(
                 Kind::Truncated,
                 self.data.location(),
-                format!("the header states the shape {:?}, the file has {room} numbers", self.shape),
-                "it is not complete: export or copy it again",
+                format!("the header states the shape {:?}, but the file contains {room} numbers", self.shape),
+                "the file is not complete; export or copy it again",
             )),
         }
     }
@@ -133,7 +133,7 @@ impl<'a> Array<'a> {
         let size = self.size().map_err(|note| {
             let kind = if self.element == Element::Complex { Kind::Complex } else { Kind::Unsupported };
             let remedy = "save a real array of two dimensions";
-            Error::new(kind, Location::File, format!("a real matrix was expected, this is {note}"), remedy)
+            Error::new(kind, Location::File, format!("this is not a real matrix: {note}"), remedy)
         });
         let size = size?;
         let Element::Number(number) = self.element else {

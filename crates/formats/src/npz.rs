@@ -34,7 +34,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let size = array(&find(&members, "shape")?.contents()?)?.numbers(Number::index)?;
         let [rows, columns] = size[..] else {
             let location = Location::Variable("shape".into());
-            let problem = format!("{} sizes, rows and columns were expected", size.len());
+            let problem = format!("the array `shape` has {} numbers instead of two", size.len());
             return Err(Error::new(Kind::Unsupported, location, problem, "save a matrix of two dimensions"));
         };
         return Ok(vec![Item::new("", rows, columns, move || read_sparse(&members, rows, columns))]);
@@ -46,7 +46,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 fn item(member: Member) -> Result<Item, Error> {
     let start = member.beginning();
     if !start.starts_with(npy::MAGIC) {
-        return Ok(Item::other(member.name.clone(), "no array"));
+        return Ok(Item::other(member.name.clone(), "not an array"));
     }
     let array = Array::new(&start).map_err(|error| error.at(Location::Variable(member.name.clone())))?;
     Ok(match array.size() {
@@ -63,8 +63,8 @@ fn array(contents: &[u8]) -> Result<Array<'_>, Error> {
 
 fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>, Error> {
     members.iter().find(|member| member.name == name).ok_or_else(|| {
-        let problem = format!("the sparse matrix has no part `{name}`");
-        Error::new(Kind::Malformed, Location::File, problem, "write it by scipy.sparse.save_npz")
+        let problem = format!("the sparse matrix has no array `{name}`");
+        Error::new(Kind::Malformed, Location::File, problem, "write the file with scipy.sparse.save_npz")
     })
 }
 
@@ -83,7 +83,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
         return Err(Error::new(
             Kind::Complex,
             location,
-            "the matrix is complex, a real one was expected".into(),
+            "the matrix is complex, but it must be real".into(),
             "save its real part",
         ));
     }
@@ -101,12 +101,17 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
         b"coo" => {
             let (row, column) = (indices("row")?, indices("col")?);
             if row.len() != values.len() || column.len() != values.len() {
-                let problem = format!("{} rows, {} columns, {} values", row.len(), column.len(), values.len());
+                let problem = format!(
+                    "the arrays have different lengths: {} rows, {} columns, {} values",
+                    row.len(),
+                    column.len(),
+                    values.len()
+                );
                 return Err(Error::new(
                     Kind::Count,
                     Location::File,
                     problem,
-                    "write it again by scipy.sparse.save_npz",
+                    "write the file again with scipy.sparse.save_npz",
                 ));
             }
             for ((row, column), value) in row.into_iter().zip(column).zip(values) {
@@ -114,7 +119,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
             }
         }
         other => {
-            let problem = format!("the matrix is stored as {}, {LAYOUTS} was expected", shown(other));
+            let problem = format!("the matrix is stored as {}; supported are {LAYOUTS}", shown(other));
             let location = Location::Variable("format".into());
             return Err(Error::new(
                 Kind::Unsupported,
@@ -159,8 +164,8 @@ impl<'a> Member<'a> {
         if crc.sum() == self.crc {
             return Ok(contents);
         }
-        let problem = "its checksum differs from the one the zip states".into();
-        Err(Error::new(Kind::Malformed, self.location(), problem, "the file is damaged: copy or export it again"))
+        let problem = "the checksum of the member differs from the one in the zip".into();
+        Err(Error::new(Kind::Malformed, self.location(), problem, "the file is damaged; copy or export it again"))
     }
 }
 
@@ -196,8 +201,9 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
         let [_, packed, local] = sizes_64(extra, [full, packed, local])?;
         let name = name.strip_suffix(".npy").map_or_else(|| name.clone(), str::to_string);
         if flags & 1 != 0 || !matches!(method, 0 | 8) {
-            let problem = format!("the member is encrypted or packed by method {method}, deflate was expected");
-            let remedy = "write it by numpy.savez or savez_compressed";
+            let problem =
+                format!("the member is encrypted or compressed with method {method}; only deflate is supported");
+            let remedy = "write the file with numpy.savez or numpy.savez_compressed";
             return Err(Error::new(Kind::Unsupported, Location::Variable(name), problem, remedy));
         }
         let mut data = Bytes::new(bytes, Order::Little);
@@ -235,8 +241,13 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
     let from = bytes.len().saturating_sub(22 + 65535);
     let mark = END.to_le_bytes();
     let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
-        let problem = "the zip has no directory at its end".into();
-        Error::new(Kind::Truncated, Location::Byte(bytes.len()), problem, "it is not complete: export or copy it again")
+        let problem = "the zip has no central directory at its end".into();
+        Error::new(
+            Kind::Truncated,
+            Location::Byte(bytes.len()),
+            problem,
+            "the file is not complete; export or copy it again",
+        )
     })?;
     let mut zip = Bytes::new(bytes, Order::Little);
     zip.seek(end + 16)?;
@@ -292,7 +303,7 @@ pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
 fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     let small = |size: usize| {
-        let problem = format!("{size} bytes do not fit into a zip of 32 bits");
+        let problem = format!("{size} bytes exceed the limit of a 32-bit zip");
         u32::try_from(size)
             .map_err(|_| Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"))
     };
@@ -376,7 +387,10 @@ mod tests {
         assert_eq!(listed, ["K (1 x 1)", "M (2 x 1)", "note (text)"]);
         assert_eq!(read_bytes(&file, None, Some("M"))?.get(1, 0), 3.0);
         let several = read_bytes(&file, None, None).map(|_| ()).map_err(|e| e.to_string());
-        assert_eq!(several, Err("the file holds K (1 x 1), M (2 x 1), note (text); say which one by its name".into()));
+        assert_eq!(
+            several,
+            Err("the file contains several matrices: K (1 x 1), M (2 x 1), note (text); select one by its name".into())
+        );
         assert_eq!(read_bytes(&file, None, Some("C")).map_err(|e| e.kind), Err(Kind::Choice));
         assert_eq!(read_bytes(&file, None, Some("note")).map_err(|e| e.kind), Err(Kind::Unsupported));
         Ok(())

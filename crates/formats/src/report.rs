@@ -94,7 +94,7 @@ impl fmt::Display for Report {
         let Self { rows, columns, entries, zeros, largest, smallest, asymmetry, .. } = self;
         write!(f, "{rows} x {columns}, {entries} entries")?;
         if *zeros > 0 {
-            write!(f, " and {zeros} zeros")?;
+            write!(f, " and {zeros} explicit zeros")?;
         }
         if !self.origin.is_empty() {
             write!(f, ", from {}", self.origin)?;
@@ -113,7 +113,7 @@ impl fmt::Display for Report {
             ("a zero diagonal", &self.zero_diagonal),
             ("a negative diagonal", &self.negative_diagonal),
             ("no entry", &self.empty),
-            ("1e36 on the diagonal, constrained", &self.clamped),
+            ("1e36 on the diagonal (constrained)", &self.clamped),
         ];
         for (what, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
             let first: Vec<String> = list.iter().take(SHOWN).map(|row| (row + 1).to_string()).collect();
@@ -146,10 +146,10 @@ mod tests {
         assert_eq!(report.empty, [3]);
         assert_eq!(report.asymmetry, 1e-36);
         assert_eq!((report.smallest, report.zeros), (2.0, 1));
-        let text = "4 x 4, 4 entries and 1 zeros\nvalues from 2.000e0 to 1.000e36\n\
-            not symmetric: the triangles differ by 1.0e-36 of the largest value\n2 rows with a zero diagonal: 3, 4\n\
-            1 row with a negative diagonal: 2\n1 row with no entry: 4\n1 row with 1e36 on the diagonal, constrained: 1\n\
-            rows are named 1.x, 2.x, 3.x, 4.x";
+        let text = "4 x 4, 4 entries and 1 zeros\nvalues from 2.000e0 to 1.000e36\nnot symmetric: the triangles \
+                    differ by 1.0e-36 of the largest value\n2 rows with a zero diagonal: 3, 4\n1 row with a negative \
+                    diagonal: 2\n1 row with no entry: 4\n1 row with 1e36 on the diagonal (constrained): 1\nrows are \
+                    named 1.x, 2.x, 3.x, 4.x";
         assert_eq!(report.to_string(), text);
         let wide = Report::new(&Matrix::new(1, 2, Symmetry::General, [])?);
         assert_eq!(wide.to_string(), "1 x 2, 0 entries\nnot square\n1 row with no entry: 1");

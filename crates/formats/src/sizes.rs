@@ -63,10 +63,10 @@ pub(crate) fn unclear(line: &Line) -> Error {
         Kind::Malformed,
         line.location(),
         format!(
-            "{} is either an entry or the sizes of a Matrix Market file, whose number of entries is another one",
+            "{} is either an entry, or the sizes of a Matrix Market file with a wrong number of entries",
             shown(line.text)
         ),
-        "if it is sizes, correct them and write `%%MatrixMarket matrix coordinate real general` above; \
-         if it is an entry, give its value a decimal point",
+        "for sizes, correct the number of entries and add the line `%%MatrixMarket matrix coordinate real general` \
+         above; for an entry, write its value with a decimal point",
     )
 }

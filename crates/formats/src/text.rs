@@ -129,7 +129,7 @@ impl<'a> Line<'a> {
             Kind::Malformed,
             self.location(),
             format!("expected {expected}, found {found}"),
-            "the file is damaged or of another format: export it again, or state its format",
+            "the file is damaged or has another format; export it again, or state its format",
         )
     }
 }
@@ -140,7 +140,7 @@ pub(crate) fn must_end_its_lines(bytes: &[u8]) -> Result<(), Error> {
     if bytes.last().is_none_or(|last| *last == b'\n') {
         return Ok(());
     }
-    let remedy = "it is not complete: export or copy it again; if it is, end its last line";
+    let remedy = "if the file is not complete, export or copy it again; otherwise add a line break at its end";
     let location = Location::Line(Lines::new(bytes).count());
     Err(Error::new(Kind::Truncated, location, "the file ends within a line".into(), remedy))
 }
@@ -150,8 +150,8 @@ pub(crate) fn truncated(location: Location, what: &str) -> Error {
     Error::new(
         Kind::Truncated,
         location,
-        format!("the file ends where {what} was expected"),
-        "it is not complete: export or copy it again",
+        format!("the file ends before {what}"),
+        "the file is not complete; export or copy it again",
     )
 }
 

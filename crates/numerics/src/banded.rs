@@ -93,7 +93,7 @@ impl Banded {
     /// If the entry lies outside the band.
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
-        assert!(i.abs_diff(j) <= self.band, "({i}, {j}) lies outside of the band {}", self.band);
+        assert!(i.abs_diff(j) <= self.band, "entry ({i}, {j}) lies outside the half bandwidth {}", self.band);
         let at = self.place()(i, j);
         self.rows[at] += value;
     }

@@ -334,7 +334,7 @@ impl<T: Number> Lu<T> {
         if n == 0 || right.is_empty() {
             return;
         }
-        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        assert!(right.len().is_multiple_of(n), "{} numbers do not form columns of length {n}", right.len());
         let columns = right.len() / n;
         let mut memory = MemBuffer::new(scratch(n, columns, Par::Seq));
         let factors = MatRef::from_column_major_slice(&self.factors, n, n);

@@ -65,13 +65,17 @@ impl Fourier {
             self.spectrum[h] += if h == 0 { Complex64::new(c.re, 0.0) } else { c * 0.5 };
         }
         let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
-        self.inverse.process_with_scratch(&mut self.spectrum, out, scratch).expect("lengths are those of the plan");
+        self.inverse
+            .process_with_scratch(&mut self.spectrum, out, scratch)
+            .expect("the lengths must equal those of the plan");
     }
 
     /// Returns `Σ_i u_i e^{-jhθ_i}` for h = 0..=N/2. Overwrites the samples.
     pub fn sums(&mut self, samples: &mut [f64]) -> &[Complex64] {
         let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
-        self.forward.process_with_scratch(samples, &mut self.spectrum, scratch).expect("lengths are those of the plan");
+        self.forward
+            .process_with_scratch(samples, &mut self.spectrum, scratch)
+            .expect("the lengths must equal those of the plan");
         &self.spectrum
     }
 }

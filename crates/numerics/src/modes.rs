@@ -36,7 +36,9 @@ pub struct Modes {
 /// Two modes coincide, as at critical damping. If the numbers are out of range,
 /// `lambda` is not finite.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("two modes fall together at {lambda:.6} rad/s (critical damping); change a damper by a part in a million")]
+#[error(
+    "two modes coincide at {lambda:.6} rad/s (critical damping); change the coefficient of one damper by a factor of 1.000001"
+)]
 pub struct Defective {
     /// Eigenvalue at which two modes coincide, rad/s.
     pub lambda: Complex64,

@@ -21,7 +21,7 @@ impl Pairs {
     /// # Panics
     /// If `matrix` does not have n² entries.
     pub fn new(matrix: &[Complex64], n: usize) -> Self {
-        assert_eq!(matrix.len(), n * n, "a square matrix");
+        assert_eq!(matrix.len(), n * n, "the matrix must be square");
         Pairs { n, parts: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
     }
 
@@ -46,7 +46,7 @@ impl Pairs {
     /// If the length of `v` is not n.
     pub fn apply(&self, v: &mut [Complex64], memory: &mut Vec<f64>) {
         let n = self.n;
-        assert_eq!(v.len(), n, "a vector as long as the matrix");
+        assert_eq!(v.len(), n, "the vector must be as long as the matrix");
         memory.resize(6 * n, 0.0);
         let (parts, products) = memory.split_at_mut(2 * n);
         let (re, im) = parts.split_at_mut(n);

@@ -142,11 +142,11 @@ fn names() {
         "between",
         &["two different places"],
     );
-    check("name = \"blade3\"", "name = \"blade1\"", (20, 8), "name", &["stands twice", "another name"]);
+    check("name = \"blade3\"", "name = \"blade1\"", (20, 8), "name", &["appears twice", "another name"]);
     check("name = \"blade3\"", "name = \"blade 3\"", (20, 8), "name", &["a letter first"]);
     check("name = \"blade3\"", "name = 3", (20, 8), "name", &["a name in quotes"]);
     check("on = \"blade1\"", "on = \"blad1\"", (41, 6), "on", &["did you mean `blade1`?"]);
-    check("on = \"blade1\"", "on = \"ground\"", (41, 6), "on", &["moves nothing"]);
+    check("on = \"blade1\"", "on = \"ground\"", (41, 6), "on", &["has no effect"]);
 }
 
 #[test]

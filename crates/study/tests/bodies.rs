@@ -356,8 +356,8 @@ fn what_is_wrong_is_said_where_it_stands() {
         "directions",
         &["in the plane x, z", "its rotation is ry"],
     );
-    refused(directions, "directions = [\"x\", \"up\", \"ry\"]", "directions", &["there is no direction `up`"]);
-    refused(directions, "directions = [\"x\", \"z\", \"z\"]", "directions", &["stands twice"]);
+    refused(directions, "directions = [\"x\", \"up\", \"ry\"]", "directions", &["`up` is not a direction of a body"]);
+    refused(directions, "directions = [\"x\", \"z\", \"z\"]", "directions", &["appears twice"]);
     refused(directions, "directions = [\"x\"]", "directions", &["the body has no rotation"]);
     let place = "name = \"left\"\nof = \"bar\"\noffset = [\"-120 mm\", 0, 0]";
     refused(
@@ -387,7 +387,7 @@ fn what_is_wrong_is_said_where_it_stands() {
         "normal",
         &["`bar` does not move along y"],
     );
-    refused(place, "name = \"bar\"\nof = \"bar\"\noffset = [0, 0, 0]", "name", &["stands twice"]);
+    refused(place, "name = \"bar\"\nof = \"bar\"\noffset = [0, 0, 0]", "name", &["appears twice"]);
     refused("\"900 N m/rad\"", "\"900 N/m\"", "stiffness", &["expected angular stiffness (N m/rad)", "500 N m/rad"]);
     refused("\"900 N m/rad\"", "\"900 N m\"", "stiffness", &["expected angular stiffness (N m/rad)"]);
     refused("\"0.7 N m\"", "\"0.7 N\"", "amplitude", &["expected energy or moment (J)", "2 N m"]);
@@ -396,7 +396,7 @@ fn what_is_wrong_is_said_where_it_stands() {
         "between = [\"bar.ry\", \"ground\"]",
         "between = [\"bar.ry\", \"left.x\"]",
         "between",
-        &["`bar.ry` is a rotation and `left.x` a displacement"],
+        &["`bar.ry` is a rotation and `left.x` is a displacement"],
     );
     refused(
         "between = [\"bar.ry\", \"ground\"]",
@@ -413,7 +413,7 @@ fn what_is_wrong_is_said_where_it_stands() {
     refused(joint, &joined("bar.ry"), "between", &["this is a rotation", "[[place]]"]);
     refused(joint, &joined("bar"), "between", &["the node `bar` has 2", "name one, such as `bar.x`"]);
     let twice = "[[body]]\nname = \"bar\"\nmass = 1\ninertia = 1\ndirections = [\"x\", \"y\"]\n[study]";
-    refused(joint, twice, "name", &["stands twice"]);
+    refused(joint, twice, "name", &["appears twice"]);
     let offset = "[[mass]]\nname = \"block\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[place]]\nname = \"side\"\nof = \"block\"\noffset = [0, 0, \"1 mm\"]\nnormal = [1, 0, 0]\n[study]";
     refused(joint, offset, "offset", &["`block` is a point mass", "make it a [[body]]"]);
     let figure = "output = [\"velocity\", \"acceleration\", \"harmonics\"]";

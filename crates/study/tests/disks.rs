@@ -180,7 +180,7 @@ fn wrong_disks_are_refused_at_their_place() {
         (
             "",
             "mistuning = { of = \"k\", deviation = 100, seed = 1 }",
-            "nothing is left | deviations are shares: 0.02 is 2 %",
+            "no stiffness or mass remains | deviations are shares: 0.02 is 2 %",
         ),
         ("", "sectors_ = 3", "no key `sectors_`"),
     ] {
@@ -369,7 +369,11 @@ fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
         let whole = sector.ring.map(|ring| Ring { order: None, ..ring });
         let ring = Model { ring: whole, ..sector.clone() };
         assert!(
-            Model { ring: None, ..sector.clone() }.assemble().unwrap_err().to_string().contains("no model by itself")
+            Model { ring: None, ..sector.clone() }
+                .assemble()
+                .unwrap_err()
+                .to_string()
+                .contains("needs a ring, which defines the number of sectors")
         );
         let orbit = |model: &Model| {
             let method = HarmonicBalance { harmonics: Some(9), samples: Some(768), tolerance: None };
@@ -464,10 +468,10 @@ fn wrong_sectors_by_matrices_are_refused_at_their_place() {
         ("", "needs `boundary`"),
         ("boundary = \"none.csv\"", "cannot be read"),
         ("boundary = \"wrong.csv\"", "expected the columns low,high, found `left,right`"),
-        ("boundary = \"strange.csv\"", "no row of node `9`, and rows of node `1`"),
-        ("boundary = \"pairs.csv\"\naxis = \"z\"", "constrain both alike"),
+        ("boundary = \"strange.csv\"", "rows of node `1`, but none of its partner `9`"),
+        ("boundary = \"pairs.csv\"\naxis = \"z\"", "constrain both equally"),
         ("boundary = \"pairs.csv\"\nblade = \"pairs.csv\"", "expected the columns node"),
-        ("boundary = \"pairs.csv\"\nblade = \"rim_blade.csv\"", "row `1.x` of the blade stands on the boundary"),
+        ("boundary = \"pairs.csv\"\nblade = \"rim_blade.csv\"", "row `1.x` of the blade is on or next to the boundary"),
         ("boundary = \"pairs.csv\"\nblade = \"no_blade.csv\"", "names no node"),
         ("boundary = \"pairs.csv\"\nmistuning = { of = \"blade.stiffness\", deviation = 0.1 }", "add blade = "),
     ] {
@@ -554,9 +558,9 @@ fn coordinates_tell_a_wrong_sector() {
         ("sectors = 6\naxis = \"z\"\nboundary = \"swapped.csv\"", "the sides are exchanged"),
         ("sectors = 6\naxis = \"z\"\nboundary = \"crossed.csv\"", "away from node `4`"),
         ("sectors = 6\naxis = \"z\"\nboundary = \"few.csv\"", "no pair names them"),
-        ("sectors = 7\naxis = \"z\"\nboundary = \"right.csv\"", "as on a disk of 6.00 sectors"),
+        ("sectors = 7\naxis = \"z\"\nboundary = \"right.csv\"", "as in a disk with 6.00 sectors"),
         ("sectors = 7\naxis = \"z\"", "number of sectors"),
-        ("sectors = 6\naxis = \"x\"\nboundary = \"right.csv\"", "they fit about z"),
+        ("sectors = 6\naxis = \"x\"\nboundary = \"right.csv\"", "they coincide for a rotation about z"),
         ("sectors = 6\nboundary = \"right.csv\"", "there is no `axis`"),
     ] {
         assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));

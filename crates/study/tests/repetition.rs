@@ -130,7 +130,7 @@ fn errors_name_the_entry_and_the_index() {
     check("\"blade{i}\"", "\"blade{i/2}\"", 7, &["whole number, found 0.5", "(i = 1)"]);
     check("\"blade{i}\"", "\"blade{i\"", 7, &["not closed"]);
     check("\"blade{i}\"", "\"{i}\"", 7, &["`1` is no name"]);
-    check("\"blade{i}\"", "\"blade\"", 7, &["stands twice", "(mass 1, i = 2)"]);
+    check("\"blade{i}\"", "\"blade\"", 7, &["appears twice", "(mass 1, i = 2)"]);
     check("repeat = { i = 12 }\nname", "name", 6, &["repeat = { i = 12 }"]);
     // errors of the repetition itself
     check("{ i = 12 }", "{ i = 0 }", 6, &["number of times"]);
@@ -212,5 +212,5 @@ harmonics = 1
     let exact = text.replace("kind = \"harmonic-balance\"\nharmonics = 1", "kind = \"event-driven\"");
     let study = read_study("ring.toml", &exact, &[]).unwrap().with_memory_limit(u64::MAX);
     let error = stickslip_study::run::check(&study).unwrap_err().to_string();
-    assert!(error.contains("full matrices over at most 2000 places"), "{error}");
+    assert!(error.contains("full matrices and takes at most 2000 degrees of freedom"), "{error}");
 }

@@ -494,14 +494,14 @@ fn what_is_wrong_is_said() {
     let moved = format!(
         "{twin}[[place]]\nname = \"twin\"\ndof = \"{node}.x\"\n[[motion]]\non = \"twin\"\namplitude = \"1 mm\"\n"
     );
-    told(&twin, &moved, &["`tip.x` follows `twin`", "leave out the place"]);
+    told(&twin, &moved, &["`tip.x` is determined by the imposed motion of `twin`", "remove the place"]);
     for ratio in ["1e300", "2"] {
         told(DAMPED, &format!("modal_damping = {ratio}"), &["study.toml:7", "no mode vibrates", "0.1 %"]);
     }
     told(
         DAMPED,
         &format!("{DAMPED}\nreduce = {{ up_to = \"1e12 Hz\" }}"),
-        &["has none far above", "lowest frequencies", "reduce = false"],
+        &["has no modes far above", "lowest frequencies", "reduce = false"],
     );
     // stiffness in wrong units: frequencies of 5e-4 Hz and 5e8 Hz
     let other = good.replacen("k.mtx\"\nmass = \"m.mtx", "k.npz\"\nmass = \"m.npz", 1);

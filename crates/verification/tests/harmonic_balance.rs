@@ -457,7 +457,7 @@ fn clear_words_instead_of_wrong_amplitudes() {
     let refused = |method: HarmonicBalance| method.solver(&system).err().expect("refused").to_string();
     assert_eq!(
         refused(HarmonicBalance { harmonics: Some(3), ..HarmonicBalance::default() }),
-        "option `harmonics` of harmonic-balance: must be 5 (the excitation's) to 10000, found 3"
+        "option `harmonics` of harmonic-balance: must be from 5 (the highest harmonic of the excitation) to 10000, found 3"
     );
     assert_eq!(refused(balance(9, 20)), "option `samples` of harmonic-balance: must be even and at least 40, found 20");
     // rigid friction with stick: the series converges slowly

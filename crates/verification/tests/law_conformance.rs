@@ -45,7 +45,7 @@ fn rows_are_whole() {
     let mut names = BTreeSet::new();
     for row in TABLE {
         let law = row.sample();
-        assert!(names.insert(row.name), "{} stands twice", row.name);
+        assert!(names.insert(row.name), "{} appears twice", row.name);
         assert!(std::ptr::eq(find(row.name).unwrap(), *row));
         assert!((1..=MOST_DIRECTIONS).contains(&law.directions()), "{}", row.name);
         assert!(!views(&*law).is_empty(), "{} offers no view", row.name);
@@ -53,7 +53,7 @@ fn rows_are_whole() {
         assert!(law.check().is_ok() && law.scale() > 0.0, "{}", row.name);
         assert!(std::ptr::eq(law.info(), *row));
         let keys: BTreeSet<_> = row.parameters.iter().map(|p| p.key).collect();
-        assert_eq!(keys.len(), row.parameters.len(), "{}: a key stands twice", row.name);
+        assert_eq!(keys.len(), row.parameters.len(), "{}: a key appears twice", row.name);
         for parameter in row.parameters {
             assert!(parameter.power.is_none_or(|power| keys.contains(power)), "{}: {}", row.name, parameter.key);
             assert!(

@@ -406,7 +406,7 @@ impl Method for Linear {
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         match system.joints().first() {
             None => Ok(Box::new(LinearSolver(system))),
-            Some(joint) => Err(MethodError::law("linear", joint, "joints are none of its matters")),
+            Some(joint) => Err(MethodError::law("linear", joint, "it takes no joints")),
         }
     }
 }

@@ -188,7 +188,7 @@ fn negative_damping_is_computed() {
             match orbit.stability() {
                 Stability::Proven => assert!(stable),
                 Stability::Computed { largest } => assert!((largest - expected).abs() < 1e-9, "{largest} {expected}"),
-                Stability::Unknown => panic!("{} knows nothing", orbit.method),
+                Stability::Unknown => panic!("{} reports no stability", orbit.method),
             }
             assert_eq!(matches!(orbit.stability(), Stability::Proven), stable);
         }

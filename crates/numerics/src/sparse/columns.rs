@@ -39,7 +39,7 @@ pub fn products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
 /// every column of V and a column for every column of W.
 pub fn add(n: usize, w: &mut [f64], factor: f64, v: &[f64], s: &DMatrix<f64>) {
     let (inner, columns) = (count(n, v), count(n, w));
-    assert_eq!(s.shape(), (inner, columns), "a combination of {inner} columns to {columns}");
+    assert_eq!(s.shape(), (inner, columns), "S must have {inner} rows and {columns} columns");
     if inner * columns > 0 {
         matmul(
             MatMut::from_column_major_slice_mut(w, n, columns),
@@ -132,10 +132,10 @@ const TOGETHER: usize = 8;
 /// Returns the number of columns of length `n`.
 fn count(n: usize, v: &[f64]) -> usize {
     if n == 0 {
-        assert!(v.is_empty(), "{} numbers are no columns of length zero", v.len());
+        assert!(v.is_empty(), "{} numbers do not form columns of length zero", v.len());
         return 0;
     }
-    assert!(v.len().is_multiple_of(n), "{} numbers are no columns of {n}", v.len());
+    assert!(v.len().is_multiple_of(n), "{} numbers do not form columns of length {n}", v.len());
     v.len() / n
 }
 

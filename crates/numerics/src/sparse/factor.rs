@@ -27,7 +27,7 @@ const NUDGE: f64 = 1e-9;
 /// Error: the matrix is singular to rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the matrix is singular: row {row} (from 0) depends on the others; hold what it belongs to, or shift the matrix"
+    "the matrix is singular: row {row} (counted from 0) depends on the others; support the part that it belongs to, or shift the matrix"
 )]
 pub struct Singular {
     /// A row with a free motion, from 0.
@@ -175,7 +175,7 @@ impl Factor {
         if n == 0 || right.is_empty() {
             return;
         }
-        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        assert!(right.len().is_multiple_of(n), "{} numbers do not form columns of length {n}", right.len());
         self.blocks.solve(self.pattern.real(), right);
     }
 }
@@ -217,7 +217,7 @@ impl ComplexFactor {
         if n == 0 || right.is_empty() {
             return;
         }
-        assert!(right.len().is_multiple_of(n), "{} numbers are no columns of {n}", right.len());
+        assert!(right.len().is_multiple_of(n), "{} numbers do not form columns of length {n}", right.len());
         match &self.kind {
             Kind::Symmetric(blocks) => {
                 let mut parts: Vec<f64> = right.iter().flat_map(|z| [z.re, z.im]).collect();

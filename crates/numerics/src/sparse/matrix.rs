@@ -33,7 +33,7 @@ pub struct Matrix {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MatrixError {
     /// An entry lies outside the matrix.
-    #[error("an entry stands in row {row}, column {column} (from 0), and the matrix is {n} x {n}")]
+    #[error("an entry in row {row}, column {column} (counted from 0) lies outside the {n} x {n} matrix")]
     OutOfRange {
         /// Row of the entry.
         row: usize,
@@ -43,7 +43,7 @@ pub enum MatrixError {
         n: usize,
     },
     /// An entry is not finite.
-    #[error("row {row}, column {column} (from 0) has {value}; every entry must be finite")]
+    #[error("the entry in row {row}, column {column} (counted from 0) is {value}; every entry must be finite")]
     NotFinite {
         /// Row of the entry.
         row: usize,
@@ -53,7 +53,9 @@ pub enum MatrixError {
         value: f64,
     },
     /// The numbers of rows or entries exceed the 32-bit indices.
-    #[error("a matrix of {n} rows and {entries} entries is too large: at most {MOST} of either")]
+    #[error(
+        "a matrix with {n} rows and {entries} entries is too large; at most {MOST} rows and {MOST} entries are supported"
+    )]
     TooLarge {
         /// Number of rows.
         n: usize,
@@ -186,7 +188,7 @@ impl Matrix {
     /// # Panics
     /// If `x` does not have n entries.
     pub fn times(&self, x: &[f64]) -> Vec<f64> {
-        assert_eq!(x.len(), self.n, "the vector of a product has as many entries as the matrix has columns");
+        assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
         let mut product = vec![0.0; self.n];
         for (row, column, value) in self.entries() {
             product[row] += value * x[column];
@@ -199,7 +201,7 @@ impl Matrix {
     /// # Panics
     /// If `x` does not have n entries.
     pub fn times_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
-        assert_eq!(x.len(), self.n, "the vector of a product has as many entries as the matrix has columns");
+        assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
         let mut product = vec![Complex64::new(0.0, 0.0); self.n];
         for (row, column, value) in self.entries() {
             product[row] += x[column] * value;

@@ -63,13 +63,16 @@ impl Pattern {
     pub fn sum<T: Copy + Default + AddAssign + Mul<f64, Output = T>>(&self, sum: &[(T, &Matrix)]) -> Vec<T> {
         let mut values = vec![T::default(); self.rows.len()];
         for &(factor, matrix) in sum {
-            assert_eq!(matrix.n(), self.n, "the matrices of a sum have the size of those analysed");
+            assert_eq!(matrix.n(), self.n, "the matrices of a sum must have the size of the analysed matrices");
             for column in 0..self.n {
                 let mut at = self.starts[column] as usize;
                 for (row, value) in matrix.column(column) {
                     while self.rows[at] as usize != row {
                         at += 1;
-                        assert!(at < self.starts[column + 1] as usize, "({row}, {column}) was not analysed");
+                        assert!(
+                            at < self.starts[column + 1] as usize,
+                            "entry ({row}, {column}) lies outside the analysed pattern"
+                        );
                     }
                     values[at] += factor * value;
                 }
@@ -83,7 +86,7 @@ impl Pattern {
         let symbolic = self.real();
         let mut values = vec![0.0; symbolic.rows.len()];
         for &(factor, matrix) in sum {
-            assert_eq!(matrix.n(), self.n, "the matrices of a sum have the size of those analysed");
+            assert_eq!(matrix.n(), self.n, "the matrices of a sum must have the size of the analysed matrices");
             for column in 0..self.n {
                 let (mut at, end) = (symbolic.starts[column] as usize, symbolic.starts[column + 1] as usize);
                 let own = matrix.range(column);
@@ -92,7 +95,7 @@ impl Pattern {
                 for (&row, value) in matrix.rows[own.clone()].iter().zip(&matrix.values[own]) {
                     while symbolic.rows[at] != row {
                         at += 1;
-                        assert!(at < end, "({row}, {column}) was not analysed");
+                        assert!(at < end, "entry ({row}, {column}) lies outside the analysed pattern");
                     }
                     values[at] += factor * value;
                 }
@@ -164,7 +167,7 @@ impl Pattern {
 /// Returns the union of the patterns, the mirrored patterns and the diagonal,
 /// by columns with rising rows.
 fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
-    assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum have one size");
+    assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum must have one size");
     let mirrored: Vec<_> = matrices.iter().map(|matrix| mirrored(n, &matrix.starts, &matrix.rows)).collect();
     let most = matrices.iter().map(|matrix| matrix.rows.len()).max().unwrap_or(0);
     let (mut starts, mut rows) = (Vec::with_capacity(n + 1), Vec::with_capacity(most + n));
@@ -235,7 +238,7 @@ fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
         links.extend(others.map(|other| alike[*other as usize] as i32));
         among.push(links.len() as i32);
     }
-    let pattern = CscPattern::new(number as usize, &among, &links).expect("the union of the patterns is one");
+    let pattern = CscPattern::new(number as usize, &among, &links).expect("the union of patterns is a pattern");
     let order = metis_order(&pattern).unwrap_or_else(|error| panic!("{n} rows, {} entries: {error:?}", rows.len()));
     let mut members = vec![Vec::new(); number as usize];
     alike.iter().enumerate().for_each(|(row, &number)| members[number as usize].push(row as u32));

@@ -89,7 +89,7 @@ impl PerformanceCurve {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PerformanceError<E> {
     /// The system could not be built.
-    #[error("no system at the value {value}: {cause}")]
+    #[error("the system could not be built at the parameter value {value}: {cause}")]
     System {
         /// Value of the parameter.
         value: f64,

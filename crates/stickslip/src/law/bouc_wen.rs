@@ -28,13 +28,14 @@ pub(super) static INFO: LawInfo = LawInfo {
     name: "bouc-wen",
     summary: "smooth hysteresis, f = stiffness z, z' = u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n with n = exponent",
     parameters: &[
-        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
-        Parameter::new("beta", Dimension::INVERSE_LENGTH, Range::ZeroOrMore, "makes the loop").to_the(EXPONENT),
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness"),
+        Parameter::new("beta", Dimension::INVERSE_LENGTH, Range::ZeroOrMore, "size of the hysteresis loop")
+            .to_the(EXPONENT),
         Parameter::new(
             "gamma",
             Dimension::INVERSE_LENGTH,
             Range::Any,
-            "shapes the loop; beta + gamma must be more than zero",
+            "shape of the hysteresis loop; beta + gamma must be more than zero",
         )
         .to_the(EXPONENT),
         Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, SHARPEST), "sharpness of the knee").or(1.0),
@@ -96,7 +97,7 @@ impl Law for BoucWen {
             return Ok(());
         }
         Err(format!(
-            "`beta + gamma` must be more than zero, or nothing bounds the force; found {}",
+            "`beta + gamma` is {}; it must be more than zero, otherwise the force is unbounded",
             self.beta + self.gamma
         ))
     }

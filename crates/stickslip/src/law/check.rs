@@ -49,12 +49,12 @@ impl dyn Law + '_ {
         ];
         if let Some(size) = sizes.into_iter().flatten().find(|size| !(size.is_finite() && *size > 0.0)) {
             let message =
-                format!("the size of its internal states, `state_scale`, must be finite and above zero, found {size}");
+                format!("`state_scale` is {size}; the scale of the internal states must be finite and positive");
             return Err(LawError::Inconsistent { law: self.name(), message });
         }
         if self.is_odd() && mirror::is_broken(self) {
-            let message = "it says that it is odd, and the mirror image of a motion does not have the mirror image of its force: `is_odd` must be \
-                           false";
+            let message = "`is_odd` returns true, but a mirrored motion does not give the mirrored force; `is_odd` \
+                           must return false";
             return Err(LawError::Inconsistent { law: self.name(), message: message.to_owned() });
         }
         self.consistent().map_err(|message| LawError::Inconsistent { law: self.name(), message })

@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb",
     summary: "rigid dry friction, f = limit Sgn(u'), exact",
-    parameters: &[Parameter::limit("slip limit: friction force while slipping")],
+    parameters: &[Parameter::limit("slip limit: friction force during slip")],
     sample: &[2.0],
     build: |values| Arc::new(Coulomb { limit: values[0] }),
 };

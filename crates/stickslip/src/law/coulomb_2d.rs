@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb-2d",
     summary: "rigid dry friction in a plane, |f| <= limit, f = limit u'/|u'| in slip",
-    parameters: &[Parameter::limit("slip limit: size of the friction force while slipping")],
+    parameters: &[Parameter::limit("slip limit: magnitude of the friction force during slip")],
     sample: &[2.0],
     build: |values| Arc::new(Coulomb2d { limit: values[0] }),
 };

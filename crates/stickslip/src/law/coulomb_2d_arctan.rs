@@ -18,7 +18,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     name: "coulomb-2d-arctan",
     summary: "smoothed dry friction in a plane, f = limit (2/pi) arctan(alpha |u'|) u'/|u'|",
     parameters: &[
-        Parameter::limit("size of the friction force at high sliding velocity"),
+        Parameter::limit("magnitude of the friction force at high sliding velocity"),
         Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
     ],
     sample: &[2.0, 25_000.0],

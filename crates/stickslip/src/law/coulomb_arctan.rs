@@ -18,7 +18,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     summary: "smoothed dry friction, f = limit (2/pi) arctan(alpha u'), paper Eq. (2)",
     parameters: &[
         Parameter::limit("friction force at high sliding velocity"),
-        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
+        Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at zero velocity"),
     ],
     sample: &[2.0, 25_000.0],
     build: |values| Arc::new(CoulombArctan { limit: values[0], alpha: values[1] }),

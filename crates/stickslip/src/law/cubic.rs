@@ -19,7 +19,7 @@ pub(super) static INFO: LawInfo = LawInfo {
         "stiffness",
         Dimension::CUBIC_STIFFNESS,
         Range::Any,
-        "force per cube of the stretch; negative softens",
+        "force per cube of the elongation; negative: softening",
     )],
     sample: &[4e9],
     build: |values| Arc::new(Cubic { stiffness: values[0] }),

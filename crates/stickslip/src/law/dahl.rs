@@ -16,8 +16,8 @@ pub(super) static INFO: LawInfo = LawInfo {
     name: "dahl",
     summary: "presliding friction, f' = stiffness u' (1 - (f/limit) sgn u')",
     parameters: &[
-        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
-        Parameter::limit("slip limit, which long motion to one side tends to"),
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness"),
+        Parameter::limit("slip limit; the force approaches it under monotonic loading"),
     ],
     sample: &[10_000.0, 2.0],
     build: |values| Arc::new(Dahl { stiffness: values[0], limit: values[1] }),

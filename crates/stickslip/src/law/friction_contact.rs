@@ -36,14 +36,14 @@ pub(super) static INFO: LawInfo = LawInfo {
             "preload",
             Dimension::FORCE,
             Range::Any,
-            "normal load where the structure does not give way, which takes part of it otherwise; negative: a gap of -preload/normal",
+            "normal load at zero displacement; an elastic structure relieves part of it; negative: a gap of -preload/normal",
         )
         .or(0.0),
         Parameter::new(
             TANGENTS,
             Dimension::NONE,
             Range::Count(2),
-            "tangential directions before the normal; by default those of the nodes",
+            "number of tangential directions; by default that of the nodes",
         )
         .or(2.0),
     ],

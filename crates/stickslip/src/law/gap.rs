@@ -14,13 +14,13 @@ use stickslip_numerics::dual::Real;
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "gap",
-    summary: "elastic stop behind a gap, f = stiffness max(u - gap, 0), exact",
+    summary: "elastic stop with a gap, f = stiffness max(u - gap, 0), exact",
     parameters: &[
         Parameter::new(
             "gap",
             Dimension::LENGTH,
             Range::Any,
-            "where the faces meet; negative: they are pressed together at rest",
+            "displacement at which the faces touch; negative: the stop is compressed at zero displacement",
         ),
         Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness of the stop"),
     ],

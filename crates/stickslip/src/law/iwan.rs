@@ -41,25 +41,25 @@ pub(super) static INFO: LawInfo = LawInfo {
     name: "iwan",
     summary: "parallel spring-sliders with the four-parameter distribution of Segalman, exact",
     parameters: &[
-        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest, KT"),
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness, KT"),
         Parameter::limit("slip limit, FS"),
         Parameter::new(
             "chi",
             Dimension::NONE,
             Range::Within(-1.0, 0.0),
-            "exponent of the distribution, above -1: a cycle loses u^(chi+3)",
+            "exponent of the distribution, above -1; a cycle dissipates an energy proportional to u^(chi+3)",
         ),
         Parameter::new(
             "beta",
             Dimension::NONE,
             Range::ZeroOrMore,
-            "stiffness that slips last over that of the distribution",
+            "ratio of the stiffness that slips last to that of the distribution",
         ),
         Parameter::new(
             "elements",
             Dimension::NONE,
             Range::UpTo(MOST),
-            "sliders that approximate the distribution, for `event-driven`; 0: the distribution itself, exact",
+            "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
         )
         .or(0.0),
     ],
@@ -199,7 +199,7 @@ impl Law for Iwan {
         if self.chi > -1.0 {
             return Ok(());
         }
-        Err("`chi` must be above -1, or the stiffness at rest has no bound".to_owned())
+        Err("`chi` must be above -1; otherwise the initial stiffness is infinite".to_owned())
     }
 }
 

@@ -16,7 +16,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     summary: "spring and slider in series, f = kt (u - s), |f| <= limit, exact, paper Eq. (1)",
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
-        Parameter::limit("slip limit: force while the slider moves"),
+        Parameter::limit("slip limit: force during slip"),
     ],
     sample: &[10_000.0, 2.0],
     build: |values| Arc::new(Jenkins { stiffness: values[0], limit: values[1] }),

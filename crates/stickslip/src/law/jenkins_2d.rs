@@ -22,7 +22,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     summary: "spring and slider in series in a plane, f = kt (u - s), |f| <= limit",
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
-        Parameter::limit("slip limit: size of the force while the slider moves"),
+        Parameter::limit("slip limit: magnitude of the force during slip"),
     ],
     sample: &[10_000.0, 2.0],
     build: |values| Arc::new(Jenkins2d { stiffness: values[0], limit: values[1] }),

@@ -19,7 +19,7 @@ pub(super) static INFO: LawInfo = LawInfo {
     summary: "spring and smoothed slider in series in a plane, f' = kt (u' - tan(pi |f|/(2 limit))/alpha f/|f|)",
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "tangential contact stiffness"),
-        Parameter::limit("size of the friction force at high sliding velocity"),
+        Parameter::limit("magnitude of the friction force at high sliding velocity"),
         Parameter::positive("alpha", Dimension::INVERSE_VELOCITY, "steepness of the arctangent at rest"),
     ],
     sample: &[10_000.0, 2.0, 25_000.0],

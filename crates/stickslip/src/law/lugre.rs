@@ -108,10 +108,9 @@ impl Law for LuGre {
     fn consistent(&self) -> Result<(), String> {
         super::stribeck_curve::limits_fit(self.limit, self.static_limit)?;
         if self.limit == 0.0 && self.static_limit > 0.0 {
-            return Err(
-                "`limit` must be more than zero where `static_limit` is, or bristles would break at high velocity"
-                    .to_owned(),
-            );
+            return Err("`limit` is zero, but `static_limit` is positive: the law divides by the \
+                 friction force, which is `limit` at high velocity; make `limit` positive"
+                .to_owned());
         }
         Ok(())
     }

@@ -114,7 +114,7 @@ impl Parameter {
     /// };
     /// assert_eq!(parameter("dahl", "limit"), "force (N), zero or more");
     /// assert_eq!(parameter("bouc-wen", "gamma"), "inverse length (1/m) to the power `exponent`, of either sign");
-    /// assert_eq!(parameter("friction-contact", "tangents"), "a whole number from 1 to 2; 2 if absent");
+    /// assert_eq!(parameter("friction-contact", "tangents"), "a whole number from 1 to 2; default 2");
     /// ```
     pub fn takes(&self) -> String {
         let power = self.power.map(|power| format!(" to the power `{power}`")).unwrap_or_default();
@@ -123,7 +123,7 @@ impl Parameter {
             (range, Dimension::NONE) => format!("pure number{power}, {range}"),
             (range, dimension) => format!("{dimension}{power}, {range}"),
         };
-        what + &self.default.map(|value| format!("; {value} if absent")).unwrap_or_default()
+        what + &self.default.map(|value| format!("; default {value}")).unwrap_or_default()
     }
 
     /// Returns the parameter with a default value, SI.
@@ -141,7 +141,7 @@ fn measured(dimension: Dimension) -> String {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LawError {
     /// A value is out of range.
-    #[error("{law}: `{key}` must be a finite {}, {range}, found {value}", measured(*.dimension))]
+    #[error("{law}: `{key}` is {value}; it must be a finite {}, {range}", measured(*.dimension))]
     Value {
         /// Name of the law.
         law: &'static str,
@@ -178,7 +178,7 @@ impl LawError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildError {
     /// Parameters are missing.
-    #[error("law `{law}` needs {}", .keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", "))]
+    #[error("law `{law}` needs values for {}", .keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", "))]
     Missing {
         /// Name of the law.
         law: &'static str,

@@ -21,7 +21,7 @@ static INFO: LawInfo = LawInfo {
         along("first"),
         along("second"),
         along("third"),
-        Parameter::new("directions", Dimension::NONE, Range::Count(3), "directions that it acts along"),
+        Parameter::new("directions", Dimension::NONE, Range::Count(3), "number of directions"),
     ],
     sample: &[1e4, 1e4, 1e4, 3.0],
     build: |values| Springs::shared(&values[..(values[3] as usize).clamp(1, MOST_DIRECTIONS)]),

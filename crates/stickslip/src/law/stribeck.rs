@@ -31,7 +31,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             "velocity",
             Dimension::VELOCITY,
             Range::ZeroOrMore,
-            "velocity over which friction falls, vs; 0: at once",
+            "velocity over which friction falls, vs; 0: friction drops immediately at slip",
         )
         .or(0.0),
     ],

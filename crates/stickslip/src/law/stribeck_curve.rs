@@ -15,5 +15,7 @@ pub(super) fn limits_fit(limit: f64, static_limit: f64) -> Result<(), String> {
     if static_limit >= limit {
         return Ok(());
     }
-    Err(format!("`static_limit` must not be below `limit`, found {static_limit} N and {limit} N"))
+    Err(format!(
+        "`static_limit` ({static_limit} N) is below `limit` ({limit} N); the static limit must be at least the dynamic limit"
+    ))
 }

@@ -27,7 +27,7 @@ pub type SharedLaw = Arc<dyn Law>;
 ///     name: "stiffening",
 ///     summary: "f = stiffness (u + growth u^3)",
 ///     parameters: &[
-///         Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest"),
+///         Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness"),
 ///         Parameter::positive("growth", Dimension::NONE, "growth of the stiffness, 1/m^2"),
 ///     ],
 ///     sample: &[1e4, 1e6],
@@ -158,7 +158,7 @@ pub trait Law: Debug + Send + Sync {
     /// Checks that the parameters are consistent with each other.
     ///
     /// # Errors
-    /// A sentence without the law's name, such as "`beta + gamma` must be more than zero".
+    /// A sentence without the law's name, such as "`beta + gamma` is -1; it must be more than zero".
     fn consistent(&self) -> Result<(), String> {
         Ok(())
     }

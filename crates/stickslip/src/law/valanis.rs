@@ -22,14 +22,14 @@ pub(super) static INFO: LawInfo = LawInfo {
     name: "valanis",
     summary: "joint with stick and slip stiffness, f' = E0 u' (1 + q)/(1 + kappa q), q = (lambda/E0) sgn(u') (Et u - f)",
     parameters: &[
-        Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness at rest, E0"),
+        Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness, E0"),
         Parameter::new(
             "slip_stiffness",
             Dimension::STIFFNESS,
             Range::ZeroOrMore,
             "stiffness in slip, Et; below `stiffness`",
         ),
-        Parameter::positive("lambda", Dimension::INVERSE_LENGTH, "how soon it slips"),
+        Parameter::positive("lambda", Dimension::INVERSE_LENGTH, "rate of the transition from stick to slip"),
         Parameter::new("kappa", Dimension::NONE, Range::Within(0.0, 1.0), "sharpness of the knee, below 1"),
     ],
     sample: &[10_000.0, 1000.0, 5000.0, 0.6],
@@ -85,10 +85,10 @@ impl Law for Valanis {
     }
     fn consistent(&self) -> Result<(), String> {
         if self.slip_stiffness >= self.stiffness {
-            return Err("`slip_stiffness` must be below `stiffness`, or the joint does not slip".to_owned());
+            return Err("`slip_stiffness` must be below `stiffness`; otherwise the joint does not slip".to_owned());
         }
         if self.kappa >= 1.0 {
-            return Err("`kappa` must be below 1, where the joint is a spring".to_owned());
+            return Err("`kappa` must be below 1; at 1 the joint is a linear spring".to_owned());
         }
         Ok(())
     }

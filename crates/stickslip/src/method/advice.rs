@@ -135,7 +135,7 @@ mod tests {
     fn errors_name_methods_that_take_the_system() {
         let exact: SharedLaw = Arc::new(Coulomb { limit: 4.0 });
         for (law, named, unnamed) in [
-            (exact, "`event-driven`, or `shooting` with a `width`", "`transient`"),
+            (exact, "`event-driven`, or `shooting` with the option `width`", "`transient`"),
             (Arc::new(CoulombArctan { limit: 4.0, alpha: 1e4 }), "`shooting`", "event-driven"),
         ] {
             let mut model = crate::model::example::blade_couple();

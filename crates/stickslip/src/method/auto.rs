@@ -17,10 +17,10 @@ use crate::orbit::{Course, Orbit, OrbitError};
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
-    summary: "event-driven where all laws are exact, shooting where all are smooth, or friction falls with velocity along a smooth curve; harmonic balance where neither holds (friction in a plane or with \
-              a normal force, mixtures), where a place has no mass, where fewer multiplications are counted for it than from event to event, beyond 12 smooth \
-              joints or 24 degrees of freedom with them, and for waves around a tuned disk; what it does not take goes to the method that does, \
-              and a point that it does not find to the next one that takes it within seconds",
+    summary: "picks a method: event-driven for exact laws; shooting for smooth laws and for friction that falls with \
+              velocity along a smooth curve, up to 12 joints and 24 degrees of freedom; harmonic balance for all \
+              other systems, for places without mass, for travelling waves on a tuned disk, and where it is cheaper; \
+              picks another method if this one refuses the system, and tries a second fast one if it finds no orbit",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
 };
@@ -82,15 +82,15 @@ impl Auto {
         let balance =
             |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };
         if joints > 0 && system.cyclic().is_some() {
-            balance("one of equal sectors is solved".to_owned())
+            balance("it solves one sector of the tuned disk".to_owned())
         } else if massless {
             balance("a place has no mass".to_owned())
         } else if !system.structure().has_definite_mass() {
-            balance("some motion has no mass".to_owned())
+            balance("the mass matrix is singular".to_owned())
         } else if let Some(events) = events {
             if events > DEAREST || events > harmonic_balance::orbit_work(system) {
                 let sizes = format!("{} degrees of freedom and {joints} joints", system.dofs());
-                return balance(format!("faster than from event to event with {sizes}"));
+                return balance(format!("faster than event-driven with {sizes}"));
             }
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
@@ -99,14 +99,14 @@ impl Auto {
             && system.dofs() <= DOFS
             && joints <= FOLLOWED
         {
-            let because = "friction falls with velocity, and its switches are located";
+            let because = "friction falls with velocity along a smooth curve; shooting locates its switches";
             (Box::new(Shooting::default()), because.to_owned())
         } else if !smooth {
-            balance("neither are all laws exact nor all smooth".to_owned())
+            balance("the laws are neither all exact nor all smooth".to_owned())
         } else if system.dofs() > DOFS {
-            balance(format!("{} degrees of freedom are more than {DOFS}", system.dofs()))
+            balance(format!("{} degrees of freedom exceed the limit of {DOFS} for shooting", system.dofs()))
         } else if joints > FOLLOWED {
-            balance(format!("{joints} joints are more than {FOLLOWED}"))
+            balance(format!("{joints} joints exceed the limit of {FOLLOWED} for shooting"))
         } else {
             (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }
@@ -331,7 +331,7 @@ mod tests {
         let first = Box::new(Nothing);
         let mut solver = WithSecond { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
         let said = solver.orbit(TAU * 121.0, None).unwrap_err().to_string();
-        assert!(said.ends_with("; `harmonic-balance` finds none either"), "{said}");
+        assert!(said.ends_with("; `harmonic-balance` found no orbit either"), "{said}");
     }
 
     /// No affordable series reaches this tolerance. The solver refuses it after a few short

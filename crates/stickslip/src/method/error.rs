@@ -31,7 +31,7 @@ pub enum Refusal {
     },
     /// A place has no mass.
     #[error(
-        "{method} needs a mass above zero at `{place}` (the law `jenkins` stands for a spring, a massless place and a slider)"
+        "{method} needs a positive mass at `{place}` (for a massless place between a spring and a slider, use one joint with the law `jenkins`)"
     )]
     NeedsMass {
         /// Name of the method.
@@ -41,8 +41,9 @@ pub enum Refusal {
     },
     /// A place has no mass, spring or damper, only joints.
     #[error(
-        "{method} needs a mass, a spring or a damper at `{place}`: nothing else says how it moves between its joints; of joints in series make one, as \
-         of two `jenkins`, which have the smaller limit and the springs of both in series"
+        "{method} needs a mass, a spring or a damper at `{place}`, because joints alone do not determine its motion; \
+         replace joints in series by one joint (two `jenkins` in series equal one with the smaller limit and both \
+         springs in series)"
     )]
     Empty {
         /// Name of the method.
@@ -52,8 +53,9 @@ pub enum Refusal {
     },
     /// A place between rigid joints is so light that rounding removes its inertia.
     #[error(
-        "{method} loses the inertia of `{place}`, which is {ratio:.0e} times lighter than what it rubs on at joint `{joint}` and rubs on something else, \
-         too: of rigid joints in series the weaker one slips, so leave the other and the place out, or give it {least:.0e} of that mass"
+        "{method} cannot resolve the inertia of `{place}`: it is {ratio:.0e} times lighter than the mass on the \
+         other side of joint `{joint}`, and has another rigid joint; rigid joints in series slip at the weaker one, \
+         so remove the place and the stronger joint, or give the place at least {least:.0e} of that mass"
     )]
     Light {
         /// Name of the method.
@@ -68,7 +70,7 @@ pub enum Refusal {
         least: f64,
     },
     /// The system has more degrees of freedom than the full matrices of the method may have.
-    #[error("{method} carries full matrices over at most {most} places, and there are {dofs}")]
+    #[error("{method} uses full matrices and takes at most {most} degrees of freedom; the system has {dofs}")]
     TooLarge {
         /// Name of the method.
         method: &'static str,
@@ -78,7 +80,7 @@ pub enum Refusal {
         most: usize,
     },
     /// A matrix is not positive definite.
-    #[error("{method} needs a positive definite {matrix} matrix")]
+    #[error("{method} needs a positive definite {matrix} matrix; check the masses of all places")]
     NotPositive {
         /// Name of the method.
         method: &'static str,

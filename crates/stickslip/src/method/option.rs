@@ -22,7 +22,7 @@ pub(super) const PERIOD: MethodOption = MethodOption {
     key: "period",
     dimension: Dimension::NONE,
     count: true,
-    doc: "periods of the drive after which the motion repeats; motions that repeat earlier are found too; 1 when absent",
+    doc: "excitation periods after which the orbit repeats; the method also finds orbits that repeat earlier; default 1",
 };
 
 /// Upper bound of [`PERIOD`]; a longer motion does not count as periodic.
@@ -45,8 +45,7 @@ pub const WIDTH: &str = "width";
 pub(super) fn width(method: &'static str, options: &Options) -> Result<Option<f64>, MethodError> {
     match options.get(WIDTH).copied() {
         Some(width) if !(width.is_finite() && width > 0.0) => {
-            let message =
-                format!("must be more than zero, found {width}; leave it out where laws are smooth by themselves");
+            let message = format!("must be more than zero, found {width}; omit it if all laws are smooth");
             Err(MethodError::option(method, WIDTH, message))
         }
         width => Ok(width),

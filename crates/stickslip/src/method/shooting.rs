@@ -77,19 +77,19 @@ const INSTANTS: usize = 8;
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "smooth laws and laws of steps: Newton on the period of an implicit integration, exact sensitivities",
+    summary: "smooth laws and laws with steps: Newton's method on the return map of an implicit integration, with exact sensitivities",
     options: &[
         MethodOption {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "relative error per step of the integration, a thousandth of that of orbits in equal steps; 1e-8 when absent",
+            doc: "relative error per step of the integration; orbits in equal steps have 1000 times this error; default 1e-8",
         },
         MethodOption {
             key: WIDTH,
             dimension: Dimension::VELOCITY,
             count: false,
-            doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are refused when absent",
+            doc: "smooths exact laws: friction changes sign over this velocity; without it, exact laws are refused",
         },
         PERIOD,
     ],

@@ -75,7 +75,7 @@ pub enum TimeHistoryError {
 }
 
 fn good(last: Option<f64>) -> String {
-    last.map_or("no sample before is good".to_owned(), |last| format!("the samples until t = {last:.6e} s are good"))
+    last.map_or("no sample is valid".to_owned(), |last| format!("the samples up to t = {last:.6e} s are valid"))
 }
 
 /// Most attempts to recompute an interval in which the motion broke down. Each attempt ends

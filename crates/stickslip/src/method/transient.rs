@@ -28,25 +28,25 @@ const PERIODS: usize = 50_000;
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "brute force: follow the motion until its transient has died, with an estimate of the rest",
+    summary: "integrates the motion until its transient has decayed, and estimates the remaining error",
     options: &[
         MethodOption {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "estimated relative distance to the orbit at which the motion counts as settled; 1e-7 when absent",
+            doc: "estimated relative distance to the orbit at which the motion counts as settled; default 1e-7",
         },
         MethodOption {
             key: "periods",
             dimension: Dimension::NONE,
             count: true,
-            doc: "periods after which the search is given up; 50000 when absent",
+            doc: "most periods before the search fails; default 50000",
         },
         MethodOption {
             key: WIDTH,
             dimension: Dimension::VELOCITY,
             count: false,
-            doc: "replaces exact laws by smooth ones that change sign over this velocity; exact laws are followed exactly when absent",
+            doc: "smooths exact laws: friction changes sign over this velocity; without it, exact laws stay exact",
         },
         PERIOD,
     ],

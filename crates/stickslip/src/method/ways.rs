@@ -37,16 +37,20 @@ fn one_of(names: &[&str]) -> String {
 
 impl fmt::Display for Ways {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = "with a `width` (m/s) over which friction changes its sign";
+        let width = "with the option `width` (m/s), which smooths the friction";
         match (&self.methods[..], &self.with_width[..]) {
             ([], []) => {
                 let one = |(methods, said): &(Vec<&str>, String)| match &methods[..] {
                     [only] => format!("{only} {said}"),
-                    [first, other] => format!("{first} {said}, and so does {other}"),
-                    [first, others @ ..] => format!("{first} {said}, and so do {}", others.join(" and ")),
+                    [first, other] => format!("{first} {said} (also {other})"),
+                    [first, others @ ..] => format!("{first} {said} (also {})", others.join(" and ")),
                     [] => said.clone(),
                 };
-                write!(f, "no method takes it: {}", self.missing.iter().map(one).collect::<Vec<_>>().join("; "))
+                write!(
+                    f,
+                    "no method takes this system: {}",
+                    self.missing.iter().map(one).collect::<Vec<_>>().join("; ")
+                )
             }
             (methods, []) => write!(f, "use method {}", one_of(methods)),
             ([], smoothing) => write!(f, "use method {} {width}", one_of(smoothing)),

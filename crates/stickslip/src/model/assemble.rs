@@ -149,7 +149,8 @@ impl Assembler<'_> {
         }
         let (angle, other) = if turns[0] { (&between[0], &between[1]) } else { (&between[1], &between[0]) };
         let message = format!(
-            "`{angle}` is a rotation and `{other}` a displacement: a spring joins two of a kind; the lever of a body is a [[place]] of it with `offset`"
+            "`{angle}` is a rotation and `{other}` is a displacement, but a spring connects two rotations or two \
+             displacements; for a lever, add a [[place]] of the body with `offset`"
         );
         Err(ModelError::new(element, "between", message))
     }
@@ -254,10 +255,17 @@ impl Assembler<'_> {
             let element = Element::Force(i);
             let value = harmonic_amplitude(force.amplitude, force.phase, element)?;
             let End::At(place) = self.places.find(&force.on, element, "on")? else {
-                return Err(ModelError::new(element, "on", "a force on `ground` moves nothing; name a mass"));
+                return Err(ModelError::new(
+                    element,
+                    "on",
+                    "a force on `ground` has no effect; name a mass or a place",
+                ));
             };
             if self.places.stated[place].moved {
-                let message = format!("`{}` has an imposed motion, a force on it changes nothing", force.on);
+                let message = format!(
+                    "`{}` has an imposed motion, so that a force on it has no effect; remove one of the two",
+                    force.on
+                );
                 return Err(ModelError::new(element, "on", message));
             }
             let (axis, moved) = self.axis(&self.coordinates.places[place]);
@@ -359,7 +367,7 @@ impl Assembler<'_> {
 
 fn differ(between: &[String; 2], element: Element) -> Result<(), ModelError> {
     if between[0] == between[1] {
-        let message = format!("both ends are `{}`; two different places are needed", between[0]);
+        let message = format!("both ends are `{}`; name two different places", between[0]);
         return Err(ModelError::new(element, "between", message));
     }
     Ok(())
@@ -383,8 +391,7 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
         }
     }
     if amplitude != 0.0 && !SIZES.contains(&amplitude.abs()) {
-        let message =
-            format!("{amplitude:e} in SI has no square that a computer can hold; is its unit the one that was meant?");
+        let message = format!("{amplitude:e} in SI units is out of range (1e-140 to 1e140); check its unit");
         return Err(ModelError::new(element, "amplitude", message));
     }
     Ok(Complex64::from_polar(1.0, phase) * amplitude)

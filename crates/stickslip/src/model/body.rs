@@ -131,14 +131,15 @@ impl Body {
     pub(super) fn check(&self) -> Result<(), Wrong> {
         let known = |name: &String| TRANSLATIONS.iter().chain(&ROTATIONS).any(|known| known == name);
         if let Some(other) = self.directions.iter().find(|name| !known(name)) {
-            let message =
-                format!("a body moves along x, y, z and turns about rx, ry, rz; there is no direction `{other}`");
+            let message = format!(
+                "`{other}` is not a direction of a body; use x, y, z (displacements) and rx, ry, rz (rotations)"
+            );
             return Err(("directions", message));
         }
         let about = self.rotations();
         if about.is_empty() {
-            let message = "the body has no rotation: name two or three of x, y, z, which rotations follow from, or rotations too, as in \
-                           [\"z\", \"ry\"]; what never turns is a [[mass]]";
+            let message = "the body has no rotation; name two or three of x, y, z (the rotations then follow), or \
+                           name a rotation, as in [\"z\", \"ry\"]; use a [[mass]] for a body that never rotates";
             return Err(("directions", message.to_owned()));
         }
         let along: Vec<usize> = (0..3).filter(|axis| self.has(TRANSLATIONS[*axis])).collect();
@@ -147,7 +148,7 @@ impl Body {
             && about != [own]
         {
             let message = format!(
-                "in the plane {}, {} a body turns about {} alone: its rotation is {}",
+                "a body in the plane {}, {} rotates about {} only; its rotation is {}",
                 TRANSLATIONS[first], TRANSLATIONS[second], TRANSLATIONS[own], ROTATIONS[own]
             );
             return Err(("directions", message));
@@ -162,14 +163,15 @@ impl Body {
         let entries = || about.iter().flat_map(|a| about.iter().map(|b| (*a, *b)));
         let symmetric = |(a, b): (usize, usize)| self.inertia[a][b] == self.inertia[b][a];
         if !entries().all(|(a, b)| self.inertia[a][b].is_finite()) || !entries().all(symmetric) {
-            return Err("must be finite numbers, in kg m^2, the same on both sides of the diagonal".to_owned());
+            return Err("must be a symmetric matrix of finite numbers, in kg m^2".to_owned());
         }
         let mut moments: Vec<f64> = self.principal().iter().map(|principal| principal.moment).collect();
         moments.sort_by(f64::total_cmp);
         if moments.len() < about.len() || moments[0] <= 0.0 {
             let least = moments.first().copied().unwrap_or(f64::NAN);
             return Err(format!(
-                "the moment of inertia about every axis must be above zero, and the smallest is {least:e} kg m^2; what has none is a [[mass]]"
+                "the moment of inertia about every axis must be above zero, but the smallest is {least:e} kg m^2; \
+                 use a [[mass]] for a body without inertia"
             ));
         }
         // tolerance for typed numbers with few digits
@@ -177,7 +179,8 @@ impl Body {
             && small + middle < 0.99 * large
         {
             return Err(format!(
-                "no body has the principal moments {small:e}, {middle:e} and {large:e} kg m^2: none is larger than the sum of the other two"
+                "the principal moments {small:e}, {middle:e} and {large:e} kg m^2 are physically \
+                 impossible: none may exceed the sum of the other two"
             ));
         }
         Ok(())
@@ -502,15 +505,15 @@ mod tests {
                 .contains("inertia the moment of inertia about every axis")
         );
         assert!(message(Body::in_plane("b", 0.0, 1.0, ["x", "z"])).contains("mass must be a finite number above zero"));
-        assert!(message(Body::in_space("b", 1.0, [1.0, 1.0, 2.5])).contains("none is larger than the sum"));
-        assert!(message(along(&["x", "z", "rx"])).contains("a body turns about y alone: its rotation is ry"));
+        assert!(message(Body::in_space("b", 1.0, [1.0, 1.0, 2.5])).contains("none may exceed the sum"));
+        assert!(message(along(&["x", "z", "rx"])).contains("rotates about y only; its rotation is ry"));
         assert!(message(along(&["x"])).contains("the body has no rotation"));
-        assert!(message(along(&["x", "north"])).contains("no direction `north`"));
-        assert!(message(along(&["x", "x", "ry"])).contains("stands twice"));
+        assert!(message(along(&["x", "north"])).contains("`north` is not a direction"));
+        assert!(message(along(&["x", "x", "ry"])).contains("appears twice"));
         let model = Model { bodies: vec![plane()], masses: vec![Mass::new("b", 1.0)], ..Model::default() };
-        assert!(model.assemble().unwrap_err().message.contains("stands twice"));
+        assert!(model.assemble().unwrap_err().message.contains("appears twice"));
         let model = Model { springs: vec![spring("b.ry", "b.x", 1.0)], bodies: vec![plane()], ..Model::default() };
-        assert!(model.assemble().unwrap_err().message.contains("`b.ry` is a rotation and `b.x` a displacement"));
+        assert!(model.assemble().unwrap_err().message.contains("`b.ry` is a rotation and `b.x` is a displacement"));
         let joint = Joint {
             name: "rub".into(),
             between: ["b.ry".into(), GROUND.into()],

@@ -70,7 +70,7 @@ impl Coordinates {
                 Of::Component(index, along) => match part.places.get(index) {
                     Some(rows) => rows[along].iter().map(|(at, weight)| (order.of_part(*at), *weight)).collect(),
                     None => {
-                        let message = "there is no structure that it could be a place of; add [structure]";
+                        let message = "the model has no structure for this place; add [structure]";
                         return Err(ModelError::new(Element::Place(index), "name", message));
                     }
                 },
@@ -237,8 +237,8 @@ fn follows(
         let name = moved[at - free];
         let motion = model.motions.iter().position(|motion| motion.on == name).unwrap_or(0);
         let message = format!(
-            "`{}` follows `{name}`, whose motion is imposed: they are weighted sums of the same rows, or the few coordinates of a reduction do not \
-             tell them apart; leave out the place, or say reduce = false in [structure]",
+            "`{}` is determined by the imposed motion of `{name}`: both are weighted sums of the same rows, or the \
+             reduced model cannot distinguish them; remove the place, or set reduce = false in [structure]",
             place.name
         );
         return Err(ModelError::new(Element::Motion(motion), "on", message));
@@ -265,7 +265,7 @@ impl Turned {
             let most = free.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()).then(b.0.cmp(&a.0)));
             let Some(&(at, weight)) = most.filter(|(_, weight)| weight.abs() > DEPENDENT * size) else {
                 let message =
-                    format!("the motion of `{name}` follows from other imposed motions; leave one of them out");
+                    format!("the motion of `{name}` is determined by other imposed motions; remove one of them");
                 return Err(ModelError::new(Element::Motion(0), "on", message));
             };
             let mut own: Row = vec![(count + k, 1.0 / weight)];

@@ -207,26 +207,26 @@ impl Disk {
     fn check(&self, sector: &Model) -> Result<(), ModelError> {
         let refuse = |element, key, message: String| Err(ModelError::new(element, key, message));
         if self.sectors < LEAST_SECTORS {
-            let message = format!("a disk has {LEAST_SECTORS} sectors or more, found {}", self.sectors);
+            let message = format!("a disk needs at least {LEAST_SECTORS} sectors, found {}", self.sectors);
             return refuse(Element::Whole, "sectors", message);
         }
         if sector.substructure.as_ref().is_some_and(|own| own.disk.is_none()) {
-            let message = "the matrices of a sector need to know what ties it to the next: the node pairs of its low and high side";
+            let message = "the matrices of a sector need the node pairs of its low and high side, which connect it to the next sector";
             return refuse(Element::Substructure, "stiffness", message.to_owned());
         }
         let next = |name: &str| NEXT.strip_suffix('.') == Some(name);
         if let Some(i) = sector.places.iter().position(|place| next(&place.name)) {
-            let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
+            let message = "`next` is reserved for the next sector of a disk; choose another name".to_owned();
             return refuse(Element::Place(i), "name", message);
         }
         for (i, mass) in sector.masses.iter().enumerate() {
             if next(&mass.name) {
-                let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
+                let message = "`next` is reserved for the next sector of a disk; choose another name".to_owned();
                 return refuse(Element::Mass(i), "name", message);
             }
         }
         if let Some(i) = sector.bodies.iter().position(|body| next(&body.name)) {
-            let message = "`next` stands for the next sector of a disk and cannot be declared".to_owned();
+            let message = "`next` is reserved for the next sector of a disk; choose another name".to_owned();
             return refuse(Element::Body(i), "name", message);
         }
         let mut known: BTreeSet<String> = sector.place_names().into_iter().collect();
@@ -247,12 +247,14 @@ impl Disk {
         }
         let excited = |on: &String, around: Around, element: Element| {
             if let Some(place) = on.strip_prefix(NEXT) {
-                let message = format!("name a place of the sector itself, such as `{place}`: every sector has its own");
+                let message =
+                    format!("name a place of the sector itself, such as `{place}`; each sector has its own excitation");
                 return refuse(element, "on", message);
             }
             match around {
                 Around::Sector(sector) if sector >= self.sectors => {
-                    let message = format!("there is no sector {sector}: they count from 0 to {}", self.sectors - 1);
+                    let message =
+                        format!("there is no sector {sector}; sectors are numbered from 0 to {}", self.sectors - 1);
                     refuse(element, "sector", message)
                 }
                 _ => Ok(()),
@@ -276,12 +278,12 @@ impl Disk {
 /// # Example
 /// ```
 /// assert_eq!(stickslip::model::too_far(&[0.02, -0.01]), None);
-/// assert!(stickslip::model::too_far(&[2.0, -1.0]).unwrap().contains("sector 1 deviates by -100.0 %: nothing is left"));
+/// assert!(stickslip::model::too_far(&[2.0, -1.0]).unwrap().contains("sector 1 deviates by -100.0 %: no stiffness or mass remains"));
 /// ```
 pub fn too_far(deviations: &[f64]) -> Option<String> {
     let first = |far: fn(f64) -> bool| deviations.iter().position(|deviation| far(*deviation));
     let said = |sector: usize| format!("sector {sector} deviates by {:.1} %", 100.0 * deviations[sector]);
-    let nothing = first(|deviation| deviation <= -1.0).map(|sector| said(sector) + ": nothing is left");
+    let nothing = first(|deviation| deviation <= -1.0).map(|sector| said(sector) + ": no stiffness or mass remains");
     nothing.or_else(|| first(|deviation| deviation >= 1.0).map(said))
 }
 
@@ -504,9 +506,9 @@ mod tests {
         assert_eq!((element, message.as_str()), (Element::Spring(0), "there is no place `disc` in a sector"));
         assert!(wrong(|m| m.springs[0].between[1] = "next.ground".into(), wave, 3).1.contains("`ground`"));
         assert!(wrong(|m| m.joints[0].between[0] = "blade.y".into(), wave, 3).1.contains("`blade.y`"));
-        assert!(wrong(|m| m.masses[0].name = "next".into(), wave, 3).1.contains("cannot be declared"));
+        assert!(wrong(|m| m.masses[0].name = "next".into(), wave, 3).1.contains("`next` is reserved"));
         assert!(wrong(|m| m.forces[0].on = "next.blade.x".into(), wave, 3).1.contains("such as `blade.x`"));
-        assert!(wrong(|_| {}, wave, 1).1.contains("2 sectors or more"));
+        assert!(wrong(|_| {}, wave, 1).1.contains("at least 2 sectors"));
         assert!(wrong(|_| {}, Around::Sector(3), 3).1.contains("from 0 to 2"));
         let mut moved = sector();
         moved.motions.push(Motion { on: "next.base".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 });

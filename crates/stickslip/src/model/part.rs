@@ -35,10 +35,10 @@ impl Part {
             for row in &place.rows {
                 let wrong = |key, message: String| Err(ModelError::new(Element::Place(i), key, message));
                 if let Some((at, _)) = row.iter().find(|(at, _)| *at >= n) {
-                    return wrong("dof", format!("row {} of a structure of {n} rows", at + 1));
+                    return wrong("dof", format!("row {} does not exist; the structure has {n} rows", at + 1));
                 }
                 if row.iter().all(|(_, weight)| *weight == 0.0) || row.iter().any(|(_, weight)| !weight.is_finite()) {
-                    return wrong("dof", "its weights must be finite numbers, not all zero".to_owned());
+                    return wrong("dof", "the weights must be finite numbers, not all zero".to_owned());
                 }
             }
         }
@@ -46,8 +46,9 @@ impl Part {
             (Some(ring), Some(of)) => return Part::ring(substructure, of, ring.sectors, model),
             // without a ring, places of all sectors would refer to one sector
             (None, Some(_)) => {
-                let message = "a sector by its matrices is no model by itself: its ring, which `Disk::ring` makes, says how many of them there are; for \
-                               the whole ring without its waves take `Ring { order: None, .. }`";
+                let message = "a sector given by matrices needs a ring, which defines the number of sectors: create \
+                               it with `Disk::ring`; for the whole ring without travelling waves, use `Ring { order: \
+                               None, .. }`";
                 return Err(ModelError::new(Element::Whole, "boundary", message));
             }
             (_, None) => {}
@@ -125,17 +126,21 @@ impl Part {
     fn ring(substructure: &Substructure, disk: &DiskPart, sectors: usize, model: &Model) -> Result<Self, ModelError> {
         let Substructure { component, reduction, .. } = substructure;
         if let Some(i) = model.places.iter().position(|place| place.of.is_some()) {
-            let message = "a turned face of a mass cannot stand in a disk by the matrices of a sector yet; state the blade by masses";
+            let message = "a rotated view of a mass is not supported in a disk whose sector is given by matrices; define the blade by masses";
             return Err(ModelError::new(Element::Place(i), "of", message));
         }
         if !model.places.len().is_multiple_of(sectors) {
-            let message = format!("{} places on {sectors} sectors: each has the same", model.places.len());
+            let message = format!(
+                "{} places on {sectors} sectors: all sectors must have the same number of places",
+                model.places.len()
+            );
             return Err(ModelError::new(Element::Whole, "place", message));
         }
         let stated = &model.places[..model.places.len() / sectors];
         let unlike = model.places.iter().enumerate().find(|(i, place)| place.rows != stated[i % stated.len()].rows);
         if let Some((i, _)) = unlike {
-            let message = "it has other rows than in the first sector, and all sectors are seen at the same";
+            let message =
+                "its rows differ from those in the first sector; all sectors must be observed at the same rows";
             return Err(ModelError::new(Element::Place(i), "dof", message));
         }
         let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.iter().cloned()).collect();
@@ -308,8 +313,8 @@ fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Opt
 }
 
 fn no_modes() -> ModelError {
-    let message = "a damping ratio belongs to the modes of a ring, and without a reduction of its sectors these are not sought; state `rayleigh`, a \
-                   damping matrix, or leave out `reduce = false`";
+    let message = "a damping ratio needs the modes of the ring, which are computed only with a reduction; use \
+                   `rayleigh` or a damping matrix, or remove `reduce = false`";
     ModelError::new(Element::Substructure, "modal_damping", message)
 }
 

@@ -119,9 +119,7 @@ pub enum FrameError {
     #[error("the {0} must be three finite numbers, not all zero")]
     NoDirection(&'static str),
     /// The tangent is parallel to the normal.
-    #[error(
-        "the tangent stands {angle:.1} degrees from the normal, and must be more than {LEAST} degrees away from it"
-    )]
+    #[error("the angle between tangent and normal is {angle:.1} degrees; it must be more than {LEAST} degrees")]
     Parallel {
         /// Angle between tangent and normal, degrees.
         angle: f64,

@@ -108,7 +108,7 @@ impl Places {
     pub fn new(model: &Model) -> Result<Self, ModelError> {
         if model.masses.is_empty() && model.bodies.is_empty() && model.motions.is_empty() && model.places.is_empty() {
             let message = if model.substructure.is_some() {
-                "a structure needs at least one place: what joints, forces and results speak of"
+                "a structure needs at least one place, for joints, forces or results"
             } else {
                 "a model needs at least one mass or one imposed motion"
             };
@@ -124,11 +124,11 @@ impl Places {
             let element = Element::Place(i);
             let expected = place.directions.len().max(1);
             if place.rows.len() != expected {
-                let message = format!("{} displacements are given for {expected}", place.rows.len());
+                let message = format!("found {} displacements, expected {expected}", place.rows.len());
                 return Err(ModelError::new(element, "dofs", message));
             }
             if place.frame.is_some() && expected != 3 {
-                let message = "a local frame turns three displacements, those along x, y and z";
+                let message = "a local frame needs three displacements, along x, y and z";
                 return Err(ModelError::new(element, "normal", message));
             }
             if place.of.is_none() {
@@ -168,7 +168,7 @@ impl Places {
             let places = self.stated.iter().map(|place| place.name.as_str());
             let own = places.filter(|place| place.split_once('.').is_some_and(|(node, _)| node == name));
             let places: Vec<String> = own.map(|place| format!("`{place}`")).collect();
-            let message = format!("`{name}` moves in several directions; name one of them: {}", places.join(", "));
+            let message = format!("`{name}` has several directions; name one of them: {}", places.join(", "));
             return Err(ModelError::new(element, key, message));
         }
         let node = name.split_once('.').filter(|(node, _)| self.directions.contains_key(*node));
@@ -197,26 +197,26 @@ impl Places {
         let Some(directions) = nodes.first().copied() else {
             let [a, b] = [self.find(&between[0], element, key)?, self.find(&between[1], element, key)?];
             if [a, b].into_iter().any(|end| self.is_rotation(end)) {
-                let message = "a joint joins displacements, and this is a rotation: name a [[place]] of the body, whose offset is the lever";
+                let message = "a joint connects displacements, but this is a rotation; name a [[place]] of the body, whose offset is the lever";
                 return Err(ModelError::new(element, key, message));
             }
             if count == 1 {
                 return Ok(vec![(None, [a, b])]);
             }
             let message = format!(
-                "the law acts along {count} directions, and `{}` and `{}` have one; join nodes with `directions`",
+                "the law acts along {count} directions, but `{}` and `{}` have one; connect nodes with `directions`",
                 between[0], between[1]
             );
             return Err(ModelError::new(element, key, message));
         };
         if directions.is_empty() {
-            let message = "the body only turns: name a [[place]] of it, whose offset is the lever";
+            let message = "the body has rotations only; name a [[place]] of the body, whose offset is the lever";
             return Err(ModelError::new(element, key, message));
         }
         if directions.len() != count {
             let node = if self.directions.contains_key(&between[0]) { &between[0] } else { &between[1] };
             let message = format!(
-                "the law acts along {count} direction{}, and the node `{node}` has {}: {}",
+                "the law acts along {count} direction{}, but the node `{node}` has {}: {}",
                 if count == 1 { "" } else { "s" },
                 directions.len(),
                 if count == 1 {
@@ -232,8 +232,8 @@ impl Places {
         let normals = normal.map(|at| nodes.iter().filter_map(|own| own.get(at)).collect::<Vec<_>>());
         if let Some([one, other]) = normals.as_deref().filter(|ends| ends.len() == 2 && ends[0] != ends[1]) {
             let message = format!(
-                "the law presses along one direction of its nodes, and that is {one} of `{}` and {other} of `{}`: state their directions in the \
-                 same order, tangents first",
+                "the normal directions of both nodes differ: {one} of `{}` and {other} of `{}`; list the directions \
+                 of both nodes in the same order, tangents first",
                 between[0], between[1]
             );
             return Err(ModelError::new(element, key, message));
@@ -257,13 +257,13 @@ fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelErr
     let mass = model.masses.iter().find(|mass| mass.name == *of).map(|mass| mass.places().len());
     let body = model.bodies.iter().find(|body| body.name == *of).map(|body| body.directions.len());
     let Some(count) = mass.or(body) else {
-        let message = format!("there is no mass and no body `{of}` that `{}` could be a place of", place.name);
+        let message = format!("there is no mass or body `{of}`, of which `{}` is declared to be a place", place.name);
         return Err(ModelError { wrong_name: Some(of.clone()), ..ModelError::new(element, "of", message) });
     };
     let still = place.rows.iter().position(|row| row.iter().all(|(_, weight)| *weight == 0.0));
     if let (Some(along), Some(_)) = (still, body) {
         let message = format!(
-            "`{}` does not move along its direction {}: the body neither moves along it nor turns with a lever to it",
+            "`{}` cannot move along its direction {}: the body has no displacement along it and no rotation with a lever",
             place.name,
             place.directions.get(along).map_or("", String::as_str)
         );
@@ -272,7 +272,7 @@ fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelErr
     let weights = || place.rows.iter().flatten();
     let usable = |row: &Row| row.iter().any(|(_, weight)| *weight != 0.0);
     if weights().any(|(at, weight)| *at >= count || !weight.is_finite()) || !place.rows.iter().all(usable) {
-        let message = format!("its weights must be finite numbers, not all zero, of the {count} directions of `{of}`");
+        let message = format!("the weights must be finite numbers, not all zero, for the {count} directions of `{of}`");
         return Err(ModelError::new(element, "of", message));
     }
     Ok(())
@@ -297,7 +297,7 @@ impl Collected<'_> {
     ) -> Result<(), ModelError> {
         identifier(name, element, "name", is_identifier)?;
         if directions.len() > crate::law::MOST_DIRECTIONS {
-            let message = format!("a node has up to three directions, found {}", directions.len());
+            let message = format!("a node has at most three directions, found {}", directions.len());
             return Err(ModelError::new(element, "directions", message));
         }
         for (k, along) in directions.iter().enumerate() {
@@ -377,11 +377,11 @@ fn identifier(name: &str, element: Element, key: &'static str, accepts: fn(&str)
     } else if accepts(name) {
         Ok(())
     } else {
-        let message = format!("`{name}` is no name: a letter first, then letters, digits and `_`");
+        let message = format!("`{name}` is not a valid name: use a letter first, then letters, digits and `_`");
         Err(ModelError::new(element, key, message))
     }
 }
 
 fn twice<T>(name: &str, element: Element, key: &'static str) -> Result<T, ModelError> {
-    Err(ModelError::new(element, key, format!("the name `{name}` stands twice")))
+    Err(ModelError::new(element, key, format!("the name `{name}` appears twice")))
 }

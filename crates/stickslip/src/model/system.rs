@@ -295,7 +295,7 @@ pub struct MovedPlace {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SystemError {
     /// The number of axes of a joint differs from the number of directions of its law.
-    #[error("joint `{joint}` has {axes} axes, and its law `{law}` acts along {directions}")]
+    #[error("joint `{joint}` has {axes} axes, but its law `{law}` has {directions} directions")]
     Axes {
         /// Name of the joint.
         joint: String,
@@ -307,7 +307,7 @@ pub enum SystemError {
         directions: usize,
     },
     /// A degree of freedom does not exist.
-    #[error("{what} names degree of freedom {row}, and there are {dofs}: they count from 0")]
+    #[error("{what} uses degree of freedom {row}, but the system has {dofs}, numbered from 0")]
     Row {
         /// The joint, place or load.
         what: String,
@@ -317,7 +317,7 @@ pub enum SystemError {
         dofs: usize,
     },
     /// A number is not finite.
-    #[error("{what} has an entry that is not finite")]
+    #[error("{what} contains a number that is not finite")]
     NotFinite {
         /// The joint, place or load.
         what: String,
@@ -331,7 +331,7 @@ pub enum SystemError {
         error: LawError,
     },
     /// The system does not have the claimed cyclic symmetry.
-    #[error("the sectors are not alike: {0} differ from those of the first sector")]
+    #[error("the sectors are not equal: their {0} differ from those of the first sector")]
     NotCyclic(&'static str),
 }
 

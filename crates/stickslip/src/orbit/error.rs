@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Breakdown {
     /// Too many transitions.
-    #[error("joint `{joint}` chatters at t = {time:.6e} s after {switches} switches")]
+    #[error("joint `{joint}` chatters: {switches} transitions before t = {time:.6e} s")]
     Chatter {
         /// Time of the failure, s.
         time: f64,
@@ -16,9 +16,10 @@ pub enum Breakdown {
     /// Rigid joints in a loop stick simultaneously, and the distribution of their forces is not
     /// unique.
     #[error(
-        "joint `{joint}` and others stick in a loop of rigid contacts whose forces are not unique at t = {time:.6e} s; \
-         give one of them a stiffness (law `jenkins`), or smooth them: method = {{ kind = \"shooting\", width = \"0.1 mm/s\" }}, the velocity over which \
-         friction changes its sign; or use `harmonic-balance` with a `tolerance` that the series of rigid friction reaches, 0.02"
+        "joint `{joint}` and others stick in a closed loop of rigid contacts at t = {time:.6e} s, so their forces \
+         are not unique; give one of them a stiffness (law `jenkins`), or regularize friction: method = {{ kind = \
+         \"shooting\", width = \"0.1 mm/s\" }} (`width` is the velocity over which friction changes its sign); or use \
+         `harmonic-balance` with a `tolerance` of 0.02, which a series can reach for rigid friction"
     )]
     Redundant {
         /// Time of the failure, s.
@@ -27,14 +28,14 @@ pub enum Breakdown {
         joint: String,
     },
     /// The contact problem has no solution.
-    #[error("no stick-slip state is consistent at t = {time:.6e} s")]
+    #[error("no combination of stick and slip satisfies the contact conditions at t = {time:.6e} s")]
     Undecidable {
         /// Time of the failure, s.
         time: f64,
     },
     /// The linear motion of a contact pattern has no complete set of modes.
     #[error(
-        "two modes fall together at {lambda:.6e} rad/s (critical damping) at t = {time:.6e} s; change a damper slightly"
+        "two modes coincide at {lambda:.6e} rad/s (critical damping), at t = {time:.6e} s; change the coefficient of one damper slightly"
     )]
     Defective {
         /// Time of the failure, s.
@@ -43,13 +44,16 @@ pub enum Breakdown {
         lambda: f64,
     },
     /// The signals oscillate too fast relative to the period.
-    #[error("modes far faster than the drive: no switch could be excluded within the allowed steps, t = {time:.6e} s")]
+    #[error(
+        "the search for the next transition reached its maximum number of steps at t = {time:.6e} s, because \
+         some modes are far faster than the excitation"
+    )]
     TooFast {
         /// Time of the failure, s.
         time: f64,
     },
     /// The step size of a time integration became too small.
-    #[error("the integration stalls at t = {time:.6e} s (step {step:.1e} s)")]
+    #[error("the step size of the time integration became too small at t = {time:.6e} s (step {step:.1e} s)")]
     Stalled {
         /// Time of the failure, s.
         time: f64,
@@ -57,7 +61,7 @@ pub enum Breakdown {
         step: f64,
     },
     /// A law returned NaN or infinity.
-    #[error("the law `{law}` of joint `{joint}` gives no number at t = {time:.6e} s")]
+    #[error("law `{law}` of joint `{joint}` returned NaN or infinity at t = {time:.6e} s")]
     NoNumber {
         /// Time of the failure, s.
         time: f64,
@@ -68,8 +72,8 @@ pub enum Breakdown {
     },
     /// Integration with equal steps does not reach the tolerance, however short the steps.
     #[error(
-        "{steps} steps leave an estimated error of {estimate:.1e} where {tolerance:.1e} is wanted; \
-         raise the tolerance, or soften what is far stiffer than the rest"
+        "the estimated error with {steps} steps is {estimate:.1e}, above the tolerance {tolerance:.1e}; raise the \
+         tolerance, or reduce stiffnesses that are far above the others"
     )]
     Unresolved {
         /// Number of steps of the finest attempt.
@@ -82,8 +86,8 @@ pub enum Breakdown {
     /// The vibration is too small relative to the static displacement to be resolved in floating
     /// point.
     #[error(
-        "the motion vibrates by only {share:.1e} of the displacement that it is about, too little for its digits; \
-         take the constant force that displaces it away and let the structure be as it is under it, or use `harmonic-balance`"
+        "the vibration is only {share:.1e} of the static displacement, too small for floating-point accuracy; remove \
+         the constant force and model the structure in its loaded state, or use `harmonic-balance`"
     )]
     Offset {
         /// Magnitude of the vibration relative to the state, both in the energy norm.
@@ -91,7 +95,7 @@ pub enum Breakdown {
     },
     /// Numbers leave the range of floating point, or the range in which the equations can be
     /// solved.
-    #[error("masses, springs and dampers are too far apart to compute with at t = {time:.6e} s; check their units")]
+    #[error("masses, springs and dampers differ too much in magnitude (at t = {time:.6e} s); check their units")]
     OutOfRange {
         /// Time of the failure, s.
         time: f64,
@@ -120,7 +124,8 @@ fn beyond(needed: Option<usize>) -> String {
         || format!("; {raise}"),
         |needed| {
             format!(
-                ": rigid friction may take {needed} and more, and with them more work or memory than one point may; {raise}, or give friction a stiffness (law `jenkins`, in a plane `jenkins-2d`)"
+                ": rigid friction may need {needed} or more, which exceeds the work or memory limit of a point; \
+                 {raise}, or give friction a stiffness (law `jenkins`, in a plane `jenkins-2d`)"
             )
         },
     )
@@ -165,9 +170,10 @@ impl Breakdown {
 pub enum OrbitError {
     /// The iteration did not converge.
     #[error(
-        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}{}; \
-         start from a neighbouring orbit, or check that a periodic motion exists (undamped resonance has none){instead}",
-        if *spent { ", with all the work that one point may take" } else { "" }
+        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}{}; use a \
+         neighbouring orbit as initial guess, or check that a periodic motion exists (an undamped resonance has \
+         none){instead}",
+        if *spent { ", at the work limit of a point" } else { "" }
     )]
     NotConverged {
         /// Name of the method.
@@ -186,7 +192,7 @@ pub enum OrbitError {
     },
     /// The motion does not settle.
     #[error(
-        "{method} at Ω = {omega:.4} rad/s: after {returns} returns the motion still changes by {change:.1e} from one to the next{}",
+        "{method} at Ω = {omega:.4} rad/s: the motion has not settled after {returns} returns; it still changes by {change:.1e} per return{}",
         unsettled(*.repeats, *.needed, .instead)
     )]
     Unsettled {
@@ -209,7 +215,7 @@ pub enum OrbitError {
         instead: String,
     },
     /// The time integration of the motion failed.
-    #[error("{method} broke down at Ω = {omega:.4} rad/s: {cause}")]
+    #[error("{method} failed at Ω = {omega:.4} rad/s: {cause}")]
     Breakdown {
         /// Name of the method.
         method: &'static str,
@@ -219,7 +225,7 @@ pub enum OrbitError {
         cause: Breakdown,
     },
     /// The evidence contradicts the orbit.
-    #[error("{method} closed an orbit at Ω = {omega:.4} rad/s that fails its check: energy gap {energy_gap:.1e}")]
+    #[error("{method} rejected its orbit at Ω = {omega:.4} rad/s: the energy balance has a gap of {energy_gap:.1e}")]
     Evidence {
         /// Name of the method.
         method: &'static str,
@@ -230,7 +236,7 @@ pub enum OrbitError {
     },
     /// The longest series that the method may use does not reach the tolerance.
     #[error(
-        "{method} reaches an estimated error of {} at Ω = {omega:.4} rad/s with {harmonics} harmonics, not {tolerance:.1e}{}{instead}",
+        "{method} at Ω = {omega:.4} rad/s: the estimated error with {harmonics} harmonics is {}, above the tolerance {tolerance:.1e}{}{instead}",
         told_apart(*.estimate, *.tolerance), beyond(*.needed)
     )]
     Truncation {
@@ -255,9 +261,10 @@ pub enum OrbitError {
     },
     /// No stiffness, or friction alone, carries the mean of the forces.
     #[error(
-        "{method} finds no motion at Ω = {omega:.4} rad/s that stays where it is: friction or contacts alone hold some of the structure, and \
-         its mean leaves them; press the contacts harder, or add the spring that holds it{}",
-        if .instead.is_empty() { String::new() } else { format!("{instead}, which may find one that friction holds") }
+        "{method} found no periodic motion at Ω = {omega:.4} rad/s, because a body drifts: friction or contacts \
+         alone hold part of the structure, and the mean force exceeds what they carry; increase the normal loads, or \
+         add a spring{}",
+        if .instead.is_empty() { String::new() } else { format!("{instead}, which may find a motion that friction holds") }
     )]
     Drift {
         /// Name of the method.
@@ -270,9 +277,7 @@ pub enum OrbitError {
     },
     /// No orbit was found. A motion that was integrated from static equilibrium shows the actual
     /// behaviour.
-    #[error(
-        "{method} finds no orbit at Ω = {omega:.4} rad/s; followed in time from static equilibrium, the motion {course}"
-    )]
+    #[error("{method} found no orbit at Ω = {omega:.4} rad/s; a time integration from static equilibrium {course}")]
     NoOrbit {
         /// Name of the method.
         method: &'static str,
@@ -285,8 +290,8 @@ pub enum OrbitError {
     },
     /// The motion of the structure without its joints is unbounded.
     #[error(
-        "{method} finds the structure without its joints {} at Ω = {omega:.4} rad/s: {}",
-        if *resonance == 0.0 { "free to stand anywhere" } else { "in a resonance without damping" },
+        "{method} at Ω = {omega:.4} rad/s: without its joints, the structure {}: {}",
+        if *resonance == 0.0 { "has a rigid-body mode" } else { "has an undamped resonance" },
         unbounded(*resonance)
     )]
     Resonance {
@@ -298,7 +303,7 @@ pub enum OrbitError {
         resonance: f64,
     },
     /// The path that a method returned is not a periodic motion.
-    #[error("the motion of {method} at Ω = {omega:.4} rad/s {what}")]
+    #[error("the motion that {method} returned at Ω = {omega:.4} rad/s is not an orbit: it {what}")]
     NotAnOrbit {
         /// Name of the method.
         method: &'static str,
@@ -308,7 +313,7 @@ pub enum OrbitError {
         what: &'static str,
     },
     /// The excitation frequency is not positive and finite.
-    #[error("the drive frequency must be positive and finite, found {omega} rad/s")]
+    #[error("the excitation frequency is {omega} rad/s; it must be positive and finite")]
     Frequency {
         /// The given frequency, rad/s.
         omega: f64,
@@ -358,7 +363,7 @@ impl std::fmt::Display for Course {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let apart = |joint: &str, share: f64| {
             if share > 0.0 {
-                format!(", with `{joint}` apart for {:.0} % of the last", 100.0 * share)
+                format!(" (`{joint}` is separated for {:.0} % of the last)", 100.0 * share)
             } else {
                 String::new()
             }
@@ -367,29 +372,26 @@ impl std::fmt::Display for Course {
             Course::Settles => {
                 write!(
                     f,
-                    "settles on one that repeats with the drive, which this series does not reach: take more harmonics, or method `transient`"
+                    "converges to a periodic motion, which this series does not reach: use more harmonics, or method `transient`"
                 )
             }
             Course::Settling { periods } => write!(
                 f,
-                "settles slowly: after {periods} periods it still changes, less and less; take more harmonics, or method `transient`"
+                "converges slowly: it still changes after {periods} periods; use more harmonics, or method `transient`"
             ),
             Course::Repeats { periods } => {
-                write!(
-                    f,
-                    "repeats after {periods} periods of the drive: ask for it with the option `period = {periods}`"
-                )
+                write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
             Course::MovesOn { place, way, periods, joint, share } => write!(
                 f,
-                "moves on, and nothing brings it back: `{place}` by {way:.2e} m in {periods} periods{}; add a spring that holds it, press the \
-                 contacts harder, or damp the motion",
+                "drifts: `{place}` moves by {way:.2e} m in {periods} periods{}; add a spring, increase the normal \
+                 loads, or add damping",
                 apart(joint, *share)
             ),
             Course::Wanders { periods, joint, share } => write!(
                 f,
-                "neither repeats nor settles in {periods} periods{}, which does not prove that there is no orbit; press the contacts harder, \
-                 damp the motion, or look at it with kind = \"transient\"",
+                "neither repeats nor settles in {periods} periods{}, which does not exclude an orbit; increase the \
+                 normal loads, add damping, or examine the motion with kind = \"transient\"",
                 apart(joint, *share)
             ),
         }
@@ -398,22 +400,18 @@ impl std::fmt::Display for Course {
 
 /// Describes a motion that does not settle, and gives advice.
 fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> String {
-    let by_newton = if instead.is_empty() { String::new() } else { format!("{instead}, which does not wait") };
+    let by_newton = if instead.is_empty() { String::new() } else { format!("{instead}, which needs no settling") };
     match repeats {
         // A motion that repeats after one return is settled, so `repeats` is at least 2.
         Some(repeats) => {
-            format!(
-                "; it repeats after {repeats} of them: ask for it with {repeats} times the `period` (1 when absent)"
-            )
+            format!("; it repeats after {repeats} returns: set `period` to {repeats} times its value (default 1)")
         }
         None => match needed {
             Some(needed) => {
-                format!(
-                    "; by its decay so far it would settle after about {needed:.0} returns: raise `periods`{by_newton}"
-                )
+                format!("; from its decay, it would settle after about {needed:.0} returns: raise `periods`{by_newton}")
             }
             None => {
-                format!("; it does not decay; add damping, or look at it with kind = \"transient\"{by_newton}")
+                format!("; it does not decay: add damping, or examine it with kind = \"transient\"{by_newton}")
             }
         },
     }
@@ -423,9 +421,10 @@ fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> Stri
 /// Zero means a mean force that no stiffness carries.
 fn unbounded(resonance: f64) -> String {
     if resonance == 0.0 {
-        return "nothing holds some of its bodies; add a spring that does, or a constant force or preload that presses their contacts".to_owned();
+        return "some bodies have no support; add a spring, or a constant force or preload that closes their contacts"
+            .to_owned();
     }
-    format!("nothing bounds its motion at {resonance:.4} rad/s; give it damping, or take a frequency beside it")
+    format!("its motion is unbounded at {resonance:.4} rad/s; add damping, or choose another frequency")
 }
 
 impl OrbitError {
@@ -439,7 +438,7 @@ impl OrbitError {
     pub(crate) fn after(mut self, other: &str) -> Self {
         match &mut self {
             OrbitError::NotConverged { instead, .. } | OrbitError::Truncation { instead, .. } => {
-                *instead = format!("; `{other}` finds none either");
+                *instead = format!("; `{other}` found no orbit either");
             }
             _ => {}
         }

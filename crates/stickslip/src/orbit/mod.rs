@@ -176,14 +176,14 @@ impl Orbit {
         let wrong = |what| OrbitError::NotAnOrbit { method, omega, what };
         let (n, period) = (system.dofs(), periods as f64 * std::f64::consts::TAU / omega);
         if periods == 0 {
-            return Err(wrong("takes no period: `periods` counts from 1"));
+            return Err(wrong("has `periods` = 0; `periods` must be at least 1"));
         }
         if start.len() < 2 * n || !start.iter().all(|z| z.is_finite()) {
-            return Err(wrong("has no start of displacements and velocities of all places"));
+            return Err(wrong("has a `start` without finite displacements and velocities of all degrees of freedom"));
         }
         let sampled = sampled::Sampled::new(system, path.as_ref(), omega, period);
         if !sampled.fits() {
-            return Err(wrong("has samples that do not fit the places and joints, or are not finite"));
+            return Err(wrong("has samples with a wrong number of values, or with NaN or infinity"));
         }
         let Ok(measured) = measure::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
         let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
@@ -195,13 +195,13 @@ impl Orbit {
         let begin = rated(path.sample(0.0));
         let stated: Vec<f64> = (0..2 * n).map(|i| if i < n { start[i] } else { start[i] / omega }).collect();
         if apart(&begin, 1.0, &stated) {
-            return Err(wrong("does not begin at its start"));
+            return Err(wrong("does not begin at `start`"));
         }
         if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - BEFORE)))) {
-            return Err(wrong("does not return to its start after its period"));
+            return Err(wrong("does not return to its initial state after one period"));
         }
         if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
-            return Err(wrong("is not mirrored after half of its period"));
+            return Err(wrong("is not the mirrored initial state after half a period"));
         }
         let energy_gap = measured.energy_gap(0.0);
         if energy_gap > LARGEST_GAP {

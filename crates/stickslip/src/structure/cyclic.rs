@@ -56,27 +56,28 @@ pub enum Axis {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoundaryError {
     /// There is no pair.
-    #[error("there is no pair of nodes; every node of the low side needs one on the high side")]
+    #[error("there are no node pairs; every node of the low side needs a partner on the high side")]
     Empty,
     /// Neither node has a row.
     #[error("the structure has no rows of node `{0}`")]
     NoRows(String),
     /// A node occurs twice on one side.
-    #[error("node `{0}` stands twice on the {1} side")]
+    #[error("node `{0}` appears twice on the {1} side")]
     Twice(String, &'static str),
     /// A node occurs on both sides.
     #[error(
-        "node `{0}` stands on both sides: what lies on the axis turns about itself and cannot be tied; hold it, or leave it out of the model"
+        "node `{0}` is on both sides, but a node on the axis cannot be coupled to itself; constrain it, or remove it from the model"
     )]
     Both(String),
     /// One node of a pair has no rows, but the other has.
     #[error(
-        "the structure has no row of node `{0}`, and rows of node `{1}` that it is tied to: is that its name? what is constrained is so on both sides"
+        "the structure has rows of node `{1}`, but none of its partner `{0}`; check the name, and constrain both sides equally"
     )]
     Unknown(String, String),
     /// A direction is missing.
     #[error(
-        "node `{high}` of the high side moves along {along}, and node `{low}` of the low side lacks a direction for that; constrain both alike"
+        "node `{high}` of the high side moves along {along}, but node `{low}` of the low side lacks the \
+         corresponding direction; constrain both equally"
     )]
     Constrained {
         /// Node of the low side.
@@ -88,7 +89,7 @@ pub enum BoundaryError {
     },
     /// The rotation of a direction is unknown.
     #[error(
-        "row `{0}` is not along x, y, z, rx, ry or rz and cannot be turned; leave out the axis if the rows turn with the sectors"
+        "row `{0}` cannot be rotated, because it is not along x, y, z, rx, ry or rz; remove the axis if the rows rotate with the sectors"
     )]
     Direction(String),
 }
@@ -397,7 +398,7 @@ impl CyclicSector {
 pub enum BladeError {
     /// The blade reaches the boundary of the sector.
     #[error(
-        "row `{0}` of the blade stands on the boundary of the sector, or beside it: only what one sector has alone can be mistuned"
+        "row `{0}` of the blade is on or next to the boundary of the sector; only rows inside the sector can be mistuned"
     )]
     OnBoundary(String),
     /// The set of rows is empty.
@@ -405,7 +406,8 @@ pub enum BladeError {
     Empty,
     /// The blade is not a cantilever.
     #[error(
-        "with all other rows held the blade can still move, or nothing else holds it: name all nodes of the blade, and not those of the disk"
+        "the blade is not a cantilever: it can move with all other rows fixed, or it has no connection to them; name \
+         all nodes of the blade, and none of the disk"
     )]
     NotHeld,
 }
@@ -544,12 +546,12 @@ mod tests {
         let refused = |rows: &[String], nodes: &[(&str, &str)], axis| {
             Boundary::of_nodes(rows, &pairs(nodes), axis).unwrap_err().to_string()
         };
-        assert!(refused(&free, &[], None).contains("no pair"));
-        assert!(refused(&free, &[("1", "1")], None).contains("lies on the axis"));
+        assert!(refused(&free, &[], None).contains("no node pairs"));
+        assert!(refused(&free, &[("1", "1")], None).contains("a node on the axis cannot be coupled"));
         assert!(refused(&free, &[("1", "2"), ("1", "3")], None).contains("twice on the low side"));
         assert!(refused(&free, &[("8", "9")], None).contains("no rows of node `9`"));
         let held = named(&["1.x", "1.z", "2.x", "2.y", "2.z"]);
-        assert!(refused(&held, &[("1", "2")], Some(Axis::Z)).contains("constrain both alike"));
+        assert!(refused(&held, &[("1", "2")], Some(Axis::Z)).contains("constrain both equally"));
         // a direction that both sides lack is fixed
         let held = named(&["1.z", "2.z"]);
         assert_eq!(

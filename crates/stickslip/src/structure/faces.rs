@@ -24,7 +24,8 @@ pub enum FacesError {
     Unknown(String),
     /// The nodes of a pair do not coincide after rotation.
     #[error(
-        "node `{low}` of the low side, turned by 360°/{sectors} about {axis}, is {apart:.3e} away from node `{high}` (sector's radius {radius:.3e}){}",
+        "node `{low}` of the low side, rotated by 360°/{sectors} about {axis}, is {apart:.3e} away from node \
+         `{high}` (radius of the sector: {radius:.3e}){}",
         hint.as_ref().map_or_else(String::new, |hint| format!("; {hint}"))
     )]
     Apart {
@@ -45,7 +46,7 @@ pub enum FacesError {
     },
     /// Two nodes of the sides coincide after rotation, but no pair names them.
     #[error(
-        "node `{low}` lies on the low side and node `{high}` is its counterpart, and no pair names them ({count} like it)"
+        "nodes `{low}` and `{high}` coincide after rotation, but no pair names them ({count} missing pairs); add the pairs"
     )]
     Missing {
         /// Node of the low side.
@@ -57,7 +58,7 @@ pub enum FacesError {
     },
     /// No two nodes coincide after rotation.
     #[error(
-        "no node turned by 360°/{sectors} about {axis} meets another: are the axis and the number of sectors right?"
+        "no node coincides with another one after rotation by 360°/{sectors} about {axis}; check the axis and the number of sectors"
     )]
     None {
         /// Number of sectors.
@@ -185,20 +186,20 @@ impl<'a> Faces<'a> {
         let fits = |axis: Axis, angle: f64| self.after_turn(axis, angle, from, to) <= self.tolerance();
         if fits(self.axis, -angle) {
             return Some(format!(
-                "the sides are exchanged: low is where the sector begins by the right-hand rule about {}",
+                "the sides are exchanged: the low side is the start of the sector by the right-hand rule about {}",
                 self.axis
             ));
         }
         let others = [Axis::X, Axis::Y, Axis::Z].into_iter().filter(|axis| *axis != self.axis);
         for axis in others {
             if fits(axis, angle) {
-                return Some(format!("they fit about {axis}"));
+                return Some(format!("they coincide for a rotation about {axis}"));
             }
         }
         let between = self.axis.angle(from, to);
         (fits(self.axis, between) && between.abs() > 0.0).then(|| {
             format!(
-                "they are {:.3}° apart about {}, as on a disk of {:.2} sectors",
+                "they are {:.3}° apart about {}, as in a disk with {:.2} sectors",
                 between.to_degrees(),
                 self.axis,
                 TAU / between.abs()
@@ -259,10 +260,10 @@ mod tests {
         assert_eq!(refused(Axis::Z, 10, &right), Ok(()));
         for (axis, sectors, pairs, words) in [
             (Axis::Z, 10, &right.map(|(low, high)| (high, low))[..], "sides are exchanged"),
-            (Axis::Z, 12, &right[..], "as on a disk of 10.00 sectors"),
-            (Axis::X, 10, &right[..], "they fit about z"),
+            (Axis::Z, 12, &right[..], "as in a disk with 10.00 sectors"),
+            (Axis::X, 10, &right[..], "they coincide for a rotation about z"),
             (Axis::Z, 10, &[("0", "11"), ("1", "10")][..], "8.000e0 away from node `11`"),
-            (Axis::Z, 10, &right[..3], "node `3` lies on the low side and node `13` is its counterpart"),
+            (Axis::Z, 10, &right[..3], "nodes `3` and `13` coincide after rotation, but no pair names them"),
             (Axis::Z, 10, &[("0", "99")][..], "node `99` has no coordinates"),
         ] {
             let message = refused(axis, sectors, pairs).unwrap_err();

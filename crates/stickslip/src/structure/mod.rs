@@ -87,7 +87,7 @@ const FULL: f64 = 0.3;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StructureError {
     /// The size of a matrix differs from the number of places.
-    #[error("the {matrix} matrix is {rows} x {columns}, and there are {places} places: it must be {places} x {places}")]
+    #[error("the {matrix} matrix is {rows} x {columns}; for {places} places it must be {places} x {places}")]
     Size {
         /// Name of the matrix.
         matrix: &'static str,
@@ -112,8 +112,8 @@ pub enum StructureError {
     },
     /// A matrix is not symmetric, although it must be.
     #[error(
-        "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column} and {mirrored:e} across the diagonal; \
-         give both triangles, or their mean if they differ by rounding"
+        "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column}, but {mirrored:e} in the \
+         mirrored entry; provide both triangles, or their mean if they differ by rounding"
     )]
     NotSymmetric {
         /// Name of the matrix.
@@ -128,10 +128,10 @@ pub enum StructureError {
         mirrored: f64,
     },
     /// The mass matrix is not positive semidefinite.
-    #[error("the mass matrix is not positive semidefinite: some motion has a negative kinetic energy")]
+    #[error("the mass matrix is not positive semidefinite: some motion has negative kinetic energy")]
     NegativeMass,
     /// Two places have the same name.
-    #[error("the name `{0}` stands twice among the places")]
+    #[error("the name `{0}` appears twice among the places")]
     Twice(String),
 }
 

@@ -176,7 +176,7 @@ impl Sector {
         });
         let mut places = self.places.clone();
         if !real {
-            places.extend(self.places.iter().map(|place| format!("{place}, a quarter later")));
+            places.extend(self.places.iter().map(|place| format!("{place}, a quarter period later")));
         }
         let structure = Structure::sparse(places, mass?, damping?, stiffness?)?;
         Ok(Wave { sectors: self.sectors, diameter, dofs: n, structure })

@@ -49,7 +49,8 @@ pub enum ModesError {
     Massless(Singular),
     /// The stiffness is not positive semidefinite.
     #[error(
-        "{} below {below:.3e} rad²/s²: the stiffness is not positive semidefinite; check its signs, or a state beyond buckling",
+        "{} below {below:.3e} rad²/s²: the stiffness matrix is not positive semidefinite; check its signs, and check \
+         that the structure is not loaded beyond buckling",
         if *count == 1 { "1 eigenvalue lies".to_owned() } else { format!("{count} eigenvalues lie") }
     )]
     Negative {
@@ -59,10 +60,10 @@ pub enum ModesError {
         below: f64,
     },
     /// The mass is not positive semidefinite.
-    #[error("some motion has a negative mass; the mass matrix must be positive semidefinite")]
+    #[error("the mass matrix gives some motion a negative mass; it must be positive semidefinite")]
     NegativeMass,
     /// More modes lie below the bound than allowed.
-    #[error("{count} modes lie below {below:.3e} rad²/s², and at most {most} are allowed; lower the bound")]
+    #[error("{count} modes lie below {below:.3e} rad²/s², but at most {most} are allowed; lower the upper bound")]
     TooMany {
         /// Number of modes.
         count: usize,
@@ -73,8 +74,8 @@ pub enum ModesError {
     },
     /// The factor is not accurate enough.
     #[error(
-        "the mode at {value:.6e} rad²/s² keeps a residual of {residual:.1e}: stiffness and mass range over so many orders that rounding drowns it; \
-         replace what is nearly rigid by constraints, or take longer elements"
+        "the mode at {value:.6e} rad²/s² has a residual of {residual:.1e}: stiffness and mass cover too many orders \
+         of magnitude, so rounding dominates; replace nearly rigid parts by constraints, or use longer elements"
     )]
     Inaccurate {
         /// λ, rad²/s².
@@ -83,12 +84,12 @@ pub enum ModesError {
         residual: f64,
     },
     /// Numbers overflow.
-    #[error("the entries of mass and stiffness leave the range of numbers; choose other units")]
+    #[error("the entries of mass and stiffness exceed the range of floating-point numbers; choose other units")]
     OutOfRange,
     /// The number of modes found differs from the count, or the search finds no further mode.
     #[error(
-        "the search for modes ended with {found} below {below:.3e} rad²/s², where the count of negative pivots is {counted}; \
-         matrices whose entries are scaled very differently need better units"
+        "the search found {found} modes below {below:.3e} rad²/s², but the negative pivots count {counted}; choose \
+         units that give the matrix entries similar magnitudes"
     )]
     NotConverged {
         /// Modes found below the bound.

@@ -29,38 +29,36 @@ pub struct Lost {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
     /// The structure without joints has no such mode, or its frequency is zero.
-    #[error("no motion near the mode of the structure without its joints was found, or that mode has no frequency")]
+    #[error("no motion was found near the linear mode without joints, or this mode has zero frequency")]
     NoBeginning,
     /// The curve turned and returned to amplitudes at which friction is negligible.
     #[error(
-        "its curve turns there and goes back to large amplitudes: it becomes one with another mode, and does not exist below"
+        "its curve turns there and returns to large amplitudes: it coalesces with another mode and does not exist below"
     )]
     Merged,
     /// The curve turned and did not return to smaller amplitudes.
-    #[error("its curve turns there and has not come back to smaller amplitudes after 1000 steps; try fewer harmonics")]
+    #[error("its curve turns there and has not returned to smaller amplitudes after 1000 steps; try fewer harmonics")]
     Turned,
     /// The corrector fails even at the smallest step size.
-    #[error("no neighbouring motion was found; try more harmonics")]
+    #[error("the continuation found no neighbouring motion; try more harmonics")]
     Stalled,
     /// The damping ratio exceeds ten over many steps.
-    #[error(
-        "its damping ratio is above ten there: nothing vibrates, and it is not followed further; ask for larger amplitudes"
-    )]
+    #[error("its damping ratio exceeds ten there (overdamped), and the continuation stops; choose larger amplitudes")]
     Overdamped,
     /// The branch from small amplitudes ends there, and no branch from large amplitudes was
     /// found.
     #[error(
-        "it is followed from small amplitudes to there, where nothing vibrates or no neighbouring motion was found, and at large amplitudes no motion \
-         was found either"
+        "the branch from small amplitudes ends there (overdamped, or no neighbouring motion was found), and at large \
+         amplitudes no motion was found either"
     )]
     FromRest,
     /// Laws with internal states exceeded their work limit.
     #[error(
-        "it is not followed further: the states of a law change so fast there that every motion takes long; ask for other amplitudes"
+        "the continuation reached its work limit, because the internal states of a law change very fast there; choose other amplitudes"
     )]
     Dear,
     /// The maximum number of steps is reached.
-    #[error("it was not followed to the end within 4000 steps; try fewer harmonics")]
+    #[error("the continuation did not reach the end within 4000 steps; try fewer harmonics")]
     Steps,
 }
 /// Ratio of friction to the forces of the linear mode at which the continuation begins.

@@ -33,20 +33,22 @@ impl std::fmt::Display for Unsettled {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Unsettled::Neighbours => {
-                "orbits beside this peak were not found, and the real one may be higher: much higher with little or no damping, or where friction \
-                 cannot bound the motion; look closer with a finer range or another method"
+                "orbits next to this peak were not found; the actual peak may be higher: much higher with little or \
+                 no damping, or if friction cannot bound the motion; use a finer range or another method"
             }
             Unsettled::Needle => {
-                "this peak is narrower than its search resolves, and the real one is higher, or has no bound: without damping friction bounds a \
-                 resonance only up to a force; add the damping that the structure has, or take a narrower range"
+                "this peak is narrower than the resolution of the search; the actual peak is higher or unbounded: \
+                 without damping, friction bounds a resonance only up to a certain force; add the damping of the \
+                 structure, or use a narrower range"
             }
             Unsettled::CutOff => {
-                "the curve still rises steeply to this peak where it jumps to another orbit, so that the real one is higher, or has no bound: follow it \
-                 with kind `branch`; without damping add what the structure has"
+                "the curve still rises steeply to this peak at a jump to another orbit, so the actual peak is higher \
+                 or unbounded; follow the curve with kind `branch`, and if the model has no damping, add the damping \
+                 of the structure"
             }
             Unsettled::Open => {
-                "the search for this peak has taken all orbits that it may, and the real one is higher; take a finer range, or follow the curve with kind \
-                 `branch`"
+                "the search for this peak reached its maximum number of orbits, and the actual peak is higher; use a \
+                 finer range, or follow the curve with kind `branch`"
             }
         })
     }

@@ -223,12 +223,12 @@ impl Gathered {
 
 /// Returns the reason why the method does not support a law.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
-    let Some(pieces) = law.pieces() else { return Some("it is not made of ideal sliders, springs and stops") };
+    let Some(pieces) = law.pieces() else { return Some("it does not consist of ideal sliders, springs and stops") };
     let drops = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
     if law.directions() != 1 {
         Some("it acts along several directions")
     } else if pieces.iter().any(drops) {
-        Some("the slider behind its spring holds more than it carries in slip")
+        Some("its slider in series with a spring has a static limit above its dynamic limit")
     } else {
         None
     }

@@ -109,28 +109,29 @@ pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 /// Entry of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "Fourier series along the joints, friction sampled over the period, with an error estimate",
+    summary: "Fourier series of the joint motions, friction sampled over the period, with an error estimate",
     options: &[
         MethodOption {
             key: "harmonics",
             dimension: Dimension::NONE,
             count: true,
-            doc: "highest harmonic; absent: doubled until the estimated error is below `tolerance`",
+            doc: "highest harmonic; default: doubled until the estimated error is below `tolerance`",
         },
         MethodOption {
             key: "samples",
             dimension: Dimension::NONE,
             count: true,
-            doc: "samples per period, even, at least 4 (harmonics + 1), and 16 per harmonic if `harmonics` is absent; absent: 16 per \
-                  harmonic, at least 1024, and 128 per harmonic for steep laws and for friction in a plane; fewer for laws in steps, such as contacts \
-                  that part, where `tolerance` is above 0.001",
+            doc: "samples per period: even, at least 4 (harmonics + 1), and without `harmonics` at least 16 per \
+                  harmonic; default: 16 per harmonic and at least 1024, 128 per harmonic for steep laws and for \
+                  friction in a plane, and fewer for laws with steps (such as contacts that separate) if `tolerance` \
+                  is above 0.001",
         },
         MethodOption {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "error of the motion relative to the largest amplitude: aimed at when `harmonics` is absent, and beyond it a \
-                  point is `truncated`; 0.001",
+            doc: "permitted error of the motion relative to the largest amplitude; without `harmonics`, the method \
+                  extends the series until it is reached; a point with a larger error is `truncated`; default 0.001",
         },
         PERIOD,
     ],

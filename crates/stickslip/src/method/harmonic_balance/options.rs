@@ -105,7 +105,10 @@ impl HarmonicBalance {
             && (harmonics < highest.max(1) || harmonics > 10_000)
         {
             let least = highest.max(1);
-            return option("harmonics", format!("must be {least} (the excitation's) to 10000, found {harmonics}"));
+            return option(
+                "harmonics",
+                format!("must be from {least} (the highest harmonic of the excitation) to 10000, found {harmonics}"),
+            );
         }
         if let Some(samples) = self.samples {
             let least = 4 * (self.harmonics.unwrap_or(FIRST.max(highest)) + 1);

@@ -456,6 +456,6 @@ mod tests {
         let method = HarmonicBalance { harmonics: Some(10_000), ..HarmonicBalance::default() };
         let system = ring(24, 10.0);
         let error = method.solver(&system).err().expect("too many harmonics").to_string();
-        assert!(error.contains("would fill") && error.contains("GB"), "{error}");
+        assert!(error.contains("harmonics need") && error.contains("GB"), "{error}");
     }
 }

@@ -24,7 +24,8 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
     }
     let (key, fewer) = fewer(periods);
     let message = format!(
-        "the equations of {} directions of joints and {harmonics} harmonics would fill {:.0} GB, and {:.0} are allowed: {fewer}fewer harmonics, or fewer joints",
+        "the equations of {} joint directions and {harmonics} harmonics need {:.0} GB, but the limit is {:.0} GB; \
+         use {fewer}fewer harmonics, or fewer joints",
         ports.count(),
         1e-9 * bytes,
         1e-9 * MEMORY

@@ -44,7 +44,7 @@ impl Method for Subharmonic {
         self.balance.check(highest)?;
         let (period, times) = (self.period.max(1), |count: usize| count.saturating_mul(self.period.max(1)));
         let too_high = |_| {
-            let message = format!("{period} periods of harmonic {highest} are more than can be counted");
+            let message = format!("{period} periods with harmonic {highest} are too many; use fewer periods");
             MethodError::option(NAME, PERIOD.key, message)
         };
         u32::try_from(times(highest)).map_err(too_high)?;

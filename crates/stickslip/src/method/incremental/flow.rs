@@ -32,7 +32,8 @@ const EASY: f64 = 0.05;
 const FIRST_FOLLOWED: usize = 64;
 
 /// Reason for rejecting a law without a smooth approximation.
-const DROPS: &str = "its friction drops at once when slip begins; that of a law that falls over a `velocity` above zero can be smoothed";
+const DROPS: &str =
+    "its friction drops abruptly at the onset of slip; only a law with a `velocity` above zero can be regularized";
 
 /// Flow of a structure with any laws except rigid sliders.
 pub(crate) struct IncrementalFlow {
@@ -71,8 +72,8 @@ impl IncrementalFlow {
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
                 None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(Piece::drops)) => Err(DROPS),
-                None if chosen.pieces().is_some() => Err("its slider is rigid, with no spring before it"),
-                None => Err("it has neither a step nor a rate view"),
+                None if chosen.pieces().is_some() => Err("its slider is rigid; it needs a spring in series"),
+                None => Err("it defines neither a step view nor a rate view"),
             }
         })?;
         Ok(IncrementalFlow {

@@ -42,7 +42,7 @@ fn assembly(system: &System, method: &'static str) -> Result<Assembly, MethodErr
         let (states, scale) = nothing
             .or(slides)
             .or_else(|| law.rate().map(|rate| (rate.states(), rate.state_scale())))
-            .ok_or("it is neither smooth nor does it slide along a smooth curve")?;
+            .ok_or("it is neither smooth nor does it have a smooth slip curve")?;
         Ok((law.clone(), states, scale))
     })
 }

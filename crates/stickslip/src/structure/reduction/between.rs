@@ -63,7 +63,7 @@ impl Whole {
             references.push(Reference::new(whole, &whole.modes(up_to)?, up_to)?);
         }
         loop {
-            let kind = format!("a basis of {} reductions from rest to there", taken.len());
+            let kind = format!("a common basis of {} reductions for both stiffnesses", taken.len());
             let project = |whole: &Whole| Reduced::project(whole, kind.clone(), basis.clone());
             let mut worst = (Deviation { error: 0.0, omega: 0.0 }, 0);
             for (at, reference) in references.iter().enumerate() {

@@ -91,9 +91,10 @@ impl Reduce {
     /// [`ReductionError::OutOfReach`] with the smallest error, or the error of the mode
     /// computation.
     pub fn of(self, whole: &Whole) -> Result<Chosen, ReductionError> {
-        for (what, value) in
-            [("the largest frequency of a reduction (rad/s)", self.up_to), ("its tolerance", self.tolerance)]
-        {
+        for (what, value) in [
+            ("the largest frequency of a reduction (rad/s)", self.up_to),
+            ("the tolerance of a reduction", self.tolerance),
+        ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(ReductionError::Number { what, value, must: "positive" });
             }

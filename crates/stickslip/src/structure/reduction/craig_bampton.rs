@@ -63,6 +63,10 @@ impl Whole {
             };
             interior.iter().zip(from).for_each(|(&i, x)| column[i] = *x);
         }
-        Reduced::project(self, format!("Craig-Bampton: {} modes, {outer} held", modes.count()), basis)
+        Reduced::project(
+            self,
+            format!("Craig-Bampton: {} fixed-interface modes, {outer} interface degrees of freedom", modes.count()),
+            basis,
+        )
     }
 }

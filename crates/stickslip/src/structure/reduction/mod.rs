@@ -111,11 +111,11 @@ impl Damping {
         match *self {
             Damping::Ratio { ratio, up_to } => {
                 number("the damping ratio", ratio, "zero or more", ratio >= 0.0)?;
-                number("the upper end of the frequencies (rad/s)", up_to, "positive", up_to > 0.0)?;
+                number("the upper end of the frequency range (rad/s)", up_to, "positive", up_to > 0.0)?;
             }
             Damping::Rayleigh { mass, stiffness } => {
-                number("the damping by mass (1/s)", mass, "zero or more", mass >= 0.0)?;
-                number("the damping by stiffness (s)", stiffness, "zero or more", stiffness >= 0.0)?;
+                number("the mass-proportional damping (1/s)", mass, "zero or more", mass >= 0.0)?;
+                number("the stiffness-proportional damping (s)", stiffness, "zero or more", stiffness >= 0.0)?;
             }
             Damping::Matrix(_) => {}
         }
@@ -155,7 +155,7 @@ pub struct Whole {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReductionError {
     /// The sizes of the matrices differ.
-    #[error("the {matrix} matrix has {rows} rows and the stiffness matrix {n}; they must have the same")]
+    #[error("the {matrix} matrix has {rows} rows, but the stiffness matrix has {n}; both must have the same size")]
     Size {
         /// Name of the matrix.
         matrix: &'static str,
@@ -175,9 +175,7 @@ pub enum ReductionError {
         column: usize,
     },
     /// A port is zero, out of range, or not finite.
-    #[error(
-        "port {port} (from 0) is no motion of the structure: it needs finite weights, not all zero, of rows below {n}"
-    )]
+    #[error("port {port} (from 0) is invalid: it needs finite weights, not all zero, for rows below {n}")]
     Port {
         /// Index of the port, from 0.
         port: usize,
@@ -185,10 +183,10 @@ pub enum ReductionError {
         n: usize,
     },
     /// The structure has no ports.
-    #[error("the structure has no port; name at least one joint, force or place that is observed")]
+    #[error("the structure has no port; name at least one joint, force or observed place")]
     NoPorts,
     /// A parameter of damping or of a range is invalid.
-    #[error("{what} is {value}, and must be {must}")]
+    #[error("{what} is {value}; it must be {must}")]
     Number {
         /// Name of the parameter.
         what: &'static str,
@@ -200,7 +198,7 @@ pub enum ReductionError {
     /// The requested frequency is far above all modes: a wrong unit, or an excitation that
     /// needs no modes.
     #[error(
-        "the reduction is to know all modes up to {:.6} Hz, and the structure has none far above {:.6} Hz",
+        "the reduction requests all modes up to {:.6} Hz, but the structure has no modes far above {:.6} Hz; check the unit",
         omega / std::f64::consts::TAU,
         highest / std::f64::consts::TAU
     )]
@@ -223,7 +221,8 @@ pub enum ReductionError {
     },
     /// The structure with fixed ports has free motions.
     #[error(
-        "with all ports held the structure still has {count} free motion{}, so it has no static answers to them; take free modes instead of Craig-Bampton",
+        "with all ports fixed, the structure still has {count} free motion{}, so that its static response does not \
+         exist; use free modes instead of Craig-Bampton",
         if *count == 1 { "" } else { "s" }
     )]
     NotHeld {
@@ -232,13 +231,14 @@ pub enum ReductionError {
     },
     /// A series needs proportional or modal damping.
     #[error(
-        "a series of residuals needs modal or Rayleigh damping, and the structure has a damping matrix; reduce it by free modes"
+        "a residual series needs modal or Rayleigh damping, but the structure has a damping matrix; use free modes"
     )]
     SeriesDamping,
     /// No reduction reaches the tolerance.
     #[error(
-        "the best of the reductions tried errs by {best:.1e} at {:.7} Hz with {dofs} coordinates, and {tolerance:.1e} was \
-         asked for; ask for less, for a lower frequency, or for free modes with residual vectors, which need fewer coordinates",
+        "no reduction reaches the tolerance {tolerance:.1e}: the best one has an error of {best:.1e} at {:.7} Hz \
+         with {dofs} coordinates; increase the tolerance, reduce the frequency range, or use free modes with residual \
+         vectors, which need fewer coordinates",
         at / std::f64::consts::TAU
     )]
     OutOfReach {
@@ -252,7 +252,7 @@ pub enum ReductionError {
         tolerance: f64,
     },
     /// Numbers overflow.
-    #[error("the entries of the reduced matrices leave the range of numbers; choose other units")]
+    #[error("the entries of the reduced matrices overflow; choose other units")]
     OutOfRange,
 }
 

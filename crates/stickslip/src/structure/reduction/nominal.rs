@@ -251,7 +251,7 @@ impl NominalRing {
                 .for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
             columns::products(n, &whole, &damping.times_columns(&whole))
         });
-        let kind = format!("modes of the ring; {}", self.sector.kind);
+        let kind = format!("modes of the mistuned ring; {}", self.sector.kind);
         Ok((RingModes { kind, own, damping, seen }, Deviation { error, omega: self.up_to }))
     }
 

@@ -161,7 +161,9 @@ impl Waves<'_> {
         kind: Option<ReductionKind>,
         from: usize,
     ) -> Result<ChosenSector, ReductionError> {
-        for (what, value) in [("the largest frequency of a reduction (rad/s)", up_to), ("its tolerance", tolerance)] {
+        for (what, value) in
+            [("the largest frequency of a reduction (rad/s)", up_to), ("the tolerance of a reduction", tolerance)]
+        {
             if !(value.is_finite() && value > 0.0) {
                 return Err(ReductionError::Number { what, value, must: "positive" });
             }
@@ -267,9 +269,9 @@ impl Waves<'_> {
             ReductionKind::CraigBampton => "Craig-Bampton",
         };
         let count = diameters.len();
-        let differing = if self.blade.is_some() { ", and of its blade" } else { "" };
+        let differing = if self.blade.is_some() { ", with blade vectors" } else { "" };
         let modes = modes.div_ceil(2).max(1);
-        let kind = format!("a sector, {name} of {count} nodal diameters with up to {modes} modes{differing}");
+        let kind = format!("one sector: {name} of {count} nodal diameters, up to {modes} modes each{differing}");
         Ok(self.projected(kind, basis, n))
     }
 

@@ -32,7 +32,7 @@ impl Gathered {
             && let Some(pieces) = law.pieces()
         {
             if pieces.iter().any(Piece::drops) {
-                return Err(unsupported("its limit jumps when slip begins"));
+                return Err(unsupported("its slip limit drops abruptly at the onset of slip"));
             }
             self.add_pieces(j, joint, &pieces);
             return Ok(());
@@ -44,7 +44,7 @@ impl Gathered {
         }
         if let Some(prox) = law.prox() {
             if !(scale.is_finite() && scale > 0.0) {
-                return Err(unsupported("its resolvent has no finite scale of forces"));
+                return Err(unsupported("its force scale is not finite and positive, which its resolvent needs"));
             }
             let measures = (prox.compliance(), scale, prox.least_penalty());
             self.add_force(j, joint, Kernel::Prox(Times { law: law.clone(), times: 1.0 }), measures);
@@ -53,7 +53,9 @@ impl Gathered {
         } else if law.rate().is_some() {
             self.add(j, joint, Kernel::Rate(law.clone()), (0.0, scale, 0.0));
         } else {
-            return Err(unsupported("it has none of the views prox, step and rate, nor pieces along one direction"));
+            return Err(unsupported(
+                "it defines none of the views prox, step and rate, and no pieces along one direction",
+            ));
         }
         Ok(())
     }
