@@ -346,8 +346,8 @@ fn impossible_draws_are_refused_at_their_line() {
         ("\"1 N\"]", "\"1 kg\"]", "Ft"),
         ("Ft = {", "Fx = {", "there is no parameter `Fx` to draw"),
         ("count = 50", "count = 0", "count"),
-        ("design = \"random\"", "design = \"halton\"", "there is no `halton`"),
-        ("kind = \"response\"", "kind = \"response\"\nvary = { Ft = [\"1 N\", \"2 N\"] }", "is in `vary` too"),
+        ("design = \"random\"", "design = \"halton\"", "unknown value `halton`"),
+        ("kind = \"response\"", "kind = \"response\"\nvary = { Ft = [\"1 N\", \"2 N\"] }", "is also in `vary`"),
         ("\"105 kN/m\", \"105.2 kN/m\"", "\"105 kN/m\"", "`uniform` takes from, to"),
     ] {
         let said = edited(from, to);

@@ -106,13 +106,13 @@ impl Tally {
         if self.more_failures > 0 {
             let known = self.failures.len();
             notes.push(format!(
-                "Of the points that failed the first {known} are listed with their reasons, {} more are not; all have their status in the \
-                 tables.",
+                "The first {known} failed points are listed with their reasons; {} more are not listed. The tables \
+                 have the status of every point.",
                 self.more_failures
             ));
         }
         if !self.is_whole() {
-            notes.push("The run was interrupted; only the points finished until then are here.".to_owned());
+            notes.push("The run was interrupted; the results contain only the points finished until then.".to_owned());
         }
         notes
     }

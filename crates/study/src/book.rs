@@ -14,10 +14,10 @@ pub fn markdown() -> String {
         if !intro.is_empty() {
             book.push_str(&format!("{intro}\n\n"));
         }
-        book.push_str("| key | takes | without it | what it is | example |\n| --- | --- | --- | --- | --- |\n");
+        book.push_str("| key | value | default | meaning | example |\n| --- | --- | --- | --- | --- |\n");
         for key in keys.iter().filter(|key| key.is_taken()) {
             let absent = match key.presence {
-                Presence::Required => "error".to_owned(),
+                Presence::Required => "required".to_owned(),
                 Presence::Optional => String::new(),
                 Presence::Default(value) => format!("`{value}`"),
             };

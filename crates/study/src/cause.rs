@@ -39,6 +39,7 @@ pub(crate) fn blame(problem: Problem, template: Option<usize>, names: &[String],
     let values: Vec<String> = given.iter().map(value).collect();
     let Problem { key, message, help, .. } = problem;
     let text = stated[wrong].text.trim();
-    let message = format!("with {} the template's `{key}`, {text}, is wrong: {message}", values.join(", "));
+    let message =
+        format!("with {}, the value `{text}` of the template parameter `{key}` is wrong: {message}", values.join(", "));
     Problem::new(stated[*first].location, names[*first].clone(), message).maybe_help(help)
 }

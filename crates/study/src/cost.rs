@@ -422,7 +422,7 @@ impl Size {
             return None;
         }
         let message = format!(
-            "this would need about {} of memory for {} rows of results; the limit is {}",
+            "the study needs about {} of memory for {} rows of results; the limit is {}",
             bytes_text(memory),
             self.rows,
             bytes_text(limit)
@@ -430,7 +430,7 @@ impl Size {
         let lengths = ["samples", "samples_per_cycle", "cycles", "duration", "steps"].into_iter();
         let given: Vec<String> =
             lengths.filter(|key| study.study.entry(key).is_some()).map(|key| format!("lower `{key}`, ")).collect();
-        let fewer = if study.points() > study.cases() { "take fewer frequencies, " } else { "" };
+        let fewer = if study.points() > study.cases() { "use fewer frequencies, " } else { "" };
         let split = if study.cases() > 1 { "split `vary` over several files, " } else { "" };
         let help = format!("{}{fewer}{split}or allow more with --memory", given.concat());
         // the error stands at the key that contributes most

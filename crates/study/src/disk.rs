@@ -64,7 +64,7 @@ pub(crate) fn ring_of(
             let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MOST_ROWS}");
             let problem = Problem::new(disk.table.location_of("sectors", None), "sectors", message);
             return Err(vec![
-                problem.help("leave out `reduce = false` in [structure]: few coordinates then serve all sectors"),
+                problem.help("remove `reduce = false` from [structure]: all sectors then share one reduced model"),
             ]);
         }
         let ring = around.ring(|s| all.get(s).unwrap_or(&first).clone());
@@ -88,10 +88,11 @@ fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &
     let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     if structure.matrices.is_none() {
         return match ["boundary", "nodes", "axis", "blade"].into_iter().find(|key| table.entry(key).is_some()) {
-            Some(key) => {
-                Err(problem(key, format!("`{key}` belongs to a sector by its matrices, and there is no [structure]"))
-                    .help("masses and springs of neighbouring sectors are joined by `next.NAME`"))
-            }
+            Some(key) => Err(problem(
+                key,
+                format!("`{key}` is only for a sector given by matrices, and the study has no [structure]"),
+            )
+            .help("connect masses and springs of adjacent sectors by `next.NAME`")),
             None => Ok(()),
         };
     }
@@ -112,16 +113,16 @@ fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &
     let blade =
         blade.map_err(|node| problem("blade", format!("the structure has no rows of node `{}`", shown(node))))?;
     if nodes.is_some() && blade.is_empty() {
-        let help = "name all nodes of the blade, and not those of the disk that it stands on";
-        return Err(problem("blade", "the file names no node".to_owned()).help(help));
+        let help = "list all nodes of the blade, without the nodes of the disk";
+        return Err(problem("blade", "the file contains no node".to_owned()).help(help));
     }
     let shared: HashSet<usize> = boundary.low_rows().chain(boundary.high_rows()).collect();
     if let Some(row) = blade.iter().find(|row| shared.contains(*row)) {
         let message = format!(
-            "row `{}` of the blade stands on the boundary of the sector, and belongs to two blades then",
+            "row `{}` of the blade is on the boundary of the sector, so it would belong to two blades",
             shown(&component.rows()[*row])
         );
-        return Err(problem("blade", message).help("leave out the nodes that `boundary` names"));
+        return Err(problem("blade", message).help("remove the nodes that `boundary` lists"));
     }
     substructure.disk = Some(DiskPart { boundary, blade, deviations: Vec::new() });
     Ok(())
@@ -141,15 +142,16 @@ fn pairs<'a>(
     let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     let Some(nodes) = &disk.nodes else {
         return disk.boundary.as_deref().map(Cow::from).ok_or_else(|| {
-            let message = "a sector by its matrices needs `boundary`: the node pairs of its low and its high side";
+            let message = "a sector given by matrices needs `boundary`: the node pairs of its low and high side";
             problem("boundary", message.to_owned()).help(
-                "write boundary = \"pairs.csv\", a file with the columns low,high, and axis = \"z\"; or nodes = \"sector.inp\", and the pairs follow",
+                "write axis = \"z\" and either boundary = \"pairs.csv\", a file with the columns low,high, or \
+                 nodes = \"sector.inp\", which determines the pairs",
             )
         });
     };
     let Some(axis) = axis else {
-        let message = "coordinates tell the sides of a sector by a turn about the axis, and there is no `axis`";
-        return Err(problem("nodes", message.to_owned()).help("add axis = \"z\", or leave `nodes` out"));
+        let message = "`nodes` needs `axis` to find the sides of the sector by rotation";
+        return Err(problem("nodes", message.to_owned()).help("add axis = \"z\", or remove `nodes`"));
     };
     // a fixed node or a centre of rotation has no rows and cannot be tied
     let moving = component.rows().iter().filter_map(|row| Some(row.rsplit_once('.')?.0));
@@ -164,10 +166,10 @@ fn pairs<'a>(
     };
     found.map_err(|error| {
         let help = match &error {
-            FacesError::Unknown(_) => "name every node of both sides in `nodes`",
-            FacesError::Missing { .. } => "add the pair, or leave `boundary` out: the pairs follow from `nodes`",
+            FacesError::Unknown(_) => "add every node of both sides to the file `nodes`",
+            FacesError::Missing { .. } => "add the pair, or remove `boundary`; `nodes` then determines the pairs",
             FacesError::Apart { .. } | FacesError::None { .. } => {
-                "mend the pairs, `axis` or `sectors`; without `boundary` the pairs follow from `nodes`"
+                "correct the pairs, `axis` or `sectors`; without `boundary`, `nodes` determines the pairs"
             }
         };
         problem(key, error.to_string()).help(help)
@@ -190,7 +192,7 @@ fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usiz
 fn sectors(disk: &StatedDisk, values: &Values) -> Result<usize, Vec<Problem>> {
     let sectors = whole(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
     usize::try_from(sectors).ok().filter(|sectors| *sectors >= LEAST_SECTORS).ok_or_else(|| {
-        let message = format!("a disk has {LEAST_SECTORS} sectors or more, found {sectors}");
+        let message = format!("a disk needs at least {LEAST_SECTORS} sectors, found {sectors}");
         vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]
     })
 }
@@ -200,7 +202,7 @@ fn deviations(disk: &StatedDisk, values: &Values, sectors: usize) -> Result<Opti
     let Some((table, mistuning)) = mistuning(disk, values) else { return Ok(None) };
     if let Some(pattern) = &disk.pattern {
         if pattern.len() != sectors {
-            let message = format!("the pattern has {} sectors, and the disk has {sectors}", pattern.len());
+            let message = format!("the pattern has {} sectors, but the disk has {sectors}", pattern.len());
             return Err(vec![Problem::new(table.location_of("file", None), "file", message)]);
         }
         return Ok(Some(pattern.clone()));
@@ -230,7 +232,7 @@ fn mistuned(
     if let Some(message) = too_far(deviations) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
         let problem = Problem::new(table.location_of(key, None), key, message);
-        return Err(vec![problem.help("deviations are shares: 0.02 is 2 %")]);
+        return Err(vec![problem.help("write deviations as fractions or in percent: 0.02 is 2 %")]);
     }
     let mut models = Vec::with_capacity(deviations.len());
     for (sector, deviation) in deviations.iter().enumerate() {
@@ -253,10 +255,12 @@ fn mistuned(
                 if model.substructure != first.substructure || model.places != first.places {
                     let name = &environment.names[*index];
                     let message = format!(
-                        "[structure] or a [[place]] depends on `{name}`, and they are the same in every sector"
+                        "[structure] or a [[place]] depends on `{name}`, but both must be the same in all sectors"
                     );
                     let problem = Problem::new(table.location_of("of", None), "of", message);
-                    return Err(vec![problem.help("blades by their matrices differ by of = \"blade.frequency\"")]);
+                    return Err(vec![
+                        problem.help("to mistune blades given by matrices, write of = \"blade.frequency\""),
+                    ]);
                 }
                 model
             }
@@ -283,7 +287,7 @@ fn target(
                 if disk.table.entry("blade").is_some() {
                     return Ok(Differs::Part(part));
                 }
-                let message = format!("`{name}` needs to know what of the sector is the blade");
+                let message = format!("`{name}` needs the nodes of the blade");
                 let help = "add blade = \"blade_nodes.csv\" to [disk], a file with the column node";
                 return Err(Problem::new(place, "of", message).help(help));
             }
@@ -298,7 +302,7 @@ fn target(
             let help = match nearest(name, known.map(String::as_str)) {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => {
-                    "name a parameter of [parameters], or a mass; a spring by its two ends, [\"blade\", \"ground\"]"
+                    "name a parameter of [parameters], a mass, or the two ends of a spring: [\"blade\", \"ground\"]"
                         .into()
                 }
             };
@@ -310,7 +314,7 @@ fn target(
                 return Ok(Differs::Part(spring));
             }
             let message = format!("there is no spring between `{}` and `{}`", shown(a), shown(b));
-            Err(Problem::new(place, "of", message).help("write its ends as in the list of springs"))
+            Err(Problem::new(place, "of", message).help("write the ends as in [[spring]]"))
         }
         _ => Err(Problem::new(place, "of", "expected one name, or the two ends of a spring")),
     }

@@ -76,14 +76,13 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<Table, Problem> {
         let mut key = "";
         if message.starts_with("duplicate key") {
             key = text.get(span.clone()).unwrap_or("").trim();
-            message = format!("the key `{}` stands twice in one table", shown(key));
-            help = Some("leave one of them; a list of masses is written with several `[[mass]]`".to_owned());
+            message = format!("the key `{}` appears twice in one table", shown(key));
+            help = Some("remove one of them; for several masses, write `[[mass]]` several times".to_owned());
         } else if let Some(rest) = message.strip_prefix("cannot recurse further") {
-            message =
-                format!("too many brackets inside each other{}", if rest.is_empty() { "" } else { " (80 at most)" });
+            message = format!("brackets are nested too deeply{}", if rest.is_empty() { "" } else { " (80 at most)" });
         } else {
             message = format!("this is not TOML: {message}");
-            help = Some("texts and quantities stand in quotes: mass = \"182 g\"".to_owned());
+            help = Some("write texts and quantities in quotes: mass = \"182 g\"".to_owned());
         }
         Problem::new(&Location { source, span }, shown(key), message).maybe_help(help)
     })?;

@@ -24,7 +24,7 @@ pub(crate) struct Extra {
 pub(crate) const TABLE: &[Extra] = &[
     Extra {
         name: "joint_force",
-        doc: "half of peak to peak of every joint's force",
+        doc: "half the peak-to-peak value of the force of every joint",
         columns: |system| of_joints(system, "force_amplitude_N"),
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
@@ -34,7 +34,7 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "joint_mean",
-        doc: "mean of every joint's force over the period: of a contact its normal load",
+        doc: "mean force of every joint over the period; for a contact the mean normal load",
         columns: |system| of_joints(system, "force_mean_N"),
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
@@ -48,7 +48,7 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "joint_motion",
-        doc: "half of peak to peak of every joint's relative displacement",
+        doc: "half the peak-to-peak value of the relative displacement of every joint",
         columns: |system| of_joints(system, "amplitude_m"),
         values: |_, orbit, _| {
             let axes = orbit.joints.iter().flat_map(|joint| &joint.displacement);
@@ -57,7 +57,8 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "contact",
-        doc: "shares of the period in which the faces of every joint stick and are apart, beside that in which they slip",
+        doc: "shares of the period in which the faces of every joint stick and are apart, in addition to the slip \
+            share",
         columns: |system| {
             let joints = system.joints().iter();
             joints.flat_map(|joint| [columns::sticks(joint.name()), columns::open(joint.name())]).collect()
@@ -74,7 +75,7 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "velocity",
-        doc: "half of peak to peak of every mass's velocity",
+        doc: "half the peak-to-peak value of the velocity of every place",
         columns: |system| of_places(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
             let places = prepared.system.seen().iter();
@@ -83,7 +84,7 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "acceleration",
-        doc: "half of peak to peak of every mass's acceleration",
+        doc: "half the peak-to-peak value of the acceleration of every place",
         columns: |system| of_places(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
             let places = prepared.system.seen().iter();
@@ -92,7 +93,7 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "harmonics",
-        doc: "amplitudes of the harmonics 1 to 5 of every mass's displacement",
+        doc: "amplitudes of harmonics 1 to 5 of the displacement of every place",
         columns: |system| {
             let places = system.places().iter().zip(system.seen());
             let all = |(place, along): (&String, &Axis)| {
@@ -104,7 +105,7 @@ pub(crate) const TABLE: &[Extra] = &[
     },
     Extra {
         name: "receptance",
-        doc: "amplitude of the first harmonic of every mass per unit of the largest force",
+        doc: "amplitude of the first harmonic of every place per unit of the largest force",
         columns: |system| of_places(system, |unit| format!("receptance_{unit}_per_N")),
         values: |prepared, orbit, _| {
             let model = &prepared.case.model;

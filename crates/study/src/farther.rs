@@ -144,27 +144,34 @@ impl Slipping {
         let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
         let Slipping { points, up_to, again, .. } = self;
         let slips = format!(
-            "at {points} point{} joints slip: `reduction_error` is that of forces up to {}, and not of the harmonics that friction makes above",
+            "at {points} point{} joints slip: `reduction_error` holds for forces up to {}, not for the higher \
+             harmonics of friction",
             if *points == 1 { "" } else { "s" },
             hertz(*up_to)
         );
         let twice = hertz(2.0 * up_to);
         match again {
             None => format!(
-                "A{}. Where one of them meets a mode that is hardly damped, a joint is rigid or stiff, or at the driven place, amplitudes may be \
-                 wrong by percent: compare with reduce = {{ up_to = \"{twice}\" }}, or with reduce = false.",
+                "A{}. Amplitudes may have an error of several percent if a harmonic excites a lightly damped mode, \
+                 if a joint is rigid or stiff, or if a joint is at the place of the excitation. Compare with \
+                 reduce = {{ up_to = \"{twice}\" }} or with reduce = false.",
                 &slips[1..]
             ),
             Some(Again { error, place, at, of, coordinates, up_to }) => {
-                let some = if *of == 1 { "the largest was".to_owned() } else { format!("{of} of a stretch were") };
+                let some = if *of == 1 {
+                    "the largest was".to_owned()
+                } else {
+                    format!("{of} points of one part of the study were")
+                };
                 let solved = format!(
-                    "{some} solved again in {coordinates} coordinates that reach to {}, and the amplitude of `{place}` differs by up to {error:.1e} of \
-                     the largest ({at}), at others maybe by more",
+                    "{some} solved again in {coordinates} coordinates that are valid up to {}: the amplitude of \
+                     `{place}` differs by up to {error:.1e} of the largest amplitude ({at}); other points may differ \
+                     more",
                     hertz(*up_to)
                 );
                 match *error > SHOWS {
                     true => format!(
-                        "{warning}{slips}; {solved}: say reduce = {{ up_to = \"{}\" }}, or reduce = false",
+                        "{warning}{slips}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
                         hertz(*up_to)
                     ),
                     false => format!("A{}; {solved}.", &slips[1..]),

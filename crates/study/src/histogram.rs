@@ -68,7 +68,7 @@ pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str)
     let ordinates = abscissae.iter().map(|x| fit.density(*x) * all * width).collect();
     panel.series.push(Series::line("Weibull distribution", abscissae, ordinates, 1));
     if !fit.is_of(&finite) {
-        panel.title += "; no Weibull distribution: peaks of several kinds?";
+        panel.title += "; no Weibull distribution fits (peaks of several resonances?)";
         return Some(panel);
     }
     for ((share, words), style) in HIGH.into_iter().zip([Style::Dashed, Style::Dotted]) {

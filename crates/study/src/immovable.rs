@@ -56,8 +56,8 @@ fn held(model: &Model) -> impl Iterator<Item = Held<'_>> {
 pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
     let Held { mass, stiffness, by } = held(model).find(|held| omega < held.slowest())?;
     let message = format!(
-        "{} is so stiff for {} that `{}` does not move at {}: the inertia is lost in the rounding of the stiffness. Connect its \
-         neighbours to `ground`, make one mass of two, or take `coulomb` for rigid friction",
+        "a stiffness of {} is too high for a mass of {}: `{}` cannot move at {}, because its inertia is lost in \
+         rounding; replace this place by `ground`, merge the two masses, or use the law `coulomb` for rigid friction",
         displayed(stiffness, Some(Dimension::STIFFNESS)),
         displayed(mass.mass, Some(Dimension::MASS)),
         mass.name,
@@ -78,8 +78,8 @@ pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     let lost = |held: &Held<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
     let Held { mass, stiffness, by } = held(model).find(lost)?;
     let message = format!(
-        "{} is so soft for {} that it does nothing to `{}` at {}: the stiffness is lost in the rounding of the inertia. Leave it out, or give the mass \
-         that moves",
+        "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
+         rounding; remove it, or correct the mass",
         displayed(stiffness, Some(Dimension::STIFFNESS)),
         displayed(mass.mass, Some(Dimension::MASS)),
         mass.name,
@@ -117,12 +117,14 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
     let shown = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
     let enough = TAU * 10f64.powf((SEEN.sqrt() * slowest / TAU).log10().ceil());
     let message = format!(
-        "{} is so slow that no inertia counts: it is lost in the rounding of the stiffness, of which `{name}` has {} by itself",
+        "at {} inertia has no effect, because it is lost in rounding; the lowest natural frequency of a single mass is \
+         {}, that of `{name}`",
         shown(omega),
         shown(own)
     );
     let help = format!(
-        "from {} on it is solved, and inertia is as good as nothing there too; if stiffnesses only stand for something rigid, lower them",
+        "use a frequency of at least {} (inertia is still negligible there), or lower stiffnesses that only \
+         represent rigid parts",
         shown(enough)
     );
     Some(Complaint::new("frequency", message, help))

@@ -204,7 +204,13 @@ pub const SPEEDS: &[Key] = &[
 pub const ENDS: &[Key] = &[
     FROM,
     TO,
-    default("points", Takes::Count(2, MOST_POINTS as i64), "2", "of a range whose ends alone count, any number", "2"),
+    default(
+        "points",
+        Takes::Count(2, MOST_POINTS as i64),
+        "2",
+        "number of values of a range; only the two ends of the range matter",
+        "2",
+    ),
 ];
 
 /// Keys of a range of frequencies whose points are placed by the curvature of the response.

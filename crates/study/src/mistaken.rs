@@ -23,8 +23,9 @@ const OF_ROTATION: [(Dimension, Dimension); 9] = [
     (Dimension::CUBIC_STIFFNESS, dimension(1, 2, -2, -3)),
 ];
 
-const TORSION: &str = "this is a quantity of rotation, and places move in metres; state a torsional model by the same numbers: kg m^2 as kg, N m/rad \
-                       as N/m, N m s/rad as N s/m, N m as N; results in metres are then radians";
+const TORSION: &str = "this quantity belongs to a rotation, but places move in metres; to model torsion, enter the \
+    same numbers in other units: kg m^2 as kg, N m/rad as N/m, N m s/rad as N s/m, N m as N; results in metres are \
+    then radians";
 
 /// Returns advice for a quantity of dimension `found` where `expected` is required; `text` is
 /// the user's text.
@@ -32,8 +33,8 @@ pub(crate) fn advice(expected: Dimension, found: Dimension, text: &str) -> Optio
     let said = match (expected, found) {
         _ if OF_ROTATION.contains(&(expected, found)) => TORSION,
         (Dimension::STIFFNESS, PRESSURE) => {
-            "this is a pressure; a stiffness is a force over a length, as in \"10 N/mm\", or a pressure times an area over a length: \
-             \"210 GPa * 3 mm^2/(40 mm)\""
+            "this is a pressure; write a stiffness as a force over a length, such as \"10 N/mm\", or as a pressure \
+             times an area over a length: \"210 GPa * 3 mm^2/(40 mm)\""
         }
         (Dimension::FORCE, PRESSURE) => {
             "this is a pressure; multiply it by the area on which it acts: \"10 N/mm^2 * 25 mm^2\""
@@ -41,17 +42,19 @@ pub(crate) fn advice(expected: Dimension, found: Dimension, text: &str) -> Optio
         (_, PRESSURE) => "this is a pressure, a force over an area",
         (Dimension::LENGTH | ACCELERATION | Dimension::FORCE, Dimension::MASS) if is_grams(text) => match expected {
             Dimension::FORCE => {
-                "`g` is the gram; the acceleration is written 9.80665 m/s^2, and a force is a mass times that: \"2 kg * 9.80665 m/s^2\""
+                "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2, and a force as a mass times \
+                 it: \"2 kg * 9.80665 m/s^2\""
             }
             Dimension::LENGTH => {
-                "`g` is the gram; the acceleration is written 9.80665 m/s^2, and a motion is stated by its displacement, which at one frequency is \
-                 the acceleration over its square: \"2*9.80665 m/s^2/(50 Hz)^2 * (1 rad)^2\""
+                "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2; a motion is stated by its \
+                 displacement, which at one frequency is the acceleration over the squared angular frequency: \
+                 \"2*9.80665 m/s^2/(50 Hz)^2 * (1 rad)^2\""
             }
-            _ => "`g` is the gram; the acceleration is written 9.80665 m/s^2",
+            _ => "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2",
         },
         (Dimension::LENGTH, ACCELERATION) => {
-            "a motion is stated by its displacement, which at one frequency is the acceleration over its square: \
-             \"20 m/s^2/(50 Hz)^2 * (1 rad)^2\""
+            "a motion is stated by its displacement, which at one frequency is the acceleration over the squared \
+             angular frequency: \"20 m/s^2/(50 Hz)^2 * (1 rad)^2\""
         }
         (Dimension::FORCE, ACCELERATION) => "a force is a mass times an acceleration: \"2 kg * 20 m/s^2\"",
         _ => return None,
@@ -85,7 +88,7 @@ mod tests {
             ("3 N m", Dimension::FORCE, "N m as N"),
             ("2 g", Dimension::LENGTH, "`g` is the gram"),
             ("2 g", Dimension::FORCE, "2 kg * 9.80665 m/s^2"),
-            ("20 m/s^2", Dimension::LENGTH, "over its square"),
+            ("20 m/s^2", Dimension::LENGTH, "over the squared angular frequency"),
         ] {
             assert!(said(text, expected).contains(words), "{text}: {}", said(text, expected));
         }

@@ -28,8 +28,8 @@ pub(crate) fn mixed<'a>(key: &str, all: impl IntoIterator<Item = &'a Quantity>) 
     let (quantity, number) = all.iter().find_map(|quantity| Some((quantity, bare_number(quantity)?)))?;
     let counts = displayed(number * bare, Some(dimension));
     let text = shown(quantity.text.trim());
-    let message = format!("the bare number {text} counts as {counts}, and stands beside quantities in {unit}");
-    Some(quantity.problem(key, message).help(format!("say its unit: \"{text} {unit}\" or \"{counts}\"")))
+    let message = format!("the bare number {text} counts as {counts}, but other values of this key are in {unit}");
+    Some(quantity.problem(key, message).help(format!("add the unit: \"{text} {unit}\" or \"{counts}\"")))
 }
 
 /// Returns the unit of a literal, its factor to SI and its dimension.

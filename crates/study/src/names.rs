@@ -117,7 +117,7 @@ impl Names {
         found.ok_or_else(|| {
             let words = || self.known.iter().map(|(known, _)| known.as_str());
             let help = match self.directions_of(name) {
-                Some(directions) => format!("say {}", one_of(directions.iter().map(String::as_str))),
+                Some(directions) => format!("write {}", one_of(directions.iter().map(String::as_str))),
                 None => match nearest(name, words()) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None if self.is_empty() => format!("the model has no {what}"),
@@ -136,11 +136,11 @@ impl Names {
                 let of_node =
                     several.iter().all(|label| label.strip_prefix(name).is_some_and(|rest| rest.starts_with('.')));
                 let message = match of_node {
-                    true => format!("`{name}` has several directions, and one is needed"),
+                    true => format!("`{name}` has several directions; this key needs one of them"),
                     // on a disk: the places with this name in every sector
-                    false => format!("`{name}` stands for {} places, and one is needed", several.len()),
+                    false => format!("`{name}` stands for {} places; this key needs one of them", several.len()),
                 };
-                let help = format!("say {}", one_of(several.iter().take(LISTED).map(String::as_str)));
+                let help = format!("write {}", one_of(several.iter().take(LISTED).map(String::as_str)));
                 Err(Complaint { name: Some(name.to_owned()), ..Complaint::new(key, message, help) })
             }
         }
@@ -194,7 +194,7 @@ mod tests {
         );
         let help = |found: Result<&str, Complaint>| found.unwrap_err().help.unwrap();
         for wrong in ["tip", "tip.y"] {
-            assert_eq!(help(names.one("start", "mass", wrong)), "say `tip.x` or `tip.z`", "{wrong}");
+            assert_eq!(help(names.one("start", "mass", wrong)), "write `tip.x` or `tip.z`", "{wrong}");
         }
         let wrong = names.one("start", "mass", "tip.y").unwrap_err();
         assert_eq!(wrong.message, "there is no mass `tip.y`: `tip` has no direction y");

@@ -24,8 +24,9 @@ const MOST_NAMED: usize = 3;
 const MOST_STUCK: usize = 4;
 
 /// Says which orbit of a continuum is reported.
-const SHOWN: &str = "Reported: the solution that begins at static equilibrium under the constant loads, applied as one ramp. A rigid joint sticks where the \
-    search found it, and method `transient` reports what its run led to.";
+const SHOWN: &str = "Reported: the orbit that begins at static equilibrium under the constant loads, applied as one \
+    ramp. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
+    orbit that its run reached.";
 
 /// Relative change of the amplitudes with the history above which it is reported: the tolerance
 /// of harmonic balance.
@@ -294,49 +295,53 @@ impl Note {
                 })
             }
             Note::HistorySpread(count, largest) => Some(format!(
-                "At {} the amplitudes depend on the history of a joint that sticks: they change by up to {} % where it begins without the \
-                 friction force of static equilibrium, or with the opposite one.",
+                "At {} the amplitudes depend on the history of a stuck joint: they change by up to {} % if the joint \
+                 begins without the friction force of static equilibrium, or with the opposite one.",
                 points(*count),
                 significant(100.0 * largest, 2)
             )),
             Note::Truncated(count, largest) => Some(format!(
-                "At {} the series is too short: its estimated error is beyond the `tolerance` of the method, and up to {largest:.1e}. \
-                 Leave `harmonics` out or raise it, raise `tolerance` if that is good enough, or use `event-driven` where the laws \
-                 are exact.",
+                "At {} the series is too short: its estimated error is up to {largest:.1e} and exceeds the \
+                 `tolerance` of the method. Remove or raise `harmonics`, raise `tolerance` if this error is \
+                 acceptable, or use `event-driven` if the laws are exact.",
                 points(*count)
             )),
             Note::TruncatedOnBranch(count, largest) => Some(format!(
-                "At {} of the branch the series is too short: its estimated error is beyond `tolerance`, and up to {largest:.1e}. Raise \
-                 `harmonics` in [study], or `tolerance` if that is good enough; kind = \"response\" gives points by other methods to compare with.",
+                "At {} of the branch the series is too short: its estimated error is up to {largest:.1e} and exceeds \
+                 `tolerance`. Raise `harmonics` in [study], or `tolerance` if this error is acceptable. To compare \
+                 with other methods, use kind = \"response\".",
                 points(*count)
             )),
             Note::Unchecked(count) => Some(format!(
-                "At {} nothing is known of the error of the series: the longer one that tells it has too many unknowns or was not found. \
-                 Try fewer `harmonics`.",
+                "At {} the error of the series is unknown: the longer series for the comparison has too many \
+                 unknowns or was not found. Use fewer `harmonics`.",
                 points(*count)
             )),
             Note::Unstable(count, early) => {
                 let early = match early {
                     0 => String::new(),
                     early => format!(
-                        "; at {} of them it repeats after fewer periods than `period` says, and none that takes as many was found",
+                        "; at {} of them it repeats after fewer periods than `period` requests, and no orbit with \
+                         that many periods was found",
                         early
                     ),
                 };
                 Some(format!(
-                    "warning: at {} the orbit is unstable (`stable` is false): no motion stays on it, and the real one is another{early}; \
-                     look for it with kind = \"transient\", or with the option `period` of a method if it may take several",
+                    "warning: at {} the orbit is unstable (`stable` is false): the real motion leaves it{early}. \
+                     Find the real motion with kind = \"transient\", or with the option `period` of a method if it \
+                     may repeat after several periods.",
                     points(*count)
                 ))
             }
             Note::History(count) => Some(format!(
-                "At {} a joint or a part of one sticks for the whole period, in a motion that is not its own mirror image: where it sticks \
-                 depends on how the motion began, and with it the means. {SHOWN}",
+                "At {} a joint, or a part of it, sticks permanently in a motion without half-period symmetry: its \
+                 position and the mean values depend on the history. {SHOWN}",
                 points(*count)
             )),
             Note::Several { points: count, stuck, knows } => Some(format!(
-                "warning: at {} more than one orbit may be true: `{stuck}`, or a part of it, sticks for the whole period, where depends on how the \
-                 motion began, and with it the force of `{knows}` and the amplitudes. {SHOWN} kind = \"transient\" follows the one of a given start.",
+                "warning: at {} several orbits are possible: `{stuck}`, or a part of it, sticks permanently. Its \
+                 position depends on the history, and so do the force of `{knows}` and the amplitudes. {SHOWN} \
+                 kind = \"transient\" follows the motion from a given start.",
                 points(*count)
             )),
             Note::OtherOrbit { points: count, from, to, ratios: [least, most] } => {
@@ -345,9 +350,10 @@ impl Note {
                 let lower = (*least < 1.0).then(|| format!("down to {} of the height", significant(*least, 3)));
                 let size: Vec<String> = higher.into_iter().chain(lower).collect();
                 Some(format!(
-                    "warning: at {} {} the curve has another orbit when it is followed the other way, {}: which one is met depends \
-                     on how the motion began. `way_back.csv` has these orbits, and peaks that only they have are `way_back` in `peaks.csv`. Kind `branch` \
-                     follows both and what joins them, with its folds.",
+                    "warning: at {} {} the reverse sweep finds another orbit, {}: the history of the motion decides \
+                     between them. `way_back.csv` contains the orbits of the reverse sweep; peaks that only they \
+                     have are marked `way_back` in `peaks.csv`. Kind `branch` follows the whole curve, with its \
+                     folds.",
                     points(*count),
                     if hertz(*from) == hertz(*to) {
                         format!("at {} Hz", hertz(*from))
@@ -358,34 +364,36 @@ impl Note {
                 ))
             }
             Note::Instead { points: count, chosen, found } => Some(format!(
-                "At {} `{chosen}`, which `auto` had chosen, found no orbit and `{found}` did.",
+                "At {} `{chosen}`, the choice of `auto`, found no orbit; `{found}` found one.",
                 points(*count)
             )),
             Note::Unjudged(count) => Some(format!(
-                "At {} nothing says whether the orbit is stable, as no flow follows friction that falls with velocity: the real motion may stick \
-                 and slip in jerks, with other amplitudes. Compare with kind = \"transient\" and a `width` (m/s) over which friction changes its sign.",
+                "At {} the stability of the orbit is unknown, because no time integration supports friction that \
+                 falls with velocity: the real motion may be stick-slip with other amplitudes. Compare with \
+                 kind = \"transient\" and a `width` (m/s) over which friction changes its sign.",
                 points(*count)
             )),
             Note::InTime(up_to) => {
                 let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
                 Some(format!(
-                    "`reduction_error` is that of harmonic forces up to {}: of what a start and joints that slip excite above, it says nothing. Compare \
-                     with reduce = {{ up_to = \"{}\" }}, or with reduce = false.",
+                    "`reduction_error` is that of harmonic forces up to {}. It does not include higher frequencies, \
+                     which the initial state and slipping joints excite. Compare with reduce = {{ up_to = \"{}\" }} \
+                     or reduce = false.",
                     hertz(*up_to),
                     hertz(4.0 * up_to)
                 ))
             }
             Note::Slipping(slipping) => Some(slipping.text(WARNING)),
             Note::StuckElsewhere(count) => Some(format!(
-                "In further cases a joint sticks for the whole period at {}; the same holds there.",
+                "In other cases a joint sticks permanently at {}; its offset is not unique there either.",
                 points(*count)
             )),
             Note::Stuck { points: 0, .. } => None,
             Note::Stuck { case, points: count, of } => {
                 let label = if case.is_empty() { String::new() } else { format!("{case}: ") };
                 Some(format!(
-                    "{label}at {count} of {} a joint sticks for the whole period; its offset is not unique there, and the \
-                     symmetric motion is shown.",
+                    "{label}at {count} of {} a joint sticks permanently; its offset is not unique there, and the \
+                     symmetric orbit is reported.",
                     points(*of)
                 ))
             }
@@ -436,15 +444,15 @@ mod tests {
         assert_eq!(texts.len(), 9, "{texts:?}");
         assert!(texts[0].starts_with("Ft = 1 N: at 3 of 20 points a joint sticks"), "{}", texts[0]);
         assert!(texts[1].starts_with("At 3 points") && texts[1].contains("5.0e-2"), "{}", texts[1]);
-        assert!(texts[2].starts_with("At 2 points a joint or a part of one sticks"), "{}", texts[2]);
+        assert!(texts[2].starts_with("At 2 points a joint, or a part of it, sticks"), "{}", texts[2]);
         assert!(
             texts[3].contains("at 2 points the orbit is unstable") && texts[3].contains("at 1 of them it repeats"),
             "{}",
             texts[3]
         );
-        assert!(texts[4].starts_with("At 3 points nothing says whether the orbit is stable"), "{}", texts[4]);
+        assert!(texts[4].starts_with("At 3 points the stability of the orbit is unknown"), "{}", texts[4]);
         assert_eq!(texts[5], "It is so.");
-        assert!(texts[6].starts_with("At 2 points `shooting`") && texts[6].contains("`harmonic-balance` did"));
+        assert!(texts[6].starts_with("At 2 points `shooting`") && texts[6].contains("`harmonic-balance` found one"));
         assert!(texts[7].starts_with("At 1 point `event-driven`"), "{}", texts[7]);
         assert!(
             texts[8].contains("at 3 points between 2 and 4 Hz")
@@ -522,7 +530,7 @@ mod tests {
         };
         let one_by_one = joined(1);
         assert!(one_by_one.len() <= MOST_STUCK + 7, "{}", one_by_one.len());
-        assert!(one_by_one.iter().any(|text| text.starts_with("In further cases")), "{one_by_one:?}");
+        assert!(one_by_one.iter().any(|text| text.starts_with("In other cases")), "{one_by_one:?}");
         for stretch in [2, 3, 7, 50, 1000, all.len()] {
             assert_eq!(joined(stretch), one_by_one, "{stretch}");
         }

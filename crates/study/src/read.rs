@@ -46,15 +46,15 @@ pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, S
     let refuse = |message: String, help: Option<String>| StudyError::file(&name, message, help);
     let failed = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::NotFound => refuse("there is no such file".to_owned(), sibling(path)),
-        std::io::ErrorKind::PermissionDenied => refuse("the file may not be read".to_owned(), None),
+        std::io::ErrorKind::PermissionDenied => refuse("no permission to read the file".to_owned(), None),
         _ => refuse(format!("the file cannot be read: {error}"), None),
     };
     if std::fs::metadata(path).map_err(failed)?.is_dir() {
-        let help = is_results(path).then(|| format!("`stickslip plot {name}` draws the results in it again"));
-        return Err(refuse("this is a folder, a study file (TOML) is needed".to_owned(), help));
+        let help = is_results(path).then(|| format!("`stickslip plot {name}` draws the results in this folder"));
+        return Err(refuse("this is a folder; a study file (TOML) is needed".to_owned(), help));
     }
     if let Some((what, help)) = no_study(path) {
-        return Err(refuse(format!("this is {what}, a study file (TOML) is needed"), Some(help)));
+        return Err(refuse(format!("this is {what}; a study file (TOML) is needed"), Some(help)));
     }
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(failed)?;
@@ -79,15 +79,14 @@ fn no_study(path: &Path) -> Option<(&'static str, String)> {
     if let Some((_, what)) = RESULTS.iter().find(|(known, _)| *known == end) {
         let folder = path.parent().filter(|folder| is_results(folder));
         let help = match folder {
-            Some(folder) => format!("`stickslip plot {}` draws the results in its folder again", folder.display()),
+            Some(folder) => format!("`stickslip plot {}` draws the results in its folder", folder.display()),
             None => "`stickslip new TEMPLATE` writes a study file to start from".to_owned(),
         };
         return Some((what, help));
     }
     let matrices = ["mtx", "mat", "npz", "npy", "op4", "pch", "sti", "mas", "dof", "rsa", "full"];
     matrices.contains(&end.as_str()).then(|| {
-        let help =
-            format!("`stickslip inspect {}` says what is in it; a study names it in [structure]", path.display());
+        let help = format!("`stickslip inspect {}` lists its contents; a study uses it in [structure]", path.display());
         ("a file of matrices", help)
     })
 }
@@ -123,9 +122,9 @@ pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> R
             let valid = error.valid_up_to();
             let text = String::from_utf8_lossy(bytes).into_owned();
             let span = valid..valid + char::REPLACEMENT_CHARACTER.len_utf8();
-            let message = format!("the file is not UTF-8 text: byte {:#04x} has no meaning here", bytes[valid]);
+            let message = format!("the file is not UTF-8 text: byte {:#04x} is invalid here", bytes[valid]);
             let problem = Problem::new(&Location { source: 0, span }, "", message)
-                .help("save the file as UTF-8; a binary file is no study");
+                .help("save the file as UTF-8; a study file is text, not binary");
             Err(StudyError::at(&[Arc::new(Source { name: name.to_owned(), text })], problem))
         }
     }
@@ -135,7 +134,7 @@ fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
     if bytes as u64 <= MOST_BYTES {
         return Ok(());
     }
-    let message = format!("the file is too big for a study: the limit is {} MiB", MOST_BYTES / (1024 * 1024));
+    let message = format!("the file is too large for a study: the limit is {} MiB", MOST_BYTES / (1024 * 1024));
     Err(StudyError::file(name, message, None))
 }
 
@@ -219,7 +218,7 @@ pub fn read_document(
 ) -> Result<Study, StudyError> {
     match toml::to_string(document) {
         Ok(text) => read_study(name, &text, overrides),
-        Err(error) => Err(StudyError::file(name, format!("the document is none of a study: {error}"), None)),
+        Err(error) => Err(StudyError::file(name, format!("the document is not a valid study: {error}"), None)),
     }
 }
 

@@ -109,7 +109,8 @@ impl Turn<'_> {
         match self.indices.iter().filter(used).collect::<Vec<_>>()[..] {
             [index] if index.wraps => Ok(index.from + (whole - index.from).rem_euclid(index.to - index.from + 1)),
             [_, _, ..] if self.indices.iter().filter(used).any(|index| index.wraps) => {
-                Err(Fault::new(0..inner.len(), "with `wrap`, braces hold one index").help("write \"m{i}_{j}\""))
+                Err(Fault::new(0..inner.len(), "with `wrap`, braces must contain exactly one index")
+                    .help("write \"m{i}_{j}\""))
             }
             _ => Ok(whole),
         }

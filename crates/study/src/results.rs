@@ -14,7 +14,8 @@ use crate::study::Study;
 pub enum ResultsError {
     /// The dataset is of another kind.
     #[error(
-        "`{dataset}` is of the kind `{found}`, and results of a `{expected}` were asked for: use the function of its kind"
+        "`{dataset}` is of kind `{found}`, but results of kind `{expected}` were requested: use the function of its \
+         own kind"
     )]
     Kind {
         /// Name of the dataset.
@@ -26,7 +27,10 @@ pub enum ResultsError {
     },
     /// A column that the kind always writes is absent, or has another length than the other
     /// columns.
-    #[error("the table `{table}` of `{dataset}` has no whole column `{column}`: take the dataset as `run` returns it")]
+    #[error(
+        "the table `{table}` of `{dataset}` lacks the column `{column}`, or the column is incomplete: pass the \
+         dataset unchanged, as `run` returns it"
+    )]
     Column {
         /// Name of the dataset.
         dataset: String,
@@ -36,7 +40,7 @@ pub enum ResultsError {
         column: String,
     },
     /// Rows belong to no case of the study, or two tables do not match.
-    #[error("the table `{table}` of `{dataset}` has rows of another study: hand over the study that was run")]
+    #[error("the table `{table}` of `{dataset}` has rows of another study: pass the study that was run")]
     Rows {
         /// Name of the dataset.
         dataset: String,

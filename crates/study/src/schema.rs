@@ -27,36 +27,33 @@ pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
 /// The top-level keys of the file.
 pub const FILE: &[Key] = &[
     required("schema", Takes::Count(VERSION, VERSION), "version of the file format", "1"),
-    optional(
-        "title",
-        Takes::Text,
-        "title of the figure; the file's name when absent",
-        "\"Response of the blade couple\"",
-    ),
-    optional("source", Takes::Text, "where the study comes from: a paper, a figure", "\"Den Hartog (1931), Fig. 5\""),
+    optional("title", Takes::Text, "title of the figure; default: the file's name", "\"Response of the blade couple\""),
+    optional("source", Takes::Text, "source of the study: a paper, a figure", "\"Den Hartog (1931), Fig. 5\""),
     optional("parameters", Takes::Parameters, "quantities by name, for use in expressions", "{ Ft = \"2 N\" }"),
     optional(
         "model",
         Takes::Table(MODEL),
-        "a ready model instead of the lists below",
+        "a template of a model instead of the lists below",
         "{ template = \"blade-couple\" }",
     ),
     optional(
         "structure",
         Takes::Table(STRUCTURE),
-        "a structure by its matrices, from a finite-element program; masses, springs and joints may be added to it at places",
+        "a structure given by its matrices, from a finite-element program; masses, springs and joints can be added \
+         at its places",
         "{ stiffness = \"blade.sti\", mass = \"blade.mas\", dofs = \"blade.dof\", units = \"mm-t-s\" }",
     ),
     optional(
         "place",
         Takes::List(PLACE),
-        "places of the structure, points of bodies, or faces of masses that are turned, which joints, forces and results speak of",
+        "places of the structure, points of bodies, or rotated faces of masses; joints, forces and results refer to \
+         them",
         "[]",
     ),
-    optional("mass", Takes::List(MASS), "point masses, each with one displacement", "[]"),
-    optional("body", Takes::List(BODY), "rigid bodies, which turn as well; points of them are [[place]]s", "[]"),
+    optional("mass", Takes::List(MASS), "point masses with one or several displacements", "[]"),
+    optional("body", Takes::List(BODY), "rigid bodies with rotations; their points are [[place]]s", "[]"),
     optional("spring", Takes::List(SPRING), "springs and dampers", "[]"),
-    optional("joint", Takes::List(JOINT), "places that rub", "[]"),
+    optional("joint", Takes::List(JOINT), "friction joints and contacts between places", "[]"),
     optional(
         "disk",
         Takes::Table(DISK),
@@ -65,15 +62,15 @@ pub const FILE: &[Key] = &[
     ),
     optional("force", Takes::List(FORCE), "forces amplitude * cos(harmonic * Omega * t + phase); they add up", "[]"),
     optional("motion", Takes::List(MOTION), "imposed motions of a place; they add up", "[]"),
-    required("study", Takes::Study, "what is asked for", "{ kind = \"response\", frequency = \"121 Hz\" }"),
+    required("study", Takes::Study, "the results to compute", "{ kind = \"response\", frequency = \"121 Hz\" }"),
     optional(
         "sample",
         Takes::Sample,
-        "uncertain parameters: runs the study for values that are drawn from distributions",
+        "uncertain parameters: runs the study for values drawn from distributions",
         "{ count = 1000, of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } } }",
     ),
-    optional("method", Takes::Method, "how the orbits are found", "{ kind = \"event-driven\" }"),
-    optional("figure", Takes::Table(FIGURE), "how the figure is drawn", "{ overlay = true }"),
+    optional("method", Takes::Method, "method that finds the orbits", "{ kind = \"event-driven\" }"),
+    optional("figure", Takes::Table(FIGURE), "appearance of the figure", "{ overlay = true }"),
 ];
 
 /// The keys of `[figure]`.
@@ -81,23 +78,24 @@ pub const FIGURE: &[Key] = &[
     optional(
         "overlay",
         Takes::Flag,
-        "all values of the last varied parameter in one panel, a panel for every mass (true), or a panel for every case with all \
-         masses (false); absent: overlaid for one mass or more than six cases",
+        "true: all values of the last varied parameter in one panel, with a panel for every mass; false: a panel for \
+         every case, with all masses; absent: true for one mass or more than six cases",
         "true",
     ),
     optional(
         "panels",
         Takes::Choice(panel_names),
-        "what has a panel of its own; the same as `overlay`, and stronger",
+        "the items that have their own panel; takes precedence over `overlay`",
         "\"cases\"",
     ),
-    optional("only", Takes::Names, "the masses, or joints, that are shown; all when absent", "[\"blade1\"]"),
+    optional("only", Takes::Names, "the masses or joints that are shown; absent: all", "[\"blade1\"]"),
     default(
         "references",
         Takes::Flag,
         "false",
-        "adds the linear responses with all joints free and all joints stuck to a response; where they differ from case to case each is in the colour of its \
-         case, of more than seven those of the first and the last; none behind percentiles of draws",
+        "adds the linear responses with all joints free and all joints stuck to a response. If they differ between \
+         cases, each has the colour of its case; with more than seven cases only the first and the last are shown. \
+         Percentiles of draws have no references",
         "true",
     ),
     optional("x", Takes::Choice(scale_names), "scale of the horizontal axis", "\"log\""),
@@ -111,11 +109,11 @@ fn panel_names() -> Vec<(&'static str, &'static str)> {
 }
 
 fn scale_names() -> Vec<(&'static str, &'static str)> {
-    vec![("linear", "equal differences are equal lengths"), ("log", "equal ratios are equal lengths")]
+    vec![("linear", "equal differences have equal lengths"), ("log", "equal ratios have equal lengths")]
 }
 
 const MODEL: &[Key] = &[
-    required("template", Takes::Choice(template_names), "name of the ready model", "\"blade-couple\""),
+    required("template", Takes::Choice(template_names), "name of the template", "\"blade-couple\""),
     optional("law", Takes::Law, "replaces the law of every joint", "{ kind = \"coulomb\", limit = \"2 N\" }"),
 ];
 
@@ -124,54 +122,57 @@ pub const STRUCTURE: &[Key] = &[
     required(
         "stiffness",
         Takes::File,
-        "file of the stiffness matrix, beside the study file; its format is found by its content",
+        "file of the stiffness matrix, in the folder of the study file; its format is recognized by its content",
         "\"blade.sti\"",
     ),
     required("mass", Takes::File, "file of the mass matrix", "\"blade.mas\""),
     optional(
         "stiffened",
         Takes::Table(STIFFENED),
-        "what rotation adds to the stiffness: a second file of it, exported with the stress of a speed, of which the square of the speed decides \
-         the share",
+        "stress stiffening by rotation: a second stiffness file, exported with the stress of the speed `at`; its \
+         added stiffness is scaled with the square of the speed",
         "{ file = \"blade_6000.sti\", at = \"6000 rpm\", speed = \"speed\" }",
     ),
     optional("damping", Takes::File, "file of a damping matrix", "\"blade.dam\""),
     optional(
         "dofs",
         Takes::Text,
-        "file with the names of the rows: CSV `row,name`, CalculiX .dof, ANSYS .mapping; without it they have those that the matrices \
-         come with, or numbers from 1",
+        "file with the names of the rows: CSV `row,name`, CalculiX .dof, ANSYS .mapping; absent: the names in the \
+         matrix files, or numbers from 1",
         "\"blade.dof\"",
     ),
     required(
         "units",
         Takes::Choice(unit_sets),
-        "units of the numbers in these files; everything else in the study has its own",
+        "units of the numbers in these files; all other quantities of the study state their own units",
         "\"mm-t-s\"",
     ),
     optional(
         "modal_damping",
         Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-        "share of critical damping of every mode up to the largest frequency of interest, see `reduce`; beyond, damping grows with the stiffness",
+        "damping ratio of every mode up to the largest frequency of interest, see `reduce`; above, the ratio grows \
+         with the frequency",
         "\"0.5 %\"",
     ),
     optional(
         "rayleigh",
         Takes::Table(RAYLEIGH),
-        "damping in proportion to mass and stiffness",
+        "Rayleigh damping, proportional to mass and stiffness",
         "{ mass = \"1 /s\", stiffness = \"1e-6 s\" }",
     ),
     optional(
         "reduce",
         Takes::TableOrNone(REDUCE),
-        "how the structure is brought into few coordinates; absent: as far as its error asks for, up to five times the highest drive \
-         frequency, and with joints up to fifteen times if at most 60 modes lie there; of up to 100 rows with joints of exact laws all are kept; false: not at all",
+        "reduction of the structure. Absent: the range is five times the highest excitation frequency, and up to \
+         fifteen times with joints if it contains at most 60 modes; a structure of up to 100 rows with joints of \
+         exact laws is not reduced. false: no reduction",
         "{ up_to = \"5 kHz\" }",
     ),
     optional(
         "reduced",
         Takes::Table(REDUCED),
-        "where the files are a reduction already, as `stickslip reduce` writes them: its error, which every `reduction_error` then counts",
+        "if the files are already a reduced model, as written by `stickslip reduce`: its error, which is added to \
+         every `reduction_error`",
         "{ error = 2e-6, up_to = \"5 kHz\" }",
     ),
 ];
@@ -179,20 +180,25 @@ pub const STRUCTURE: &[Key] = &[
 /// The keys of an entry for a file that has several matrices, or a format that is not
 /// recognized by content.
 pub(crate) const FILE_KEYS: &[Key] = &[
-    required("file", Takes::Text, "its path", "\"blade.mat\""),
-    optional("name", Takes::Text, "which matrix in it, if it has several", "\"K\""),
-    optional("format", Takes::Choice(format_names), "its format, if that is not seen from its content", "\"matlab\""),
+    required("file", Takes::Text, "path of the file", "\"blade.mat\""),
+    optional("name", Takes::Text, "name of the matrix, if the file has several", "\"K\""),
+    optional("format", Takes::Choice(format_names), "format, if it is not recognized by the content", "\"matlab\""),
 ];
 
 const STIFFENED: &[Key] = &[
     FILE_KEYS[0],
     FILE_KEYS[1],
     FILE_KEYS[2],
-    required("at", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "speed of that file", "\"6000 rpm\""),
+    required(
+        "at",
+        Takes::Quantity(Dimension::FREQUENCY, Within::Positive),
+        "speed of rotation of that export",
+        "\"6000 rpm\"",
+    ),
     required(
         "speed",
         Takes::Quantity(Dimension::FREQUENCY, Within::AtLeastZero),
-        "speed of rotation, an expression over a parameter",
+        "speed of rotation in the study, an expression of a parameter",
         "\"speed\"",
     ),
 ];
@@ -205,12 +211,12 @@ fn format_names() -> Vec<(&'static str, &'static str)> {
 const RATE: Dimension = Dimension { kg: 0, m: 0, s: -1, rad: 0 };
 
 const RAYLEIGH: &[Key] = &[
-    default("mass", Takes::Quantity(RATE, Within::AtLeastZero), "0 /s", "times the mass matrix", "\"1 /s\""),
+    default("mass", Takes::Quantity(RATE, Within::AtLeastZero), "0 /s", "factor of the mass matrix", "\"1 /s\""),
     default(
         "stiffness",
         Takes::Quantity(Dimension::TIME, Within::AtLeastZero),
         "0 s",
-        "times the stiffness matrix",
+        "factor of the stiffness matrix",
         "\"1e-6 s\"",
     ),
 ];
@@ -219,27 +225,29 @@ const REDUCE: &[Key] = &[
     optional(
         "up_to",
         Takes::Quantity(Dimension::FREQUENCY, Within::Positive),
-        "the largest frequency of interest, of the drive with all harmonics that count: as many modes as the error asks for",
+        "largest frequency of interest, including all relevant harmonics of the excitation; the reduction takes as \
+         many modes as `tolerance` requires",
         "\"5 kHz\"",
     ),
-    optional("modes", Takes::Count(1, 600), "so many modes instead", "50"),
+    optional("modes", Takes::Count(1, 600), "number of modes, instead of `up_to`", "50"),
     optional(
         "orders",
         Takes::Count(1, 3),
-        "orders of residual vectors beside these modes: the residual series, two terms of it for each order; absent: 1, the residual flexibility",
+        "orders of residual vectors in addition to `modes`; each order makes two terms of the residual series exact; \
+         absent: 1, the residual flexibility",
         "2",
     ),
     default(
         "tolerance",
         Takes::Quantity(Dimension::NONE, Within::Positive),
         "1e-4",
-        "the largest relative error of what the places see up to there",
+        "largest relative error of the response at the places up to `up_to`",
         "1e-6",
     ),
     optional(
         "kind",
         Takes::Choice(reduction_kinds),
-        "the kind; absent: whichever is small and close enough",
+        "kind of reduction; absent: the one that is small and accurate enough",
         "\"rubin\"",
     ),
 ];
@@ -248,10 +256,15 @@ const REDUCED: &[Key] = &[
     required(
         "error",
         Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-        "the largest relative error of what the places see",
+        "largest relative error of the response at the places",
         "2e-6",
     ),
-    required("up_to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "up to there", "\"5 kHz\""),
+    required(
+        "up_to",
+        Takes::Quantity(Dimension::FREQUENCY, Within::Positive),
+        "frequency up to which this error holds",
+        "\"5 kHz\"",
+    ),
 ];
 
 fn unit_sets() -> Vec<(&'static str, &'static str)> {
@@ -267,56 +280,56 @@ const PLACE: &[Key] = &[
     optional(
         "of",
         Takes::Text,
-        "the [[body]] that it is a point of, with `offset`, `normal` or both; or the [[mass]] that it is another view of, with `normal`: a face \
-         that is turned; needs no [structure]",
+        "the [[body]] of which it is a point or a face, with `offset`, `normal` or both; or the [[mass]] of which it \
+         is a rotated face, with `normal`; needs no [structure]",
         "\"damper\"",
     ),
     optional(
         "dof",
         Takes::Row,
-        "the one row that it is, by its name `node.direction`; by its number from 1 where rows have no names",
+        "its one row, by the name `node.direction`, or by the number from 1 if rows have no names",
         "\"1353.y\"",
     ),
     optional(
         "dofs",
         Takes::Rows,
-        "of a node: a row for each of its directions, a normal last",
+        "the rows of a node, one for each direction, a normal last",
         "[\"188.x\", \"188.y\", \"188.z\"]",
     ),
     optional(
         "nodes",
         Takes::Rows,
-        "the mean of several nodes, or one node: each direction is the mean of their rows `node.direction`",
+        "one node, or several nodes: each direction is the mean of their rows `node.direction`",
         "[\"188\", \"189\"]",
     ),
     optional(
         "sum",
         Takes::Weights,
-        "a weighted sum of rows, or a list of one for each direction",
+        "a weighted sum of rows, or a list of such sums, one for each direction",
         "{ \"188.x\" = 0.5, \"189.x\" = 0.5 }",
     ),
     optional(
         "directions",
         Takes::Names,
-        "names of its directions; absent: as in the names of the rows, with a normal t1, t2, n",
+        "names of its directions; absent: those in the names of the rows, with a normal t1, t2, n",
         "[\"x\", \"y\", \"z\"]",
     ),
     optional(
         "normal",
         Takes::Vector(Dimension::NONE),
-        "the normal of a local frame: the directions then are two tangents and the normal, made of x, y, z",
+        "normal of a local frame, with components along x, y, z; the directions are then two tangents and the normal",
         "[0, \"-sin(a)\", \"cos(a)\"]",
     ),
     optional(
         "tangent",
         Takes::Vector(Dimension::NONE),
-        "a vector whose part across the normal is the first tangent",
+        "a vector whose projection onto the face is the first tangent",
         "[1, 0, 0]",
     ),
     optional(
         "offset",
         Takes::Vector(Dimension::LENGTH),
-        "of a place of a [[body]]: the point, along x, y, z from the centre of mass",
+        "for a place of a [[body]]: position of the point relative to the centre of mass, along x, y, z",
         "[\"3 mm\", 0, \"-2 mm\"]",
     ),
     REPEAT,
@@ -326,7 +339,8 @@ const PLACE: &[Key] = &[
 const REPEAT: Key = optional(
     "repeat",
     Takes::Repeat,
-    "states the entry for i = 1 to 12: `{i}` in its names, `i` in its expressions; `wrap = true` lets `{i+1}` begin anew after the last",
+    "repeats the entry for i = 1 to 12: `{i}` in its names, `i` in its expressions; with `wrap = true`, `{i+1}` \
+     restarts after the last value",
     "{ i = 12, wrap = true }",
 );
 
@@ -336,7 +350,7 @@ const MASS: &[Key] = &[
     optional(
         "directions",
         Takes::Names,
-        "directions in which it moves, if more than one: each is a place `name.direction`; a normal is the last",
+        "directions of motion, if there is more than one: each is a place `name.direction`; a normal is the last",
         "[\"x\", \"z\"]",
     ),
     REPEAT,
@@ -346,22 +360,23 @@ const BODY: &[Key] = &[
     required(
         "name",
         Takes::Name,
-        "name; its places are `name.x` and so on, of the centre of mass, and the rotations `name.rx`, `name.ry`, `name.rz`",
+        "name; the places of its centre of mass are `name.x` and so on, its rotations `name.rx`, `name.ry`, `name.rz`",
         "\"damper\"",
     ),
     required("mass", Takes::Quantity(Dimension::MASS, Within::Positive), "mass", "\"12 g\""),
     required(
         "inertia",
         Takes::Quantities(Dimension::INERTIA, Within::Finite),
-        "moment of inertia about the centre of mass: one where the body has one rotation, in a plane that about its normal; else a list of one for each \
-         rotation, in space also the six entries xx, yy, zz, xy, yz, zx of the inertia matrix, where xy is minus the integral of x y",
+        "moments of inertia about the centre of mass: one value for a body with one rotation, otherwise a list with \
+         one value for each rotation; in space also the six entries xx, yy, zz, xy, yz, zx of the inertia matrix, \
+         where xy is minus the integral of x y",
         "\"300 g mm^2\"",
     ),
     required(
         "directions",
         Takes::Names,
-        "the displacements: two of x, y, z are a plane, in which the body turns about the third, all three are space, with three rotations; where \
-         rotations rx, ry, rz are named too, the body has those that are named",
+        "displacements: two of x, y, z for a plane body, which rotates about the third axis, or all three for a body \
+         in space with three rotations; name rotations rx, ry, rz to keep only those",
         "[\"x\", \"z\"]",
     ),
     REPEAT,
@@ -371,26 +386,26 @@ const SPRING: &[Key] = &[
     required(
         "between",
         Takes::Pair,
-        "the two places it joins; `ground` is the fixed frame",
+        "the two places that it connects; `ground` is the fixed frame",
         "[\"blade1\", \"ground\"]",
     ),
     optional(
         "stiffness",
         Takes::Quantity(Dimension::STIFFNESS, Within::AtLeastZero),
-        "stiffness; between rotations of bodies in N m/rad; may be absent where damping is given",
+        "stiffness; between rotations of bodies in N m/rad; optional if damping is given",
         "\"105103 N/m\"",
     ),
     optional(
         "damping",
         Takes::Quantity(Dimension::DAMPING, Within::Finite),
-        "viscous damping in parallel; in percent it is a `damping_ratio`; between rotations in N m s/rad",
+        "viscous damping in parallel; a value in percent is a `damping_ratio`; between rotations in N m s/rad",
         "\"0.2 kg/s\"",
     ),
     optional(
         RATIO,
         Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-        "instead of `damping`: share of the critical damping of this spring with the mass at its end, c = 2 zeta sqrt(k m); between two masses m is \
-         m1 m2/(m1 + m2)",
+        "instead of `damping`: damping ratio zeta of this spring with the mass at its end, c = 2 zeta sqrt(k m); \
+         between two masses m is m1 m2/(m1 + m2)",
         "\"2 %\"",
     ),
     REPEAT,
@@ -401,7 +416,7 @@ const JOINT: &[Key] = &[
     required(
         "between",
         Takes::Pair,
-        "the two places, or nodes with the law's directions, that rub or touch",
+        "the two places, or nodes with the law's directions, between which the joint acts",
         "[\"blade1\", \"contact\"]",
     ),
     required("law", Takes::Law, "friction law", "{ kind = \"coulomb\", limit = \"2 N\" }"),
@@ -419,34 +434,35 @@ const DISK: &[Key] = &[
     optional(
         "boundary",
         Takes::Text,
-        "of a sector by its matrices: a CSV file with the columns low, high, nodes of one side and their counterparts on the other; what lies \
-         on the high side is the low side of the next sector",
+        "for a sector given by matrices: a CSV file with the columns low, high: the nodes of one side and their \
+         counterparts on the other; the high side is the low side of the next sector",
         "\"sector_boundary.csv\"",
     ),
     optional(
         "nodes",
         Takes::Text,
-        "where the nodes of that sector stand: a CSV file with the columns node, x, y, z, or an input deck with *NODE; `boundary` is held against it, \
-         and follows from it if it is absent",
+        "coordinates of the nodes of the sector: a CSV file with the columns node, x, y, z, or an input deck with \
+         *NODE; checks `boundary`, and replaces it if it is absent",
         "\"sector.inp\"",
     ),
     optional(
         "axis",
         Takes::Choice(axes),
-        "the axis of the disk, if rows are along x, y, z: the next sector is turned about it by the right-hand rule, and the high side lies \
-         that way; absent: rows turn with the sectors",
+        "axis of the disk, if the rows are along x, y, z: the next sector is rotated about it by the right-hand \
+         rule, towards the high side; absent: the directions of the rows rotate with the sectors",
         "\"z\"",
     ),
     optional(
         "blade",
         Takes::Text,
-        "of a sector by its matrices: a CSV file with the column node, the nodes of the blade without those of the disk, for its mistuning",
+        "for a sector given by matrices, for its mistuning: a CSV file with the column node: the nodes of the blade \
+         without those of the disk",
         "\"blade_nodes.csv\"",
     ),
     optional(
         "mistuning",
         Takes::Table(MISTUNING),
-        "how sectors differ; absent: all alike, and a travelling wave is solved on one",
+        "differences between sectors; absent: all alike, and a travelling wave is solved on one sector",
         "{ of = \"k\", deviation = \"2 %\", seed = 7 }",
     ),
 ];
@@ -459,26 +475,28 @@ const MISTUNING: &[Key] = &[
     required(
         "of",
         Takes::Names,
-        "what differs: a parameter, a mass, or the two ends of a spring; of a sector by its matrices `blade.frequency`, the cantilever \
-         frequencies of the blade, or `blade.stiffness`; it is multiplied by 1 + deviation",
+        "the quantity that differs: a parameter, a mass, or the two ends of a spring; for a sector given by matrices \
+         `blade.frequency`, the cantilever frequencies of the blade, or `blade.stiffness`; it is multiplied by 1 + \
+         deviation",
         "\"k\"",
     ),
     optional(
         "deviation",
         Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-        "standard deviation of normal deviations",
+        "standard deviation of normally distributed deviations",
         "\"2 %\"",
     ),
     optional(
         "seed",
         Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-        "whole number that decides them: the same ones on every machine; 0 when absent",
+        "seed of the deviations, a whole number: the same deviations on every machine; default: 0",
         "7",
     ),
     optional(
         "file",
         Takes::Text,
-        "instead of both: a CSV file with the columns sector, deviation, beside the study file",
+        "instead of `deviation` and `seed`: a CSV file with the columns sector, deviation, in the folder of the \
+         study file",
         "\"pattern.csv\"",
     ),
 ];
@@ -486,36 +504,42 @@ const MISTUNING: &[Key] = &[
 const ENGINE_ORDER: Key = optional(
     "engine_order",
     Takes::Quantity(Dimension::NONE, Within::Finite),
-    "on a disk: sector n leads by 2 pi engine_order n / sectors, a travelling wave; all sectors alike when absent",
+    "on a disk: sector n leads by 2 pi engine_order n / sectors, a travelling wave; default: all sectors alike",
     "3",
 );
 
 const NODAL_DIAMETER: Key = optional(
     "nodal_diameter",
     Takes::Quantity(Dimension::NONE, Within::Finite),
-    "on a disk: sector n has the share cos(2 pi nodal_diameter n / sectors), a standing wave",
+    "on a disk: the amplitude of sector n is multiplied by cos(2 pi nodal_diameter n / sectors), a standing wave",
     "3",
 );
 
 const ONE_SECTOR: Key = optional(
     "sector",
     Takes::Quantity(Dimension::NONE, Within::AtLeastZero),
-    "on a disk: it acts on this sector alone, from 0",
+    "on a disk: acts on this sector only; sectors count from 0",
     "0",
 );
 
 const MOST_HARMONIC: i64 = 1_000;
 
 const FORCE: &[Key] = &[
-    required("on", Takes::Name, "the mass it acts on", "\"blade1\""),
+    required("on", Takes::Name, "the place on which it acts", "\"blade1\""),
     required(
         "amplitude",
         Takes::Quantity(Dimension::FORCE, Within::Finite),
-        "amplitude; on a rotation of a body that of a moment in N m",
+        "amplitude; on a rotation of a body the amplitude of a moment in N m",
         "\"10 N\"",
     ),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
-    default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    default(
+        "harmonic",
+        Takes::Count(0, MOST_HARMONIC),
+        "1",
+        "multiple of the excitation frequency; 0 is constant",
+        "3",
+    ),
     ENGINE_ORDER,
     NODAL_DIAMETER,
     ONE_SECTOR,
@@ -523,23 +547,30 @@ const FORCE: &[Key] = &[
 ];
 
 const MOTION: &[Key] = &[
-    required("on", Takes::Name, "the place: a mass, or one that exists by this motion alone", "\"mover\""),
+    required("on", Takes::Name, "the place: a mass, or a place that exists only by this motion", "\"mover\""),
     required(
         "amplitude",
         Takes::Quantity(Dimension::LENGTH, Within::Finite),
-        "amplitude; of a rotation of a body an angle",
+        "amplitude; for a rotation of a body an angle",
         "\"2 mm\"",
     ),
     default("phase", Takes::Quantity(Dimension::ANGLE, Within::Finite), "0 deg", "phase lead", "\"90 deg\""),
-    default("harmonic", Takes::Count(0, MOST_HARMONIC), "1", "multiple of the drive frequency; 0 is constant", "3"),
+    default(
+        "harmonic",
+        Takes::Count(0, MOST_HARMONIC),
+        "1",
+        "multiple of the excitation frequency; 0 is constant",
+        "3",
+    ),
     ENGINE_ORDER,
     NODAL_DIAMETER,
     ONE_SECTOR,
     refused(
         "velocity",
-        "a place that moves on at a constant velocity, such as a belt, cannot be stated: every motion repeats with the drive",
-        "for a belt of velocity v take kind = \"transient\" and a motion that is slow and long: amplitude A, phase = \"-90 deg\" and a \
-         drive frequency of v/A rad/s begin with v, and keep it as long as the duration is short beside A/v",
+        "a place with a constant velocity, such as a belt, is not supported: every motion repeats with the excitation",
+        "for a belt of velocity v use kind = \"transient\" and a slow, long motion: with amplitude A, phase = \"-90 \
+         deg\" and an excitation frequency of v/A rad/s, the velocity is v while the duration is short compared with \
+         A/v",
     ),
     REPEAT,
 ];
@@ -550,19 +581,19 @@ pub const STUDY: &[Key] = &[
     optional(
         "vary",
         Takes::Vary,
-        "runs the study for every combination of these values of parameters: one, a list, or `{ from, to, points }`",
+        "runs the study for every combination of these parameter values: one value, a list, or `{ from, to, points }`",
         "{ Ft = [\"2 N\", \"4 N\"] }",
     ),
 ];
 
 /// The keys of `[sample]`.
 pub const SAMPLE: &[Key] = &[
-    required("count", Takes::Count(1, MOST_CASES as i64), "how many values are drawn", "1000"),
+    required("count", Takes::Count(1, MOST_CASES as i64), "number of values that are drawn", "1000"),
     default(
         "seed",
         Takes::Count(0, i64::MAX),
         "1",
-        "what the draws depend on; the same seed gives the same values on every machine",
+        "seed of the draws; the same seed gives the same values on every machine",
         "7",
     ),
     required(
@@ -575,7 +606,7 @@ pub const SAMPLE: &[Key] = &[
         "design",
         Takes::Choice(design_names),
         "random",
-        "how the draws are spread over the parameters",
+        "distribution of the draws over the parameters",
         "\"sobol\"",
     ),
 ];
@@ -626,7 +657,7 @@ pub fn described(takes: &Takes) -> String {
             let many = matches!(takes, Takes::List(_));
             format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
         }
-        Takes::Repeat => "a table from indices to a number of times or [first, last], and `wrap`".to_owned(),
+        Takes::Repeat => "a table with a number of repetitions or [first, last] for each index, and `wrap`".to_owned(),
         Takes::Law => "a law: { kind = \"…\", … }".to_owned(),
         Takes::Choice(words) => format!("one of {}", crate::near::one_of(words().iter().map(|word| word.0))),
         Takes::Parameters => "a table of quantities by name".to_owned(),
@@ -648,7 +679,7 @@ pub fn described(takes: &Takes) -> String {
         Takes::Vector(dimension) => format!("a list of three quantities: {}", crate::expression::described(*dimension)),
         Takes::Quantities(dimension, within) => {
             let one = described(&Takes::Quantity(*dimension, *within));
-            format!("{one}, or a list of such")
+            format!("{one}, or a list of them")
         }
         Takes::Refused(why) => format!("nothing: {why}"),
     }
@@ -690,7 +721,7 @@ fn property(key: &Key) -> Value {
         doc = format!("{doc}: {}", described(&key.takes));
     }
     if let Presence::Default(value) = key.presence {
-        doc = format!("{doc}; {value} when absent");
+        doc = format!("{doc}; default: {value}");
     }
     schema["description"] = json!(doc);
     schema
@@ -735,7 +766,8 @@ fn takes_schema(takes: &Takes) -> Value {
         Takes::Repeat => json!({
             "type": "object",
             "properties": { "wrap": {
-                "description": "values beyond the last begin anew in names: of every index, or of those named",
+                "description": "values after the last one restart at the first in names: true for all indices, or \
+                    the names of the indices",
                 "anyOf": [{ "type": "boolean" }, { "type": "string" }, { "type": "array", "items": { "type": "string" } }],
             } },
             "additionalProperties": { "anyOf": [

@@ -44,8 +44,9 @@ pub(crate) fn sector_of(
         }
         (None, _) => {
             if let Some(place) = own(lists).next() {
-                let message = "a place is one of a structure, and there is none";
-                let help = "add [structure] with `stiffness` and `mass`; a point mass is a [[mass]], a point or a face of a [[body]] or a mass is a place with `of`";
+                let message = "this place belongs to a structure, but the study has no [structure]";
+                let help = "add [structure] with `stiffness` and `mass`; for a point mass use [[mass]]; for a point \
+                    or a face of a [[body]] or [[mass]] add `of` to the place";
                 problems.push(Problem::new(&place.location, "place", message).help(help));
             }
         }
@@ -158,9 +159,9 @@ fn inertia(table: &StatedTable, directions: &[String], stated: &[f64]) -> Result
             let names: Vec<&str> = about.iter().map(|axis| ROTATIONS[*axis]).collect();
             let message = format!("{} for the rotations {}", plural(stated.len()), names.join(", "));
             let help = match about.len() {
-                1 => "state the moment of inertia about that axis, as in inertia = \"300 g mm^2\"",
-                2 => "state a list of the two moments of inertia",
-                _ => "state a list of the moments about x, y, z, or of the six entries xx, yy, zz, xy, yz, zx",
+                1 => "give one moment of inertia about that axis: inertia = \"300 g mm^2\"",
+                2 => "give a list of two moments of inertia",
+                _ => "give a list of the moments about x, y, z, or of the six entries xx, yy, zz, xy, yz, zx",
             };
             let problem = Problem::new(table.location_of("inertia", None), "inertia", table.with_turn(&message));
             return Err(problem.help(help));
@@ -185,12 +186,12 @@ fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f
     let inverse_mass = |name: &String| match masses.iter().find(|mass| mass.name == node(name)) {
         Some(mass) => Ok(1.0 / mass.mass),
         None if name == GROUND || moved(name) => Ok(0.0),
-        None => Err(format!("the mass of `{name}` is not known here")),
+        None => Err(format!("the mass of `{name}` is unknown here")),
     };
     let [a, b] = &spring.between;
     let compliance = inverse_mass(a)? + inverse_mass(b)?;
     if !(compliance > 0.0 && compliance.is_finite()) {
-        return Err("no mass moves on this spring".to_owned());
+        return Err("no end of this spring has a mass that can move".to_owned());
     }
     if spring.stiffness <= 0.0 {
         return Err("this spring has no stiffness".to_owned());
@@ -200,9 +201,10 @@ fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f
 
 /// Returns the problem that a damping ratio has no meaning at this spring.
 fn no_ratio(table: &StatedTable, why: &str) -> Problem {
-    let message = format!("a share of the critical damping needs a stiffness and a mass, and {why}");
+    let message = format!("a damping ratio needs a stiffness and a mass, but {why}");
     Problem::new(table.location_of(RATIO, None), RATIO, table.with_turn(&message)).help(
-        "write damping = \"2*zeta*sqrt(k*m)\" with the parameters zeta, k, m, the mass that moves; [structure] has `modal_damping`",
+        "write damping = \"2*zeta*sqrt(k*m)\" with the parameters zeta, k and the moving mass m; for a structure \
+         given by matrices use `modal_damping` in [structure]",
     )
 }
 
@@ -241,9 +243,9 @@ pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Pr
         [("nodal_diameter", diameter)] => Around::NodalDiameter(diameter),
         [(_, sector)] => Around::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
         [(one, _), (other, _), ..] => {
-            let message = format!("`{one}` and `{other}` say different things of the same wave");
+            let message = format!("`{one}` and `{other}` both define the wave");
             let help =
-                format!("keep one of them; for two waves write two entries, one with `{one}`, one with `{other}`");
+                format!("keep one of them; for two waves write two entries, one with `{one}` and one with `{other}`");
             problems.push(Problem::new(table.location_of(other, None), other, message).help(help));
             Around::EngineOrder(0)
         }
@@ -254,7 +256,7 @@ pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Pr
 pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
     for key in ["engine_order", "nodal_diameter", "sector"] {
         if let Some(entry) = table.entry(key) {
-            let message = format!("`{key}` is for bladed disks, and there is no [disk]");
+            let message = format!("`{key}` needs a bladed disk, but the study has no [disk]");
             let help = "add a table [disk] with `sectors`, and state one sector as the model";
             problems.push(Problem::new(&entry.location, key, message).help(help));
         }

@@ -14,9 +14,10 @@ pub(crate) fn beginnings() -> Vec<(&'static str, &'static str)> {
     vec![
         (
             EQUILIBRIUM,
-            "the places of `start` are held there and everything else is in static equilibrium under the constant forces; joints carry what they carry then",
+            "the places of `start` are held at these displacements; everything else, with the forces of the joints, \
+             is in static equilibrium under the constant forces",
         ),
-        (UNLOADED, "displacements as `start` says, zero elsewhere; joints carry nothing"),
+        (UNLOADED, "displacements as in `start`, zero elsewhere; joints carry no force"),
     ]
 }
 

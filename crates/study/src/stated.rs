@@ -99,7 +99,7 @@ impl NamedTemplate {
             [one] => format!("the value of {one} makes"),
             several => format!("the values of {} make", several.join(", ")),
         };
-        format!("{who} {element} of the template wrong: `{key}` {message}")
+        format!("{who} {element} of the template invalid: `{key}` {message}")
     }
 }
 
@@ -253,7 +253,7 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
     let nodes = Names::of_places(model);
     let help = match &error.wrong_name {
         Some(wrong) => Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
-            (Some(directions), _) => format!("say {}", one_of(directions.iter().map(String::as_str))),
+            (Some(directions), _) => format!("write {}", one_of(directions.iter().map(String::as_str))),
             (None, Some(near)) => format!("did you mean `{near}`?"),
             (None, None) => {
                 format!("the places are {}", one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", "))
@@ -265,7 +265,8 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
         None if error.element == Element::Whole => Some("add a [[mass]], a [[body]] or a [[motion]]".to_owned()),
         None if error.key == "reduce" => advice_on_reduction(model),
         None if softened => Some(
-            "lower `speed`: what both exports add up to there has lost more stiffness than rotation gives; or check `at` and the sign of the second export"
+            "lower `speed`: at this speed the sum of both exports loses more stiffness than rotation adds; or check \
+             `at` and the sign of the second export"
                 .to_owned(),
         ),
         None if error.key == "name" => Some("choose another name".to_owned()),
@@ -282,13 +283,13 @@ const LOWEST: usize = 3;
 fn without_end(model: &Model) -> Option<(&'static str, &'static str)> {
     match model.substructure.as_ref()?.reduction {
         Reduction::UpTo { up_to, .. } if up_to <= 0.0 => Some((
-            "the structure is to be brought into few coordinates, and this study has no drive frequency that tells up to which frequency \
-             these must be good",
+            "the structure must be reduced, but the study has no excitation frequency that defines the frequency \
+             range of the reduced model",
             "add to [structure] reduce = { up_to = \"5 kHz\" }, the highest frequency of interest",
         )),
         Reduction::None { up_to } if up_to <= 0.0 => Some((
-            "this study has no drive frequency that tells up to which frequency modes are damped by `modal_damping`",
-            "say reduce = { kind = \"none\", up_to = \"5 kHz\" }, the highest frequency of interest",
+            "the study has no excitation frequency that defines the frequency range of `modal_damping`",
+            "add reduce = { kind = \"none\", up_to = \"5 kHz\" } with the highest frequency of interest",
         )),
         _ => None,
     }
@@ -303,7 +304,7 @@ fn advice_on_reduction(model: &Model) -> Option<String> {
     }
     if matches!(substructure.reduction, Reduction::UpTo { kind: Some(ReductionKind::CraigBampton), .. }) {
         return Some(
-            "leave `kind` out: free modes with residual vectors need fewer coordinates for the same error".to_owned(),
+            "remove `kind`: free modes with residual vectors need fewer coordinates for the same error".to_owned(),
         );
     }
     let component = &substructure.component;
@@ -314,7 +315,9 @@ fn advice_on_reduction(model: &Model) -> Option<String> {
     let exchanged = || Component::new(component.rows().to_vec(), stiffness.clone(), None, mass.clone()).ok();
     let advice = match absurd.then(exchanged).flatten().as_ref().and_then(sensible) {
         Some(frequencies) => exchange(&frequencies),
-        None => "are the units right, and `up_to`? A drive far above them needs no modes: reduce = false".to_owned(),
+        None => "check the units and `up_to`; if the excitation is far above these frequencies, no modes are needed: \
+            reduce = false"
+            .to_owned(),
     };
     Some(format!("its lowest frequencies are {}: {advice}", listed.join(", ")))
 }
@@ -336,7 +339,7 @@ pub(crate) fn sensible(component: &Component) -> Option<Vec<f64>> {
 pub(crate) fn exchange(frequencies: &[f64]) -> String {
     let listed: Vec<String> = frequencies.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
     format!(
-        "are the files of `stiffness` and `mass` exchanged? The other way round its lowest frequencies are {}",
+        "are the files of `stiffness` and `mass` exchanged? With exchanged files the lowest frequencies are {}",
         listed.join(", ")
     )
 }

@@ -164,7 +164,8 @@ impl Quantity {
                 .or_else(|| {
                     let name = &environment.names[bare?];
                     Some(format!(
-                        "`{name}` has no unit, so it counts as a pure number in a product; give it one in [parameters]"
+                        "`{name}` has no unit and counts as a pure number in this product; give it a unit in \
+                         [parameters]"
                     ))
                 })
                 .or_else(|| (!example.is_empty()).then(|| format!("write it as in {key} = {example}")));
@@ -363,6 +364,6 @@ pub(crate) fn not_empty(from: f64, to: f64, end: &Quantity, dimension: Option<Di
     }
     let (from, to) = (displayed(from, dimension), displayed(to, dimension));
     Err(end
-        .problem("to", format!("the range is empty: `to` must be more than `from`, found {from} to {to}"))
-        .help("exchange the two, or write a single value"))
+        .problem("to", format!("the range is empty: `to` must be greater than `from`, found {from} to {to}"))
+        .help("exchange both values, or write a single value"))
 }

@@ -220,8 +220,8 @@ pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
 const MOST_RESOLVED: usize = 1_000;
 
 /// Help for a draw with values that no model can have.
-const IMPOSSIBLE: &str = "of the values that [sample] draws this one cannot be: bound the distribution with `within = [least, most]`, or take one \
-                          without such values, such as `lognormal`";
+const IMPOSSIBLE: &str = "[sample] draws invalid values such as this one: bound the distribution with \
+    `within = [least, most]`, or use a distribution without such values, such as `lognormal`";
 
 impl Study {
     /// Returns the stem of the file's name.
@@ -385,7 +385,7 @@ impl Study {
 
     fn case_where(&self, index: usize, fixed: Option<(usize, f64)>) -> Result<Case, StudyError> {
         if index >= self.cases() {
-            let message = format!("there is no case {index}, the study has {}", self.cases());
+            let message = format!("there is no case {index}; the study has {} cases", self.cases());
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
@@ -394,7 +394,9 @@ impl Study {
         match (parts, error) {
             (Some(parts), None) => Ok(self.finished(index, parts)),
             (_, Some(error)) => Err(error),
-            (None, None) => Err(StudyError::file(&self.sources[0].name, "the case could not be resolved", None)),
+            (None, None) => {
+                Err(StudyError::file(&self.sources[0].name, "the values of this case could not be computed", None))
+            }
         }
     }
 
@@ -537,8 +539,9 @@ impl Study {
     /// Checks all cases. The first one is assembled; the others differ from it only in numbers.
     pub(crate) fn check(&self) -> Result<(), StudyError> {
         if self.is_adaptive() && !self.kind.adapts {
-            let message = format!("the kind `{}` needs to know its frequencies", self.kind.name);
-            let help = "write { from = …, to = …, points = … }; only a response takes a tolerance".to_owned();
+            let message = format!("a study of kind `{}` needs a fixed number of frequencies", self.kind.name);
+            let help =
+                "write { from = …, to = …, points = … }; only kind = \"response\" accepts a tolerance".to_owned();
             return Err(self.error_at("study", 0, "frequency", message, Some(help)));
         }
         let mut sectors = None;
@@ -548,11 +551,12 @@ impl Study {
             if let Some(found) = parts.and_then(|parts| parts.model.ring).map(|ring| ring.sectors)
                 && *sectors.get_or_insert(found) != found
             {
-                let message = "the number of sectors is another in another case, and results are named after them";
+                let message = "the number of sectors differs between cases, but the columns of the results are named \
+                    after the sectors";
                 let location =
                     self.structure.lists.disk.as_ref().map(|disk| disk.table.location_of("sectors", None).clone());
                 let problem = Problem::new(&location.unwrap_or_default(), "sectors", message);
-                return Err(StudyError::at(&self.sources, problem.help("make a study for every number of sectors")));
+                return Err(StudyError::at(&self.sources, problem.help("write one study for each number of sectors")));
             }
             if let Some(error) = StudyError::all(&self.sources, problems) {
                 return Err(error);

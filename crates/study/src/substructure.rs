@@ -47,12 +47,13 @@ pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
     ("rubin", "free modes and residual flexibility", Some(ReductionKind::Rubin)),
     (
         "craig-bampton",
-        "modes with the places held, and what static forces at them do",
+        "modes with fixed places, and static constraint modes (Craig-Bampton)",
         Some(ReductionKind::CraigBampton),
     ),
     (
         "none",
-        "all rows, as with reduce = false; `up_to` then says of which modes `modal_damping` is the share, and nothing else",
+        "all rows, as with reduce = false; `up_to` is only the frequency up to which `modal_damping` is the damping \
+         ratio",
         None,
     ),
 ];
@@ -76,9 +77,9 @@ pub(crate) fn of(
         component.clone()
     });
     if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= CRITICAL) {
-        let message = format!("a damping ratio of {ratio}, and from 1 on no mode vibrates");
+        let message = format!("a damping ratio of {ratio}: from 1 on a mode does not oscillate");
         let problem = Problem::new(table.location_of("modal_damping", None), "modal_damping", message);
-        problems.push(problem.help("say percent, as in modal_damping = \"0.1 %\""));
+        problems.push(problem.help("write it in percent, as in modal_damping = \"0.1 %\""));
     }
     let damping = match (values.quantity("modal_damping"), values.table("rayleigh")) {
         (Some(ratio), _) => SubstructureDamping::Ratio(ratio),
@@ -107,9 +108,11 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
     let named = reduce.text("kind").and_then(named);
     if let Some((_, _, None)) = named {
         return match reduce.count("modes") {
-            Some(_) => {
-                Err(("modes", "`modes` of a structure that is not reduced", "leave out one of `kind` and `modes`"))
-            }
+            Some(_) => Err((
+                "modes",
+                "`modes` is stated, but kind = \"none\" does not reduce the structure",
+                "remove `kind` or `modes`",
+            )),
             None => Ok(Reduction::None { up_to: reduce.quantity("up_to").unwrap_or(0.0) }),
         };
     }
@@ -119,23 +122,23 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
         (Some(_), Some(_)) => Err((
             "modes",
             "both `up_to` and `modes` are stated",
-            "leave out one: `up_to` takes as many modes as the error asks for",
+            "remove one of them: `up_to` takes as many modes as the error requires",
         )),
         (None, Some(modes)) => {
             let (kind, orders) = (kind.unwrap_or(ReductionKind::Rubin), reduce.count("orders"));
             if let (ReductionKind::CraigBampton, Some(_)) = (kind, orders) {
                 return Err((
                     "orders",
-                    "Craig-Bampton has no residual vectors, and `orders` of them are stated",
-                    "leave out `orders`, or say kind = \"rubin\"",
+                    "`orders` is stated, but a Craig-Bampton reduction has no residual vectors",
+                    "remove `orders`, or use kind = \"rubin\"",
                 ));
             }
             Ok(Reduction::Modes { modes: modes as usize, kind, orders: orders.unwrap_or(1) as usize, up_to: 0.0 })
         }
         (_, None) if reduce.count("orders").is_some() => Err((
             "orders",
-            "`orders` of residual vectors belong to `modes`",
-            "add `modes`: with `up_to` they are as many as the error asks for",
+            "`orders` of residual vectors need `modes`",
+            "add `modes`; with `up_to` the error determines the number of residual vectors",
         )),
         (up_to, None) => Ok(Reduction::UpTo { up_to: up_to.unwrap_or(0.0), tolerance, kind }),
     }
@@ -251,8 +254,9 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
     };
     if let Some(key) = ["dof", "dofs", "nodes", "sum"].into_iter().find(|key| table.entry(key).is_some()) {
-        let message = format!("`of` makes it a place of a mass or a body, and `{key}` of a structure");
-        return Err(problem(key, message).map_help("take one of the two out"));
+        let message =
+            format!("`of` makes this a place of a mass or a body, but `{key}` makes it a place of a structure");
+        return Err(problem(key, message).map_help("remove one of the two keys"));
     }
     let of = values.text("of").unwrap_or_default();
     let Some(viewed) = Viewed::find(model, of) else {
@@ -261,17 +265,18 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
             Some(near) => format!("did you mean `{near}`?"),
             None => "name a [[body]], or a [[mass]] with `directions`".to_owned(),
         };
-        return Err(problem("of", format!("there is no mass `{}`, and no body", shown(of))).map_help(&help));
+        return Err(problem("of", format!("there is no mass and no body `{}`", shown(of))).map_help(&help));
     };
     let offset = values.vector("offset");
     if let (Viewed::Mass(mass), Some(_)) = (&viewed, offset) {
-        let message = format!("`{}` is a point mass, which does not turn: no point of it moves otherwise", mass.name);
-        return Err(problem("offset", message).map_help("make it a [[body]] with its inertia, or take `offset` out"));
+        let message = format!("`{}` is a point mass and does not rotate: all its points move alike", mass.name);
+        return Err(problem("offset", message).map_help("use a [[body]] with its inertia, or remove `offset`"));
     }
     let name = values.text("name").unwrap_or_default().to_owned();
     if let (Viewed::Body(body), None) = (&viewed, values.vector("normal")) {
         if offset.is_none() {
-            let help = "add offset = [\"3 mm\", 0, \"-2 mm\"], the point seen from the centre of mass";
+            let help =
+                "add offset = [\"3 mm\", 0, \"-2 mm\"], the position of the point relative to the centre of mass";
             return Err(problem("name", "a place of a body needs `offset`, `normal` or both".to_owned()).map_help(help));
         }
         return point(table, values, body, &name);
@@ -279,7 +284,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
     let Some(axes) = viewed.axes() else {
         let Viewed::Mass(mass) = viewed else { return Err(problem("of", format!("no point of `{of}` moves"))) };
         let message = format!(
-            "a face of `{}` is turned among x, y, z, and it moves along {}",
+            "a rotated face of `{}` needs directions among x, y, z, but the mass moves along {}",
             mass.name,
             match &mass.directions[..] {
                 [] => "one direction without a name".to_owned(),
@@ -289,14 +294,15 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         return Err(problem("of", message).map_help("give the mass directions = [\"x\", \"z\"], or all three"));
     };
     let Some(normal) = values.vector("normal") else {
-        return Err(problem("normal", "a turned face needs its normal".to_owned()).map_help("add normal = [0, 0, 1]"));
+        return Err(problem("normal", "a rotated face needs its normal".to_owned()).map_help("add normal = [0, 0, 1]"));
     };
     let missing = (0..CARTESIAN.len()).find(|axis| !axes.contains(axis));
     let tangent = match missing {
         None => values.vector("tangent"),
         Some(axis) if normal[axis] != 0.0 => {
-            let message = format!("`{of}` does not move along {}, and the normal has a part along it", CARTESIAN[axis]);
-            return Err(problem("normal", message).map_help("make that part 0"));
+            let message =
+                format!("`{of}` does not move along {}, but the normal has a component along it", CARTESIAN[axis]);
+            return Err(problem("normal", message).map_help("set that component to 0"));
         }
         // in a plane the tangent is unique: the axis across the plane times the normal
         Some(axis) => {
@@ -317,8 +323,8 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         .names("directions")
         .map_or_else(|| names.iter().map(|&name| name.to_owned()).collect(), <[String]>::to_vec);
     if directions.len() != rows.len() {
-        let message = format!("{} directions for {}", directions.len(), names.join(", "));
-        return Err(problem("directions", message).map_help("name each tangent and the normal, or leave it out"));
+        let message = format!("{} names in `directions` for {}", directions.len(), names.join(", "));
+        return Err(problem("directions", message).map_help("name each tangent and the normal, or remove `directions`"));
     }
     Ok(Place { name, directions, rows, frame: None, of: Some(of.to_owned()) })
 }
@@ -329,18 +335,20 @@ fn point(table: &StatedTable, values: &Values, body: &Body, name: &str) -> Resul
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
     };
     if values.vector("tangent").is_some() {
-        return Err(
-            problem("tangent", "a tangent without a normal is no frame".to_owned()).map_help("add normal = [0, 0, 1]")
-        );
+        return Err(problem("tangent", "a local frame needs a normal; only `tangent` is stated".to_owned())
+            .map_help("add normal = [0, 0, 1]"));
     }
     let point = body.point(name, values.vector("offset").unwrap_or_default());
     let Some(named) = values.names("directions") else { return Ok(point) };
     let mut rows = Vec::with_capacity(named.len());
     for along in named {
         let Some(at) = point.directions.iter().position(|own| own == along) else {
-            let message =
-                format!("points of `{}` move along {}, not along {along}", body.name, point.directions.join(", "));
-            let help = "name some of these; the rotations of the body are its own places, those of every point of it";
+            let message = format!(
+                "points of `{}` move along {}; `{along}` is not one of these directions",
+                body.name,
+                point.directions.join(", ")
+            );
+            let help = "use these directions; rotations are places of the body itself and apply to all its points";
             return Err(problem("directions", message).map_help(help));
         };
         rows.push(point.rows[at].clone());
@@ -368,8 +376,8 @@ fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<
     let count = values.names("dofs").map(<[String]>::len).or(sums);
     if let Some(count) = count.filter(|count| *count > CARTESIAN.len()) {
         let key = if sums.is_some() { "sum" } else { "dofs" };
-        return Err(problem(key, format!("a node has up to three directions, and {count} rows are named"))
-            .map_help("a mean of several rows is nodes = [\"188\", \"189\"], a sum of them sum = { … }"));
+        return Err(problem(key, format!("a node has at most three directions, but {count} rows are named"))
+            .map_help("for the mean of several nodes use nodes = [\"188\", \"189\"], for a weighted sum sum = { … }"));
     }
     let names = match (framed, &stated, values.names("dofs")) {
         (false, _, _) if values.names("dof").is_some() => stated.unwrap_or_default(),
@@ -386,11 +394,13 @@ fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<
     };
     let rows = if framed { owned(&CARTESIAN) } else { names.clone() };
     if framed && count.is_some_and(|count| count != CARTESIAN.len()) {
-        return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned())
-            .map_help("of a plane structure name the rows in order, tangent and normal, without a frame, or turn them by sum = { … }"));
+        return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned()).map_help(
+            "for a plane structure name the rows in the order tangent, normal and remove the frame, or \
+                rotate them with sum = { … }",
+        ));
     }
     if let Some(count) = count.filter(|count| *count != names.len()) {
-        let message = format!("{} directions for {count} rows", names.len());
+        let message = format!("{} names in `directions` for {count} rows", names.len());
         return Err(problem("directions", message).map_help("give each row the name of its direction"));
     }
     Ok((names, rows))
@@ -414,7 +424,7 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
     let [key] = stated[..] else {
         let message = match stated[..] {
             [] => "the place has no row: one of `dof`, `dofs`, `nodes`, `sum` is needed".to_owned(),
-            _ => format!("a place is one of `{}`", stated.join("`, `")),
+            _ => format!("a place takes only one of `{}`", stated.join("`, `")),
         };
         return Err(problem(stated.last().copied().unwrap_or("name"), message).map_help(
             "write dof = \"1353.y\", dofs = [\"188.x\", \"188.y\", \"188.z\"], or nodes = [\"188\", \"189\"]",
@@ -452,10 +462,9 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
             let names = values.names(key).unwrap_or_default();
             if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
                 let (place, name) = (table.location_of(key, Some(twice.1)), shown(twice.1));
-                let message =
-                    format!("the row `{name}` stands twice, and a node moves along each of its directions once");
+                let message = format!("the row `{name}` is named twice; a node has each direction once");
                 return Err(Box::new(
-                    Problem::new(place, key, message).help("name each row once; a weighted sum of rows is sum = { … }"),
+                    Problem::new(place, key, message).help("name each row once; for a weighted sum use sum = { … }"),
                 ));
             }
             let framed = values.vector("normal").is_some();
@@ -481,7 +490,7 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
             Some(frame.map_err(|error| problem("normal", error.to_string()))?)
         }
         None if values.vector("tangent").is_some() => {
-            return Err(problem("tangent", "a tangent without a normal is no frame".to_owned())
+            return Err(problem("tangent", "a local frame needs a normal; only `tangent` is stated".to_owned())
                 .map_help("add normal = [0, 0, 1]"));
         }
         None => None,
@@ -509,7 +518,7 @@ fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) 
     component.row(&name).ok_or_else(|| {
         let place = table.location_of("nodes", Some(node));
         Box::new(Problem::new(place, "nodes", format!("the structure has no row `{}`", shown(&name))).help(format!(
-            "{}; or state directions = [\"x\", …] with those that every one of the nodes has",
+            "{}; or add directions = [\"x\", …] with directions that all these nodes have",
             near(component, &name)
         )))
     })
@@ -533,7 +542,7 @@ fn near(component: &Component, name: &str) -> String {
         .collect();
     if !same.is_empty() {
         return format!(
-            "its rows of this node are {}; what is missing there is constrained",
+            "the rows of this node are {}; missing directions are constrained",
             one_of(same).replace(" or ", ", ")
         );
     }

@@ -81,7 +81,7 @@ impl Orbits {
             return match system.structure().is_sparse() {
                 true => None,
                 false if system.contracts() => Some(Orbits::One),
-                false => Some(Orbits::Several("the structure gives energy to some motion".to_owned())),
+                false => Some(Orbits::Several("the structure feeds energy into some motion".to_owned())),
             };
         }
         if let Some(more @ 1..) = of.len().checked_sub(NAMED) {
@@ -219,7 +219,10 @@ impl ModelSummary {
     pub fn long_run(&self) -> Option<String> {
         (self.seconds >= LONG_RUN).then(|| {
             let time = self.time();
-            format!("this takes {time}; `check` says it before, and Ctrl-C ends the run and keeps the finished points")
+            format!(
+                "this run takes {time}; `check` estimates this in advance; Ctrl-C ends the run and keeps the \
+                finished points"
+            )
         })
     }
 
@@ -234,7 +237,7 @@ impl ModelSummary {
         if self.seconds < WIDE * self.usual_seconds || self.seconds < SOON {
             return usual;
         }
-        format!("{usual}, up to {} where orbits are hard to find", crate::words::duration(self.seconds))
+        format!("{usual}, up to {} if orbits are hard to find", crate::words::duration(self.seconds))
     }
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.

@@ -353,17 +353,19 @@ impl Reader<'_> {
                     None => {
                         let message = format!("the unit is incomplete: after `{next}` a unit is missing");
                         return Err(Fault::new(symbol..self.text.len(), message)
-                            .help("complete the unit, as in \"10 N/m\", or leave the sign out"));
+                            .help("complete the unit, as in \"10 N/m\", or remove the sign"));
                     }
                     Some('(') if self.group_here() => {}
                     Some(_) if self.unit_here() => {
                         let word = self.word();
                         if space && space_after && (self.names.parameter)(word) {
                             let span = self.at..self.at + word.len();
-                            let message = format!("`{word}` can be the unit or the parameter `{word}` here");
+                            let message =
+                                format!("`{word}` is ambiguous here: the unit `{word}` or the parameter `{word}`");
                             let (before, after) = (self.text[..symbol].trim(), &self.text[self.at..]);
                             let help = format!(
-                                "for the unit leave out the spaces around `{next}`; for the parameter write \"({}) {next} {}\"",
+                                "for the unit remove the spaces around `{next}`; for the parameter write \"({}) \
+                                 {next} {}\"",
                                 shown(before),
                                 shown(after)
                             );
@@ -383,9 +385,10 @@ impl Reader<'_> {
                 }
                 if divided {
                     let word = self.word();
-                    let message = format!("it is not clear whether `{word}` is below the `/`");
-                    return Err(Fault::new(self.at..self.at + word.len(), message)
-                        .help("write \"N s/m\" or \"N/(m s)\", whichever is meant"));
+                    let message = format!("it is not clear whether `{word}` belongs to the denominator");
+                    return Err(
+                        Fault::new(self.at..self.at + word.len(), message).help("write \"N s/m\" or \"N/(m s)\"")
+                    );
                 }
             }
             divided |= inverse;
@@ -468,7 +471,7 @@ impl Reader<'_> {
                 start..self.at,
                 format!("the power of a unit must be a whole number from -{HIGHEST_POWER} to {HIGHEST_POWER}"),
             )
-            .help("put the quantity into parentheses to raise it to another power: \"(2 m)^0.5\"")),
+            .help("to raise a quantity to another power, put it in parentheses: \"(2 m)^0.5\"")),
         }
     }
 
@@ -596,7 +599,7 @@ mod tests {
         refuse("2 lbs", "write `lb` for a mass, `lbf` for a force");
         refuse("2 Pounds", "write `lb` for a mass, `lbf` for a force");
         refuse("0.1 sec", "write `s`");
-        refuse("10 N/m s", "whether `s` is below");
+        refuse("10 N/m s", "whether `s` belongs to the denominator");
         refuse("10 N / m", "the parameter `m`");
         refuse("10 m^", "whole number");
         refuse("10 m^0.5", "whole number");

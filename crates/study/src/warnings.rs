@@ -47,9 +47,9 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
         return None;
     }
     Some(if cases.iter().any(constant) {
-        "every force and motion is constant in time: nothing vibrates".to_owned()
+        "all forces and motions are constant in time, so nothing vibrates".to_owned()
     } else {
-        "there is no force and no motion that is not zero: nothing vibrates; add a [[force]] or a [[motion]]".to_owned()
+        "all forces and motions are zero, so nothing vibrates; add a [[force]] or a [[motion]]".to_owned()
     })
 }
 
@@ -63,11 +63,12 @@ pub(crate) fn undamped(cases: &[Surveyed]) -> Option<String> {
     // the warning must be true for every case
     let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
     let hertz = significant(all.first()? / TAU, 6);
-    let advice = "give a spring `damping`, or damping_ratio = \"0.5 %\"";
+    let advice = "add `damping` or damping_ratio = \"0.5 %\" to a spring";
     Some(match cases[0].survey.system().joints().is_empty() {
-        true => format!("nothing damps the resonance at {hertz} Hz: the response has no bound there; {advice}"),
+        true => format!("the resonance at {hertz} Hz is undamped: the response has no bound there; {advice}"),
         false => format!(
-            "nothing but the joints damps the resonance at {hertz} Hz: where they do not bound it, the response has no bound; {advice}"
+            "only the joints damp the resonance at {hertz} Hz: the response has no bound if friction does not limit \
+             it; {advice}"
         ),
     })
 }
@@ -112,7 +113,9 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
     // reports.
     let (_, omega, name) = nearest?;
     let (from, to, omega) = (hertz(from), hertz(to), hertz(omega));
-    Some(format!("no resonance lies between {from} and {to} Hz: the nearest is at {omega} Hz with all joints {name}"))
+    Some(format!(
+        "no resonance lies between {from} and {to} Hz: the nearest one, with all joints {name}, is at {omega} Hz"
+    ))
 }
 
 /// A resonance of the linear structure that is narrower than the steps of a range of
@@ -144,12 +147,13 @@ fn coarse(cases: &[Surveyed]) -> Option<String> {
     let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
     let step = (to - from) / (points - 1) as f64;
     let several = if enough <= MOST_POINTS as f64 {
-        format!("{enough} points would do")
+        format!("{enough} points are enough")
     } else {
-        "take a narrower range".to_owned()
+        "use a narrower range".to_owned()
     };
     Some(format!(
-        "the frequencies are {} Hz apart, and the resonance at {} Hz is only {} Hz wide where friction does not damp it: the curve may step over it; {several}",
+        "the frequencies are {} Hz apart, but the resonance at {} Hz is only {} Hz wide without friction: the curve \
+         may miss it; {several}",
         hertz(step, 2),
         hertz(at, 5),
         hertz(width, 2)
@@ -235,7 +239,7 @@ fn displaced(cases: &[Surveyed]) -> Option<String> {
     let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
     let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
     Some(format!(
-        "modes leave all forces out, also the constant one on `{}`: what it closes, opens or brings to its limit is as it is without it",
+        "a mode has no forces: the constant force on `{}` is ignored, with its effect on contacts and slip limits",
         force.on
     ))
 }
@@ -257,7 +261,7 @@ fn sticks(cases: &[Surveyed]) -> Option<String> {
         }
     }
     if needed > UNLOADED * asked {
-        return Some("no joint slips in this mode, however large it is: its motion does not load them".to_owned());
+        return Some("no joint slips in this mode at any amplitude: its motion does not load the joints".to_owned());
     }
     Some(format!(
         "no joint slips in this mode: the amplitudes end at {}, and the first slip is at about {}",

@@ -58,7 +58,7 @@ pub fn bytes_text(bytes: u64) -> String {
 
 /// Formats an estimated time, rounded to one digit.
 pub(crate) fn about(seconds: f64) -> String {
-    if seconds < 1.0 { "below a second".to_owned() } else { format!("about {}", duration(seconds)) }
+    if seconds < 1.0 { "less than a second".to_owned() } else { format!("about {}", duration(seconds)) }
 }
 
 /// Formats a time in seconds, minutes, hours or days.
@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(significant(3.110_516e15, 3), "3.11e15");
         assert_eq!(
             [about(0.3), about(34.0), about(600.0), about(1e5), about(1e6)],
-            ["below a second", "about 34 s", "about 10 minutes", "about 28 hours", "about 12 days",]
+            ["less than a second", "about 34 s", "about 10 minutes", "about 28 hours", "about 12 days",]
         );
         assert_eq!([quantity(2e-4, "m"), quantity(2.0, "N"), quantity(4e4, "N")], ["200 µm", "2 N", "4.000e4 N"]);
     }

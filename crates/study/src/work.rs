@@ -137,7 +137,8 @@ fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
             displayed(ANY_WIDTH, Some(Dimension::VELOCITY))
         ),
         None => format!(
-            "a study of the kind `{}` goes by a method of its own, which does not take this; in kinds that choose one, {ways}",
+            "a study of kind `{}` uses its own method, which does not accept this model; for kinds with a choice of \
+             method: {ways}",
             kind.name
         ),
     }

@@ -364,7 +364,7 @@ fn what_is_wrong_is_said_where_it_stands() {
         place,
         "name = \"left\"\nof = \"beam\"\noffset = [0, 0, 0]",
         "of",
-        &["there is no mass `beam`, and no body"],
+        &["there is no mass and no body `beam`"],
     );
     refused(place, "name = \"left\"\nof = \"bat\"\noffset = [0, 0, 0]", "of", &["did you mean `bar`?"]);
     refused(place, "name = \"left\"\nof = \"bar\"", "name", &["needs `offset`, `normal` or both"]);
@@ -379,7 +379,7 @@ fn what_is_wrong_is_said_where_it_stands() {
         place,
         "name = \"left\"\nof = \"bar\"\noffset = [0, 0, 0]\ndirections = [\"x\", \"y\"]",
         "directions",
-        &["points of `bar` move along x, z, not along y"],
+        &["points of `bar` move along x, z; `y` is not one of these directions"],
     );
     refused(
         place,
@@ -415,7 +415,7 @@ fn what_is_wrong_is_said_where_it_stands() {
     let twice = "[[body]]\nname = \"bar\"\nmass = 1\ninertia = 1\ndirections = [\"x\", \"y\"]\n[study]";
     refused(joint, twice, "name", &["appears twice"]);
     let offset = "[[mass]]\nname = \"block\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[place]]\nname = \"side\"\nof = \"block\"\noffset = [0, 0, \"1 mm\"]\nnormal = [1, 0, 0]\n[study]";
-    refused(joint, offset, "offset", &["`block` is a point mass", "make it a [[body]]"]);
+    refused(joint, offset, "offset", &["`block` is a point mass", "use a [[body]]"]);
     let figure = "output = [\"velocity\", \"acceleration\", \"harmonics\"]";
     refused(figure, &format!("{figure}\n[figure]\nonly = \"bar.ry\""), "only", &["`bar.ry` is a rotation"]);
 }

@@ -83,8 +83,8 @@ fn every_study_in_the_book_checks() {
 #[test]
 fn the_reference_of_keys_is_up_to_date() {
     let head = "<!-- Generated from the schema by crates/study/tests/book.rs; do not edit. -->\n\n# Every key\n\n\
-                What the columns mean: *takes* says what may stand there (a quantity is a string with a unit, an expression over \
-                `[parameters]`, or a bare number in SI); *without it* says what holds when the key is absent.\n\n";
+                The column *value* states what the key accepts. A quantity is a string with a unit, an expression over \
+                `[parameters]`, or a bare number in SI. The column *default* states the value that applies if the key is absent.\n\n";
     up_to_date(&root().join("docs/src/study_file_keys.md"), &format!("{head}{}", book::markdown()));
 }
 

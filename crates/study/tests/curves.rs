@@ -88,11 +88,11 @@ fn no_value_is_the_best_where_nothing_moves() {
         found.notes.join("; ")
     };
     let still = found("[\"2 N\", \"3 N\", \"4 N\"]");
-    assert!(still.contains("nothing whose peak counts moves at any value of Fc"), "{still}");
+    assert!(still.contains("no place of `peak_of` moves at any value of Fc"), "{still}");
     let level = found("[\"0.2 N\", \"2 N\", \"3 N\", \"4 N\"]");
-    assert!(level.contains("3 values of Fc have the same lowest peak, from Fc = 2 N to Fc = 4 N"), "{level}");
+    assert!(level.contains("3 values of Fc, from Fc = 2 N to Fc = 4 N, have the same lowest peak"), "{level}");
     let falling = found("[\"0.1 N\", \"0.2 N\", \"0.3 N\"]");
-    assert!(falling.contains("stands at an end"), "{falling}");
+    assert!(falling.contains("is at an end"), "{falling}");
 }
 
 /// (10.3) at its ends: stuck with the spring of the joint, free without it.
@@ -157,7 +157,7 @@ amplitude = {{ from = "0.01 mm", to = "100 mm", points = {points} }}
     let (coarse, fine) = (study(3), study(50));
     assert_eq!(fine.record.points.get("merging"), Some(&1), "{:?}", fine.record.points);
     let reason = &fine.failures[0].reason;
-    assert!(fine.failures[0].at == "mode 2" && reason.contains("nearly becomes one with another mode"), "{reason}");
+    assert!(fine.failures[0].at == "mode 2" && reason.contains("nearly merges with another mode"), "{reason}");
     assert_eq!(coarse.failures, fine.failures);
     let largest = |found: &Dataset| table(found, "modes_summary").numbers("largest_damping_ratio").unwrap()[0];
     assert!((largest(&coarse) / largest(&fine) - 1.0).abs() < 1e-6 && largest(&fine) > 0.05);

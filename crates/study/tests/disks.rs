@@ -155,7 +155,7 @@ fn a_pattern_from_a_file() {
     let found = blades(&read("pattern.csv").unwrap().case(0).unwrap());
     assert!(found.iter().zip([1.01, 1.0, 0.98, 1.0, 1.0, 1.005]).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
     for (file, words) in
-        [("short.csv", "has 1 sectors, and the disk has 6"), ("wrong.csv", "line 2"), ("none.csv", "cannot be read")]
+        [("short.csv", "has 1 sectors, but the disk has 6"), ("wrong.csv", "line 2"), ("none.csv", "cannot be read")]
     {
         assert!(read(file).unwrap_err().message().contains(words), "{file}");
     }
@@ -170,17 +170,21 @@ fn wrong_disks_are_refused_at_their_place() {
     };
     for (force, disk, words) in [
         ("engine_order = 1.5", "", "whole number"),
-        ("engine_order = 1\nnodal_diameter = 2", "", "different things"),
+        ("engine_order = 1\nnodal_diameter = 2", "", "both define the wave"),
         ("sector = 6", "", "from 0 to 5"),
         ("", "mistuning = { of = \"q\", deviation = 0.02 }", "no parameter or mass `q`"),
         ("", "mistuning = { of = [\"blade\", \"disk\"], deviation = 0.02 }", "no spring between"),
         ("", "mistuning = { of = \"k\" }", "`deviation` or `file` is missing"),
         ("", "mistuning = { of = \"k\", deviation = 0.02, seed = 0.5 }", "whole number"),
-        ("", "mistuning = { of = \"k\", deviation = 0.02, file = \"p.csv\" }", "says nothing beside it"),
+        (
+            "",
+            "mistuning = { of = \"k\", deviation = 0.02, file = \"p.csv\" }",
+            "`deviation` and `file` exclude each other",
+        ),
         (
             "",
             "mistuning = { of = \"k\", deviation = 100, seed = 1 }",
-            "no stiffness or mass remains | deviations are shares: 0.02 is 2 %",
+            "no stiffness or mass remains | write deviations as fractions or in percent: 0.02 is 2 %",
         ),
         ("", "sectors_ = 3", "no key `sectors_`"),
     ] {
@@ -191,7 +195,7 @@ fn wrong_disks_are_refused_at_their_place() {
         read_study("d.toml", &text.replace("next.blade", "ground"), &[]).unwrap_err().message().contains("no [disk]")
     );
     let one = format!("{SECTOR}\n[disk]\nsectors = 1\n{STUDY}");
-    assert!(read_study("d.toml", &one, &[]).unwrap_err().message().contains("2 sectors or more"));
+    assert!(read_study("d.toml", &one, &[]).unwrap_err().message().contains("at least 2 sectors"));
     let many = format!("{SECTOR}\n[disk]\nsectors = 1e8\n{STUDY}");
     assert!(read_study("d.toml", &many, &[]).unwrap_err().message().contains("the limit is"));
     let misspelt = format!("{SECTOR}\n[disk]\nsectors = 6\n{STUDY}").replacen("\"next.blade\"", "\"next.blad\"", 1);
@@ -200,7 +204,7 @@ fn wrong_disks_are_refused_at_their_place() {
     let varied = format!(
         "{SECTOR}\n[disk]\nsectors = \"s\"\n[study]\nkind = \"response\"\nfrequency = \"1 Hz\"\nvary = {{ s = [4, 5] }}"
     );
-    assert!(read_study("d.toml", &varied, &[]).unwrap_err().message().contains("in another case"));
+    assert!(read_study("d.toml", &varied, &[]).unwrap_err().message().contains("differs between cases"));
 }
 
 /// `only = \"blade\"` selects the blades of all sectors; a name with a number selects one of
@@ -230,7 +234,7 @@ fn frequencies_by_nodal_diameter() {
     }
     assert!(!data.figure.panels[0].series.is_empty());
     let mistuned = read("", "mistuning = { of = \"k\", deviation = 0.01 }", "[study]\nkind = \"nodal-diameter\"\n");
-    assert!(mistuned.unwrap_err().message().contains("no nodal diameters"));
+    assert!(mistuned.unwrap_err().message().contains("have no nodal diameter"));
 }
 
 /// A blade with stress stiffening, `k0 + k1 Ω²`: engine order e crosses at
@@ -438,7 +442,7 @@ fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
     }
     assert!(rows > 6 * 4 * 2 * 3, "{rows}");
     for (key, words) in [
-        ("stiffened = { file = \"k.mtx\", at = \"100 Hz\", speed = \"speed\" }", "at rest once more"),
+        ("stiffened = { file = \"k.mtx\", at = \"100 Hz\", speed = \"speed\" }", "at rest again"),
         ("stiffened = { file = \"small.mtx\", at = \"100 Hz\", speed = \"speed\" }", "has 1 rows"),
         ("stiffened = { file = \"k100.mtx\", at = \"0 Hz\", speed = \"speed\" }", "more than zero"),
         ("stiffened = { file = \"k100.mtx\", at = \"100 Hz\" }", "`speed` is missing"),
@@ -471,8 +475,8 @@ fn wrong_sectors_by_matrices_are_refused_at_their_place() {
         ("boundary = \"strange.csv\"", "rows of node `1`, but none of its partner `9`"),
         ("boundary = \"pairs.csv\"\naxis = \"z\"", "constrain both equally"),
         ("boundary = \"pairs.csv\"\nblade = \"pairs.csv\"", "expected the columns node"),
-        ("boundary = \"pairs.csv\"\nblade = \"rim_blade.csv\"", "row `1.x` of the blade is on or next to the boundary"),
-        ("boundary = \"pairs.csv\"\nblade = \"no_blade.csv\"", "names no node"),
+        ("boundary = \"pairs.csv\"\nblade = \"rim_blade.csv\"", "row `1.x` of the blade is on the boundary"),
+        ("boundary = \"pairs.csv\"\nblade = \"no_blade.csv\"", "contains no node"),
         ("boundary = \"pairs.csv\"\nmistuning = { of = \"blade.stiffness\", deviation = 0.1 }", "add blade = "),
     ] {
         assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));
@@ -561,7 +565,7 @@ fn coordinates_tell_a_wrong_sector() {
         ("sectors = 7\naxis = \"z\"\nboundary = \"right.csv\"", "as in a disk with 6.00 sectors"),
         ("sectors = 7\naxis = \"z\"", "number of sectors"),
         ("sectors = 6\naxis = \"x\"\nboundary = \"right.csv\"", "they coincide for a rotation about z"),
-        ("sectors = 6\nboundary = \"right.csv\"", "there is no `axis`"),
+        ("sectors = 6\nboundary = \"right.csv\"", "`nodes` needs `axis`"),
     ] {
         assert!(refused(disk).contains(words), "{disk}: {}", refused(disk));
     }
@@ -728,7 +732,7 @@ fn amplification_is_the_ratio_of_two_studies() {
     assert!((tuned[0] - 1.0).abs() < 1e-9, "{tuned:?}");
     let warned = |text: &str| {
         let study = read_study("disk.toml", text, &[]).unwrap();
-        stickslip_study::run::check(&study).unwrap().summary().warnings.join("; ").contains("all blades are alike")
+        stickslip_study::run::check(&study).unwrap().summary().warnings.join("; ").contains("all blades are equal")
     };
     assert!(warned(&text("0 %", "amplification = true")) && !warned(&text("3 %", seeds)));
     // Whitehead's bound for six blades in the linear limit

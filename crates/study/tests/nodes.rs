@@ -87,7 +87,7 @@ fn a_node_is_taken_for_all_its_directions_or_they_are_named() {
         for along in ["x", "z"] {
             assert!(with(&format!("{node}.{along}")).is_ok(), "{before}{node}.{along}");
         }
-        let directions = format!("say `{node}.x` or `{node}.z`");
+        let directions = format!("write `{node}.x` or `{node}.z`");
         match with(node) {
             Ok(_) => assert!(taken, "{before}{node}"),
             Err(error) => {
@@ -103,7 +103,7 @@ fn a_node_is_taken_for_all_its_directions_or_they_are_named() {
     // places in springs, joints and forces
     for (from, to) in [("on = \"tip.x\"", "on = \"tip.y\""), ("between = [\"tip.z\"", "between = [\"tip.y\"")] {
         let error = read_study("study.toml", &text(RESPONSE).replace(from, to), &[]).unwrap_err();
-        assert_eq!(error.help_text(), Some("say `tip.x` or `tip.z`"), "{error}");
+        assert_eq!(error.help_text(), Some("write `tip.x` or `tip.z`"), "{error}");
         assert_eq!(error.underlined().map(|text| text.trim_matches('"')), Some("tip.y"), "{error}");
     }
 }
@@ -229,13 +229,13 @@ fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
     };
     let both = "directions = [\"x\", \"z\"]";
     for (place, directions, words) in [
-        ("of = \"n\"\nnormal = [0, 0, 1]", both, "there is no mass `n`"),
+        ("of = \"n\"\nnormal = [0, 0, 1]", both, "there is no mass and no body `n`"),
         ("of = \"m\"", both, "needs its normal"),
         ("of = \"m\"\nnormal = [0, 1, 1]", both, "does not move along y"),
         ("of = \"m\"\nnormal = [0, 0, 0]", both, "not all zero"),
-        ("of = \"m\"\nnormal = [0, 0, 1]", "", "turned among x, y, z"),
+        ("of = \"m\"\nnormal = [0, 0, 1]", "", "needs directions among x, y, z"),
         ("of = \"m\"\nnormal = [0, 0, 1]\ndof = 1", both, "a place of a mass"),
-        ("dof = 1", both, "there is none"),
+        ("dof = 1", both, "the study has no [structure]"),
     ] {
         let found = error(place, directions);
         assert!(found.contains(words), "{place}: {found}");

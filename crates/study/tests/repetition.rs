@@ -129,21 +129,21 @@ fn errors_name_the_entry_and_the_index() {
     check("0.2 kg\"", "0.2 kg\"\nmas = 1", 9, &["mass 1 has no key `mas`", "(i = 1)"]);
     check("\"blade{i}\"", "\"blade{i/2}\"", 7, &["whole number, found 0.5", "(i = 1)"]);
     check("\"blade{i}\"", "\"blade{i\"", 7, &["not closed"]);
-    check("\"blade{i}\"", "\"{i}\"", 7, &["`1` is no name"]);
+    check("\"blade{i}\"", "\"{i}\"", 7, &["`1` is not a valid name"]);
     check("\"blade{i}\"", "\"blade\"", 7, &["appears twice", "(mass 1, i = 2)"]);
     check("repeat = { i = 12 }\nname", "name", 6, &["repeat = { i = 12 }"]);
     // errors of the repetition itself
-    check("{ i = 12 }", "{ i = 0 }", 6, &["number of times"]);
-    check("{ i = 12 }", "{ i = 1.5 }", 6, &["number of times"]);
-    check("{ i = 12 }", "{ i = [3, 2] }", 6, &["number of times"]);
-    check("{ i = 12 }", "{ i = 12, k = 2 }", 6, &["`k` is a parameter already"]);
-    check("{ i = 12 }", "{ pi = 12 }", 6, &["meaning of its own"]);
+    check("{ i = 12 }", "{ i = 0 }", 6, &["number of repetitions"]);
+    check("{ i = 12 }", "{ i = 1.5 }", 6, &["number of repetitions"]);
+    check("{ i = 12 }", "{ i = [3, 2] }", 6, &["number of repetitions"]);
+    check("{ i = 12 }", "{ i = 12, k = 2 }", 6, &["`k` is already a parameter"]);
+    check("{ i = 12 }", "{ pi = 12 }", 6, &["reserved word"]);
     check("{ i = 12 }", "{ wrap = true }", 6, &["an index is missing in mass 1"]);
     check("{ i = 12 }", "{ i = 12, wrap = \"j\" }", 6, &["no index `j`"]);
     check("{ i = 12 }", "12", 6, &["expected a table of indices in mass 1, found the number 12"]);
     check("{ i = 12 }", "{ i = 20001 }", 5, &["20001 elements", "20000"]);
     check("{ i = 12 }", "{ i = 1000000, j = 1000000 }", 5, &["the limit is 20000"]);
-    check("{ i = 12 }", "{ i = 9999999999 }", 6, &["number of times"]);
+    check("{ i = 12 }", "{ i = 9999999999 }", 6, &["number of repetitions"]);
 }
 
 /// An error in every element of a repeated entry is reported once.

@@ -257,12 +257,12 @@ fn an_interrupted_run_has_what_was_finished() {
 fn what_is_not_the_result_of_the_study_is_refused() {
     let (study, dataset) = oscillators(SWEEP);
     let wrong_kind = hysteresis::loops(&study, &dataset).unwrap_err();
-    assert!(wrong_kind.to_string().contains("`study` is of the kind `response`"), "{wrong_kind}");
+    assert!(wrong_kind.to_string().contains("`study` is of kind `response`"), "{wrong_kind}");
     // without a column, or with a shorter one
     let mut broken = dataset.clone();
     broken.tables[0].columns.retain(|column| column.name != "fast_amplitude_m");
     let column = response::curves(&study, &broken).unwrap_err();
-    assert!(column.to_string().contains("`curve` of `study` has no whole column `fast_amplitude_m`"), "{column}");
+    assert!(column.to_string().contains("`curve` of `study` lacks the column `fast_amplitude_m`"), "{column}");
     let mut broken = dataset.clone();
     let Values::Number(values) = &mut broken.tables[1].columns[3].values else {
         panic!("k, c, mass, then the frequency")
@@ -405,7 +405,7 @@ kind = "event-driven"
 "#
         );
         let notes = of(&text).1.notes;
-        let found = notes.iter().find(|note| note.contains("more than one orbit may be true"));
+        let found = notes.iter().find(|note| note.contains("several orbits are possible"));
         assert_eq!(found.is_some(), told, "{limit} {law} {stop}: {notes:?}");
         let right = found.is_none_or(|note| {
             note.starts_with("warning: at 2 points") && note.contains("`held`") && note.contains("`stop`")
@@ -472,8 +472,5 @@ kind = "shooting"
     assert_eq!(found.record.points.get("converged"), Some(&1), "{:?}", found.record.points);
     let notes = &found.notes;
     assert!(!notes.iter().any(|note| note.contains("unstable")), "{notes:?}");
-    assert!(
-        notes.iter().any(|note| note.contains("`j0`") && note.contains("sticks for the whole period")),
-        "{notes:?}"
-    );
+    assert!(notes.iter().any(|note| note.contains("`j0`") && note.contains("sticks permanently")), "{notes:?}");
 }

@@ -273,7 +273,7 @@ fn modes_of_a_structure_need_an_end() {
     let file = folder.path().join("study.toml");
     std::fs::write(&file, text).unwrap();
     let said = read_file(&file, &[]).unwrap_err().to_string();
-    assert!(said.contains("no drive frequency that tells up to which"), "{said}");
+    assert!(said.contains("no excitation frequency that defines the frequency range"), "{said}");
 }
 
 /// Drawn parameters in a study with matrices alone: every draw is the response with its values,
@@ -466,7 +466,7 @@ fn what_is_wrong_is_said() {
     told("\"k.mtx\"", "\"slanted.mtx\"", &["not symmetric", "row 4, column 1"]);
     told("\"k.mtx\"", "\"pulled.mtx\"", &["study.toml:3", "not positive semidefinite", "signs"]);
     told("\"m.mtx\"", "\"negative.mtx\"", &["study.toml:4", "negative"]);
-    told("\"m.mtx\"", "\"k.mtx\"", &["study.toml:4", "stiffness matrix once more"]);
+    told("\"m.mtx\"", "\"k.mtx\"", &["study.toml:4", "the stiffness matrix again"]);
     told(
         "stiffness = \"k.mtx\"\nmass = \"m.mtx\"",
         "stiffness = \"m.mtx\"\nmass = \"k.mtx\"",
@@ -476,17 +476,17 @@ fn what_is_wrong_is_said() {
     told("units = \"m-kg-s\"\n", "", &["`units` is missing", "mm-t-s"]);
     told("\"m-kg-s\"", "\"mm-t\"", &["mm-t-s"]);
     told(&format!("\"{node}.z\""), "\"7.z\"", &["no row `7.z`"]);
-    told(&format!("\"{node}.z\"]"), &format!("\"{node}.w\"]"), &["no row", "its rows of this node are"]);
+    told(&format!("\"{node}.z\"]"), &format!("\"{node}.w\"]"), &["no row", "the rows of this node are"]);
     // no name is similar to a number: the first and the last row show the range
     told(&format!("\"{node}.z\""), "\"9999.z\"", &["no row", "its 144 rows are", ", … `"]);
-    told(DAMPED, &format!("{DAMPED}\nreduce = {{ kind = \"none\", modes = 3 }}"), &["leave out one"]);
+    told(DAMPED, &format!("{DAMPED}\nreduce = {{ kind = \"none\", modes = 3 }}"), &["remove `kind` or `modes`"]);
     told(DAMPED, &format!("{DAMPED}\nreduce = {{ orders = 2 }}"), &["`orders`", "add `modes`"]);
     let held = "reduce = { modes = 3, orders = 2, kind = \"craig-bampton\" }";
     told(DAMPED, &format!("{DAMPED}\n{held}"), &["no residual vectors", "kind = \"rubin\""]);
     told(DAMPED, &format!("{DAMPED}\nmodal_damping = 0.01"), &["one damping"]);
-    told(DAMPED, "reduce = { modes = 3, up_to = \"1 kHz\" }", &["leave out one"]);
+    told(DAMPED, "reduce = { modes = 3, up_to = \"1 kHz\" }", &["remove one of them"]);
     told("dofs = [", "normal = [0, 0, 0]\ndofs = [", &["normal"]);
-    told(&format!("\"{node}.z\"]"), &format!("\"{node}.x\"]"), &["stands twice", "sum = {"]);
+    told(&format!("\"{node}.z\"]"), &format!("\"{node}.x\"]"), &["is named twice", "sum = {"]);
     told("tip.z", "tip", &["several directions"]);
     told("tip.z", "top.z", &["no place `top.z`"]);
     // a place on the row of an imposed motion follows that motion
@@ -496,7 +496,7 @@ fn what_is_wrong_is_said() {
     );
     told(&twin, &moved, &["`tip.x` is determined by the imposed motion of `twin`", "remove the place"]);
     for ratio in ["1e300", "2"] {
-        told(DAMPED, &format!("modal_damping = {ratio}"), &["study.toml:7", "no mode vibrates", "0.1 %"]);
+        told(DAMPED, &format!("modal_damping = {ratio}"), &["study.toml:7", "a mode does not oscillate", "0.1 %"]);
     }
     told(
         DAMPED,

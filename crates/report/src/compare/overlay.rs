@@ -218,7 +218,7 @@ mod tests {
             let mut figure = figure("", "mm", 2.0);
             let own = |case: usize| {
                 let y = factor * (case as f64 + 1.0);
-                let line = Series::line("all joints free, of each case", vec![1.0, 2.0], vec![y, y], case);
+                let line = Series::line("all joints free, for each case", vec![1.0, 2.0], vec![y, y], case);
                 line.reference_of_its_own()
             };
             figure.panels[0].series = (0..3).map(own).collect();
@@ -228,8 +228,8 @@ mod tests {
             let whole = overlay(&[("exact", &cases(1.0)), ("series", &cases(factor))]);
             whole.panels[0].series.iter().map(|series| series.label.clone()).collect::<Vec<_>>()
         };
-        assert_eq!(labels(1.0 + 1e-9), vec!["all joints free, of each case"; 3]);
-        assert_eq!(labels(1.5)[3..], vec!["all joints free, of each case, series"; 3]);
+        assert_eq!(labels(1.0 + 1e-9), vec!["all joints free, for each case"; 3]);
+        assert_eq!(labels(1.5)[3..], vec!["all joints free, for each case, series"; 3]);
     }
 
     /// Colours show cases, line styles show runs, and the title explains the line styles.

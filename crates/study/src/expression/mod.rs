@@ -80,7 +80,7 @@ impl Expression {
         let mut parser = Parser { text, at: 0, index, constant, names, depth: 0, steps: Vec::new() };
         parser.space();
         if parser.peek().is_none() {
-            return Err(Fault::new(0..text.len(), "the text is empty, a number or an expression is missing"));
+            return Err(Fault::new(0..text.len(), "the text is empty: write a number or an expression"));
         }
         parser.sum()?;
         if let Some(c) = parser.peek() {
@@ -206,10 +206,7 @@ impl Clash {
     fn into_fault(self, span: &Range<usize>, verb: &str) -> Fault {
         match self.other {
             Some((message, help)) => Fault { span: span.clone(), message, help },
-            None => Fault::new(
-                span.clone(),
-                format!("these do not {verb}: {} and {}", described(self.a), described(self.b)),
-            ),
+            None => Fault::new(span.clone(), format!("cannot {verb} {} and {}", described(self.a), described(self.b))),
         }
     }
 }
@@ -347,7 +344,7 @@ mod tests {
 
     #[test]
     fn faults_point_at_the_part_that_is_wrong() {
-        refuse("m + Ft", Dimension::MASS, "these do not add: mass (kg) and force (N)", 0..6);
+        refuse("m + Ft", Dimension::MASS, "cannot add mass (kg) and force (N)", 0..6);
         refuse("2 * (m - k)", Dimension::MASS, "subtract", 5..10);
         refuse("10 kg", Dimension::STIFFNESS, "expected stiffness (N/m), found mass (kg)", 0..5);
         refuse("kt * 2", Dimension::FORCE, "there is no parameter `kt`", 0..2);
@@ -363,8 +360,8 @@ mod tests {
         refuse("  ", Dimension::FORCE, "empty", 0..2);
         refuse("2 *", Dimension::FORCE, "ends too early", 3..3);
         refuse("(2", Dimension::FORCE, "not closed", 0..1);
-        refuse("2)", Dimension::FORCE, "closes none", 1..2);
-        refuse("1,5 N", Dimension::FORCE, "decimal sign is a point", 0..3);
+        refuse("2)", Dimension::FORCE, "no opening parenthesis", 1..2);
+        refuse("1,5 N", Dimension::FORCE, "use a decimal point", 0..3);
         refuse("2 Ft", Dimension::FORCE, "write \"* Ft\"", 2..4);
         refuse("2 ** 3", Dimension::NONE, "`^`", 2..4);
         refuse("sqrt 2", Dimension::NONE, "parentheses", 0..4);

@@ -10,9 +10,9 @@ use stickslip::dimension::Dimension;
 /// Lower-case names that users give to the excitation frequency.
 const OF_THE_DRIVE: [&str; 5] = ["frequency", "freq", "omega", "ohm", "w"];
 /// Help text: expressions read parameters only, so the frequency must be a parameter.
-const OF_PARAMETERS: &str = "expressions know parameters, not the drive frequency of each point; make the frequency a parameter, \
-                             f = \"100 Hz\" in [parameters], use `f` here, and ask for kind = \"orbit\" with frequency = \"f\" and \
-                             vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
+const OF_PARAMETERS: &str = "an expression cannot read the excitation frequency of each point. Define a parameter \
+    f = \"100 Hz\" in [parameters], use `f` here, and set kind = \"orbit\", frequency = \"f\" and \
+    vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
 
 /// Greatest depth of nested parentheses and powers.
 const DEEPEST: usize = 64;
@@ -53,8 +53,8 @@ impl Parser<'_> {
     fn deeper(&mut self) -> Result<(), Fault> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            let message = format!("more than {DEEPEST} parentheses or powers inside each other");
-            return Err(Fault::new(self.at..self.at, message).help("name the parts as parameters"));
+            let message = format!("more than {DEEPEST} nested parentheses or powers");
+            return Err(Fault::new(self.at..self.at, message).help("define parts of the expression as parameters"));
         }
         Ok(())
     }
@@ -75,7 +75,7 @@ impl Parser<'_> {
         self.signed()?;
         while let Some(c @ ('*' | '/' | '·' | '⋅' | '×')) = self.peek() {
             if self.rest().starts_with("**") {
-                return Err(Fault::new(self.at..self.at + 2, "`**` is no operator").help("a power is written `^`"));
+                return Err(Fault::new(self.at..self.at + 2, "`**` is not an operator").help("write a power with `^`"));
             }
             self.next(c);
             self.signed()?;
@@ -114,7 +114,7 @@ impl Parser<'_> {
     fn atom(&mut self) -> Result<(), Fault> {
         let start = self.at;
         match self.peek() {
-            None => Err(Fault::new(start..start, "the expression ends too early, a value is missing here")),
+            None => Err(Fault::new(start..start, "the expression ends too early: a value is missing here")),
             Some('(') => {
                 self.next('(');
                 self.deeper()?;
@@ -168,7 +168,7 @@ impl Parser<'_> {
         let literal = &self.text[start..end];
         if matches!(bytes.get(end), Some(b'.' | b',')) && bytes.get(end + 1).is_some_and(u8::is_ascii_digit) {
             return Err(Fault::new(start..digits(end + 1), "this is not one number")
-                .help("the decimal sign is a point, and digits are not grouped: \"10000.5 N/m\""));
+                .help("use a decimal point and no digit grouping: \"10000.5 N/m\""));
         }
         self.at = end;
         self.space();
@@ -246,7 +246,7 @@ impl Parser<'_> {
             return Ok(());
         }
         if is_not_finite(name) {
-            return Err(Fault::new(start..end, format!("a finite number is needed, found `{name}`")));
+            return Err(Fault::new(start..end, format!("expected a finite number, found `{name}`")));
         }
         if FUNCTIONS.contains(&name) {
             return Err(Fault::new(start..end, format!("the function `{name}` needs its argument in parentheses")));
@@ -256,7 +256,7 @@ impl Parser<'_> {
             let help = if self.steps.is_empty() {
                 format!("a unit needs a number before it, as in \"1 {name}\"")
             } else {
-                format!("as a unit, `{name}` stands right after a number, as in \"1 {name}\" or \"1 {name}^-1\"")
+                format!("a unit must follow a number, as in \"1 {name}\" or \"1 {name}^-1\"")
             };
             fault.help(help)
         } else if let Some(near) = nearest(name, self.names.iter().copied()) {
@@ -275,7 +275,7 @@ impl Parser<'_> {
             let fault = Fault::new(span, format!("there is no function `{}`", shown(name)));
             return Err(match nearest(name, FUNCTIONS.iter().copied()) {
                 Some(near) => fault.help(format!("did you mean `{near}`?")),
-                None => fault.help(format!("the functions are {}; a product is written `*`", FUNCTIONS.join(", "))),
+                None => fault.help(format!("the functions are {}; write a product with `*`", FUNCTIONS.join(", "))),
             });
         };
         let open = self.at;
@@ -302,13 +302,12 @@ impl Parser<'_> {
     pub(super) fn unexpected(&self, c: char) -> Fault {
         let span = self.at..self.at + c.len_utf8();
         match c {
-            ')' => Fault::new(span, "this parenthesis closes none"),
-            ',' => Fault::new(span, "`,` separates the arguments of `min` and `max` only")
-                .help("the decimal sign is a point"),
+            ')' => Fault::new(span, "this closing parenthesis has no opening parenthesis"),
+            ',' => Fault::new(span, "`,` separates the arguments of `min` and `max` only").help("use a decimal point"),
             c if c.is_alphanumeric() => {
-                Fault::new(span, "an operator is missing here").help("a product is written `*`")
+                Fault::new(span, "an operator is missing here").help("write a product with `*`")
             }
-            c => Fault::new(span, format!("`{}` has no meaning here", shown(&c.to_string()))),
+            c => Fault::new(span, format!("unexpected `{}`", shown(&c.to_string()))),
         }
     }
 }

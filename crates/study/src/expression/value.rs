@@ -50,7 +50,7 @@ impl Value {
                     .to_owned(),
             ),
             (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
-            (true, std::cmp::Ordering::Less) => Some("a radian is left over: divide by `1 rad`".to_owned()),
+            (true, std::cmp::Ordering::Less) => Some("there is one radian too many: divide by `1 rad`".to_owned()),
             _ => mistaken::advice(expected, found, text),
         };
         Err((format!("expected {}, found {}", described(expected), described(found)), help))
@@ -61,7 +61,7 @@ impl Value {
         if counts_cycles && self.with_pi {
             return Err((
                 "a bare number is in Hz here, but this one was computed with `pi`".to_owned(),
-                Some("say the unit: \"… * 1 rad/s\" or \"… * 1 Hz\"".to_owned()),
+                Some("state the unit: \"… * 1 rad/s\" or \"… * 1 Hz\"".to_owned()),
             ));
         }
         Ok(if counts_cycles { self.si * TAU } else { self.si })

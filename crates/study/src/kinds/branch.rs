@@ -33,20 +33,21 @@ use stickslip::model::{Model, System};
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "branch",
-        summary: "a branch of orbits by continuation, around turning points: along a range of `frequency`, or at one frequency along the last \
-                  parameter of `vary`, from its first value to its last",
+        summary: "a branch of orbits by continuation around turning points: over a range of `frequency`, or at one \
+            frequency over the last parameter of `vary`, from its first value to its last",
         keys: &[
             required(
                 "frequency",
                 Takes::Frequencies(ENDS),
-                "drive frequency: a range whose ends count, in either order, `steps` says how close the points lie; one, for a branch along a parameter",
+                "excitation frequency: a range with its ends in either order (`steps` sets the spacing), or one \
+                 value for a branch along a parameter",
                 "{ from = \"119 Hz\", to = \"123 Hz\" }",
             ),
             default(
                 "steps",
                 Takes::Count(2, 100_000),
                 "100",
-                "steps over the range at least; they shorten where it bends",
+                "minimum number of steps over the range; steps shorten where the branch bends",
                 "100",
             ),
             PEAK_OF,
@@ -61,7 +62,7 @@ pub(super) const KIND: Kind = Kind {
                 // branch turns at every border of stick, and 127 harmonics take forty times as
                 // long
                 "0.01",
-                "estimated error relative to the largest amplitude, beyond which a point is `truncated`",
+                "a point whose estimated error, relative to the largest amplitude, exceeds this value is `truncated`",
                 "0.001",
             ),
         ],
@@ -205,13 +206,18 @@ fn compute(work: &Work<'_>) -> Computed {
     }
     let reason = match branch.end {
         End::Border => missing(&branch, range, (name.as_str(), factor)),
-        End::Stalled { at } => Some(format!("no shorter step converges beyond {name} = {:.9}", at * factor)),
+        End::Stalled { at } => {
+            Some(format!("the continuation stopped at {name} = {:.9}: no step converges", at * factor))
+        }
         End::Points => Some("the branch does not reach the end of its range".to_owned()),
-        End::Stopped => Some("what follows is no orbit: its mean forces or its energies do not balance".to_owned()),
+        End::Stopped => {
+            Some("the next point is not an orbit: its mean forces or its energies do not balance".to_owned())
+        }
     };
     if let Some(reason) = reason {
         let kept = format!(
-            "{reason}; its {} points so far are kept, and kind = \"response\" seeks every point by itself",
+            "{reason}; the tables contain the {} points up to there, and kind = \"response\" solves each point \
+             separately",
             branch.points.len()
         );
         part.count(label, "stalled", Some(kept));
@@ -259,8 +265,8 @@ fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64))
         .fold(from, |far, value| if (value - from).abs() > (far - from).abs() { value } else { far });
     (!branch.reaches(to)).then(|| {
         format!(
-            "the branch turns at {name} = {:.9} and leaves the range where it began; nothing was found from there to {:.9}: begin it where there \
-             is one orbit, or at the other end",
+            "the branch turns at {name} = {:.9} and leaves the range at its beginning, so the range up to {:.9} is \
+             missing; begin where there is a single orbit, or at the other end",
             reached * factor,
             to * factor
         )

@@ -38,23 +38,29 @@ const PARAMETER: &str = "speed";
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "campbell",
-        summary: "natural frequencies over the speed of a rotor, with engine orders and where they cross",
+        summary: "natural frequencies over the speed of a rotor, with engine order lines and their crossings",
         keys: &[
             required(
                 "speed",
                 Takes::Frequencies(SPEEDS),
-                "speeds of rotation, as frequencies, zero at rest",
+                "speeds of rotation as frequencies; zero is allowed",
                 "{ from = \"10 Hz\", to = \"120 Hz\", points = 56 }",
             ),
             default(
                 "parameter",
                 Takes::Name,
                 PARAMETER,
-                "the parameter that is the speed, if stiffnesses depend on it; its own value then does not count",
+                "the parameter that holds the speed, if stiffnesses depend on it; its stated value is then ignored",
                 "\"speed\"",
             ),
             default("engine_orders", Takes::Count(1, 200), "6", "highest engine order", "6"),
-            default("modes", Takes::Count(1, 100), "3", "lowest modes, of a tuned disk of every nodal diameter", "3"),
+            default(
+                "modes",
+                Takes::Count(1, 100),
+                "3",
+                "number of lowest modes; for a tuned disk, the number for every nodal diameter",
+                "3",
+            ),
         ],
         check,
         axes: [Some(Dimension::FREQUENCY), Some(Dimension::FREQUENCY)],
@@ -75,7 +81,7 @@ fn check(values: &Values, _: &Model, _: usize) -> Result<(), Complaint> {
     if speeds >= 2 {
         return Ok(());
     }
-    let message = "a Campbell diagram needs two speeds or more";
+    let message = "a Campbell diagram needs at least two speeds";
     Err(Complaint::new("speed", message, "write { from = \"10 Hz\", to = \"120 Hz\", points = 56 }"))
 }
 
@@ -141,7 +147,7 @@ fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
     } else {
         let survey = model.survey().map_err(|error| error.to_string())?;
         if survey.is_too_large() {
-            return Err("the model is too large for all of its modes".to_owned());
+            return Err("the model is too large to compute all its modes".to_owned());
         }
         let reduction = survey.system().reduction_evidence();
         add(0, None, survey.free(), reduction);
@@ -225,7 +231,8 @@ impl Diagram<'_> {
             }
             last = next;
             let all = self.at(next)?;
-            let found = all.iter().find(|mode| mode.is_like(one)).ok_or("a mode is lost between two speeds")?;
+            let found =
+                all.iter().find(|mode| mode.is_like(one)).ok_or("a mode was not found again between two speeds")?;
             let there = excess(next, found);
             let before = (b - a).abs();
             if (there > 0.0) == (at_a > 0.0) {
@@ -249,7 +256,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let diagram = Diagram { work, prepared, most, same };
     let mut part = Part::default();
     if !depends {
-        let message = format!("There is no parameter `{name}`: the frequencies do not depend on the speed.");
+        let message = format!("The study has no parameter `{name}`, so the frequencies do not depend on the speed.");
         part.notes.push(Note::Said(message));
     }
     let (mut rows, mut crossings) = (Rows::default(), Rows::default());

@@ -40,22 +40,18 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "loop",
                 Takes::Names,
-                "joints, or moved places (the force that moves them), whose loops are wanted; every joint when absent",
+                "joints or moved places (with the force that moves them) whose loops are computed; default: every \
+                 joint",
                 "\"shroud\"",
             ),
             optional(
                 "against",
                 Takes::Name,
-                "the mass whose displacement is the abscissa of the loops; absent: the relative displacement of the joint",
+                "the mass whose displacement is the abscissa of the loops; default: the relative displacement of the \
+                 joint",
                 "\"blade1\"",
             ),
-            default(
-                "sum",
-                Takes::Flag,
-                "false",
-                "adds the forces of the joints up to one loop, or to one for each direction that they have",
-                "true",
-            ),
+            default("sum", Takes::Flag, "false", "adds the forces of the joints to one loop per direction", "true"),
             SAMPLES,
         ],
         check,
@@ -109,14 +105,17 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         let mut ends = summed.map(|(joint, _)| &joint.between);
         let first = ends.next();
         if ends.any(|between| Some(between) != first) {
-            let message =
-                "the joints to be summed lie between different places, so they share no relative displacement";
-            return Err(Complaint::new("sum", message, "say whose displacement counts: against = \"NAME\""));
+            let message = "the summed joints connect different places, so they have no common relative displacement";
+            return Err(Complaint::new(
+                "sum",
+                message,
+                "name the place whose displacement is used: against = \"NAME\"",
+            ));
         }
     }
     if known.is_empty() {
-        let help = "add a [[joint]] or a [[motion]], or ask for kind = \"orbit\"";
-        return Err(Complaint::new("kind", "the model has no joint and no moved place, so it has no loop", help));
+        let help = "add a [[joint]] or a [[motion]], or use kind = \"orbit\"";
+        return Err(Complaint::new("kind", "the model has no joint and no [[motion]], so it has no loop", help));
     }
     Ok(())
 }

@@ -12,14 +12,18 @@ use stickslip::model::{Mass, Model, System};
 /// Checks that the model has a place whose amplitude can have a peak.
 pub(super) fn check_masses(model: &Model) -> Result<(), Complaint> {
     if model.masses.is_empty() && model.bodies.is_empty() && model.places.is_empty() {
-        let help = "add a [[mass]], or ask for kind = \"hysteresis\"";
-        return Err(Complaint::new("kind", "the model has no mass, so no amplitude has a peak", help));
+        let help = "add a [[mass]], or use kind = \"hysteresis\"";
+        return Err(Complaint::new("kind", "the model has no mass, so it has no resonance peak", help));
     }
     let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
     let mut places = model.masses.iter().flat_map(Mass::places);
     if model.places.is_empty() && places.all(|place| moved.contains(place.as_str())) {
-        let help = "leave a mass without a [[motion]], or ask for kind = \"hysteresis\"";
-        return Err(Complaint::new("kind", "the motion of every mass is given, so no amplitude has a peak", help));
+        let help = "remove a [[motion]], or use kind = \"hysteresis\"";
+        return Err(Complaint::new(
+            "kind",
+            "the motion of every mass is imposed, so the model has no resonance peak",
+            help,
+        ));
     }
     Ok(())
 }
@@ -51,7 +55,7 @@ pub(super) fn check_samples(values: &Values) -> Result<(), Complaint> {
 pub(super) const FREQUENCY: Key = required(
     "frequency",
     Takes::Frequencies(RANGE),
-    "drive frequency: one, a list, or a range with both ends",
+    "excitation frequency: one value, a list, or a range that includes both ends",
     "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
 );
 
@@ -59,7 +63,7 @@ pub(super) const FREQUENCY: Key = required(
 pub(super) const OUTPUT: Key = optional(
     "output",
     Takes::Names,
-    "further columns: joint_force, joint_mean, joint_motion, contact, velocity, acceleration, harmonics, receptance",
+    "additional columns: joint_force, joint_mean, joint_motion, contact, velocity, acceleration, harmonics, receptance",
     "[\"joint_force\", \"harmonics\"]",
 );
 

@@ -44,7 +44,7 @@ pub(super) const KIND: Kind = Kind {
                 "amplitude of the place that moves most in the mode of the structure without joints",
                 "{ from = \"1 um\", to = \"10 mm\" }",
             ),
-            default("mode", Takes::Count(1, 1000), "1", "number of the mode, by rising frequency", "2"),
+            default("mode", Takes::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),
             default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
             default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
         ],
@@ -103,8 +103,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let of_masses = model.masses.iter().map(|mass| mass.places().len());
     let masses = of_masses.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
-        let message = format!("there is no mode {number}: the structure has {masses}");
-        return Err(Complaint::new("mode", message, "count modes from 1, by rising frequency"));
+        let message = format!("there is no mode {number}: the structure has {masses} degrees of freedom");
+        return Err(Complaint::new("mode", message, "modes count from 1, by ascending frequency"));
     }
     Ok(())
 }
@@ -167,8 +167,8 @@ fn number(prepared: &Prepared) -> usize {
 }
 
 /// Error text for a mode without a displacement at any place.
-const UNSEEN: &str =
-    "the structure has no such mode, or no place moves in it; ask for another mode, or add a [[place]] where it moves";
+const UNSEEN: &str = "the structure has no such mode, or no place moves in it; choose another mode, or add a \
+    [[place]] that moves in this mode";
 
 /// Computes the mode.
 ///
@@ -208,18 +208,19 @@ fn amplitude(unit: f64, modal: f64) -> String {
 fn judged(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     let words = |modal: f64| amplitude(unit, modal);
     if let Some(lost) = mode.lost {
-        let from = if lost.at.is_finite() { format!("lost at {}: ", words(lost.at)) } else { String::new() };
+        let from = if lost.at.is_finite() { format!("stopped at {}: ", words(lost.at)) } else { String::new() };
         return ("lost", Some(format!("{from}{}", lost.reason)));
     }
     if let Some(at) = mode.missing.first() {
         let more = mode.missing.len() - 1;
         let others = if more == 0 { String::new() } else { format!(" and {more} more amplitudes") };
-        return ("incomplete", Some(format!("no motion found at {}{others}; try more harmonics", words(*at))));
+        return ("incomplete", Some(format!("no solution found at {}{others}; use more harmonics", words(*at))));
     }
     if let Some(at) = mode.merges.first() {
         let reason = format!(
-            "at {} it nearly becomes one with another mode: which of both goes on to which motion below is decided by \
-             little, by the number of harmonics for example; compare another number, and the other mode",
+            "at {} the mode nearly merges with another mode; below this amplitude, small changes (such as the number \
+             of harmonics) decide which of the two is followed; compare another number of harmonics, and the other \
+             mode",
             words(*at)
         );
         return ("merging", Some(reason));
@@ -238,22 +239,22 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
         .iter()
         .map(|turn| {
             format!(
-                "the curve turns at {} and goes back to {} before it falls for good; between them there are several \
-                 motions, and below the first the values jump.",
+                "the curve turns at {} and again at {}. Between these amplitudes the mode has several solutions; \
+                 below the first amplitude the values jump.",
                 amplitude(unit, turn.at),
                 amplitude(unit, turn.up)
             )
         })
         .collect();
     if mode.travels {
-        let text = "two modes have this frequency, and every mixture of both is a motion while the joints stick; the wave that travels is followed, \
-             in which places of equal sectors move one after the other by equal amplitudes. The other mode is the wave that runs the other way. \
-             Mixtures that stand slip otherwise.";
+        let text = "two modes have this frequency, and any combination of them is a mode while the joints stick. The \
+            travelling wave is computed: equal places of all sectors have equal amplitudes with a phase shift. The \
+            other mode is the wave in the opposite direction. Standing waves slip differently.";
         remarks.push(text.to_owned());
     }
     let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
     if !mode.points.is_empty() && joints.fold(0.0, f64::max) < SLIPS {
-        remarks.push("no joint slips between these amplitudes; the joints add no damping.".to_owned());
+        remarks.push("no joint slips in this amplitude range, so the joints add no damping.".to_owned());
     }
     remarks
 }

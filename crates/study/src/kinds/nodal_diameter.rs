@@ -31,29 +31,25 @@ const WHEELS: usize = 4;
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "nodal-diameter",
-        summary: "frequencies of a tuned disk over its nodal diameters, all joints free and all joints stuck, and the shapes of its modes",
+        summary: "natural frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck, \
+            and mode shapes",
         keys: &[
             default("modes", Takes::Count(1, 100), "4", "lowest modes of every nodal diameter", "4"),
-            default(
-                SHAPES,
-                Takes::Flag,
-                "true",
-                "whether the figure has shapes, on wheels; the table always has them",
-                "false",
-            ),
+            default(SHAPES, Takes::Flag, "true", "draws the mode shapes; the table always contains them", "false"),
             optional(
                 DIAMETER,
                 Takes::Count(0, 100_000),
-                "the nodal diameter whose lowest modes are drawn; absent: the first mode (or `mode`) of the lowest nodal diameters",
+                "the nodal diameter whose lowest modes are drawn; default: the first mode (or `mode`) of the lowest \
+                 nodal diameters",
                 "3",
             ),
             optional(
                 MODE,
                 Takes::Count(1, 100),
-                "the mode that is drawn, by rising frequency in its nodal diameter",
+                "number of the drawn mode, by ascending frequency in its nodal diameter",
                 "1",
             ),
-            default(JOINTS, Takes::Choice(states), STATES[0], "the joints of the shapes that are drawn", "\"stuck\""),
+            default(JOINTS, Takes::Choice(states), STATES[0], "state of the joints in the drawn shapes", "\"stuck\""),
         ],
         check,
         axes: [Some(Dimension::NONE), Some(Dimension::FREQUENCY)],
@@ -80,7 +76,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let (most, sectors) = (values.count("modes").unwrap_or(4), model.ring.map_or(0, |ring| ring.sectors as u64));
     if let Some(diameter) = values.count(DIAMETER).filter(|diameter| 2 * diameter > sectors) {
         let message = format!("a disk of {sectors} sectors has no {diameter} nodal diameters");
-        return Err(Complaint::new(DIAMETER, message, format!("they count from 0 to {}", sectors / 2)));
+        return Err(Complaint::new(DIAMETER, message, format!("choose a nodal diameter from 0 to {}", sectors / 2)));
     }
     if let Some(mode) = values.count(MODE).filter(|mode| *mode > most) {
         let message = format!("mode {mode} is not among the {most} lowest that are computed");
@@ -94,15 +90,15 @@ fn check_disk(model: &Model) -> Result<(), Complaint> {
     match model.ring {
         Some(ring) if ring.equal => Ok(()),
         Some(_) => {
-            let message = "the sectors differ, and a mistuned disk has no nodal diameters";
+            let message = "the sectors differ, so the modes of this mistuned disk have no nodal diameter";
             Err(Complaint::new(
                 "kind",
                 message,
-                "leave `mistuning` out of [disk]; kind = \"modes\" has the modes of the whole ring",
+                "remove `mistuning` from [disk], or use kind = \"modes\" for the modes of the whole ring",
             ))
         }
         None => {
-            let message = "the model is no disk, and only disks have nodal diameters";
+            let message = "the model is not a disk; only disks have nodal diameters";
             Err(Complaint::new("kind", message, "state one sector, and add [disk] with `sectors`"))
         }
     }
@@ -134,8 +130,8 @@ const LOWEST: f64 = 4.6e-6;
 const FACTOR: f64 = 12e3;
 
 /// Error text for sectors whose modes cannot be computed.
-const TOO_LARGE: &str = "the sectors are too large for all of their modes, or without masses; of a sector by its matrices take fewer coordinates \
-                         with `reduce`";
+const TOO_LARGE: &str = "the sectors are too large to compute all their modes, or have no mass; for a sector given \
+    by matrices, set `reduce` in [structure]";
 
 /// Returns the lowest modes by nodal diameter.
 ///

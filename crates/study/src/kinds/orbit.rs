@@ -28,7 +28,7 @@ const FOLLOWED: usize = 200;
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "orbit",
-        summary: "the steady motion over one period: displacements, velocities, joint forces",
+        summary: "an orbit over one period: displacements, velocities, joint forces",
         keys: &[
             FREQUENCY,
             SAMPLES,
@@ -37,7 +37,7 @@ pub(super) const KIND: Kind = Kind {
                 "multipliers",
                 Takes::Flag,
                 "false",
-                "whether all Floquet multipliers are computed, into `multipliers.csv`; `stable` needs no more than the largest, if any",
+                "computes all Floquet multipliers into `multipliers.csv`; `stable` needs only the largest one",
                 "true",
             ),
         ],
@@ -101,7 +101,7 @@ fn compute(work: &Work<'_>) -> Computed {
         let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
         if all.is_none() {
             let place = location_of(&prepared.case, omega);
-            let text = "the multipliers are not known, as the orbit has no return map.";
+            let text = "the multipliers are unknown, because the orbit has no return map.";
             Note::of_case(&place, text).join(&mut part.notes);
         }
         for (index, multiplier) in all.unwrap_or_default().iter().enumerate() {
@@ -132,9 +132,8 @@ fn compute(work: &Work<'_>) -> Computed {
 fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");
-        let text = format!(
-            "{stuck} sticks for the whole period; the orbit is one of a continuum, the symmetric one is shown."
-        );
+        let text =
+            format!("permanently stuck: {stuck}; the orbit is one of a continuum, and the symmetric orbit is shown.");
         Note::of_case(&location_of(&prepared.case, orbit.omega), text)
     })
 }

@@ -17,7 +17,8 @@ const ALL: &str = "all";
 pub(super) const PEAK_OF: Key = optional(
     "peak_of",
     Takes::Names,
-    "the masses whose peak counts, or \"all\"; of several the largest amplitude does; absent: the first mass that a force acts on",
+    "the masses whose peak is used, or \"all\"; of several masses the largest amplitude; default: the first mass \
+     with a force",
     "[\"blade1\", \"blade3\"]",
 );
 

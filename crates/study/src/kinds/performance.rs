@@ -65,7 +65,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         drawn: cases,
         unit: costing.orbit_bytes(),
         work: (cases + tried) * peak,
-        spared: (tried > 0.0).then_some((tried * peak, "where no optimum lies between the values")),
+        spared: (tried > 0.0).then_some((tried * peak, "if no optimum lies between the values")),
     }
 }
 
@@ -108,7 +108,8 @@ fn compute(work: &Work<'_>) -> Computed {
         part.count(|| prepared.case.label(), status, failed.then(reason));
         if row.inaccurate > 0 {
             let text = format!(
-                "at {} frequencies of the grid the series is too short for the `tolerance` of the method; look at one with kind = \"response\".",
+                "at {} frequencies of the grid the series is too short: its truncation error exceeds the `tolerance` \
+                 of the method; examine one of them with kind = \"response\".",
                 row.inaccurate
             );
             Note::of_case(&prepared.case.label(), text).join(&mut part.notes);
@@ -155,13 +156,13 @@ fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, (parameter, order): (&s
     };
     match level[..] {
         [] => format!("no peak was found at any value of {parameter}"),
-        [_] => format!("the lowest peak stands at an end of the values of {parameter}: widen them"),
+        [_] => format!("the lowest peak is at an end of the values of {parameter}: extend the values"),
         _ if level.len() == curve.rows.len() && level.iter().all(|row| height(row) == 0.0) => format!(
-            "nothing whose peak counts moves at any value of {parameter}, so none is the best: friction holds it, or no force reaches it; raise \
-             the excitation, or look at other values"
+            "no place of `peak_of` moves at any value of {parameter}, so there is no optimum: friction holds these \
+             places, or no force reaches them; increase the excitation, or use other values"
         ),
         _ => format!(
-            "{} values of {parameter} have the same lowest peak, from {} to {}: none of them is the best",
+            "{} values of {parameter}, from {} to {}, have the same lowest peak, so there is no single optimum",
             level.len(),
             text(level.first()),
             text(level.last())

@@ -40,18 +40,20 @@ use stickslip::orbit::Orbit;
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: tables::NAME,
-        summary: "response curves over the drive frequency, with refined peaks",
+        summary: "response curves over the excitation frequency, with refined peaks",
         keys: &[
             FREQUENCY,
             default(
                 "peaks",
                 Takes::Flag,
                 "true",
-                "refines every peak of every mass between the points of the curve; with `peak_of` those of the worst mass",
+                "refines every peak of every mass between the points of the curve; with `peak_of`, the peaks of the \
+                 largest amplitude",
                 "false",
             ),
             Key {
-                doc: "the masses of which the worst counts in peaks.csv, or \"all\"; absent: every mass for itself",
+                doc: "the masses whose largest amplitude has its peaks in peaks.csv, or \"all\"; default: every mass \
+                    separately",
                 ..PEAK_OF
             },
             amplification::KEY,
@@ -155,8 +157,8 @@ fn many_peaks(cases: &[Surveyed]) -> Option<String> {
     let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
     (sought && places >= MANY_PEAKS).then(|| {
         format!(
-            "the peaks of {places} places are refined one by one, with {REFINING:.0} orbits or so for each: peak_of = \"all\" in [study] refines \
-             that of the worst, and peaks = false none"
+            "the peaks of {places} places are refined one by one, with about {REFINING:.0} orbits each; \
+             peak_of = \"all\" in [study] refines only the largest amplitude, and peaks = false refines none"
         )
     })
 }

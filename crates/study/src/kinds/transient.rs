@@ -37,66 +37,58 @@ const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
 const MOST_STEPS: f64 = 1e7;
 
 const RUN_UP: &[Key] = &[
-    required("from", FREQUENCY, "drive frequency at the start", "\"110 Hz\""),
-    required("to", FREQUENCY, "drive frequency at the end; it may be the lower one", "\"130 Hz\""),
-    required("duration", DURATION, "time from the one to the other, linearly", "\"10 s\""),
+    required("from", FREQUENCY, "excitation frequency at the start", "\"110 Hz\""),
+    required("to", FREQUENCY, "excitation frequency at the end; it may be lower than `from`", "\"130 Hz\""),
+    required("duration", DURATION, "time of the linear ramp", "\"10 s\""),
 ];
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "transient",
-        summary: "motion in time from rest or given displacements: free decay, switched-on drive, run-up",
+        summary: "motion in time from rest or given displacements: free decay, switched-on excitation, run-up",
         keys: &[
             optional(
                 "frequency",
                 Takes::Frequencies(RANGE),
-                "drive frequency; without it and without `run_up` the motion is a free decay",
+                "excitation frequency; without it and without `run_up` the motion is a free decay",
                 "\"121 Hz\"",
             ),
             optional(
                 "run_up",
                 Takes::Table(RUN_UP),
-                "drive frequency that changes linearly in time, in steps: each cycle has one frequency, and ends when that of the line does",
+                "excitation frequency that changes linearly in time, in steps of one cycle: each cycle has a \
+                 constant frequency and ends when the cycle of the linear ramp ends",
                 "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
             ),
-            optional(
-                "duration",
-                DURATION,
-                "time that is computed; of a run-up its own duration when absent",
-                "\"2 s\"",
-            ),
-            optional("cycles", Takes::Count(1, 1_000_000), "the same in periods of `frequency`", "200"),
+            optional("duration", DURATION, "computed time; default for a run-up: its duration", "\"2 s\""),
+            optional("cycles", Takes::Count(1, 1_000_000), "computed time in periods of `frequency`", "200"),
             optional(
                 "start",
                 Takes::ByName(Dimension::LENGTH),
-                "displacements at the start of masses that are pulled there and let go, see `begin`; zero when absent",
+                "initial displacements of masses that are pulled and released, see `begin`; default: zero",
                 "{ blade1 = \"1 mm\" }",
             ),
             optional(
                 "begin",
                 Takes::Choice(beginnings),
-                "what else is at the start: `equilibrium` where `start` is given, `unloaded` otherwise",
+                "initial state of the other masses and joints; default: `equilibrium` with `start`, otherwise \
+                 `unloaded`",
                 "\"unloaded\"",
             ),
             optional(
                 "start_velocity",
                 Takes::ByName(Dimension::VELOCITY),
-                "velocities at the start; zero when absent",
+                "initial velocities; default: zero",
                 "{ blade1 = \"0.1 m/s\" }",
             ),
             default(
                 "samples_per_cycle",
                 Takes::Count(8, MOST_SAMPLES),
                 "64",
-                "points of the table per period of the drive (of a run-up: of its highest frequency)",
+                "points of the table per excitation period (for a run-up: of its highest frequency)",
                 "64",
             ),
-            optional(
-                "time_step",
-                DURATION,
-                "distance of the points of the table; needed for a free decay",
-                "\"0.1 ms\"",
-            ),
+            optional("time_step", DURATION, "time step of the table; required for a free decay", "\"0.1 ms\""),
         ],
         check,
         axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
@@ -161,10 +153,10 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
     let (duration, cycles) = (values.quantity("duration"), values.count("cycles"));
     if run_up.is_some() && drive.is_some() {
-        return Err(Complaint::new("run_up", "`frequency` and `run_up` exclude each other", "leave one of them out"));
+        return Err(Complaint::new("run_up", "`frequency` and `run_up` exclude each other", "remove one of them"));
     }
     if duration.is_some() && cycles.is_some() {
-        return Err(Complaint::new("cycles", "`duration` and `cycles` exclude each other", "leave one of them out"));
+        return Err(Complaint::new("cycles", "`duration` and `cycles` exclude each other", "remove one of them"));
     }
     if cycles.is_some() && drive.is_none() {
         let help = "write `duration` instead, or add `frequency`";
@@ -173,7 +165,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     if let Some(run_up) = run_up
         && run_up.quantity("from") == run_up.quantity("to")
     {
-        let help = "write `frequency` for a drive that does not change";
+        let help = "write `frequency` for a constant excitation frequency";
         return Err(Complaint::new("run_up", "`from` and `to` are the same frequency", help));
     }
     let lowest = drive.map(|f| f.iter().fold(f64::INFINITY, f64::min));
@@ -188,7 +180,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         .or_else(|| run_up.and_then(|run_up| run_up.quantity("duration")));
     let Some(time) = time else {
         let help = if drive.is_some() { "add `duration` or `cycles`" } else { "add `duration`" };
-        return Err(Complaint::new("duration", "it is not said how long the motion lasts", help));
+        return Err(Complaint::new("duration", "the duration of the motion is missing", help));
     };
     let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
     let Some(step) = values.quantity("time_step").or(highest.map(|omega| period(omega) / per_cycle)) else {
@@ -196,8 +188,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         return Err(Complaint::new("time_step", "a free decay has no period to divide into samples", help));
     };
     if time / step > MOST_STEPS {
-        let message = format!("{:.3e} samples are asked for; the limit is {MOST_STEPS:e}", time / step);
-        return Err(Complaint::new("duration", message, "shorten `duration` or take fewer samples"));
+        let message = format!("the study needs {:.3e} samples; the limit is {MOST_STEPS:e}", time / step);
+        return Err(Complaint::new("duration", message, "shorten `duration` or use fewer samples"));
     }
     Ok(())
 }
@@ -220,7 +212,8 @@ fn compute(work: &Work<'_>) -> Computed {
     let begin = values.text("begin").unwrap_or(if pull.is_some() { EQUILIBRIUM } else { UNLOADED });
     let pulled = if begin == EQUILIBRIUM { pulled(&case.model, &prepared.system, pull) } else { None };
     if begin == EQUILIBRIUM && pulled.is_none() {
-        let text = "the structure has no static equilibrium where it is pulled: it begins with its joints unloaded, as with begin = \"unloaded\"";
+        let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
+            with begin = \"unloaded\"";
         part.notes.push(Note::of_case(&case.label(), format!("{WARNING}{text}")));
     }
     let start = pulled.unwrap_or_else(|| Start { displacement: given(&prepared.system, pull), states: Vec::new() });
@@ -337,8 +330,8 @@ fn read_off(
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
         return Some(
-            "warning: the samples are too far apart to read damping off the decay, or it moves too fast for them: take a \
-             `time_step` below a twentieth of its period",
+            "warning: the samples are too far apart to compute damping from the decay: use a `time_step` below a \
+             twentieth of the period",
         );
     }
     for cycle in &cycles {

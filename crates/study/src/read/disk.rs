@@ -34,7 +34,7 @@ impl Reader {
             &stated,
             "blade",
             ["node"],
-            "write a line `node` and below it the nodes of the blade, one in a line",
+            "write a line `node` and below it the nodes of the blade, one per line",
         );
         let boundary = sides.map(|rows| rows.into_iter().map(|(_, [low, high])| (low, high)).collect());
         let blade = blade.map(|rows| rows.into_iter().map(|(_, [node])| node).collect());
@@ -50,7 +50,8 @@ impl Reader {
             let deck = text.trim_start_matches('\u{feff}').trim_start().starts_with('*');
             let read = if deck { deck_nodes(&text) } else { csv_nodes(&text) };
             read.map_err(|(line, message)| {
-                let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name the input deck with its *NODE";
+                let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name an input \
+                    deck with a *NODE block";
                 (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
             })
         });
@@ -94,8 +95,8 @@ impl Reader {
         };
         for key in ["deviation", "seed"] {
             if let Some(entry) = mistuning.entry(key) {
-                let message = format!("the file has the deviations, `{key}` says nothing beside it");
-                self.problems.push(Problem::new(&entry.location, key, message).help("take one of the two out"));
+                let message = format!("`{key}` and `file` exclude each other: the file contains the deviations");
+                self.problems.push(Problem::new(&entry.location, key, message).help("remove one of them"));
             }
         }
         match self.pattern_of(name) {
@@ -120,13 +121,13 @@ impl Reader {
         let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
         let failed = |error: std::io::Error| {
             let message = format!("`{}` cannot be read: {error}", shown(&path.display().to_string()));
-            (message, Some("the name counts from the folder of the study file".to_owned()))
+            (message, Some("the path is relative to the folder of the study file".to_owned()))
         };
         let mut text = String::new();
         let file = std::fs::File::open(&path).map_err(failed)?;
         file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
         if text.len() as u64 > MOST_BYTES {
-            return Err((format!("`{}` is too big: the limit is 64 MiB", shown(name)), None));
+            return Err((format!("`{}` is too large: the limit is 64 MiB", shown(name)), None));
         }
         Ok(text)
     }
@@ -172,7 +173,7 @@ fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, Strin
     let number = |text: &str| {
         // the exponent letter of Fortran
         let value = text.trim().replace(['d', 'D'], "e").parse::<f64>().ok().filter(|value| value.is_finite());
-        value.ok_or_else(|| (line, format!("`{}` is no coordinate of node `{}`", shown(text), shown(name))))
+        value.ok_or_else(|| (line, format!("`{}` is not a valid coordinate of node `{}`", shown(text), shown(name))))
     };
     let [x, y, z] = at.map(number);
     Ok((name.to_owned(), [x?, y?, z?]))
@@ -202,7 +203,7 @@ fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
             nodes.push(node_of(line, node, [of(0), of(1), of(2)])?);
         }
     }
-    if nodes.is_empty() { Err((1, "there is no *NODE with nodes".to_owned())) } else { Ok(nodes) }
+    if nodes.is_empty() { Err((1, "the file has no *NODE block with nodes".to_owned())) } else { Ok(nodes) }
 }
 
 /// Parses the deviations of a pattern by sector. The error is the wrong line and the reason.
@@ -211,20 +212,20 @@ fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
     for (line, [sector, deviation]) in csv(text, ["sector", "deviation"])? {
         let wrong = |message: String| Err((line, message));
         let Some(sector) = sector.parse::<usize>().ok().filter(|sector| *sector < crate::schema::MOST_MASSES) else {
-            return wrong(format!("`{}` is no number of a sector, from 0", shown(&sector)));
+            return wrong(format!("`{}` is not a valid sector number; sectors count from 0", shown(&sector)));
         };
         let (number, unit) = match deviation.strip_suffix('%') {
             Some(percent) => (percent.trim(), 0.01),
             None => (deviation.as_str(), 1.0),
         };
         let Some(deviation) = number.parse::<f64>().ok().map(|n| n * unit).filter(|n| n.is_finite()) else {
-            return wrong(format!("`{}` is no deviation such as 0.012 or 1.2 %", shown(&deviation)));
+            return wrong(format!("`{}` is not a deviation such as 0.012 or 1.2 %", shown(&deviation)));
         };
         if deviations.len() <= sector {
             deviations.resize(sector + 1, None);
         }
         if deviations[sector].replace(deviation).is_some() {
-            return wrong(format!("sector {sector} stands twice"));
+            return wrong(format!("sector {sector} appears twice"));
         }
     }
     let missing = deviations.iter().position(Option::is_none);
@@ -246,7 +247,7 @@ mod tests {
         assert_eq!(deck_nodes(deck).unwrap(), expected);
         assert_eq!(
             deck_nodes("*STEP\n*NODE\n7, a, 0, 0\n").unwrap_err(),
-            (3, "`a` is no coordinate of node `7`".to_owned())
+            (3, "`a` is not a valid coordinate of node `7`".to_owned())
         );
         assert!(deck_nodes("*STEP\n1, 2\n").unwrap_err().1.contains("no *NODE"));
         assert!(csv_nodes("node,x,y,z\n7,1,2\n").unwrap_err().1.contains("expected node,x,y,z"));
@@ -265,9 +266,9 @@ mod tests {
             ("blade,deviation\n0,1", 1, "expected the columns"),
             ("sector,deviation\n0,1\n0,2\n", 3, "twice"),
             ("sector,deviation\n0,1\n2,2\n", 3, "sector 1 is missing"),
-            ("sector,deviation\n-1,1\n", 2, "no number of a sector"),
-            ("sector,deviation\n999999999,1\n", 2, "no number of a sector"),
-            ("sector,deviation\n0,nan\n", 2, "no deviation"),
+            ("sector,deviation\n-1,1\n", 2, "not a valid sector number"),
+            ("sector,deviation\n999999999,1\n", 2, "not a valid sector number"),
+            ("sector,deviation\n0,nan\n", 2, "not a deviation"),
             ("sector,deviation\n0\n", 2, "expected sector,deviation"),
         ] {
             let (at, message) = pattern(text).unwrap_err();

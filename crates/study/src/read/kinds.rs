@@ -126,7 +126,7 @@ impl Reader {
             let others = || method::TABLE.iter().filter(|other| other.options.iter().any(|o| o.key == problem.key));
             if keys.iter().all(|key| key.name != problem.key) && others().next().is_some() {
                 let names = one_of(others().map(|other| other.name));
-                problem.help = Some(format!("`{}` is a key of {names}: name the method in `kind`", problem.key));
+                problem.help = Some(format!("`{}` is a key of {names}: set `kind` to that method", problem.key));
             }
         }
         Some(stated)
@@ -177,12 +177,14 @@ fn of_another_law(row: &LawInfo, key: &str) -> Option<String> {
     let has = |key: &str| row.parameters.iter().any(|parameter| parameter.key == key);
     if COEFFICIENTS.contains(&word.as_str()) || LOADS.contains(&word.as_str()) {
         let limit =
-            "under a constant normal load that is the coefficient of friction times the load, limit = \"0.3 * 10 N\"";
-        let contact = "a load that changes with the motion has the law `friction-contact`, by `friction` and `preload`";
+            "for a constant normal load it is the coefficient of friction times the load: limit = \"0.3 * 10 N\"";
+        let contact = "for a normal load that changes with the motion, use the law `friction-contact` with \
+            `friction` and `preload`";
         return match (has("friction"), has("limit")) {
-            (true, _) => {
-                Some(format!("`{}` takes {own}: the coefficient is `friction`, the load at rest `preload`", row.name))
-            }
+            (true, _) => Some(format!(
+                "`{}` takes {own}: the coefficient is `friction`, the load in static equilibrium is `preload`",
+                row.name
+            )),
             (false, true) => {
                 Some(format!("`{}` takes {own}: `limit` is the friction force; {limit}; {contact}", row.name))
             }

@@ -86,7 +86,7 @@ impl Reader {
         for spring in &lists.spring {
             if let (Some(_), Some(ratio)) = (spring.entry("damping"), spring.entry(RATIO)) {
                 let message = format!("`damping` and `{RATIO}` exclude each other");
-                self.problems.push(Problem::new(&ratio.location, RATIO, message).help("leave one of them out"));
+                self.problems.push(Problem::new(&ratio.location, RATIO, message).help("remove one of them"));
             }
             if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
                 let message = "a spring needs a stiffness, a damping, or both";
@@ -146,19 +146,22 @@ impl Reader {
                 _ => whole(node).map(|times| (1, times)),
             };
             if !is_identifier(key) {
-                let message = format!("`{}` is no index: a letter first, then letters, digits and `_`", shown(key));
+                let message = format!(
+                    "`{}` is not a valid index name: use a letter first, then letters, digits and `_`",
+                    shown(key)
+                );
                 refuse(key_location, message, None);
             } else if is_reserved(key) {
-                refuse(key_location, format!("`{key}` has a meaning of its own in expressions"), None);
+                refuse(key_location, format!("`{key}` is a reserved word in expressions"), None);
             } else if self.index.contains_key(key) {
                 let help = Some("give the index another name");
-                refuse(key_location, format!("`{key}` is a parameter already"), help);
+                refuse(key_location, format!("`{key}` is already a parameter"), help);
             } else {
                 match range.filter(|(from, to)| from <= to) {
                     Some((from, to)) => indices.push(Index { name: key.clone(), from, to, wraps: false }),
                     None => {
                         let message = format!(
-                            "expected a whole number of times, or [first, last], found {}",
+                            "expected a number of repetitions or [first, last], found {}",
                             match &node.value {
                                 Content::List(_) => "another list".to_owned(),
                                 other => other.described(),

@@ -39,10 +39,10 @@ impl Reader {
             for entry in &table.entries {
                 let problem = |message: String| Problem::new(&entry.key_location, shown(&entry.key), message);
                 if !is_identifier(&entry.key) {
-                    let message = "no name of a parameter: a letter first, then letters, digits and `_`";
+                    let message = "not a valid parameter name: use a letter first, then letters, digits and `_`";
                     self.problems.push(problem(message.to_owned()));
                 } else if is_reserved(&entry.key) {
-                    self.problems.push(problem(format!("`{}` has a meaning of its own in expressions", entry.key)));
+                    self.problems.push(problem(format!("`{}` is a reserved word in expressions", entry.key)));
                 } else if let Some(&index) = self.index.get(&entry.key) {
                     stated.push((index, &entry.node));
                 } else {
@@ -189,20 +189,21 @@ impl Reader {
         };
         let sample = Sample { count: usize::try_from(count("count")?).ok()?, seed: count("seed")?, design: design? };
         if of.entries.is_empty() {
-            let message = "no parameter is drawn: name one at least";
+            let message = "no parameter is drawn: name at least one";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message));
         }
         if sample.design == Design::Sobol && of.entries.len() > MOST_SOBOL {
             let message =
-                format!("a Sobol sequence has up to {MOST_SOBOL} parameters here, found {}", of.entries.len());
-            let help = "take design = \"latin-hypercube\"";
+                format!("the Sobol design supports up to {MOST_SOBOL} parameters, found {}", of.entries.len());
+            let help = "use design = \"latin-hypercube\"";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "design", message).help(help));
         }
         let mut drawn = Vec::new();
         for (coordinate, entry) in of.entries.iter().enumerate() {
             let Some(index) = self.parameter(entry, "draw") else { continue };
             if listed.iter().any(|varied| varied.index == index) {
-                let message = format!("`{}` is in `vary` too: a parameter is listed or drawn", shown(&entry.key));
+                let message =
+                    format!("`{}` is also in `vary`: a parameter is either listed or drawn", shown(&entry.key));
                 self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message));
                 continue;
             }
@@ -322,9 +323,9 @@ impl Reader {
                 if shown.len() > 12 {
                     shown.splice(6..shown.len() - 5, ["…"]);
                 }
-                let message = format!("the parameters need each other in a circle: {}", shown.join(" -> "));
+                let message = format!("the parameters depend on each other in a cycle: {}", shown.join(" -> "));
                 let problem = Problem::new(location, self.names[first].clone(), message);
-                self.problems.push(problem.help("give one of them a value of its own"));
+                self.problems.push(problem.help("give one of them a fixed value"));
                 None
             }
         }
@@ -354,9 +355,10 @@ impl Reader {
             _ => (&study.location, "frequency"),
         };
         let message = format!(
-            "{cases} cases times {frequencies} frequencies are too many: the limit is {MOST_CASES} cases and {MOST_POINTS} points"
+            "{cases} cases times {frequencies} frequencies exceed the limit of {MOST_CASES} cases and {MOST_POINTS} \
+             points"
         );
-        self.problems.push(Problem::new(location, key, message).help("split the study, or take fewer points"));
+        self.problems.push(Problem::new(location, key, message).help("split the study, or use fewer points"));
         None
     }
 }

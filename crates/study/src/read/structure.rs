@@ -26,9 +26,9 @@ impl Reader {
         let several = ["damping", "modal_damping", "rayleigh"].into_iter().filter(|key| stated.entry(key).is_some());
         let several: Vec<&str> = several.collect();
         if let [first, second, ..] = several[..] {
-            let message = format!("a structure has one damping, and both `{first}` and `{second}` are stated");
+            let message = format!("`{first}` and `{second}` exclude each other: a structure has one damping");
             self.problems
-                .push(Problem::new(stated.location_of(second, None), second, message).help("leave out one of them"));
+                .push(Problem::new(stated.location_of(second, None), second, message).help("remove one of them"));
         }
         if self.problems.len() > before {
             return None;
@@ -79,17 +79,17 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
             // a truncated file has fewer rows
             let (short, long) = if matrix.rows() < rows { (*key, "stiffness") } else { ("stiffness", *key) };
             let (fewer, more) = (rows.min(matrix.rows()), rows.max(matrix.rows()));
-            let message = format!("the {short} matrix has {fewer} rows, and the {long} matrix {more}");
-            let help = "a file cut short? export both from the same model, with the same constraints";
+            let message = format!("the {short} matrix has {fewer} rows, but the {long} matrix has {more}");
+            let help = "one file may be truncated; export both from the same model with the same constraints";
             return Err(problem(short, message).help(help));
         }
     }
     if stiffness.1.entries() == mass.1.entries() {
-        let message = "this is the stiffness matrix once more".to_owned();
+        let message = "this file contains the stiffness matrix again".to_owned();
         return Err(problem("mass", message).help("name the file of the mass matrix, or its `name` in the file"));
     }
     if stiffened.as_ref().is_some_and(|(_, matrix)| matrix.entries() == stiffness.1.entries()) {
-        let message = "this is the stiffness at rest once more".to_owned();
+        let message = "this file contains the stiffness at rest again".to_owned();
         return Err(
             problem("stiffened", message).help("name the file of the prestressed model, or its `name` in the file")
         );
@@ -138,7 +138,8 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
             };
             let help = match exchanged.as_ref().and_then(sensible) {
                 Some(frequencies) => exchange(&frequencies),
-                None => "a mass matrix has no negative eigenvalue: is it the stiffness that is named here, or a matrix cut short?"
+                None => "a mass matrix has no negative eigenvalue; check whether this file contains the stiffness \
+                    matrix or is truncated"
                     .to_owned(),
             };
             problem("mass", error.to_string()).help(help)
@@ -149,7 +150,8 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
             let message = format!(
                 "the {matrix} matrix is not symmetric: {value:e} in row {row}, column {column} and {mirrored:e} across the diagonal"
             );
-            problem(matrix, message).help("export both triangles, without rotation, follower loads or friction; name one triangle as such")
+            problem(matrix, message).help("export both triangles, without rotation, follower loads or friction; a \
+                file with only one triangle must be marked as symmetric")
         }
         _ => problem("stiffness", error.to_string()),
     })?;

@@ -62,10 +62,12 @@ impl Reader {
     ) -> Option<ModelStatement> {
         for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_)) || key.name == "structure") {
             if let Some(entry) = root.get(key.name) {
-                let message =
-                    format!("the template `{}` brings its own model, `{}` cannot be added to it", row.name, key.name);
+                let message = format!(
+                    "the template `{}` contains the whole model; `{}` cannot be added to it",
+                    row.name, key.name
+                );
                 let help = format!(
-                    "change its parameters, or start from `stickslip new {}`, which writes it out as lists",
+                    "change its parameters, or start from `stickslip new {}`, which writes the model as lists",
                     row.name
                 );
                 self.problems.push(Problem::new(&entry.node.location, key.name, message).help(help));
@@ -75,7 +77,7 @@ impl Reader {
             match (&mut lists.disk, FILE.iter().find(|key| key.name == "disk").map(|key| key.takes), &entry.node.value)
             {
                 (None, ..) => {
-                    let message = format!("the template `{}` is no sector of a disk", row.name);
+                    let message = format!("the template `{}` is not a sector of a disk", row.name);
                     self.problems.push(Problem::new(&entry.node.location, "disk", message));
                 }
                 (Some(own), Some(Takes::Table(keys)), Content::Table(table)) => {

@@ -64,7 +64,8 @@ impl Reader {
         let points = count.map_or_else(|| "`points`".to_owned(), |count| format!("points = {count}"));
         Some(match table.get("tolerance") {
             Some(_) => format!(
-                "with `tolerance` the points stand where the curve needs them, and there is no step; for equal steps write {points} instead of both"
+                "with `tolerance` the solver chooses the points, so there is no step; for equal steps remove both \
+                 keys and write {points}"
             ),
             None => format!("write the number of values, both ends included: {points}"),
         })
@@ -242,7 +243,7 @@ impl Reader {
         let before = self.problems.len();
         if let Some(entry) = table.entries.iter().find(|entry| entry.key == "points") {
             let message = format!("`points` and `tolerance` in the range of `{}` exclude each other", shown(key.name));
-            let help = "leave one of them out: with `tolerance` the points follow the curve";
+            let help = "remove one of them: with `tolerance` the solver chooses the points";
             self.problems.push(Problem::new(&entry.key_location, "points", message).help(help));
             return None;
         }
@@ -262,7 +263,7 @@ impl Reader {
     }
 
     pub(super) fn unknown_word(&mut self, key: &str, word: &str, location: &Location, words: Vec<&str>) {
-        let message = format!("there is no `{}`, expected {}", shown(word), one_of(words.iter().copied()));
+        let message = format!("unknown value `{}`, expected {}", shown(word), one_of(words.iter().copied()));
         let help = nearest(word, words).map(|near| format!("did you mean `{near}`?"));
         self.problems.push(Problem::new(location, key, message).maybe_help(help));
     }
@@ -278,11 +279,12 @@ impl Reader {
                 return Some(name);
             }
             Ok(name) => {
-                let message = format!("`{}` is no name: a letter first, then letters, digits and `_`", shown(&name));
+                let message =
+                    format!("`{}` is not a valid name: use a letter first, then letters, digits and `_`", shown(&name));
                 Problem::new(location, key, message)
             }
             Err(fault) if self.repetition.indices.is_empty() => {
-                let help = "braces are for entries of lists that have an index: repeat = { i = 12 }";
+                let help = "braces need an index in the same entry: repeat = { i = 12 }";
                 Problem::fault(location, inner, key, fault).help(help)
             }
             Err(fault) => Problem::fault(location, inner, key, fault),
@@ -335,9 +337,9 @@ impl Reader {
             && let Some((from, to)) = self.two_quantities(text)
         {
             self.problems.truncate(before);
-            let message = "a text holds one quantity, this reads like a range";
+            let message = "expected one quantity, but this looks like a range";
             let help = format!(
-                "where a range can stand, write it as {{ from = \"{}\", to = \"{}\", points = 101 }}",
+                "if this key takes a range, write {{ from = \"{}\", to = \"{}\", points = 101 }}",
                 shown(from),
                 shown(to)
             );
@@ -379,7 +381,7 @@ impl Reader {
                 });
             }
             Content::Number { value, .. } => {
-                Problem::new(location, key, format!("a finite number is needed, found {value}"))
+                Problem::new(location, key, format!("expected a finite number, found {value}"))
             }
             other => Problem::new(location, key, format!("expected a quantity, found {}", other.described()))
                 .help("write a number with its unit in quotes, as in \"2 N\""),
@@ -390,7 +392,7 @@ impl Reader {
 
     pub(super) fn quantities(&mut self, key: &str, list: &[Node], location: &Location) -> Option<Vec<Quantity>> {
         if list.is_empty() {
-            let problem = Problem::new(location, key, "the list is empty, at least one value is needed");
+            let problem = Problem::new(location, key, "the list is empty: write at least one value");
             self.problems.push(problem);
             return None;
         }

@@ -24,13 +24,17 @@ pub(crate) enum Design {
 
 /// Names of the designs in study files, and their descriptions.
 pub(crate) const DESIGNS: [(&str, &str, Design); 3] = [
-    ("random", "draws that are independent of each other", Design::Random),
+    ("random", "independent draws", Design::Random),
     (
         "latin-hypercube",
-        "in every parameter one draw in each of `count` parts of equal probability",
+        "one draw in each of `count` parts of equal probability, for every parameter",
         Design::LatinHypercube,
     ),
-    ("sobol", "a scrambled Sobol sequence: evenly in all parameters together; best with a power of two", Design::Sobol),
+    (
+        "sobol",
+        "a scrambled Sobol sequence: even coverage of all parameters together; best if `count` is a power of two",
+        Design::Sobol,
+    ),
 ];
 
 /// Largest number of dimensions of the Sobol sequence.

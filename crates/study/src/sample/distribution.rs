@@ -27,12 +27,12 @@ pub(crate) enum Distribution {
 
 /// Names of distributions in study files, their numbers, and their descriptions.
 pub(crate) const DISTRIBUTIONS: [(&str, &str, &str); 6] = [
-    ("normal", "mean, deviation", "the normal distribution, which has negative values too"),
+    ("normal", "mean, deviation", "the normal distribution, which also gives negative values"),
     ("lognormal", "mean, deviation", "the lognormal distribution with this mean and deviation of the quantity itself"),
-    ("uniform", "from, to", "every value from one to the other is as likely"),
-    ("loguniform", "from, to", "every ratio is as likely: for what is known by its order only"),
-    ("triangular", "from, mode, to", "most likely at the second, falling to nothing at the others"),
-    ("values", "any number of them", "one of these values, each as likely"),
+    ("uniform", "from, to", "all values between the two are equally likely"),
+    ("loguniform", "from, to", "all ratios are equally likely: for quantities known by their order of magnitude only"),
+    ("triangular", "from, mode, to", "most likely at the second number, falling to zero at the others"),
+    ("values", "one or more values", "one of these values, all equally likely"),
 ];
 
 /// The key of the bounds of a distribution: the least and the largest value.
@@ -44,10 +44,11 @@ impl Distribution {
     /// # Errors
     /// Returns the index of the wrong number, from 0, and the requirement.
     pub fn new(name: &str, numbers: &[f64]) -> Result<Distribution, (usize, String)> {
-        let count = |expected: &str| Err((0, format!("`{name}` takes {expected}, found {} of them", numbers.len())));
+        let count =
+            |expected: &str| Err((0, format!("`{name}` takes {expected}; the list has length {}", numbers.len())));
         let rising = |at: usize| match numbers[at - 1] < numbers[at] {
             true => Ok(()),
-            false => Err((at, "must be more than the one before".to_owned())),
+            false => Err((at, "must be larger than the previous number".to_owned())),
         };
         let positive = |at: usize| match numbers[at] > 0.0 {
             true => Ok(()),
@@ -74,10 +75,10 @@ impl Distribution {
             }
             ("triangular", &[from, mode, to]) => {
                 if mode < from {
-                    return Err((1, "must not be less than the one before".to_owned()));
+                    return Err((1, "must not be less than the previous number".to_owned()));
                 }
                 if to < mode || to <= from {
-                    return Err((2, "must be more than the ones before".to_owned()));
+                    return Err((2, "must be larger than the previous numbers".to_owned()));
                 }
                 Ok(Distribution::Triangular([from, mode, to]))
             }

@@ -60,15 +60,15 @@ impl Drawn {
             None => distribution.quantile(p),
             Some([least, most]) => {
                 if !distribution.has_tails() {
-                    let message = format!("`{}` has bounds of its own", self.distribution);
-                    return Err(least.problem(WITHIN, message).help("leave `within` out"));
+                    let message = format!("`{}` already has bounds", self.distribution);
+                    return Err(least.problem(WITHIN, message).help("remove `within`"));
                 }
                 let bounds = [number(least)?, number(most)?];
                 distribution.quantile_within(p, bounds).filter(|_| bounds[0] < bounds[1]).ok_or_else(|| {
-                    let message = format!("none of the values of `{}` lies between these bounds", self.distribution);
+                    let message = format!("no value of `{}` lies between these bounds", self.distribution);
                     least
                         .problem(WITHIN, message)
-                        .help("write the lower bound first, and bounds that hold some of the values")
+                        .help("write the lower bound first, and choose bounds that contain some of the values")
                 })?
             }
         };

@@ -88,9 +88,10 @@ impl StructureSummary {
         let hertz = |omega: f64| significant(omega / TAU, 6);
         let within =
             |error: f64, up_to: f64| format!("error {} % up to {} Hz", significant(100.0 * error, 2), hertz(up_to));
-        let before = self.earlier.map(|earlier| format!("before, {}", within(earlier.error, earlier.up_to)));
+        let before =
+            self.earlier.map(|earlier| format!("by an earlier reduction, {}", within(earlier.error, earlier.up_to)));
         let Some(reduced) = &self.reduced else {
-            lines.push(("reduced", before.unwrap_or_else(|| "not at all".to_owned())));
+            lines.push(("reduced", before.unwrap_or_else(|| "no".to_owned())));
             return lines;
         };
         lines.extend(before.map(|before| ("reduced", before)));
@@ -98,7 +99,7 @@ impl StructureSummary {
         let own = if own.is_empty() { "none computed".to_owned() } else { format!("{} Hz", own.join(", ")) };
         let free = match reduced.free {
             None | Some(0) => String::new(),
-            Some(free) => format!(", {free} free motion{}", plural(free)),
+            Some(free) => format!(", {free} rigid-body motion{}", plural(free)),
         };
         lines.push(("frequencies", own + &free));
         let ReducedSummary { coordinates, kind, error, up_to, .. } = reduced;
@@ -112,8 +113,7 @@ impl StructureSummary {
         let known: Vec<(&str, f64)> =
             DIRECTIONS.iter().zip(self.mass).filter_map(|(along, mass)| Some((*along, mass?))).collect();
         let Some(&(_, first)) = known.first() else {
-            return "no row is called by a direction (449.x), so that nobody can tell it, nor whether `units` are right"
-                .to_owned();
+            return "unknown, because no row name has a direction (449.x); `units` cannot be checked".to_owned();
         };
         let kilograms = |mass: f64| format!("{} kg", significant(mass, 4));
         let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= SAME * first.abs());
@@ -125,7 +125,7 @@ impl StructureSummary {
                 known.iter().map(|(along, mass)| format!("{} along {along}", kilograms(*mass))).collect();
             each.join(", ")
         };
-        format!("{text}, of what is not held; if that is not what it weighs, `units` are wrong")
+        format!("{text}, without constrained rows; if this is not the mass of the structure, `units` are wrong")
     }
 
     /// Returns the entry of the run record, SI, with frequencies in Hz.

@@ -46,25 +46,25 @@ impl ModelSummary {
         }
         let mut text = parts.join(" ");
         if modes.rigid > 0 {
-            text += &format!("; {} motion{} without stiffness", modes.rigid, plural(modes.rigid));
+            text += &format!("; {} rigid-body motion{}", modes.rigid, plural(modes.rigid));
         }
         if modes.lost > 0 {
-            text += &format!("; {} lost in rounding beside much higher stiffnesses", modes.lost);
+            text += &format!("; {} lost in rounding, because other stiffnesses are much higher", modes.lost);
         }
         text
     }
 
     fn joint(&self, joint: &JointSummary) -> String {
         match joint.pressed {
-            Some(0.0) => return "apart at rest: it closes and opens".to_owned(),
+            Some(0.0) => return "open in static equilibrium: it closes and opens".to_owned(),
             Some(preload) => return pressed(preload, joint.at_rest),
             None => {}
         }
         if joint.limit == 0.0 {
-            return "free: carries nothing at rest".to_owned();
+            return "free: no force in static equilibrium".to_owned();
         }
         if joint.limit.is_infinite() {
-            return "a spring at rest, never slips".to_owned();
+            return "acts as a spring, never slips".to_owned();
         }
         let (limit, slip) = (quantity(joint.limit, "N"), if joint.gradual { "macro-slip" } else { "slip" });
         let mut text = match joint.displacement {
@@ -80,17 +80,17 @@ impl ModelSummary {
         let hertz = |omega: f64| significant(omega / TAU, 7);
         let at = if several { format!(" at {} Hz", hertz(onset.at)) } else { String::new() };
         if !onset.largest.is_finite() {
-            return text + "; the motion forces it to slip";
+            return text + "; the imposed motion makes it slip";
         }
         let factor = significant(1.0 / onset.largest, 3);
         let resonant = onset.largest > UNLOADED;
         if onset.largest == 0.0 {
             text += "; the excitation does not reach it";
         } else if load(onset) == 0.0 {
-            text += "; sticks, under a million times the excitation too";
+            text += "; sticks, even under a million times the excitation";
         } else if onset.slips.is_empty() && joint.gradual {
             let share = significant(100.0 * onset.largest, 3);
-            text += &format!("; micro-slip alone, up to {share} % of that{at}");
+            text += &format!("; only micro-slip, up to {share} % of the slip limit{at}");
         } else if onset.slips.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
         } else if several {
@@ -102,12 +102,12 @@ impl ModelSummary {
             let stretches = stretches.join(", ");
             text += &match resonant {
                 true => {
-                    format!("; made to {slip} in {stretches}; any excitation is enough at its undamped resonance{at}")
+                    format!("; {slip} at {stretches}; any excitation is enough at its undamped resonance{at}")
                 }
-                false => format!("; made to {slip} in {stretches}; {factor} of the excitation is enough{at}"),
+                false => format!("; {slip} at {stretches}; {factor} of the excitation is enough{at}"),
             };
         } else {
-            text += &format!("; made to {slip}, {factor} of the excitation is enough");
+            text += &format!("; {slip} occurs; {factor} of the excitation is enough");
         }
         text
     }
@@ -132,25 +132,26 @@ fn pressed(preload: f64, at_rest: Option<f64>) -> String {
     let newtons = |force: f64| quantity(force, "N");
     match at_rest {
         None => {
-            format!("pressed with {} where the structure does not give way: it opens and closes", newtons(preload))
+            format!("pressed with {} if the structure is rigid: it opens and closes", newtons(preload))
         }
         Some(force) if (force - preload).abs() <= GIVEN_WAY * preload => {
-            format!("pressed with {} at rest: it opens and closes", newtons(force))
+            format!("pressed with {} in static equilibrium: it opens and closes", newtons(force))
         }
         Some(force) if force > preload => format!(
-            "pressed with {} at rest, by its preload of {} and {} of the constant forces: it opens and closes",
+            "pressed with {} in static equilibrium, by its preload of {} and {} of the constant forces: it opens and \
+             closes",
             newtons(force),
             newtons(preload),
             newtons(force - preload)
         ),
         Some(force) if force > 0.0 => format!(
-            "pressed with {} at rest, as the structure takes {} of its preload of {}: it opens and closes",
+            "pressed with {} in static equilibrium; the structure carries {} of its preload of {}: it opens and closes",
             newtons(force),
             newtons(preload - force),
             newtons(preload)
         ),
         Some(_) => format!(
-            "apart at rest, as the structure gives way to its preload of {}: it closes and opens",
+            "open in static equilibrium, because the structure carries its preload of {}: it closes and opens",
             newtons(preload)
         ),
     }
@@ -198,9 +199,10 @@ impl fmt::Display for ModelSummary {
             line("", &format!("and {more} more joint{}", plural(more)))?;
         }
         match &self.orbits {
-            Some(Orbits::One) => line("orbits", "one at each frequency, but for offsets that stuck contacts keep")?,
+            Some(Orbits::One) => line("orbits", "one at each frequency, apart from offsets that stuck contacts keep")?,
             Some(Orbits::Several(why)) => {
-                let what = "each point says whether its own is stable, if that is known, kind `branch`, if it takes the laws, follows those that are joined to it";
+                let what = "the table states the stability of each orbit if it is known; kind `branch` follows \
+                    connected orbits if it supports the laws";
                 line("orbits", &format!("several may exist at one frequency ({why}): {what}"))?;
             }
             None => {}

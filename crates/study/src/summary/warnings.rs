@@ -48,11 +48,9 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
         let names = listed(&one.masses);
         let them = them(one.masses.len());
         if one.held_by_friction {
-            format!(
-                "no spring holds {names}: friction alone keeps {them} in place, and once all joints slip nothing does"
-            )
+            format!("no spring holds {names}: only friction keeps {them} in place, and nothing does if all joints slip")
         } else {
-            format!("nothing holds {names}: no spring and no joint ties {them} to `ground`")
+            format!("{names} can move freely: no spring and no joint connects {them} to `ground`")
         }
     };
     // bodies on preloaded faces are correct; bodies between unloaded faces have a separate
@@ -65,7 +63,8 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
         let mut joints: Vec<String> = unpressed.iter().flat_map(|one| one.faces.clone()).collect();
         joints.dedup();
         format!(
-            "nothing holds {} at rest: only the faces of {} touch {}, and no preload presses these; give them a preload, or hold {} by a spring",
+            "{} can move freely in static equilibrium: only the faces of {} touch {}, and they have no preload; add \
+             a preload, or hold {} by a spring",
             listed(&bodies),
             listed(&joints),
             them(bodies.len()),
@@ -88,8 +87,8 @@ fn preloaded(cases: &[Surveyed]) -> Option<String> {
     let (names, joints) = (listed(&bodies), listed(&found.joints));
     let preload = displayed(found.preload, Some(Dimension::FORCE));
     Some(format!(
-        "the preload of {joints}, {preload} in all, pushes {names} away: no spring holds {}, and no constant force presses the faces at rest; add a \
-         force with `harmonic = 0` that does",
+        "the preload of {joints}, {preload} in total, pushes {names} away: no spring holds {}, and no constant force \
+         presses the faces; add a force with `harmonic = 0` that presses them",
         if bodies.len() == 1 { "it" } else { "them" }
     ))
 }
@@ -102,7 +101,8 @@ fn massless(one: &Surveyed) -> Option<String> {
         let names: Vec<String> = model.masses.iter().map(|mass| mass.name.clone()).collect();
         let are = if names.len() == 1 { "is" } else { "are" };
         format!(
-            "the mass of {} {are} zero, and there is no other: nothing resonates, the springs alone answer",
+            "the mass of {} {are} zero and the model has no other mass: it has no resonance, only the response of \
+             the springs",
             listed(&names)
         )
     })
@@ -130,17 +130,17 @@ fn overstiff(one: &Surveyed) -> Option<String> {
         (Some(spring), _) => {
             let [a, b] = &spring.between;
             format!(
-                "the model vibrates at up to {hertz} Hz: is the stiffness between `{a}` and `{b}`, {}, right?",
+                "the highest natural frequency is {hertz} Hz; check the stiffness between `{a}` and `{b}`, {}",
                 of(spring.stiffness)
             )
         }
         (None, Some(joint)) => format!(
-            "with all joints stuck the model vibrates at up to {hertz} Hz: is the stiffness of `{}`, {}, right? A joint that does not give way until it \
-             slips has the law `coulomb`",
+            "with all joints stuck the highest natural frequency is {hertz} Hz; check the stiffness of `{}`, {}; for \
+             a joint that is rigid until it slips, use the law `coulomb`",
             joint.joint,
             of(stiffness(joint))
         ),
-        (None, None) => format!("the model vibrates at up to {hertz} Hz: are its stiffnesses and masses right?"),
+        (None, None) => format!("the highest natural frequency is {hertz} Hz; check stiffnesses and masses"),
     })
 }
 
@@ -158,9 +158,9 @@ fn still(case: &Surveyed) -> Option<String> {
     let names: Vec<String> =
         joints.filter(|joint| !joint.axes().iter().any(moves)).map(|joint| joint.name().to_owned()).collect();
     let (those, do_not) = if names.len() == 1 {
-        ("the joint", "never moves: its two places are")
+        ("the joint", "never moves, because its two places are")
     } else {
-        ("the joints", "never move: their two places are")
+        ("the joints", "never move, because their two places are")
     };
     (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", listed(&names)))
 }
@@ -183,7 +183,8 @@ fn structure(case: &Surveyed) -> Vec<String> {
     if reduction.error > REDUCTION_ERROR {
         let worst = system.reduced().map_or(reduction.up_to, ReducedComponent::worst_at);
         found.push(format!(
-            "the reduced structure errs by {} % at {}; take more modes, or `reduce = {{ up_to = … }}`, which takes as many as are needed",
+            "the reduced model has an error of {} % at {}; use more modes, or `reduce = {{ up_to = … }}`, which \
+             chooses the number of modes",
             significant(100.0 * reduction.error, 3),
             hertz(worst)
         ));
@@ -191,7 +192,7 @@ fn structure(case: &Surveyed) -> Vec<String> {
     let beyond = crate::survey::range(&case.case).filter(|(_, high)| *high > reduction.up_to);
     if let Some((_, high)) = beyond {
         found.push(format!(
-            "the drive reaches {}, and the error of the reduced structure is known up to {} only",
+            "the excitation frequency reaches {}, but the error of the reduced model is known only up to {}",
             hertz(high),
             hertz(reduction.up_to)
         ));
@@ -206,13 +207,10 @@ fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
     let lowest = reduced.frequencies().get(reduced.free()).copied();
     match lowest {
         Some(lowest) if lowest / TAU < USUAL.0 || lowest / TAU > USUAL.1 => {
-            found.push(format!(
-                "the lowest natural frequency of the structure is {}: are its `units` right?",
-                hertz(lowest)
-            ));
+            found.push(format!("the lowest natural frequency of the structure is {}; check `units`", hertz(lowest)));
         }
         None => found.push(format!(
-            "the structure has no natural frequency up to {}: are its `units` right, and `reduce`?",
+            "the structure has no natural frequency up to {}; check `units` and `reduce`",
             hertz(reduced.up_to())
         )),
         Some(_) => {}
@@ -237,9 +235,7 @@ fn unused(study: &Study) -> Option<String> {
             let all: Vec<usize> = idle_varied.iter().chain(&idle).copied().collect();
             let varied = names(&idle_varied);
             let others = if idle.is_empty() { String::new() } else { format!("; unused are {}", names(&all)) };
-            Some(format!(
-                "`vary` changes {varied}, which no value of the study uses: all its cases are the same{others}"
-            ))
+            Some(format!("no value of the study uses {varied}, so `vary` only repeats equal cases{others}"))
         }
     }
 }
@@ -279,8 +275,8 @@ fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
         return Vec::new();
     }
     if study.draws().is_some() {
-        let why = "`references` draws no curve where [sample] draws parameters: every draw has linear responses of its own; leave it out, or run the \
-                   study without [sample]";
+        let why = "`references` has no effect with [sample], because every draw has different linear responses; \
+            remove it, or run the study without [sample]";
         return vec![why.to_owned()];
     }
     Reference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
@@ -325,7 +321,8 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let sentence = |index: usize| {
         let (name, number) = (&study.names[index], displayed(values[index].si, None));
         format!(
-            "the parameter `{name}` is the bare number {number} in `sin`, `cos` or `tan`, where it counts as {number} rad; say the unit: \"{number} deg\""
+            "the parameter `{name}` is the bare number {number} in `sin`, `cos` or `tan`, which means {number} rad; \
+             state the unit: \"{number} deg\""
         )
     };
     turned.into_iter().filter(bare).take(NAMED).map(sentence).collect()
@@ -348,8 +345,8 @@ fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
                     None => {
                         let (number, converted) = (displayed(value.si, None), significant(converted, 4));
                         let sentence = format!(
-                            "`{key}` of {list} {} is the bare number {number}, which counts as {number} {unit} ({converted} {other}); say the \
-                             unit: \"{number} {other}\" or \"{number} {unit}\"",
+                            "`{key}` of {list} {} is the bare number {number}, which means {number} {unit} \
+                             ({converted} {other}); state the unit: \"{number} {other}\" or \"{number} {unit}\"",
                             index + 1
                         );
                         found.push((text, sentence, 0));
@@ -360,7 +357,7 @@ fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
     }
     let sentence = |(_, sentence, more): (String, String, usize)| match more {
         0 => sentence,
-        more => format!("{sentence}; {more} more like it"),
+        more => format!("{sentence} (and {more} more)"),
     };
     found.into_iter().take(NAMED).map(sentence).collect()
 }

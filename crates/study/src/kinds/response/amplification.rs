@@ -26,7 +26,8 @@ pub(super) const KEY: Key = default(
     "amplification",
     Takes::Flag,
     "false",
-    "of a mistuned disk the largest peak over that of the same disk tuned, case by case in amplification.csv, with its distribution over the cases",
+    "for a mistuned disk: its largest peak over the peak of the tuned disk, case by case in amplification.csv, with \
+     the distribution over the cases",
     "true",
 );
 
@@ -41,7 +42,7 @@ pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
             "state one sector, and add [disk] with `sectors` and `mistuning`",
         )
     } else if values.flag("peaks") == Some(false) {
-        ("the amplification is that of peaks, and `peaks` is false", "leave `peaks` out")
+        ("the amplification needs peaks, but `peaks` is false", "remove `peaks`")
     } else {
         return Ok(());
     };
@@ -53,7 +54,7 @@ pub(super) fn none(cases: &[Surveyed]) -> Option<String> {
     let asked = cases.iter().any(|one| one.case.values.flag(KEY.name) == Some(true));
     let tuned = cases.iter().all(|one| one.case.model.ring.is_some_and(|ring| ring.equal));
     (asked && tuned).then(|| {
-        "all blades are alike, and the amplification of a tuned disk is 1; add `mistuning` to [disk], with a deviation".to_owned()
+        "all blades are equal, so the amplification is 1; add `mistuning` with a deviation to [disk]".to_owned()
     })
 }
 

@@ -100,7 +100,7 @@ impl Drawn<'_> {
         points.extend(alike.into_iter().filter(|x| within.contains(x)).map(|x| (x, f64::NAN)));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (x, y) = self.scaled(points);
-        Some(Series { style: Style::Dotted, ..Series::line("way back", x, y, colour) })
+        Some(Series { style: Style::Dotted, ..Series::line("reverse sweep", x, y, colour) })
     }
 
     /// Returns the largest amplitude of the shown places at the frequencies of the curve.
@@ -132,7 +132,14 @@ impl Drawn<'_> {
         // a peak of one place below the curve of another place is not on the envelope
         let counts = |peak: &PeakOf| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
         let (x, y) = self.scaled(self.with_peaks(stretch, points.clone(), &counts));
-        (x, y, worst.map_or_else(|| "all are alike".to_owned(), |worst| format!("worst is {}", self.shown[worst].0)))
+        (
+            x,
+            y,
+            worst.map_or_else(
+                || "all places are equal".to_owned(),
+                |worst| format!("maximum at {}", self.shown[worst].0),
+            ),
+        )
     }
 
     /// Returns the amplitudes of every shown place.
@@ -234,7 +241,7 @@ impl Drawn<'_> {
                     lines.push(line.reference());
                     continue;
                 }
-                let whose = if thinned { stretch.label() } else { "of each case".to_owned() };
+                let whose = if thinned { stretch.label() } else { "for each case".to_owned() };
                 let (label, value) =
                     (format!("{}, {whose}", line.label), stretch.varied.last().map(|v| v.as_written().0));
                 lines.push(Series { label, value, colour, ..line.reference_of_its_own() });
