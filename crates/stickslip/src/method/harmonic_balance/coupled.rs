@@ -5,8 +5,8 @@
 //! structure. GMRES takes a few tens of products if its preconditioner is close to the Jacobian.
 //! The preconditioner has the equations with the mean stiffness of every joint over the period:
 //! - Receptances as matrices: one complex matrix over the axes per harmonic, with the mean
-//!   stiffness at that harmonic. With rigid friction, which couples the lowest harmonics by
-//!   more than their mean, these are factored together.
+//!   stiffness at that harmonic. Rigid friction couples the lowest harmonics by more than their
+//!   mean; these harmonics are factored together.
 //! - Large structures in modes: `R = S + Φ diag(g) Φᵀ`. The residual flexibility S of modes far
 //!   above the harmonics is the same for all harmonics. So is the factor of `1 + S K` with one
 //!   stiffness for all. The other modes enter by Woodbury's formula, with one row per mode.
@@ -33,7 +33,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Number of unknowns from which GMRES is faster than elimination, with derivatives by all
 /// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
-/// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. The second limit is that with
+/// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. The second limit applies with
 /// rigid friction, whose lowest harmonics are eliminated in any case.
 const MANY: usize = 200;
 const MANY_OF_FORCES: usize = 400;
@@ -72,8 +72,8 @@ const PRODUCTS: usize = 320;
 const USEFUL: f64 = 0.1;
 /// Number of products beyond which a kept preconditioner is replaced.
 const STALE: usize = 25;
-/// Total excess of products beyond which a preconditioner is not kept for the next step: a new
-/// one costs as much. The excess counts from the step for which it was made.
+/// Number of products that later steps may take in total in excess of the step for which a
+/// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
 const PAID: usize = 10;
 /// Modes with frequencies above this multiple of the highest harmonic respond almost statically.
 const ABOVE: f64 = 3.0;
@@ -412,7 +412,7 @@ impl Lowest {
 struct Harmonics {
     lowest: Lowest,
     others: Vec<Answer>,
-    /// Products of the step for which it was made, and the total excess of later steps.
+    /// Products of the step for which it was made, and the total excess of later steps over it.
     products: usize,
     excess: usize,
 }

@@ -52,8 +52,9 @@ pub(super) struct Level {
     /// the Jacobian, in the present search.
     pub assembled: usize,
     pub eliminated: usize,
-    /// True if the search begins with the solution of a shorter series, which remains valid if the
-    /// search fails. Rigid friction then has no minimum number of steps beyond the work limit.
+    /// True if the search begins with the solution of a shorter series, which
+    /// remains valid if the search fails. With unknown forces, the work limit
+    /// then holds without a guaranteed number of steps.
     pub prolongs: bool,
     /// Work of earlier searches of the present point, here and at other levels,
     /// see [`Level::taken`].

@@ -90,7 +90,7 @@ impl Neighbours {
 #[derive(Debug, Clone)]
 pub(super) struct Settling {
     pub neighbours: Neighbours,
-    /// Derivatives of the forces at the begin of the step.
+    /// Derivatives of the forces at the beginning of the step.
     pub tangents: Vec<f64>,
     /// Newton step of all contacts, in units.
     pub step: Vec<f64>,

@@ -5,8 +5,8 @@ use super::super::ports::{Port, Ports};
 use super::{Level, Solution};
 use num_complex::Complex64;
 
-/// If contacts alone hold a body, the length of a motion is at most this multiple of its
-/// harmonics plus the motion without friction.
+/// If contacts alone hold a body, the length of a motion is at most this multiple of the sum of
+/// its harmonics and the motion without friction.
 const FAR: f64 = 4.0;
 /// Least length, relative to the motion without friction with its mean on closed contacts. At a
 /// smaller length, the rounding of the mean would dominate the residual.

@@ -10,7 +10,7 @@
 use super::Alternation;
 use num_complex::Complex64;
 
-/// Initial force relative to the limit, about, where `y` is largest.
+/// Approximate initial force, relative to the limit, where `y` is largest.
 const BEGINS: f64 = 0.5;
 /// Longest step, as a share of the distance to the nearest bound.
 const INSIDE: f64 = 0.99;

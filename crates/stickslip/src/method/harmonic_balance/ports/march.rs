@@ -6,10 +6,10 @@
 //! with the map `F` over one period. Newton's method solves this with `Π`, the product of the
 //! steps' derivatives; if it does not converge, the integration continues for more periods.
 //!
-//! The derivative by a harmonic of the motion follows from `δz = Π δz + δq`. If
-//! some state is never forgotten, as in a permanently stuck contact, `1 - Π` is
-//! singular. Along such directions, states and derivatives are those of a joint
-//! that moves straight from static equilibrium to the begin of the period.
+//! The derivative by a harmonic of the motion follows from `δz = Π δz + δq`. If some state is
+//! never forgotten, as in a permanently stuck contact, `1 - Π` is singular. Along such
+//! directions, states and derivatives are those of a joint that moves straight from static
+//! equilibrium to the beginning of the period.
 
 use super::alternation::{Alternation, share};
 use super::memory::{Memory, REPEATS, at_once};
@@ -93,7 +93,7 @@ impl Alternation {
 
     /// Finds periodic states, into `self.state`, and the forces. With `linear`,
     /// computes the derivatives of all steps and returns Π; otherwise returns
-    /// any matrix. `None` if no periodic states are found.
+    /// an arbitrary matrix. `None` if no periodic states are found.
     fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory, linear: bool) -> Option<DMatrix<f64>> {
         let m = march.states();
         let scale = march.state_scale();

@@ -509,7 +509,7 @@ impl Alternation {
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 const _: () = assert!(MOST_DIRECTIONS == 3, "signals of a port are kept for three axes");
 
-/// Returns the begin of every port's tangent, and the length of all. A port
+/// Returns the start of every port's tangent, and the length of all. A port
 /// with d axes has a square of 2 d × harmonics rows.
 pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
     let mut length = 0;

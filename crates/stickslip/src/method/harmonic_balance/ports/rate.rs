@@ -29,7 +29,7 @@ const SOLVED: f64 = 1e-9;
 const RADAU: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 /// Share of the step after the first stage.
 const LEFT: f64 = 2.0 / 3.0;
-/// Duration of the initial step from static equilibrium to the begin of the
+/// Duration of the initial step from static equilibrium to the beginning of the
 /// period, as a share of the period.
 const LEAD: f64 = 0.25;
 

@@ -263,7 +263,7 @@ impl Alternation {
         for leg in 0..count {
             let (a, b) = (self.extremes[leg], self.extremes[(leg + 1) % count]);
             let end = b.at + if leg + 1 == count { TAU } else { 0.0 };
-            // the first passage out of the gap
+            // the first passage out of the gap, into contact
             if a.value <= gap && b.value > gap {
                 opened = Some((leg, self.passage(series, (a.at, end), gap, 1.0)));
                 break;
