@@ -1,14 +1,21 @@
-//! Contacts that a step of Newton's method misses are settled by themselves: the others follow by their derivatives.
+//! Nonlinear elimination: contacts at which a Newton step fails are solved
+//! locally; the others follow linearly.
 //!
-//! A step `d` of all contacts solves the linear equations; where a few begin to slip or to stick on its way they leave a residual that shortening the step of
-//! all would take many steps to pass. With `φ(d) = f(c - d) - f(c) + K d`, what the forces of these few have beyond their derivatives, and `S` the
-//! receptance of the structure with the derivatives of all contacts, the step `d₀` becomes one that has the few as they are,
+//! A Newton step `d` of all contacts solves the linear equations. A few contacts that
+//! begin to slip or to stick leave a residual. A line search over all contacts would
+//! take many steps to reduce it. Let `φ(d) = f(c - d) - f(c) + K d` be the nonlinear
+//! part of the forces of these contacts, and `S` the receptance of the structure with
+//! the derivatives of all contacts. The step `d₀` of all contacts becomes
 //!
 //! `d = d₀ + S φ(d)`,
 //!
-//! small equations along the few. They are solved cluster by cluster, each with its own length of step, and with the structure around it; the step of all
-//! then has the whole `S`. Source: Lanzkron, Rose, Wilkes (1996), "An analysis of approximate nonlinear elimination algorithms"; Cai, Li (2011), "Inexact
-//! Newton methods with restricted additive Schwarz based nonlinear elimination for problems with high local nonlinearity".
+//! a small system along the few contacts. It is solved cluster by cluster, each
+//! with its own line search, on the subdomain of the structure around it
+//! (additive Schwarz). The step of all contacts then uses the whole `S`.
+//!
+//! Source: Lanzkron, Rose, Wilkes (1996), "An analysis of approximate nonlinear elimination
+//! algorithms"; Cai, Li (2011), "Inexact Newton methods with restricted additive Schwarz based
+//! nonlinear elimination for problems with high local nonlinearity".
 
 use super::ease::Ease;
 use super::equations::{Level, Slopes, Solution};
@@ -18,34 +25,36 @@ use super::solve::{HALVINGS, SHORTENS};
 use super::window::{Neighbours, Settling, Window};
 use num_complex::Complex64;
 
-/// Share of the largest residual along one contact from which on a contact is settled.
+/// Residual along a contact, relative to the largest, above which the contact is solved locally.
 const MISSED: f64 = 0.1;
-/// Axes of a cluster, at most.
+/// Maximum number of axes of a cluster.
 const MOST_AXES: usize = 16;
-/// Neighbours of its places that a cluster's part of the structure has on every side.
+/// Layers of adjacent places in the subdomain of a cluster.
 const AROUND: usize = 3;
-/// Steps in a cluster, and the share of the step of all that they are to leave: the next step of all begins with what is left.
+/// Maximum number of Newton steps in a cluster, and the share of the residual that they may
+/// leave; the next step of all contacts reduces the remainder.
 const STEPS: usize = 20;
 const LEFT: f64 = 1e-3;
-/// Share of the residual before the step that settling must leave at most to be tried again at this point: it is not worth its time where motion carries
-/// far from blade to blade, or where most contacts are missed.
+/// Share of the residual that the elimination may leave at most to be used again at this point.
+/// It does not pay off if motion decays slowly from blade to blade, or if most contacts fail.
 const WORTH: f64 = 0.5;
 
-/// Forces along the axes of a cluster after a step.
+/// Forces along the axes of a cluster after a trial step.
 #[derive(Debug, Default, Clone)]
 struct Trial {
     step: Vec<f64>,
-    /// φ, and the derivative of that.
+    /// φ and its derivative.
     beyond: Vec<f64>,
     slopes: Vec<f64>,
-    /// What the equations leave.
+    /// Residual of `d = d₀ + S φ(d)`, m.
     rest: Vec<f64>,
     residual: Vec<f64>,
     size: f64,
 }
 
 impl Level {
-    /// Whether contacts can be settled after the step that is about to be made; keeps the derivatives by which it is made.
+    /// Tells whether nonlinear elimination can follow the next step. Stores the
+    /// derivatives of that step.
     pub(super) fn can_settle(&mut self, ports: &Ports) -> bool {
         let Some(sparse) = self.sparse.as_ref().filter(|_| self.springs.is_empty()) else { return false };
         if ports.iter().any(|port| port.is_force() || port.marches()) {
@@ -58,8 +67,9 @@ impl Level {
         settling.helps
     }
 
-    /// After a whole step, from whose end the residual is, that left more than `beaten`: the step with the contacts that it missed as they are, into
-    /// `motion`. The residual there, if it is less; otherwise the step is that of all again.
+    /// Solves failed contacts locally, after a full step with a residual above `beaten`. Writes
+    /// the new solution into `motion`. Returns its residual if that is less than `beaten`;
+    /// otherwise restores the step of all contacts.
     pub(super) fn settle(
         &mut self,
         ports: &Ports,
@@ -103,7 +113,7 @@ impl Level {
             self.settle_cluster(ports, &cluster, &mut window, along, (omega, ease, length));
         }
         self.eliminated += 1;
-        // the step of all with what these forces have beyond their derivatives
+        // the step of all contacts with the nonlinear parts of these forces
         self.sparse.as_mut()?.receive_all(beyond);
         for ((d, left), (step, moved)) in self.step.iter_mut().zip(&*left).zip(step.iter().zip(&*beyond)) {
             *d = step + (moved + left) / length;
@@ -112,7 +122,7 @@ impl Level {
         Some(self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap))
     }
 
-    /// Size of the residual along a port, weighted as velocities are.
+    /// Returns the size of the residual along a port, weighted as velocities.
     fn left_along(&self, port: &Port) -> f64 {
         let nh = self.harmonics().len();
         let pairs = self.residual[2 * port.first * nh..2 * (port.first + port.axes) * nh].chunks_exact(2);
@@ -120,7 +130,8 @@ impl Level {
         pairs.zip(weights).map(|(r, w)| w * (r[0] * r[0] + r[1] * r[1])).sum::<f64>().sqrt()
     }
 
-    /// Solves `d = d₀ + S φ(d)` along the axes of a cluster, from the step that was tried last or from none; φ goes into `beyond`.
+    /// Solves `d = d₀ + S φ(d)` along the axes of a cluster, from the step tried last or from
+    /// zero. Writes φ into `beyond` and the residual into `left`.
     fn settle_cluster(
         &mut self,
         ports: &Ports,
@@ -187,7 +198,7 @@ impl Level {
         }
     }
 
-    /// φ after a step, its derivative, and what is left of `d = d₀ + S φ(d)`.
+    /// Computes φ after a step, its derivative, and the residual of `d = d₀ + S φ(d)`.
     fn try_cluster(
         &mut self,
         ports: &Ports,
@@ -231,7 +242,7 @@ impl Level {
         self.measure_cluster(ports, cluster, window, tangents, trial);
     }
 
-    /// Size of the residual that a trial leaves, `J (d - d₀ - S φ)`.
+    /// Computes the size of the residual of a trial, `J (d - d₀ - S φ)`.
     fn measure_cluster(
         &self,
         ports: &Ports,
@@ -257,14 +268,14 @@ impl Level {
         trial.size = self.weighted(&trial.residual);
     }
 
-    /// Size of a vector along whole axes, weighted as velocities are.
+    /// Returns the size of a vector along whole axes, weighted as velocities.
     fn weighted(&self, values: &[f64]) -> f64 {
         let weights = self.harmonics().iter().cycle().map(|h| weight(*h));
         values.chunks_exact(2).zip(weights).map(|(v, w)| w * (v[0] * v[0] + v[1] * v[1])).sum::<f64>().sqrt()
     }
 }
 
-/// The products of one block per port with a vector, into another.
+/// Multiplies one block per port by a vector, into another vector.
 fn multiply(ports: &Ports, cluster: &[usize], pair: usize, blocks: &[f64], by: &[f64], out: &mut [f64]) {
     let (mut at, mut from) = (0, 0);
     for port in cluster.iter().map(|p| &ports[*p]) {

@@ -1,14 +1,21 @@
-//! Newton's step where the structure couples many joints: the derivative `δ r_y - r_u R f_y` is multiplied with, and not formed.
+//! Newton steps by GMRES, for structures that couple many joints: the Jacobian
+//! `δ r_y - r_u R f_y` is applied as a product and not formed.
 //!
-//! Laws couple harmonics, the structure joints. Products need both one after the other, and a solution by minimal residuals takes a few tens of them if
-//! one knows roughly what it is. That is the same equations with the mean stiffness of every joint over the period:
-//! - per harmonic, each with the mean stiffness that it sees: a complex matrix over the axes, factored in every step; few joints with long series, where
-//!   rigid friction couples the lowest harmonics by more than their mean, have a matrix of all these together;
-//! - of large structures in their modes, `R = S + Φ diag(g) Φᵀ`: what modes far above the harmonics add, S, is the same for all of these, and so is the
-//!   factor of `1 + S K` with one stiffness for all; the others enter it by as many rows as they are (Woodbury). It is kept from step to step and from
-//!   frequency to frequency for as long as it helps.
+//! Laws couple harmonics, the structure couples joints. A product applies the laws and then the
+//! structure. GMRES takes a few tens of products if its preconditioner is close to the Jacobian.
+//! The preconditioner has the equations with the mean stiffness of every joint over the period:
+//! - Receptances as matrices: one complex matrix over the axes per harmonic, with the mean
+//!   stiffness at that harmonic. Rigid friction couples the lowest harmonics by more than their
+//!   mean; these harmonics are factored together.
+//! - Large structures in modes: `R = S + Φ diag(g) Φᵀ`. The residual flexibility S of modes far
+//!   above the harmonics is the same for all harmonics. So is the factor of `1 + S K` with one
+//!   stiffness for all. The other modes enter by Woodbury's formula, with one row per mode.
 //!
-//! Memory: per harmonic two complex matrices over the axes, or in modes two real ones over the axes and one over axes and modes.
+//! Preconditioners are kept from step to step, and in modes from frequency to
+//! frequency, for as long as they help.
+//!
+//! Memory: per harmonic two complex matrices over the axes; in modes, two real
+//! matrices over the axes and one over axes and modes.
 
 use super::ease::SOLVED;
 use super::linear::Linear;
@@ -24,78 +31,88 @@ use stickslip_numerics::pairs::Pairs;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Unknowns from which products are faster than elimination, whose derivatives are by all samples: of 8 and 10 nodes of three directions with six harmonics, 288
-/// and 360 unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. Rigid friction, whose lowest harmonics are eliminated in any case, has its own.
+/// Number of unknowns from which GMRES is faster than elimination, with derivatives by all
+/// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
+/// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. The second limit applies with
+/// rigid friction, whose lowest harmonics are eliminated in any case.
 const MANY: usize = 200;
 const MANY_OF_FORCES: usize = 400;
-/// Unknowns up to which a matrix is formed all the same where products do not lead to the step: 130 MB, seconds.
+/// Number of unknowns up to which the Jacobian is formed if GMRES does not
+/// converge: 130 MB, seconds.
 pub(super) const FORMED: usize = 4096;
-/// The same for few directions with rigid friction, whose series are long: a step of 10 joints with 128 harmonics, 2560 unknowns, takes 80 products, an
-/// eighth of its elimination.
+/// Number of unknowns from which GMRES is used for few directions with rigid
+/// friction, whose series are long. Measured: a step of 10 joints with 128
+/// harmonics, 2560 unknowns, takes 80 products, an eighth of its elimination.
 const LONG: usize = 2048;
-/// Unknowns of the lowest harmonics that are eliminated together to precondition such a step. With a quarter of the harmonics it takes 80 products, with
-/// an eighth 150, and with none, each by its mean, it is not found in hundreds.
+/// Number of unknowns of the lowest harmonics that are factored together to precondition such a
+/// step. Measured: with a quarter of the harmonics a step takes 80 products, with an eighth
+/// 150. With none, each harmonic by its mean, it does not converge in hundreds.
 const LOWEST: usize = 1000;
-/// Whether a level with so many unknowns along the ports is solved by products.
+/// Tells whether a level with `size` unknowns uses GMRES.
 pub(super) fn by_products(size: usize, ports: &Ports) -> bool {
     let many = if ports.has_forces() { MANY_OF_FORCES } else { MANY };
     let many = size >= many && ports.count() >= MANY_DIRECTIONS;
     size > FORMED || many || (size > LONG && ports.has_forces())
 }
 
-/// Share of Newton's residual to which its equations are solved, and at most: derivatives of laws cost as much as tens of products, so that fewer steps
-/// count for more.
+/// Relative tolerance of GMRES, as a share of Newton's residual, and its upper bound.
+/// Derivatives of laws cost as much as tens of products, so that fewer Newton steps count more.
 const SHARE: f64 = 0.1;
 const COARSEST: f64 = 1e-6;
-/// The same at most by products with modes, which cost more than derivatives do: of 1000 nodes one takes 50 ms, all derivatives 0.3 s.
+/// Upper bound with modes, whose products cost more than derivatives do: for 1000 nodes one
+/// product takes 50 ms, all derivatives 0.3 s.
 const COARSEST_OF_MODES: f64 = 1e-2;
-/// The same at least by derivatives that are sketched, which are off by as much. Measured: with a tenth of it a point of 16 nodes takes 2 % longer.
+/// Lower bound with coarse derivatives, which have an error of this size. Measured: with a
+/// tenth of it, a point of 16 nodes takes 2 % longer.
 const FINEST_OF_SKETCHES: f64 = 1e-2;
-/// Vectors that are kept, and products in all.
+/// Maximum number of Krylov vectors, and of products.
 const VECTORS: usize = 80;
 const PRODUCTS: usize = 320;
-/// Residual of Newton's equations up to which a step is one.
+/// Relative residual of the linear equations up to which a step is used.
 const USEFUL: f64 = 0.1;
-/// Products beyond which a preconditioner that was kept is made anew.
+/// Number of products beyond which a kept preconditioner is replaced.
 const STALE: usize = 25;
-/// Products that steps took more than the one for which a preconditioner was made, together, beyond which it is not kept for the next: a new one costs as much.
+/// Number of products that later steps may take in total in excess of the step for which a
+/// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
 const PAID: usize = 10;
-/// Modes with frequencies above this multiple of the highest harmonic answer it nearly as at rest.
+/// Modes with frequencies above this multiple of the highest harmonic respond almost statically.
 const ABOVE: f64 = 3.0;
 
-/// What modes above a bound add, of a split that was given up.
+/// Residual flexibility of the modes above a bound, from a discarded split.
 type Above = (f64, Arc<Vec<f64>>);
 
-/// What Newton's steps by products keep.
+/// GMRES and the preconditioners that it keeps.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     gmres: Gmres,
-    /// Of receptances that are matrices, by the derivatives of this motion or of one nearby.
+    /// Preconditioner for receptances as matrices, with the derivatives of this
+    /// motion or a nearby one.
     harmonics: Option<Harmonics>,
     split: Option<Split>,
     above: Option<Above>,
-    /// Unknowns as forces, and what they move.
+    /// Forces of a product, and the motions that they cause.
     force: Vec<Complex64>,
     moved: Vec<Complex64>,
-    /// Those of one port, real and imaginary parts.
+    /// Forces of one port, real and imaginary parts.
     parts: Vec<f64>,
 }
 
-/// Where a step of Newton's method begins.
+/// The state in which a Newton step begins.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Near {
-    /// The yardstick of motions there, m, see `Level::length`.
+    /// The length of motions, m, see `Level::length`.
     pub length: f64,
     /// The size of the residual.
     pub residual: f64,
-    /// Whether derivatives, or all that is solved, are by fewer samples, see `Level::follow_slopes`.
+    /// True if derivatives, or all of the equations, use the coarse sampling,
+    /// see `Level::follow_slopes`.
     pub sketched: bool,
-    /// Whether they are those of the last step, whose preconditioner is theirs too.
+    /// True if the derivatives are those of the last step, whose preconditioner then fits.
     pub kept: bool,
 }
 
 impl Coupled {
-    /// Memory of what is kept to precondition steps, bytes.
+    /// Returns the memory of the kept preconditioner, bytes.
     #[cfg(test)]
     pub(super) fn bytes(&self) -> usize {
         let Some(Harmonics { lowest, others, .. }) = &self.harmonics else { return 0 };
@@ -106,8 +123,9 @@ impl Coupled {
         others.iter().map(of).sum::<usize>() + lowest.transposed.bytes()
     }
 
-    /// The Newton step from the residual in units, in `step`, into it. Whether it was found, and the products that it took; a step that was not found
-    /// is the residual still.
+    /// Computes the Newton step. `step` contains the residual in units on
+    /// entry, and the step on return. Returns whether it was found, and the
+    /// number of products. If it was not found, `step` is the residual again.
     pub(super) fn step(
         &mut self,
         linear: &Linear<'_>,
@@ -122,7 +140,7 @@ impl Coupled {
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let Coupled { gmres, harmonics, split, above, force, moved, parts } = self;
-        // where forces are unknown the lowest harmonics are coupled by which samples slip
+        // with unknown forces, the samples that slip couple the lowest harmonics
         harmonics.take_if(|_| !near.kept && linear.ports.has_forces());
         let found = loop {
             let Some(preconditioner) =
@@ -148,7 +166,7 @@ impl Coupled {
             if fresh || outcome.solved {
                 break outcome.solved || outcome.residual <= USEFUL;
             }
-            // a stiffness of another motion
+            // the stiffness of another motion
             *harmonics = None;
             *above = split.take().map(|split| (split.bound, split.above));
             step.copy_from_slice(&right);
@@ -160,19 +178,19 @@ impl Coupled {
     }
 }
 
-/// Numbers of the factor of the lowest harmonics, where these are eliminated together.
+/// Returns the number of entries in the factor of the lowest harmonics.
 pub(super) fn of_lowest(ports: &Ports, harmonics: usize) -> usize {
     (2 * ports.count() * lowest(ports, harmonics)).pow(2)
 }
 
-/// How many of the lowest harmonics are eliminated together: of none if there would be no two of them.
+/// Returns the number of lowest harmonics that are factored together; zero if it would be one.
 fn lowest(ports: &Ports, harmonics: usize) -> usize {
     let count = if ports.has_forces() { LOWEST / (2 * ports.count()) } else { 0 };
     if count < 2 { 0 } else { count.min(harmonics) }
 }
 
 impl Linear<'_> {
-    /// The derivative times a step, both in units.
+    /// Multiplies the Jacobian by a step, both in units.
     fn multiply(
         &self,
         receptance: &mut Receptance,
@@ -195,7 +213,7 @@ impl Linear<'_> {
                 continue;
             }
             parts.resize(wide, 0.0);
-            // row after row it is the transpose
+            // the tangent is row-major, so that v multiplies its transpose from the left
             multiply_in_blocks(v, self.tangent(p, port), parts, (1, wide, wide), false);
             force.iter_mut().zip(parts.chunks_exact(2)).for_each(|(f, z)| *f = Complex64::new(z[0], z[1]) * unit);
         }
@@ -213,7 +231,7 @@ impl Linear<'_> {
                 }
                 continue;
             }
-            // λ less T of what changes in λ + ε u', u = -R f
+            // λ minus T times the change of λ + ε u', with u = -R f
             let penalty = self.penalty[p];
             let changed: Vec<f64> = moved
                 .iter()
@@ -232,7 +250,8 @@ impl Linear<'_> {
         }
     }
 
-    /// What the tangent of a port does to harmonic number `k` on the whole, between two of its axes.
+    /// Returns the complex mean of a port's tangent at harmonic number `k`,
+    /// between two of its axes.
     fn mean(&self, tangent: &[f64], axes: usize, (a, b): (usize, usize), k: usize) -> Complex64 {
         let pair = 2 * self.harmonics.len();
         let wide = pair * axes;
@@ -243,7 +262,8 @@ impl Linear<'_> {
         Complex64::new(at(0, 0) + at(1, 1), at(1, 0) - at(0, 1)) * 0.5
     }
 
-    /// `None` if it has no factor. `fresh` becomes whether it is of this motion.
+    /// Returns a kept preconditioner, or a new one. `None` if it is singular.
+    /// `fresh` becomes true if it belongs to this motion.
     fn preconditioner<'b>(
         &self,
         receptance: &Receptance,
@@ -285,17 +305,17 @@ impl Linear<'_> {
         }
     }
 
-    /// The equations of the lowest harmonics, factored, where forces are unknown.
+    /// Factors the equations of the lowest harmonics, if forces are unknown.
     fn lowest(&self, receptance: &[DMatrix<Complex64>]) -> Option<Lowest> {
         let count = lowest(self.ports, self.harmonics.len());
         let mut matrix = Vec::new();
         self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
-        // row after row it is the transpose
+        // the matrix is row-major: its transpose is factored
         let transposed = Lu::new(matrix, 2 * count * self.ports.count()).ok()?;
         Some(Lowest { count, transposed })
     }
 
-    /// The equations of one harmonic with the mean tangents, factored.
+    /// Factors the equations of one harmonic with the mean tangents.
     fn of_harmonic(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<Answer> {
         let size = receptance.nrows();
         let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
@@ -342,8 +362,9 @@ impl Linear<'_> {
     }
 }
 
-/// What solves the equations of one harmonic: of matrices that stay in the cache the inverse, which is exact enough to precondition with and takes a fifth of
-/// what a solution by triangles does, which are too short for blocks.
+/// The solver of one harmonic. A matrix that fits in the cache is inverted: the
+/// inverse is exact enough for a preconditioner. It takes a fifth of the time
+/// of triangular solutions, whose rows are too short for blocks.
 #[derive(Debug, Clone)]
 enum Answer {
     Inverse(Pairs),
@@ -369,16 +390,16 @@ impl Answer {
     }
 }
 
-/// The first harmonics together.
+/// The factor of the lowest harmonics together.
 #[derive(Debug, Clone)]
 struct Lowest {
     count: usize,
-    /// In units.
+    /// The transposed Jacobian, in units.
     transposed: Lu<f64>,
 }
 
 impl Lowest {
-    /// From the residual of these harmonics to their step, both in units, and not of the others.
+    /// Returns the step of these harmonics alone, from the residual of all; both in units.
     fn apply(&self, v: &[f64], pair: usize) -> Vec<f64> {
         let mut own: Vec<f64> = v.chunks_exact(pair).flat_map(|v| &v[..2 * self.count]).copied().collect();
         self.transposed.solve_adjoint(&mut own);
@@ -386,12 +407,12 @@ impl Lowest {
     }
 }
 
-/// The lowest harmonics together, the others one by one.
+/// Preconditioner with the lowest harmonics together, and the others one by one.
 #[derive(Debug, Clone)]
 struct Harmonics {
     lowest: Lowest,
     others: Vec<Answer>,
-    /// Products that the step took for which they were made, and those that others took more, together.
+    /// Products of the step for which it was made, and the total excess of later steps over it.
     products: usize,
     excess: usize,
 }
@@ -402,7 +423,7 @@ enum Preconditioner<'a> {
 }
 
 impl Preconditioner<'_> {
-    /// From a residual in units to a step in units.
+    /// Replaces a residual in units by a step in units.
     fn apply(&self, linear: &Linear, v: &mut [f64]) {
         let nh = linear.harmonics.len();
         let together = match self {
@@ -436,13 +457,14 @@ impl Preconditioner<'_> {
     }
 }
 
-/// Harmonics beyond which derivatives of laws do not stay in the cache.
+/// Number of harmonics above which derivatives of laws do not fit in the cache.
 const COUNTED: usize = 64;
-/// How many times as long a multiplication with the derivatives of unknown forces takes, whose series are long: they are read from memory in every
-/// product. Measured: 21 ms a product of 11 joints with 512 harmonics.
+/// Cost factor of products with the derivatives of unknown forces, whose series are long: every
+/// product reads them from memory. Measured: 21 ms a product of 11 joints with 512 harmonics.
 const READ: f64 = 8.0;
 
-/// Multiplications in a product with the derivative: of the structure over the axes, and of the laws over the harmonics.
+/// Returns the multiplications in a product with the Jacobian: of the structure
+/// over the axes, and of the laws over the harmonics.
 pub(super) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
     let of_law = |port: &Port| {
         (2 * harmonics * port.axes).pow(2) as f64 * if port.is_force() && harmonics > COUNTED { READ } else { 1.0 }
@@ -450,43 +472,47 @@ pub(super) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
     4.0 * harmonics as f64 * (ports.count() as f64).powi(2) + ports.iter().map(of_law).sum::<f64>()
 }
 
-/// Multiplications in a step by products, with the lowest harmonics of unknown forces eliminated together.
+/// Returns the multiplications in a step by GMRES, with the lowest harmonics of
+/// unknown forces factored together.
 pub(super) fn step_products(ports: &Ports, harmonics: usize) -> f64 {
     let together = if ports.has_forces() { LOWEST.min(2 * harmonics * ports.count()) } else { 0 };
     VECTORS as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
 }
 
-/// `1 + R K` with one real K for all harmonics, of a structure in modes.
+/// The preconditioner `(1 + R K)⁻¹` with one real K for all harmonics, for a structure in modes.
 #[derive(Debug, Clone)]
 struct Split {
-    /// Frequency, rad/s, up to which modes are taken as they are.
+    /// Frequency, rad/s, up to which modes are taken individually.
     bound: f64,
-    /// Whether the mean is that with closed contacts: these are what precondition it.
+    /// True if the mean has closed contacts. These already precondition it.
     closed: bool,
-    /// Their numbers.
+    /// Numbers of these modes.
     low: Vec<usize>,
-    /// What the other modes and springs in series add, S: the same for any stiffness of the joints.
+    /// Residual flexibility S of the other modes, with the springs in series. It does not
+    /// depend on the stiffness of the joints.
     above: Arc<Vec<f64>>,
-    /// `1 + S K`.
+    /// `1 + S K`, factored.
     factor: Lu<f64>,
     /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
     pull: Vec<f64>,
     moved: Vec<f64>,
     /// `Φᵀ K (1 + S K)⁻¹ Φ`.
     core: Vec<f64>,
-    /// That with the dynamic stiffness of the modes, per harmonic, at a drive frequency.
+    /// `core` plus the dynamic stiffness of the modes, factored, per harmonic
+    /// at one excitation frequency.
     harmonics: Vec<ComplexLu>,
     omega: f64,
 }
 
 impl Split {
-    /// The same for frequencies that are near each other.
+    /// Returns the bound, rounded up so that nearby frequencies share it.
     fn bound(modal: &Modal) -> f64 {
         let top = modal.rates.iter().map(|s| s.im).fold(modal.omega, f64::max);
         ABOVE * top.log2().ceil().exp2()
     }
 
-    /// `stiffness(p, port, a, b)` of the joints; `above` if it is known of the same bound.
+    /// Creates the split from `stiffness(p, port, a, b)` of the joints. `above`
+    /// is S, if it is known for this bound.
     fn new(
         modal: &Modal,
         (bound, above): (f64, Option<Arc<Vec<f64>>>),
@@ -532,7 +558,7 @@ impl Split {
         Some(Split { bound, closed, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
     }
 
-    /// Prepares for a drive frequency.
+    /// Prepares the factors for an excitation frequency.
     fn drive(&mut self, modal: &Modal) -> Option<()> {
         if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
             return Some(());
@@ -550,7 +576,8 @@ impl Split {
         Some(())
     }
 
-    /// `(1 + R K)⁻¹ v = y - (1 + S K)⁻¹ Φ (1/g + core)⁻¹ Φᵀ K y`, `y = (1 + S K)⁻¹ v`, of [axis][harmonic].
+    /// Applies the preconditioner to [axis][harmonic]:
+    /// `(1 + R K)⁻¹ v = y - (1 + S K)⁻¹ Φ (1/g + core)⁻¹ Φᵀ K y`, with `y = (1 + S K)⁻¹ v`.
     fn apply(&self, v: &mut [f64]) {
         let (nh, l) = (self.harmonics.len(), self.low.len());
         let wide = 2 * nh;
@@ -582,7 +609,7 @@ impl Split {
     }
 }
 
-/// `a · b`.
+/// Returns `a · b`.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -600,12 +627,13 @@ mod tests {
     use crate::structure::Structure;
     use std::sync::Arc;
 
-    /// Values without a pattern between -1 and 1.
+    /// Returns a pseudo-random value between -1 and 1.
     fn noise(i: usize) -> f64 {
         ((i * 7919 + 13) as f64).sin()
     }
 
-    /// A structure that couples all with all, with damping in proportion to its stiffness, on contacts with the ground.
+    /// A structure that couples all coordinates, with damping proportional to
+    /// stiffness, on contacts with the ground.
     fn system(joints: &[(SharedLaw, usize)]) -> System {
         let n = joints.iter().map(|joint| joint.1).sum();
         let spread = DMatrix::from_fn(n, n, |i, k| noise(i * n + k) / (n as f64).sqrt());
@@ -631,11 +659,11 @@ mod tests {
         Eliminated,
         Formed,
         Modal,
-        /// As formed, with a quarter of the samples on the way.
+        /// Matrices with a coarse sampling first.
         Sketched,
     }
 
-    /// The motion, how many products it took, and how many steps of laws with a memory.
+    /// Returns the solution, the number of products, and the number of steps of laws with memory.
     fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Solution, usize, usize) {
         let ports = Ports::new(system).unwrap();
         let rest = Rest::new(system, &ports);
@@ -671,7 +699,7 @@ mod tests {
         }
     }
 
-    /// The same motion by elimination, by products with receptances, and by products with modes.
+    /// Elimination, GMRES with receptances and GMRES with modes find the same motion.
     #[test]
     fn products_lead_where_elimination_does() {
         let contact = |i: usize| -> (SharedLaw, usize) {
@@ -685,7 +713,8 @@ mod tests {
         agree(&system(&contacts), &[0, 1, 2, 3], &[Form::Formed, Form::Modal]);
     }
 
-    /// Fewer samples on the way lead to the motion of all samples, in fewer steps of the laws.
+    /// With a coarse sampling first, the search finds the motion of all
+    /// samples, in fewer steps of the laws.
     #[test]
     fn sketches_lead_to_the_motion_of_all_samples() {
         let contact = |i: usize| -> (SharedLaw, usize) {
@@ -702,7 +731,8 @@ mod tests {
         }
     }
 
-    /// Steps that are shortened again and again take no products, and end no search; products do. The next point has as many again.
+    /// Products are the work of a search; shortened steps are not. The next
+    /// point has its full budget.
     #[test]
     fn products_are_the_work_of_a_search() {
         let contacts: Vec<(SharedLaw, usize)> =
@@ -719,7 +749,8 @@ mod tests {
         assert!(!level.is_exhausted(&ports));
     }
 
-    /// What searches of a point took before, here or at other levels, is missing from what the next one may take.
+    /// Work of earlier searches of a point, here or at other levels, reduces
+    /// the budget of the next search.
     #[test]
     fn searches_of_a_point_share_what_it_may_take() {
         let joints: Vec<_> = (0..3).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
@@ -738,7 +769,7 @@ mod tests {
         assert!(!level.is_exhausted(&ports));
     }
 
-    /// Unknown forces too, of rigid friction beside elastic.
+    /// GMRES also solves for unknown forces, of rigid friction together with elastic friction.
     #[test]
     fn forces_are_unknowns_of_products_too() {
         let laws: [SharedLaw; 3] = [
@@ -750,7 +781,8 @@ mod tests {
         agree(&system(&joints), &[1, 3, 5], &[Form::Formed]);
     }
 
-    /// Few joints of rigid friction with long series: the lowest harmonics together lead to the step, which none of them does by its mean.
+    /// A few joints with rigid friction and long series: GMRES converges with
+    /// the lowest harmonics factored together.
     #[test]
     fn lowest_harmonics_together_lead_to_steps_of_long_series() {
         let laws: [SharedLaw; 2] = [Arc::new(Coulomb { limit: 0.3 }), Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 })];
@@ -760,7 +792,8 @@ mod tests {
         agree(&system(&joints), &harmonics, &[Form::Formed]);
     }
 
-    /// Of few joints with long series what the laws multiply is the work, and it ends a search.
+    /// With few joints and long series, products with the laws dominate the
+    /// work, and they end a search.
     #[test]
     fn the_laws_of_long_series_are_work() {
         let joints: Vec<_> = (0..10).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
@@ -774,7 +807,7 @@ mod tests {
         assert!(level.is_exhausted(&ports));
     }
 
-    /// Who needs the derivative as a matrix gets it where modes would stand for receptances too.
+    /// The Jacobian is formed on request, also if modes would replace the receptances.
     #[test]
     fn the_matrix_is_formed_where_it_is_needed() {
         let contacts: Vec<(SharedLaw, usize)> =

@@ -1,21 +1,25 @@
 //! The equations of harmonic balance.
 //!
-//! What the structure does between the axes of the ports is its receptance `R`: `u = u_lin - R f` per harmonic. A port `q` has unknowns `y`,
-//! forces `f(y)` and a residual `r(y, u)`:
-//! - a motion port has `y` for its motion: `f = f(y)`, `r = y - u`;
-//! - a force port has `y = λ` for its force: `f = y`, `r = λ - P J(λ + ε u')` with the resolvent `J` of the law and `P` the harmonics that
-//!   are kept. Where the contact sticks, the force is then free to be what the motion asks for, and no velocity is multiplied by a
-//!   penalty stiffness.
+//! The receptance `R` of the structure between the axes of the ports gives the motion per harmonic:
+//! `u = u_lin - R f`. A port `q` has unknowns `y`, forces `f(y)` and a residual `r(y, u)`:
+//! - A motion port has its motion as the unknown: `f = f(y)`, `r = y - u`.
+//! - A force port has its force as the unknown, `y = λ`: `f = y`,
+//!   `r = λ - P J(λ + ε u')`. `J` is the resolvent of the law, and `P` truncates to
+//!   the harmonics of the series. In stick the force is then free to take the value
+//!   that the motion requires, and no velocity is multiplied by a penalty stiffness.
 //!
-//! The derivative is one formula for both: `δ_qp r_y - r_u R_qp f_y`, with `r_y = 1`, `-r_u = 1`, `f_y = K` for motions and `r_y = 1 - T`,
-//! `-r_u = T ε d/dt`, `f_y = 1` for forces.
+//! The Jacobian is one formula for both: `δ_qp r_y - r_u R_qp f_y`. Motion ports have `r_y = 1`,
+//! `-r_u = 1`, `f_y = K`; force ports have `r_y = 1 - T`, `-r_u = T ε d/dt`, `f_y = 1`.
 //!
-//! Where nothing but contacts holds a body, the mean has the springs of closed contacts in `R`, and their force is taken off `f`: see `closed`.
+//! If contacts alone hold a body, `R` of the mean contains the springs of closed contacts, and
+//! their force is subtracted from `f`, see `closed`.
 //!
-//! `ε` is no free parameter: it is the impedance of the structure at the contact at the highest harmonic, the resolution of the series
-//! (see [`penalty`](super::penalty::penalty)). Another ε changes the solution no more than the missing harmonics do.
+//! `ε` is not a free parameter: it is the impedance of the structure at the contact at the
+//! highest harmonic, the resolution of the series (see [`penalty`](super::penalty::penalty)).
+//! Another ε changes the solution no more than the missing harmonics do.
 //!
-//! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian frequency-time method".
+//! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian
+//! frequency-time method".
 
 mod drive;
 mod sketch;
@@ -38,59 +42,67 @@ use num_complex::Complex64;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// The share of the springs of closed contacts that a law's derivative has beside a structure that has them.
+/// Factor of the springs of closed contacts in a law's derivative, if the structure contains them.
 pub(super) const OPEN: f64 = -1.0;
 
-/// All that belongs to one number of harmonics.
+/// The discretization by one list of harmonics: equations, scratch memory, and work counters.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
-    /// How often laws were evaluated in the present search, and how often the derivative was eliminated, where it is a matrix.
+    /// Number of evaluations of laws with derivatives, and of eliminations of
+    /// the Jacobian, in the present search.
     pub assembled: usize,
     pub eliminated: usize,
-    /// Whether it is begun from the solution of a shorter series, which is there whatever becomes of it: it takes no more than its share then.
+    /// True if the search begins with the solution of a shorter series, which
+    /// remains valid if the search fails. With unknown forces, the work limit
+    /// then holds without a guaranteed number of steps.
     pub prolongs: bool,
-    /// What searches before it took of the present point, here and at other levels, see [`Level::taken`].
+    /// Work of earlier searches of the present point, here and at other levels,
+    /// see [`Level::taken`].
     pub spent: Work,
     pub elsewhere: Work,
-    /// What all of them may take.
+    /// Work limit of all these searches together.
     pub allowed: Work,
     pub alternation: Alternation,
-    /// Of the axes; empty in the banded form.
+    /// Receptance of the axes; empty in the banded form.
     pub(super) receptance: Receptance,
-    /// ε per port, N s/m; infinite where the motion is imposed.
+    /// Penalty ε per port, N s/m; infinite if the motion is imposed.
     pub(super) penalty: Vec<f64>,
-    /// Force that contacts would take to hold what moves without them, N: those of the largest impedance where it moves most.
+    /// Force that would hold the contacts against the motion without friction,
+    /// N: the largest product of a penalty and a velocity.
     holding: f64,
     /// Motion of the axes without friction, [axis][harmonic].
     pub linear: Vec<Complex64>,
     /// Mean of the imposed motion along the axes, m.
     imposed: Vec<f64>,
-    /// Displacements along the axes in static equilibrium, m; empty where none is known.
+    /// Displacements along the axes in static equilibrium, m; empty if unknown.
     pub equilibrium: Vec<f64>,
-    /// Springs that tie the mean to where it was, where static equilibrium is sought from afar.
+    /// Springs of the proximal-point method for static equilibrium.
     pub tether: Option<Tether>,
     /// Compliances in series with the axes, m/N.
     series: Vec<f64>,
-    /// Stiffness of closed contacts along the axes (N/m) that the structure has for the mean; empty if it is held without them.
+    /// Stiffness of closed contacts along the axes (N/m) that the structure contains for the
+    /// mean; empty if it is held without them.
     pub(super) springs: Vec<f64>,
-    /// What acts on it: forces less those of these springs, [axis][harmonic], N.
+    /// Forces on the structure: those of the ports minus those of these
+    /// springs, [axis][harmonic], N.
     acting: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
     pub free: Vec<DVector<Complex64>>,
-    /// In place of receptance and Jacobian, for large systems.
+    /// Banded form of a large system, in place of receptance and Jacobian.
     pub sparse: Option<Sparse>,
-    /// What settling contacts by themselves keeps, where that is possible.
+    /// Memory of the nonlinear elimination, if the system allows it.
     pub(super) settling: Option<Settling>,
-    /// In place of the Jacobian, for many joints that the structure couples.
+    /// GMRES with its preconditioner, in place of the Jacobian, for many joints
+    /// that the structure couples.
     pub(super) coupled: Option<Coupled>,
-    /// Whether its matrix is needed, and with it receptances as matrices.
+    /// True if the Jacobian is needed as a matrix, and the receptances with it.
     with_matrix: bool,
-    /// How often the derivative was multiplied with in the present search.
+    /// Number of products with the Jacobian in the present search.
     pub products: usize,
-    /// K or T of every port, one after the other, see [`blocks`].
+    /// Derivatives K or T of all ports in sequence, see [`blocks`].
     pub(super) tangents: Vec<f64>,
     pub(super) blocks: Vec<usize>,
-    /// Per axis: its unknown is a force.
+    /// Per axis: true if its unknown is a force.
     forces: Vec<bool>,
     pub(super) jacobian: Vec<f64>,
     pub(super) residual: Vec<f64>,
@@ -98,39 +110,42 @@ pub(super) struct Level {
     pub(super) units: Vec<f64>,
     pub(super) before: Solution,
     pub(super) best: Solution,
-    /// Forces that those of [`Ease::pull`] are drawn to, [axis][harmonic], N.
+    /// Forces to which [`Ease::pull`] draws the force unknowns, [axis][harmonic], N.
     pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
     pub(super) image: Vec<Complex64>,
-    /// Of ports with a memory, the states at t = 0 in the motion that was evaluated last, and what is forgotten of them.
+    /// Per port with memory: the states at t = 0 in the motion evaluated last,
+    /// and how they are forgotten.
     pub(super) states: Vec<Beginning>,
-    /// Whether those that forget where they began do so there in the next motion: the same states as from rest, in fewer periods.
+    /// True if laws that forget their initial states begin the next motion with these. They
+    /// reach the same states as from static equilibrium, in fewer periods.
     pub(super) nearby: bool,
-    /// The same period by fewer samples, for derivatives of many contacts: see [`Level::follow_slopes`].
+    /// Coarse sampling of the period, for derivatives of many contacts: see
+    /// [`Level::follow_slopes`].
     pub(super) sketch: Option<Alternation>,
-    /// Whether the present search goes by these.
+    /// True if the present search uses the coarse sampling.
     pub(super) sketches: bool,
-    /// The same period by twice the samples, once it was needed, see [`Level::by_twice_the_samples`].
+    /// Sampling with twice the samples, created on first use, see [`Level::by_twice_the_samples`].
     pub(super) twice: Option<Alternation>,
-    /// Whether the derivatives are those of the present search, with nothing added.
+    /// True if the tangents are those of the present search, without added springs.
     pub(super) linearised: bool,
-    /// Whether the derivatives are those of the motion from which the next search begins, by fewer samples.
+    /// True if the tangents are those of the initial guess of the next search, by coarse sampling.
     pub(super) keeps_slopes: bool,
-    /// Motions along the axes under their forces, [axis][harmonic].
+    /// Motions along the axes under the forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
 }
 
-/// Springs along the axes that tie the mean to a place.
+/// Springs along the axes that tie the mean to an anchor.
 #[derive(Debug, Clone)]
 pub(super) struct Tether {
-    /// Their stiffness, relative to the springs of closed contacts.
+    /// Stiffness relative to the springs of closed contacts.
     pub share: f64,
-    /// Where they are relaxed, m.
+    /// Displacements at which the springs are relaxed, m.
     pub anchor: Vec<f64>,
 }
 
-/// A solution or a start.
+/// A solution or an initial guess.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Solution {
     /// Harmonics of the motions along the axes, [axis][harmonic], m.
@@ -147,7 +162,7 @@ impl Solution {
         Solution { c: vec![ZERO; length], force: vec![ZERO; length], ..Solution::default() }
     }
 
-    /// The same without new memory.
+    /// Copies `other` without new memory.
     pub fn copy(&mut self, other: &Solution) {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
@@ -156,11 +171,12 @@ impl Solution {
     }
 }
 
-/// Which ports' derivatives an evaluation makes.
+/// The ports whose derivatives an evaluation computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Slopes {
     None,
-    /// Those that cost little beside the forces: not of laws that are followed through the period.
+    /// All ports except those whose laws are integrated through the period:
+    /// derivatives that cost little more than forces.
     Cheap,
     All,
 }
@@ -176,12 +192,12 @@ impl Level {
         level
     }
 
-    /// The same with a derivative that is a matrix, whatever its size.
+    /// Returns the level with a Jacobian that is a matrix, whatever its size.
     pub fn with_matrix(self) -> Self {
         Level { with_matrix: true, ..self }
     }
 
-    /// Without what Newton's steps need.
+    /// Creates the level without the solver for Newton steps.
     fn unassembled(alternation: Alternation, ports: &Ports, sparse: Option<Sparse>) -> Self {
         let (nh, axes) = (alternation.harmonics.len(), ports.count());
         let size = 2 * nh * axes;
@@ -238,13 +254,14 @@ impl Level {
         &self.alternation.harmonics
     }
 
-    /// Whether its steps are sought by products, see [`by_products`].
+    /// Tells whether GMRES computes the Newton steps, see [`by_products`].
     pub fn is_coupled(&self) -> bool {
         self.coupled.is_some()
     }
 
-    /// What is measured of a motion of one sector, over all of them: `ports` are those of the ring, and the motion's are earlier by the lead of
-    /// their sector. Nothing can be solved on it.
+    /// Extends a motion of one sector to the whole ring, for postprocessing:
+    /// the returned level cannot be solved. `ports` are those of the ring.
+    /// Every sector moves with the phase of the travelling wave.
     pub fn around(&self, cyclic: Cyclic, ports: &Ports, motion: &Solution) -> (Level, Solution) {
         let (nh, own) = (self.harmonics().len(), motion.c.len());
         let all = |values: &[Complex64]| -> Vec<Complex64> {
@@ -259,8 +276,9 @@ impl Level {
         (level, motion)
     }
 
-    /// Forces and residual at the unknowns in `motion`; the rest of it follows. The derivatives of the ports go into `self.tangents`, see [`Slopes`].
-    /// Returns the size of the residual, relative.
+    /// Evaluates forces and residual at the unknowns in `motion`, and updates the other part of
+    /// `motion`. Writes the derivatives of the ports into `self.tangents`, see [`Slopes`].
+    /// Returns the relative size of the residual.
     pub fn evaluate(
         &mut self,
         ports: &Ports,
@@ -275,7 +293,7 @@ impl Level {
         self.follow(motion, ease);
         self.image(ports, omega, motion, ease, slopes);
         self.measure(ports, motion, length);
-        // relative to the motion, weighted as velocities are, and to the limits
+        // relative to the units of the residual; motions are weighted as velocities
         let nh = self.harmonics().len();
         let mut sum = 0.0;
         for port in ports.iter() {
@@ -291,7 +309,7 @@ impl Level {
         sum.sqrt()
     }
 
-    /// The forces of motion ports, and their derivatives.
+    /// Computes the forces of motion ports, and their derivatives.
     pub(super) fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, ease: Ease, slopes: Slopes) {
         let nh = self.harmonics().len();
         self.alternation.static_share = self.load(ease) / ease.limits;
@@ -313,7 +331,8 @@ impl Level {
         }
     }
 
-    /// What the structure does under the forces of a motion: into the residual of motions, and into the motions whose force is unknown.
+    /// Computes the motion of the structure under the forces. Writes the
+    /// residual of motion ports, and the motion of force ports.
     pub(super) fn follow(&mut self, motion: &mut Solution, ease: Ease) {
         let nh = self.harmonics().len();
         let share = self.load(ease);
@@ -347,14 +366,14 @@ impl Level {
         }
     }
 
-    /// What the forces of force ports must be: into their residual, and its derivatives.
+    /// Computes the residual of all force ports, and its derivatives.
     fn image(&mut self, ports: &Ports, omega: f64, motion: &Solution, ease: Ease, slopes: Slopes) {
         for p in (0..ports.len()).filter(|p| ports[*p].is_force()) {
             self.image_of(ports, p, omega, motion, (ease, slopes));
         }
     }
 
-    /// The same of one of them.
+    /// Computes the residual of one force port, and its derivatives.
     pub(super) fn image_of(
         &mut self,
         ports: &Ports,
@@ -383,7 +402,8 @@ impl Level {
         }
     }
 
-    /// The forces of motion ports after the step that was made last, by the derivatives with which it was made, which are those of the laws alone then.
+    /// Updates the forces of motion ports by the last Newton step and the derivatives of that
+    /// step. Removes the springs of closed contacts from these derivatives.
     pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut Solution, length: f64) {
         let pair = 2 * self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
@@ -399,7 +419,7 @@ impl Level {
         self.linearised = false;
     }
 
-    /// Begins a point: what its searches may take is theirs together.
+    /// Begins a point. All searches of the point share one work limit.
     pub fn begin_point(&mut self) {
         (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
         (self.spent, self.elsewhere) = (Work::default(), Work::default());
@@ -409,7 +429,7 @@ impl Level {
         }
     }
 
-    /// Begins a search, which knows nothing of the laws' memories.
+    /// Begins a search without known states of the laws with memory.
     pub fn begin_anew(&mut self, ports: &Ports) {
         self.spent = self.taken_of_point(ports);
         (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
@@ -418,8 +438,9 @@ impl Level {
         self.states.iter_mut().for_each(|known| *known = Beginning::default());
     }
 
-    /// Whether the states of a law cross their range between two samples of a motion somewhere: to the series it is as steep as a law of velocity then, and
-    /// samples place a change of its sign to a sample only.
+    /// Tells whether the states of a law may cross their range between two
+    /// samples of a motion. Such a law is as steep for the series as a law of
+    /// velocity, and samples locate its sign change only to within one sample.
     pub fn jumps(&self, ports: &Ports, motion: &Solution) -> bool {
         let (nh, samples) = (self.harmonics().len(), self.all_samples() as f64);
         let phase = |k: usize| self.harmonics()[k] as f64 * std::f64::consts::TAU / samples;
@@ -427,12 +448,13 @@ impl Level {
         ports.iter().any(|port| port.layer().is_some_and(|layer| port.range().any(|q| fastest(q) > layer)))
     }
 
-    /// Whether nothing but contacts holds some body.
+    /// Tells whether contacts alone hold some body.
     pub fn stands(&self) -> bool {
         !self.springs.is_empty()
     }
 
-    /// Static equilibrium under so many times the constant loads; where none is known, that of closed contacts.
+    /// Returns the static equilibrium times `share`. If it is unknown, returns
+    /// the mean on closed contacts.
     pub fn at_rest(&self, share: f64) -> Solution {
         let nh = self.harmonics().len();
         let mut motion = Solution::rest(self.linear.len());
@@ -442,13 +464,14 @@ impl Level {
         motion
     }
 
-    /// How much of the constant loads there is: where contacts carry them they grow with the limits, so that what sticks under all of them sticks
-    /// on the way too. The excitation is then so many times smaller beside them.
+    /// Returns the factor of the constant loads. If contacts carry the loads, these grow with
+    /// the slip limits, so that a contact that sticks under all of them sticks during the
+    /// homotopy. The excitation is then smaller relative to the loads.
     fn load(&self, ease: Ease) -> f64 {
         if self.stands() { ease.limits } else { 1.0 }
     }
 
-    /// The forces less those of the springs that the structure has, into `self.acting`.
+    /// Computes the forces minus those of the springs in the structure, into `self.acting`.
     fn act(&mut self, motion: &Solution, share: f64) {
         if !self.stands() {
             return;
@@ -465,19 +488,21 @@ impl Level {
         }
     }
 
-    /// What acts on the structure in a motion, [axis][harmonic], N, see [`Level::springs`].
+    /// Returns the forces on the structure in a motion, [axis][harmonic], N,
+    /// see [`Level::springs`].
     pub fn acting<'a>(&'a mut self, motion: &'a Solution) -> &'a [Complex64] {
         self.act(motion, 1.0);
         if self.stands() { &self.acting } else { &motion.force }
     }
 
-    /// Stiffness of the tether, relative to the springs of closed contacts.
+    /// Returns the stiffness of the tether, relative to the springs of closed contacts.
     pub(super) fn tether_share(&self) -> f64 {
         self.tether.as_ref().map_or(0.0, |tether| tether.share)
     }
 
-    /// Adds so many times these springs to the derivative of the mean at a port: [`OPEN`] where the structure has them, a share of them where a step
-    /// may go as far as they allow only.
+    /// Adds `share` times the springs of closed contacts to the derivative of
+    /// the mean at a port. The share is [`OPEN`] if the structure contains
+    /// them, and positive to shorten the step of the mean.
     pub(super) fn add_springs(&mut self, p: usize, port: &Port, share: f64) {
         let nh = self.alternation.harmonics.len();
         let tall = 2 * nh * port.axes;
@@ -488,12 +513,12 @@ impl Level {
         }
     }
 
-    /// The motion without friction.
+    /// Returns the motion without friction.
     pub fn unhindered(&self) -> Solution {
         Solution { c: self.linear.clone(), ..Solution::rest(self.linear.len()) }
     }
 
-    /// Samples of the forces of a port, into the alternation.
+    /// Samples the forces of a port, into `self.alternation`.
     pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &Solution) {
         let nh = self.harmonics().len();
         let port = &ports[p];
@@ -505,7 +530,8 @@ impl Level {
         self.alternation.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
     }
 
-    /// Forces along all axes at the harmonics `wanted`, from the samples: they may lie above those that are kept. Per harmonic.
+    /// Returns the forces along all axes at the harmonics `wanted`, per harmonic, from the
+    /// samples. The harmonics may lie above those of the series.
     pub fn forces_at(&mut self, ports: &Ports, omega: f64, motion: &Solution, wanted: &[usize]) -> Vec<Vec<Complex64>> {
         let mut forces = vec![vec![ZERO; ports.count()]; wanted.len()];
         for (p, port) in ports.iter().enumerate() {
@@ -517,7 +543,8 @@ impl Level {
         forces
     }
 
-    /// The Newton step by products, from `self.step`, the residual in units, into it; `residual` is the size of that. False if it was not found.
+    /// Computes the Newton step by GMRES. `self.step` contains the residual in units on entry
+    /// and the step on return. Returns false if GMRES does not converge.
     pub(super) fn coupled_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
         let Some(coupled) = &mut self.coupled else { return false };
         let linear = Linear {
@@ -536,7 +563,8 @@ impl Level {
         found
     }
 
-    /// The Jacobian from the tangents: rows and columns in units. False where receptances are no matrices.
+    /// Assembles the Jacobian from the tangents, rows and columns in units.
+    /// Returns false if the receptances are not matrices.
     pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Ease, length: f64) -> bool {
         let Receptance::Formed(formed) = &self.receptance else { return false };
         let linear = Linear {
@@ -554,14 +582,14 @@ impl Level {
         true
     }
 
-    /// Mean of the joint's motion by the degrees of freedom alone, along an axis, m.
+    /// Returns the mean of the joint's motion along an axis without the imposed motion, m.
     pub fn mean(&self, q: usize, motion: &Solution) -> f64 {
         let at = q * self.harmonics().len();
         motion.c[at].re + self.series[q] * motion.force[at].re - self.imposed[q]
     }
 }
 
-/// `motion` with other harmonics: those that are new are zero.
+/// Returns `motion` with other harmonics. New harmonics are zero.
 pub(super) fn transfer(motion: &Solution, from: &[usize], to: &[usize]) -> Solution {
     let pick = |values: &[Complex64]| {
         let mut out = Vec::with_capacity(values.len() / from.len().max(1) * to.len());
@@ -582,7 +610,7 @@ mod tests {
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
     use std::sync::Arc;
 
-    /// A row of masses with joints of every law between them, driven with or without a mean.
+    /// A row of masses with joints of every law between them, with or without a constant force.
     fn mixed(masses: usize, constant: f64) -> System {
         let name = |i: usize| format!("m{i}");
         let mut model = Model::default();
@@ -630,12 +658,13 @@ mod tests {
         }
     }
 
-    /// Values without a pattern between -1 and 1.
+    /// Returns a pseudo-random value between -1 and 1.
     fn noise(i: usize) -> f64 {
         ((i * 7919 + 13) as f64).sin()
     }
 
-    /// The Jacobian against central differences, for all laws together, with and without a mean.
+    /// The Jacobian agrees with central differences, for all laws together,
+    /// with and without a mean.
     #[test]
     fn the_jacobian_is_the_derivative() {
         for (constant, harmonics) in [(0.0, vec![1, 3, 5]), (0.2, vec![0, 1, 2, 3])] {
@@ -654,7 +683,8 @@ mod tests {
             };
             at(&x, Some(&mut j));
             let step = 1e-6;
-            // a difference of the force is rounded to this share, and misses the curvature by the square of the step
+            // relative rounding of a difference of the force; the neglected
+            // curvature is of second order
             let rounded = 1e-8;
             let largest = j.iter().fold(0.0, |m: f64, j| m.max(j.abs()));
             let mut wrong = 0;
@@ -674,7 +704,7 @@ mod tests {
         }
     }
 
-    /// The banded form finds the motion of the dense one, with every law that it takes.
+    /// The banded form finds the motion of the dense form, with every law that it supports.
     #[test]
     fn banded_and_dense_agree() {
         let case = Case::new(mixed(44, 0.0), 0.9);
@@ -689,8 +719,8 @@ mod tests {
         }
     }
 
-    /// ε belongs to the resolution, and is no stiffness: half and double of it change a curve by no more than the missing harmonics do, and
-    /// the less, the more harmonics there are.
+    /// ε follows the resolution and is not a stiffness. Half or twice of it changes a curve no
+    /// more than the missing harmonics do, and less with more harmonics.
     #[test]
     fn the_penalty_matters_no_more_than_missing_harmonics() {
         for limit in [2.0, 4.0, 6.0, 8.0] {

@@ -1,13 +1,14 @@
-//! The equations at a motion, linearised: what a step of Newton's method solves.
+//! Linearised equations at a motion: the system of a Newton step.
 //!
-//! The derivative is `δ_qp r_y - r_u R_qp f_y`, see `equations`; as a matrix it has the lowest harmonics alone, or all of them.
+//! The Jacobian is `δ_qp r_y - r_u R_qp f_y`, see `equations`. The matrix has
+//! the lowest harmonics alone, or all of them.
 
 use super::ease::Ease;
 use super::ports::{Port, Ports, block};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// The equations at a motion, linearised.
+/// The linearised equations at a motion.
 pub(super) struct Linear<'a> {
     pub ports: &'a Ports,
     pub harmonics: &'a [usize],
@@ -21,12 +22,13 @@ pub(super) struct Linear<'a> {
 }
 
 impl Linear<'_> {
-    /// K or T of a port.
+    /// Returns K or T of a port.
     pub fn tangent(&self, p: usize, port: &Port) -> &[f64] {
         &self.tangents[block(self.blocks, p, port, self.harmonics.len())]
     }
 
-    /// The derivative of the first `kept` harmonics, as if there were no others, row-major and in units, into `jacobian`; `product` is memory.
+    /// Assembles the Jacobian of the first `kept` harmonics without the others, row-major and
+    /// in units, into `jacobian`. `product` is scratch memory.
     pub fn matrix(
         &self,
         receptance: &[DMatrix<Complex64>],
@@ -47,7 +49,7 @@ impl Linear<'_> {
                 if row.is_force() && self.penalty[q].is_infinite() {
                     continue;
                 }
-                // R f_y, f_y = K or 1: the harmonics of R stand alone
+                // R f_y, with f_y = K or 1; R does not couple harmonics
                 product.clear();
                 product.resize(tall * wide, 0.0);
                 for a in 0..row.axes {
@@ -114,7 +116,7 @@ impl Linear<'_> {
                 }
             }
         }
-        // r_y, and units
+        // r_y, and the units
         for (q, row) in ports.iter().enumerate() {
             let own = self.tangent(q, row);
             for i in 0..pair * row.axes {

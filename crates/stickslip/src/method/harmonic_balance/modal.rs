@@ -1,4 +1,4 @@
-//! The modes of a small structure, with which its answer at every frequency is a sum.
+//! Modes of a small structure: its response at every frequency is a sum over them.
 
 use super::hold::HOLD;
 use crate::model::System;
@@ -8,27 +8,27 @@ use stickslip_numerics::modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Modes, and what they are at the joints.
+/// Modes, and their components along the axes.
 #[derive(Debug, Clone)]
 pub(super) struct Modal {
     pub lambda: Vec<Complex64>,
-    /// n × modes, and modes × n.
+    /// Right modes, n × modes, and left modes, modes × n.
     pub shape: DMatrix<Complex64>,
     pub left: DMatrix<Complex64>,
-    /// The same along the axes: q × modes, and modes × q.
+    /// Their components along the axes: q × modes, and modes × q.
     pub shape_at: DMatrix<Complex64>,
     pub left_at: DMatrix<Complex64>,
-    /// Free directions, n × r and r × q.
+    /// Free directions, n × r, and their components along the axes, r × q.
     pub free: DMatrix<f64>,
     pub free_at: DMatrix<f64>,
 }
 
 impl Modal {
-    /// Modes in the structure's coordinates; `None` if the mass matrix is not positive definite or modes fall together: then frequencies are
-    /// factored one by one.
+    /// Computes the modes in the structure's coordinates. `None` if the mass matrix is not
+    /// positive definite or modes coincide. The equations are then solved at every frequency.
     pub fn new(system: &System, direction: &DMatrix<f64>) -> Option<Self> {
         let n = system.dofs();
-        // M = L Lᵀ; with q = Lᵀ x the masses are ones
+        // M = L Lᵀ; in q = Lᵀ x the mass matrix is the identity
         let factor = system.structure().mass().clone().cholesky()?;
         let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
         let back = to.transpose();
@@ -52,14 +52,14 @@ impl Modal {
     }
 }
 
-/// `1/(s - λ)` and `1/(s - λ*)`.
+/// Returns `1/(s - λ)` and `1/(s - λ*)`, limited near a pole.
 pub(super) fn fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
     let hold = HOLD * HOLD * omega;
     let one = |d: Complex64| if d.norm() < hold { Complex64::new(1.0 / hold, 0.0) } else { 1.0 / d };
     (one(s - lambda), one(s - lambda.conj()))
 }
 
-/// `1/s²`, but for the soft spring at rest.
+/// Returns `1/s²`; at rest, the value with the soft spring.
 pub(super) fn free_fraction(s: Complex64, omega: f64) -> Complex64 {
     if s == ZERO { Complex64::new((HOLD * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
 }

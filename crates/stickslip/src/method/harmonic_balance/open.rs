@@ -1,29 +1,36 @@
-//! Directions in which equations leave their solution open, and the shortest step where they do.
+//! Null directions of the equations, and minimum-norm steps.
 //!
-//! A wave in which a blade leads its neighbour by a quarter of a period loads every other joint alike and the joints between them alike, and what one
-//! half does the other does not feel: how far one leads is open, and the mixtures are a continuum of motions. While joints stick any mixture of
-//! two equal modes is a motion. Newton's step and the tangent then have no unique solution; of all the shortest one is taken, which stays with
-//! the motion that it comes from.
-//! Source: Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 3 (Moore-Penrose inverse).
+//! Consider a wave in which each blade leads the next by a quarter period. It loads every
+//! second joint alike, and the joints between them alike, but the two halves do not interact.
+//! The phase between the halves is not determined, and the mixtures form a continuum of
+//! motions. While joints stick, any mixture of two equal modes is a motion. Newton's step and
+//! the tangent then have no unique solution. The step of minimum norm is taken, which stays
+//! close to the motion that it comes from.
+//!
+//! Source: Allgower and Georg, "Introduction to Numerical Continuation Methods"
+//! (2003), Ch. 3 (Moore-Penrose inverse).
 
 use stickslip_numerics::dense::Lu;
 
-/// Change of equations by a step of one along a direction, both relative, below which that is open. Rounding leaves 1e-13; friction that is but 1e-4 of
-/// the forces tells the mixtures of two modes apart by 1e-6.
+/// Change of the equations by a step of one along a null direction, both
+/// relative, at most. Rounding leaves 1e-13. Friction of only 1e-4 of the
+/// forces separates the mixtures of two modes by 1e-6.
 const OPEN: f64 = 1e-9;
-/// Most directions: all mixtures of two equal modes.
+/// Maximum number of null directions: all mixtures of two equal modes.
 const MOST: usize = 2;
-/// Steps of inverse iteration: open directions are apart from the others by more than a thousand.
+/// Steps of inverse iteration. Null directions are separated from the others by
+/// a factor of more than a thousand.
 const STEPS: usize = 3;
 
-/// The directions that the equations with this matrix (row after row, n × n) leave open; none of a matrix without numbers.
+/// Returns the null directions of a matrix (row-major, n × n). A matrix that
+/// has no factor, such as one with NaN, returns none.
 pub(super) fn open(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
     let size = |column: usize| (0..n).map(|row| matrix[row * n + column].powi(2)).sum::<f64>().sqrt();
     let sizes: Vec<f64> = (0..n).map(|column| size(column).max(f64::MIN_POSITIVE)).collect();
     let scaled: Vec<f64> = matrix[..n * n].iter().enumerate().map(|(at, value)| value / sizes[at % n]).collect();
-    // row after row it is the transpose of what is read column by column
+    // the matrix is row-major: its transpose is factored
     let Ok(factor) = Lu::new(scaled.clone(), n) else { return Vec::new() };
-    // columns without a pattern
+    // pseudo-random columns
     let mut found: Vec<Vec<f64>> =
         (0..MOST.min(n)).map(|j| (0..n).map(|i| (1.0 + 7.0 * (i * MOST + j) as f64).sin()).collect()).collect();
     for _ in 0..STEPS {
@@ -42,7 +49,8 @@ pub(super) fn open(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
     found
 }
 
-/// The shortest of all `step`s that differ along open directions, as `inner` measures.
+/// Subtracts the components along null directions from a step: the result has
+/// minimum norm in the product `inner`.
 pub(super) fn shorten(step: &mut [f64], mut open: Vec<Vec<f64>>, inner: &dyn Fn(&[f64], &[f64]) -> f64) {
     orthonormal(&mut open, inner);
     for z in &open {
@@ -51,11 +59,11 @@ pub(super) fn shorten(step: &mut [f64], mut open: Vec<Vec<f64>>, inner: &dyn Fn(
     }
 }
 
-/// Directions of length one, across each other, of the same span; those without length or numbers are left out.
+/// Orthonormalises the columns. Columns that are zero or not finite are omitted.
 fn orthonormal(columns: &mut Vec<Vec<f64>>, inner: &dyn Fn(&[f64], &[f64]) -> f64) {
     let mut made: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns.drain(..) {
-        // of the size of one first: what a nearly singular matrix answers may be too large to be squared
+        // scaled first: the solution of a nearly singular matrix may overflow when squared
         let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         column.iter_mut().for_each(|x| *x /= largest);
         for before in &made {
@@ -79,7 +87,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// `x + y = 2` and the same again, to rounding, leaves `x - y` open; the shortest solution is the one across it.
+    /// `x + y = 2` twice, up to rounding, does not determine `x - y`. The
+    /// minimum-norm solution is orthogonal to that direction.
     #[test]
     fn the_shortest_of_a_line_of_solutions_is_across_it() {
         let found = open(&[1.0, 1.0 + 1e-15, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 3.0], 3);
@@ -88,7 +97,7 @@ mod tests {
         let mut step = vec![5.0, -3.0, 1.0];
         shorten(&mut step, found, &|a, b| dot(a, b));
         assert!(step.iter().zip([1.0, 1.0, 1.0]).all(|(a, b): (&f64, f64)| (a - b).abs() < 1e-12), "{step:?}");
-        // what is regular leaves nothing open
+        // a regular matrix has no null directions
         assert!(open(&[2.0, 1.0, 1.0, -1.0], 2).is_empty());
     }
 }

@@ -1,4 +1,5 @@
-//! What forces along the axes do to the motions along them: matrices, or where these would be too large their product alone.
+//! Receptances: the motions along the axes under forces along them. Large ones
+//! are applied by modes and not formed.
 
 use super::rest::{CACHED, Closed};
 use super::uncoupled::{Resonant, Uncoupled};
@@ -10,24 +11,24 @@ use stickslip_numerics::pairs::Pairs;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Axes from which products in blocks are the faster ones.
+/// Number of axes from which products in blocks are faster.
 const BLOCKED: usize = 12;
 
 /// Receptances at the harmonics of a level, m/N.
 #[derive(Debug, Clone)]
 pub(super) enum Receptance {
-    /// Per harmonic, axes × axes.
+    /// One matrix per harmonic, axes × axes.
     Formed(Formed),
     /// By the modes of the structure.
     Modal(Modal),
 }
 
-/// Matrices, and the same for products where these are many and the matrices stay in the cache.
+/// Receptance matrices. Matrices of many axes that fit in the cache have a copy for fast products.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Formed {
     pub matrices: Vec<DMatrix<Complex64>>,
     pairs: Vec<Pairs>,
-    /// Forces of one harmonic, and numbers of its product.
+    /// Forces and motions of one harmonic, and scratch memory of its product.
     force: Vec<Complex64>,
     memory: Vec<f64>,
 }
@@ -39,7 +40,7 @@ impl Formed {
         Formed { matrices, pairs, ..Formed::default() }
     }
 
-    /// Memory of the matrices and of what is kept of them for products, bytes.
+    /// Returns the memory of the matrices and of their copies, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.matrices.iter().map(|matrix| size_of_val(matrix.as_slice())).sum::<usize>()
@@ -60,7 +61,7 @@ impl Formed {
                 multiply_in_blocks(matrix.as_slice(), forces, sum, (axes, axes, 1), false);
                 &*sum
             } else {
-                // column by column, as the matrix lies in memory
+                // column by column, the order in memory
                 sum.fill(ZERO);
                 for (column, f) in matrix.as_slice().chunks_exact(axes).zip(&*forces) {
                     sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
@@ -72,19 +73,19 @@ impl Formed {
     }
 }
 
-/// Modes at the harmonics of a drive frequency.
+/// Receptances by modes, at the harmonics of an excitation frequency.
 #[derive(Debug, Clone)]
 pub(super) struct Modal {
     pub structure: Arc<Uncoupled>,
-    /// Drive frequency, rad/s, and rates of the harmonics.
+    /// Excitation frequency, rad/s, and rates of the harmonics, 1/s.
     pub omega: f64,
     pub rates: Vec<Complex64>,
     gains: Vec<Vec<Complex64>>,
-    /// In place of the first of these, where the mean is that with closed contacts.
+    /// Factor that replaces the first gains, if the mean has closed contacts.
     pub closed: Option<Arc<Lu<f64>>>,
     /// Compliances in series with the axes, m/N.
     pub series: Vec<f64>,
-    /// Of the mean motions along the axes by their own forces.
+    /// Size of the mean motion along each axis under a unit force along it, m/N.
     mean: Vec<f64>,
     forces: Vec<f64>,
     modal: Vec<f64>,
@@ -100,7 +101,7 @@ impl Modal {
         let rates: Vec<Complex64> = harmonics.iter().map(|h| Complex64::new(0.0, *h as f64 * omega)).collect();
         let gains = rates.iter().map(|s| structure.gains(*s, omega)).collect::<Result<Vec<_>, _>>()?;
         let mean = match (harmonics[0], closed) {
-            // a spring carries its force at most as far as it gives way
+            // the force of a spring is at most its stiffness times the displacement
             (0, Some(closed)) => closed.springs.iter().map(|k| if *k > 0.0 { k.recip() } else { 0.0 }).collect(),
             (0, None) => structure.own_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect(),
             _ => vec![0.0; structure.axes],
@@ -119,7 +120,7 @@ impl Modal {
         })
     }
 
-    /// The forces of all harmonics go through the modes together.
+    /// Applies the receptances to the forces of all harmonics at once.
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
         let (nh, p, n) = (self.rates.len(), self.structure.axes, self.structure.own().len());
         let tall = 2 * nh;
@@ -148,7 +149,8 @@ impl Modal {
 }
 
 impl Receptance {
-    /// Motions along all axes at all harmonics, [axis][harmonic], under the forces along them.
+    /// Computes the motions along all axes at all harmonics, [axis][harmonic],
+    /// under the forces along them.
     pub fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
         match self {
             // without joints
@@ -158,7 +160,8 @@ impl Receptance {
         }
     }
 
-    /// Size of the motion of the first harmonic along an axis by a force along it, if that harmonic is the mean.
+    /// Returns the size of the motion along an axis under a unit force along it, at the first
+    /// harmonic, m/N. The first harmonic must be the mean.
     pub fn mean(&self, q: usize) -> f64 {
         match self {
             Receptance::Formed(formed) => formed.matrices.first().map_or(0.0, |r| r[(q, q)].norm()),

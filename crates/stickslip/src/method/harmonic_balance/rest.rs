@@ -1,11 +1,14 @@
-//! The linear rest of a structure: what its places do under harmonic forces, in closed form for every frequency.
+//! Dynamics of the linear part: displacements of all places under harmonic
+//! forces, in closed form for every frequency.
 //!
-//! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})` is a sum of `φ (ψᵀF) / (s - λ)`.
-//! A frequency costs the number of modes times the square of the number of joints, and no matrix is factored. Structures that are sparse, or
-//! so large that their modes would take seconds, are not taken apart into these: their dynamic stiffness is factored at every frequency.
+//! With the modes `(λ, φ)` of `M x'' + C x' + K x`, computed once, the response to `Re(F e^{st})`
+//! is a sum of `φ (ψᵀF) / (s - λ)`. A frequency costs the number of modes times the square of the
+//! number of joints, and no matrix is factored. For sparse structures, and for those so large that
+//! their modes would take seconds, the dynamic stiffness is factored at every frequency instead.
 //!
-//! Of a ring in a travelling wave only the joints of the first sector have ports: harmonic h moves as the wave of its nodal diameter, whose
-//! matrices are those of one sector. Displacements and forces are those of the whole ring all the same.
+//! For a ring in a travelling wave, only the joints of the first sector have ports. Harmonic h
+//! moves as the wave of its nodal diameter, whose matrices are those of one sector.
+//! Displacements and forces are still those of the whole ring.
 
 use super::closed;
 use super::hold::soft_spring;
@@ -24,20 +27,23 @@ use stickslip_numerics::dense::Lu;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Axes up to which all numbers of a complex matrix stay in the cache of the processor, 260 kB.
+/// Number of axes up to which a complex matrix fits in the cache of the processor, 260 kB.
 pub(super) const CACHED: usize = 128;
-/// Share of the largest static receptance below which springs hold a direction, if any is held by a soft spring alone.
+/// Share of the largest static receptance below which springs hold a direction. The largest is
+/// that of a soft spring, if one holds a direction alone.
 const HELD: f64 = 1e-5;
 
-/// Degrees of freedom beyond which full matrices are not taken apart into modes: at 200 that takes a second, with the third power.
+/// Number of degrees of freedom beyond which modes of full matrices are not computed: at 200
+/// they take a second, with the third power.
 const MODES: usize = 200;
 
-/// Axes from which receptances of a structure in modes are not formed: the products with both take as long.
+/// Number of axes from which receptances of a structure in modes are not
+/// formed: products with either take equally long.
 const MANY: usize = 150;
-/// Right sides that a factor solves at once.
+/// Number of right sides that a factor solves at once.
 const AT_ONCE: usize = 64;
 
-/// Harmonics that nobody samples.
+/// Harmonics above this are ignored.
 const HIGHEST: f64 = 1e6;
 
 /// Receptance of the structure without its joints.
@@ -45,37 +51,40 @@ const HIGHEST: f64 = 1e6;
 pub(super) struct Rest {
     n: usize,
     modal: Option<Modal>,
-    /// Of large structures whose damping couples no modes.
+    /// Modes of a large structure whose damping does not couple them.
     uncoupled: Option<Arc<Uncoupled>>,
-    /// Whether the dynamic stiffness is factored at every frequency.
+    /// True if the dynamic stiffness is factored at every frequency.
     factored: bool,
-    /// Dynamic stiffnesses of large structures at the last drive frequency, by their rates.
+    /// Factors of the dynamic stiffness of a large structure at the last
+    /// excitation frequency, by rate.
     factors: RefCell<Vec<Factored>>,
-    /// Receptances at the last frequency: a longer series asks for those of a shorter one again.
+    /// Receptances at the last frequency. A longer series requests those of a shorter one again.
     known: RefCell<Known>,
-    /// What all places do under unit forces along the axes at that frequency, by the rates: of a large structure they take less memory than its factors,
-    /// and nothing is factored twice.
+    /// Displacements of all places under unit forces along the axes at that frequency, by rate. For
+    /// a large structure they take less memory than its factors, and save a second factorization.
     moved: RefCell<Vec<Moved>>,
     structure: Structure,
-    /// Directions of the axes: rows, rising, with their weights.
+    /// Directions of the axes: rows in ascending order, with their weights.
     directions: Vec<Vec<(usize, f64)>>,
-    /// Of a ring in a travelling wave.
+    /// Travelling waves of a ring.
     waves: Option<Waves>,
     /// Stiffness of closed contacts along the axes, N/m.
     springs: Vec<f64>,
-    /// With these, if they alone hold some motion of it.
+    /// The structure with these springs, if they alone hold some motion of it.
     closed: OnceCell<Option<Closed>>,
 }
 
-/// Memory of factors that are kept, bytes. Measured: 1.7 GB for each harmonic of a block of 60,000 degrees of freedom, 11.5 GB in all with five
-/// harmonics and an estimate of their error. One that was given up is made again when it is needed.
+/// Memory limit of kept factors, bytes. Measured: 1.7 GB for each harmonic of a block of 60,000
+/// degrees of freedom, 11.5 GB in all with five harmonics and an estimate of their error. A
+/// discarded factor is computed again when needed.
 const KEPT: usize = 2_000_000_000;
 
-/// Memory of the motions under unit forces that are kept, bytes. Measured: 54 MB for each harmonic of a blade of 69,930 rows with 16 contacts of three
-/// directions, whose factors take 1.3 GB.
+/// Memory limit of kept motions under unit forces, bytes. Measured: 54 MB for each harmonic of
+/// a blade of 69,930 rows with 16 contacts of three directions, whose factors take 1.3 GB.
 const KEPT_MOVED: usize = 1_000_000_000;
 
-/// Motions of all places at a rate (1/s), at a drive frequency (rad/s): n × q, a column for a unit force along each axis.
+/// Motions of all places at a rate (1/s) and an excitation frequency (rad/s): n
+/// × q, one column for a unit force along each axis.
 #[derive(Debug, Clone)]
 struct Moved {
     rate: Complex64,
@@ -83,7 +92,7 @@ struct Moved {
     columns: Arc<DMatrix<Complex64>>,
 }
 
-/// Receptances at the harmonics of a frequency, rad/s.
+/// Receptances at the harmonics of an excitation frequency, rad/s.
 #[derive(Debug, Clone, Default)]
 struct Known {
     omega: f64,
@@ -93,7 +102,7 @@ struct Known {
 /// The structure at rest with its contacts closed, see [`closed`].
 #[derive(Debug, Clone)]
 pub(super) struct Closed {
-    /// Stiffness along the axes, N/m.
+    /// Stiffness of the contacts along the axes, N/m.
     pub springs: Vec<f64>,
     form: Form,
 }
@@ -105,7 +114,7 @@ enum Form {
 }
 
 impl Closed {
-    /// The stiffness between modes, if the structure is in these.
+    /// Returns the factored stiffness between modes, if the structure is in modes.
     pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<Lu<f64>>, Resonant>> {
         match &self.form {
             Form::Rows(_) => None,
@@ -161,7 +170,8 @@ impl Rest {
         }
     }
 
-    /// The structure at rest with its contacts closed, where these alone hold some motion of it: asked once, at the first frequency.
+    /// Returns the structure at rest with its contacts closed, if these alone hold some motion
+    /// of it. Decided once, at the first frequency.
     pub fn closed(&self, omega: f64) -> Option<&Closed> {
         let own = |omega: f64| self.own_at_rest(omega);
         let find = || if closed::hold(&self.springs, own, omega) { self.with_closed_contacts() } else { None };
@@ -175,7 +185,7 @@ impl Rest {
             return Some(Closed { springs, form: Form::Modes(modes) });
         }
         let (sectors, size) = self.sectors();
-        // around a ring, each direction in every sector
+        // in a ring, each direction in every sector
         let around: Vec<(Vec<(usize, f64)>, f64)> = (0..sectors)
             .flat_map(|sector| self.directions.iter().zip(&springs).map(move |(rows, k)| (sector, rows, *k)))
             .map(|(sector, rows, k)| (rows.iter().map(|&(i, w)| ((i + sector * size) % self.n, w)).collect(), k))
@@ -202,7 +212,8 @@ impl Rest {
         Some(Closed { springs, form: Form::Rows(Box::new(rest)) })
     }
 
-    /// Displacement along each axis at rest under a constant unit force along it alone, m/N.
+    /// Returns the displacement along each axis at rest under a constant unit
+    /// force along it alone, m/N.
     fn own_at_rest(&self, omega: f64) -> Result<Vec<f64>, Resonant> {
         if let Some(uncoupled) = &self.uncoupled {
             let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
@@ -211,7 +222,7 @@ impl Rest {
         let receptance = match &self.waves {
             Some(waves) => waves.receptance(0, (ZERO, omega), &self.directions)?,
             None => {
-                // not from modes: of free motions that are damped these have the rounding of a stiffness
+                // not from modes: for damped free motions, their rounding acts as a stiffness
                 let mut own = vec![0.0; self.directions.len()];
                 self.each_moved(ZERO, omega, |q, moved| {
                     own[q] = self.directions[q].iter().map(|&(i, w)| moved[i] * w).sum::<Complex64>().norm();
@@ -222,26 +233,28 @@ impl Rest {
         Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
     }
 
-    /// How many sectors of a ring there are, and how large one is; of any other structure one, of no size that counts.
+    /// Returns the number of sectors of a ring and the size of one; (1, 0) for any other structure.
     fn sectors(&self) -> (usize, usize) {
         self.waves.as_ref().map_or((1, 0), |waves| (waves.cyclic.sectors, waves.sector.dofs()))
     }
 
-    /// Modes in place of receptances, where these would be large matrices and no port asks for more than their products.
+    /// Returns the modes that replace receptances, if these would be large
+    /// matrices and all ports need only their products.
     pub fn modes_for(&self, ports: &Ports) -> Option<&Arc<Uncoupled>> {
         self.uncoupled.as_ref().filter(|_| ports.count() >= MANY && !ports.has_forces())
     }
 
-    /// The same for a harmonic: the mean alone is at rest.
+    /// Returns the structure with closed contacts if the harmonic is the mean,
+    /// which alone is at rest.
     fn closed_at(&self, harmonic: usize, omega: f64) -> Option<&Closed> {
         if harmonic == 0 { self.closed(omega) } else { None }
     }
 
-    /// Displacements along the axes under unit forces along them, at `s = jhΩ`, q × q, m/N. Of the mean with closed contacts, where these alone
-    /// hold it, see [`Rest::closed`].
+    /// Returns the displacements along the axes under unit forces along them, at `s = jhΩ`, q × q,
+    /// m/N. The mean has closed contacts if these alone hold the structure, see [`Rest::closed`].
     ///
     /// # Errors
-    /// A resonance without damping.
+    /// An undamped resonance.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
         if self.directions.len() > CACHED {
             return self.receptance_anew(harmonic, omega);
@@ -258,7 +271,7 @@ impl Rest {
         Ok(receptance)
     }
 
-    /// Memory of the receptances that are kept, bytes.
+    /// Returns the memory of the kept receptances, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.known.borrow().receptances.values().map(|matrix| size_of_val(matrix.as_slice())).sum()
@@ -275,10 +288,11 @@ impl Rest {
         }
     }
 
-    /// Displacement along each axis under a unit force along it alone at a rate on the positive real axis, where there are no resonances, m/N.
+    /// Returns the displacement along each axis under a unit force along it alone, m/N, at a
+    /// rate on the positive real axis, which is free of resonances.
     ///
     /// # Errors
-    /// A structure that is singular there all the same.
+    /// A structure that is singular at that rate.
     pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, Resonant> {
         match &self.waves {
             Some(waves) => waves.own((rate, omega), &self.directions),
@@ -329,10 +343,11 @@ impl Rest {
         Ok(sum)
     }
 
-    /// Displacements of all places under the complex forces `force` (length n, N), m; of the mean as in [`Rest::receptance`].
+    /// Returns the displacements of all places under the complex forces `force` (length n, N),
+    /// m. For the mean, see [`Rest::receptance`].
     ///
     /// # Errors
-    /// A resonance without damping.
+    /// An undamped resonance.
     pub fn respond(
         &self,
         harmonic: usize,
@@ -380,10 +395,10 @@ impl Rest {
         Ok(x)
     }
 
-    /// The same under forces along the axes, one for each.
+    /// Returns the displacements of all places under forces along the axes, one for each.
     ///
     /// # Errors
-    /// A resonance without damping.
+    /// An undamped resonance.
     pub fn respond_along(
         &self,
         harmonic: usize,
@@ -391,7 +406,8 @@ impl Rest {
         along: impl Fn(usize) -> Complex64,
     ) -> Result<DVector<Complex64>, Resonant> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
-        // at rest large motions of a free body are left out of the difference of forces, not of the motions
+        // at rest, sum the forces first: the large motions of a free body must
+        // not cancel each other
         let known = if harmonic > 0 { self.known(s, omega) } else { None };
         match known {
             Some(moved) => Ok(&*moved * DVector::from_fn(self.directions.len(), |q, _| along(q))),
@@ -399,13 +415,14 @@ impl Rest {
         }
     }
 
-    /// The motions under unit forces, if they are kept.
+    /// Returns the motions under unit forces, if they are kept.
     fn known(&self, s: Complex64, omega: f64) -> Option<Arc<DMatrix<Complex64>>> {
         let moved = self.moved.borrow();
         moved.iter().find(|kept| kept.omega == omega && kept.rate == s).map(|kept| kept.columns.clone())
     }
 
-    /// Hands on what a large structure does under a unit force along each axis, and keeps it if there is room.
+    /// Passes the motion of a large structure under a unit force along each
+    /// axis to `take`. Keeps the motions if memory allows.
     fn each_moved(&self, s: Complex64, omega: f64, mut take: impl FnMut(usize, &[Complex64])) -> Result<(), Resonant> {
         let mut hand = |from: usize, columns: &DMatrix<Complex64>| {
             (0..columns.ncols()).for_each(|b| take(from + b, &columns.as_slice()[b * self.n..(b + 1) * self.n]));
@@ -428,15 +445,16 @@ impl Rest {
             hand(0, &columns);
             kept.push(Moved { rate: s, omega, columns });
         } else {
-            // some at a time: all at once would fill the memory
+            // in groups: all at once would fill the memory
             let some = self.directions.chunks(AT_ONCE).enumerate();
             some.for_each(|(number, some)| hand(number * AT_ONCE, &solved(some)));
         }
         Ok(())
     }
 
-    /// Moves the mean positions `x` (length n) so that they are `along` the axes what the ports know. Where only laws hold a direction, positions
-    /// are the small difference of large ones, and rounding of the forces would move them.
+    /// Corrects the mean positions `x` (length n) so that they agree with `along` along the
+    /// axes. If only laws hold a direction, positions are the small difference of large terms,
+    /// and rounding of the forces would shift them.
     ///
     /// # Errors
     /// A structure that is singular at rest.
@@ -444,7 +462,7 @@ impl Rest {
         let q = self.directions.len();
         let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
         if let Some(uncoupled) = &self.uncoupled {
-            // nothing at rest moves farther than what is pulled
+            // at rest no place moves more than the place under the force
             let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
             if own.iter().all(|r| r.norm() < HELD * unheld) {
                 return Ok(());
@@ -455,16 +473,16 @@ impl Rest {
         let receptance = self.receptance(0, omega)?.map(|r| r.re);
         let largest = receptance.amax();
         if largest == 0.0 || largest < HELD * unheld {
-            return Ok(()); // springs hold all that moves, or nothing does
+            return Ok(()); // springs hold all that moves, or nothing moves
         }
-        // only along what nothing else holds
+        // only along directions that nothing else holds
         let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return Ok(()) };
         let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
         *x += self.respond_along(0, omega, |a| force[a])?;
         Ok(())
     }
 
-    /// The harmonics next to the resonances above harmonic `top`.
+    /// Returns the harmonics next to the resonances above harmonic `top`.
     pub fn resonances_above(&self, top: usize, omega: f64) -> Vec<usize> {
         let lambda = self.modal.iter().flat_map(|modal| &modal.lambda);
         let mut found: Vec<usize> = lambda
@@ -478,7 +496,7 @@ impl Rest {
         found
     }
 
-    /// `W f`: forces on all places from forces along the axes, those of a harmonic.
+    /// Returns `W f`: the forces on all places from forces along the axes, at a harmonic.
     pub fn spread(&self, harmonic: usize, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
         let (sectors, size) = self.sectors();
@@ -492,13 +510,14 @@ impl Rest {
         force
     }
 
-    /// Of a small structure.
+    /// Returns the dynamic stiffness of a small structure.
     fn dynamic(&self, s: Complex64) -> DMatrix<Complex64> {
         let Matrices { mass, damping, stiffness } = &**self.structure.full();
         DMatrix::from_fn(self.n, self.n, |i, k| s * s * mass[(i, k)] + s * damping[(i, k)] + stiffness[(i, k)])
     }
 
-    /// Of a large structure: kept as long as the drive frequency stays, and as there is room for it.
+    /// Factors the dynamic stiffness of a large structure. Factors of one
+    /// excitation frequency are kept, up to the memory limit.
     fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, Resonant> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|kept| kept.omega == omega);
@@ -517,17 +536,18 @@ impl Rest {
     }
 }
 
-/// Whether the dynamic stiffness is factored at every frequency.
+/// Tells whether the dynamic stiffness is factored at every frequency.
 fn is_factored(structure: &Structure) -> bool {
     structure.is_sparse() || structure.dofs() > MODES
 }
 
-/// Whether its coordinates are its modes, as those of a reduction are: real ones, whose receptances are made in blocks.
+/// Tells whether the coordinates are real modes, as in a reduced model.
+/// Receptances are then computed in blocks.
 fn is_modal(structure: &Structure) -> bool {
     structure.diagonals().is_some()
 }
 
-/// Directions as columns, n × q.
+/// Returns the directions as columns, n × q.
 fn columns(n: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
     let mut columns = DMatrix::zeros(n, directions.len());
     for (q, rows) in directions.iter().enumerate() {
@@ -544,7 +564,8 @@ mod tests {
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
     use std::f64::consts::PI;
 
-    /// Equal masses of a kilogram on equal springs between walls, pulled at the first, two joints on the ground.
+    /// Equal masses of a kilogram on equal springs between walls, with a force
+    /// on the first and two joints to the ground.
     fn chain(n: usize, stiffness: f64, damping: f64) -> System {
         let name = |i: usize| if i == 0 || i > n { GROUND.to_owned() } else { format!("m{i}") };
         let mut model = Model::default();
@@ -562,8 +583,8 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// A structure that is too large for its modes responds as the sum of the modes that it would have: `sin(π k i/(n + 1))` with the
-    /// frequencies `2 √(k/m) sin(π k/(2 (n + 1)))`.
+    /// A structure that is too large for its modes responds as the sum of these modes: shapes
+    /// `sin(π k i/(n + 1))`, frequencies `2 √(k/m) sin(π k/(2 (n + 1)))`.
     #[test]
     fn receptances_without_modes() {
         let (n, stiffness, damping) = (60, 40.0, 0.02);
@@ -603,8 +624,9 @@ mod tests {
         }
     }
 
-    /// A resonance without damping is said by its name, whatever its form: equal oscillators driven at their frequency, by themselves and coupled, where
-    /// the frequency is that of a rigid motion on springs.
+    /// An undamped resonance is reported as such in every form. Equal
+    /// oscillators are driven at their natural frequency, uncoupled and
+    /// coupled. With coupling it is the frequency of a rigid motion on springs.
     #[test]
     fn a_resonance_without_damping_is_no_answer() {
         for (n, coupling) in [(60, 0.0), (60, 3.0), (230, 0.0)] {
@@ -629,7 +651,7 @@ mod tests {
         }
     }
 
-    /// The memory of a factor is known before it is made.
+    /// The memory of a factor is predicted exactly.
     #[test]
     fn factors_take_the_memory_that_is_said() {
         let system = chain(300, 400.0, 0.5);
@@ -637,7 +659,7 @@ mod tests {
         assert_eq!(super::super::factor_bytes(&system), factor.bytes());
     }
 
-    /// Few joints on a large structure: the series against the exact motion.
+    /// Few joints on a large structure: the series agrees with the exact motion.
     #[test]
     fn few_joints_on_a_large_structure() {
         let system = chain(60, 400.0, 0.5);

@@ -1,9 +1,11 @@
-//! Large systems with local coupling: the receptance along the joints is not formed, its products are banded solves.
+//! Banded form of large systems with local coupling: the receptance along the joints is not
+//! formed, its products are banded solutions.
 //!
-//! With `Z` the dynamic stiffness and `K` the derivative of the joint forces, the Newton step of `c + R f - c_lin = r`, `R = Wᵀ Z⁻¹ W`, is
-//! `(1 + R K)⁻¹ r = r - Wᵀ (Z + W K Wᵀ)⁻¹ W K r` (Woodbury), and `Z + W K Wᵀ` has the band of the structure. Forces that are unknown
-//! themselves, along laws of velocity, border it as if each contact were one more place: `Z y - W δλ = 0` and
-//! `(1 - T) δλ + ε T D Wᵀ y = r`.
+//! With the dynamic stiffness `Z` and the derivative `K` of the joint forces, the Newton step
+//! of `c + R f - c_lin = r`, `R = Wᵀ Z⁻¹ W`, is `(1 + R K)⁻¹ r = r - Wᵀ (Z + W K Wᵀ)⁻¹ W K r`
+//! (Woodbury). `Z + W K Wᵀ` has the band of the structure. Unknown forces of laws of velocity
+//! border it, as if each contact were one more place: `Z y - W δλ = 0` and
+//! `(1 - T) δλ + ε T D Wᵀ y = r`, with the time derivative `D`.
 
 use super::ease::Ease;
 use super::hold::HOLD;
@@ -12,33 +14,34 @@ use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{Banded, order};
 
-/// Degrees of freedom from which the banded form is thought of.
+/// Number of degrees of freedom from which the banded form is considered.
 const LARGE: usize = 16;
-/// Degrees of freedom from which a search begins without friction: the describing functions solve the whole structure, densely.
+/// Number of degrees of freedom from which a search begins without friction. Describing
+/// functions would solve the whole structure with dense matrices.
 pub(super) const GUESSED: usize = 40;
 
-/// What the laws at the ports add to the tangents.
+/// Parameters of the linearised equations, in addition to the tangents.
 pub(super) struct Along<'a> {
-    /// ε per port, N s/m.
+    /// Penalty ε per port, N s/m.
     pub penalty: &'a [f64],
-    /// And what eases the step.
+    /// Parameters of the homotopy.
     pub ease: Ease,
 }
 
-/// The banded form of a system at one drive frequency.
+/// The banded form of a system at one excitation frequency.
 #[derive(Debug, Clone)]
 pub(super) struct Sparse {
     n: usize,
-    /// Of places and unknown forces, in their order.
+    /// Bandwidth, and the order of elimination of places and unknown forces.
     band: usize,
     position: Vec<usize>,
     /// Entries of (mass, damping, stiffness) that are not all zero.
     entries: Vec<(usize, usize, [f64; 3])>,
-    /// Per axis: its number among the unknown forces.
+    /// Per axis: number of its unknown force, counted after the places.
     forces: Vec<Option<usize>>,
     /// Per axis: (place, direction).
     ends: Vec<Vec<(usize, f64)>>,
-    /// Stiffness of closed contacts along the axes that the mean has, N/m; or empty.
+    /// Stiffness of closed contacts along the axes for the mean, N/m; or empty.
     springs: Vec<f64>,
     harmonics: Vec<f64>,
     omega: f64,
@@ -52,30 +55,32 @@ pub(super) struct Sparse {
 }
 
 impl Sparse {
-    /// `None` if the system is small, has joints with inner motions or a damping of modes, is solved on one sector, or if its joints are so few, or coupled all over, that a full matrix
-    /// over them is eliminated faster.
+    /// Creates the banded form. `None` for a small system, springs in series, modal damping, or
+    /// a solution on one sector. `None` also if elimination of a full matrix over the joints is
+    /// faster: they are few, or they couple many places.
     pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
         if n < LARGE || ports.wave().is_some() || ports.iter().any(|port| port.series > 0.0) {
             return None;
         }
         if system.structure().damped_modes().is_some() {
-            return None; // it couples all
+            return None; // it couples all places
         }
         let entries: Vec<(usize, usize, [f64; 3])> = system.structure().entries().collect();
         let ends: Vec<Vec<(usize, f64)>> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
-        // eliminations in the band and along the joints, both without the cube of twice the harmonics
+        // cost of elimination in the band and along the joints, both without
+        // the factor (2 × harmonics)³
         let along = (ends.len() as f64).powi(3) / 3.0;
         let is_dearer = |whole: usize, band: usize| whole as f64 * ((band + 1) as f64).powi(2) > along;
         let widest = ports.iter().map(|port| port.range().map(|q| ends[q].len()).max().unwrap_or(0)).max();
         if is_dearer(n, widest.unwrap_or(0).saturating_sub(1)) {
-            return None; // no band is narrower than what one joint couples
+            return None; // no band is narrower than the coupling of one joint
         }
         let mut links: Vec<(usize, usize)> = entries.iter().map(|(i, k, _)| (*i, *k)).collect();
         let mut unknown = 0;
         let mut forces = vec![None; ends.len()];
         for port in ports.iter() {
-            // all that a port touches is coupled: the places at its axes, and its forces
+            // a port couples all its places and its forces
             let mut touched: Vec<usize> = port.range().flat_map(|q| &ends[q]).map(|(i, _)| *i).collect();
             if port.is_force() {
                 for q in port.range() {
@@ -112,30 +117,31 @@ impl Sparse {
         })
     }
 
-    /// Memory of the same with so many harmonics, bytes.
+    /// Returns the memory of the banded form with a number of harmonics, bytes.
     pub fn memory(&self, harmonics: usize) -> f64 {
         let (factor, tangent) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
         harmonics as f64 * Banded::bytes(factor.0, factor.1) + Banded::bytes(tangent.0, tangent.1)
     }
 
-    /// Multiplications in the elimination of a step with so many harmonics.
+    /// Returns the multiplications in the elimination of a step with a number of harmonics.
     pub fn work(&self, harmonics: usize) -> f64 {
         let (_, (rows, band)) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
         rows as f64 * (band as f64).powi(2)
     }
 
-    /// Rows and band of the factor of a harmonic, and of the tangent, of so many places and unknown forces with such a band.
+    /// Returns rows and bandwidth, first of the factor of a harmonic, then of
+    /// the tangent, for `whole` places and unknown forces.
     fn sizes(whole: usize, band: usize, harmonics: usize) -> ((usize, usize), (usize, usize)) {
         ((2 * whole, 2 * band + 1), (2 * whole * harmonics, (band + 1) * 2 * harmonics - 1))
     }
 
-    /// The mean has closed contacts as stiff as this.
+    /// Sets the stiffness of closed contacts, for the mean.
     pub fn close(&mut self, springs: &[f64]) {
         self.springs.clear();
         self.springs.extend(springs);
     }
 
-    /// What these springs add to the stiffness: positions of row and column, value.
+    /// Returns the entries of these springs in the stiffness: positions of row and column, value.
     fn closed(&self) -> Vec<(usize, usize, f64)> {
         let pairs = |ends: &[(usize, f64)]| {
             let all = ends.iter().flat_map(|a| ends.iter().map(move |b| (*a, *b)));
@@ -145,10 +151,10 @@ impl Sparse {
         springs.flat_map(|(ends, k)| pairs(ends).into_iter().map(move |(i, l, w)| (i, l, w * k))).collect()
     }
 
-    /// Factors the dynamic stiffness.
+    /// Factors the dynamic stiffness at an excitation frequency.
     ///
     /// # Errors
-    /// The frequency, rad/s, of a harmonic at which it is singular.
+    /// Returns the frequency, rad/s, of a harmonic at which it is singular.
     pub fn drive(&mut self, omega: f64) -> Result<(), f64> {
         self.omega = omega;
         let closed = self.closed();
@@ -167,7 +173,7 @@ impl Sparse {
                 factor.add(2 * row, 2 * column, stiffness);
                 factor.add(2 * row + 1, 2 * column + 1, stiffness);
             }
-            // the rows of unknown forces play no part here
+            // unknown forces have rows of the identity here
             for &force in self.forces.iter().flatten() {
                 let at = 2 * self.position[force];
                 factor.add(at, at, 1.0);
@@ -180,7 +186,8 @@ impl Sparse {
         Ok(())
     }
 
-    /// Displacements of all places at harmonic number `k` of the list, from forces on them: `values(place)`, into `out`.
+    /// Computes the displacements of all places at harmonic number `k` of the
+    /// list, under the forces `values(place)`, into `out`.
     pub fn respond(&mut self, k: usize, values: impl Fn(usize) -> Complex64, out: &mut [Complex64]) {
         self.right.fill(0.0);
         for i in 0..self.n {
@@ -193,7 +200,8 @@ impl Sparse {
         }
     }
 
-    /// Motion along the axes at harmonic number `k` under the forces `force(q)` along them, into `out`.
+    /// Computes the motion along the axes at harmonic number `k` under the
+    /// forces `force(q)` along them, into `out`.
     pub fn receive(&mut self, k: usize, force: impl Fn(usize) -> Complex64, mut out: impl FnMut(usize, Complex64)) {
         self.right.fill(0.0);
         for (q, ends) in self.ends.iter().enumerate() {
@@ -214,7 +222,8 @@ impl Sparse {
         }
     }
 
-    /// Receptances of the axes at the real rate `s`, 1/s, where there are no resonances, m/N.
+    /// Returns the receptances of the axes at the real rate `s`, 1/s, which is
+    /// free of resonances, m/N.
     pub fn own_at(&mut self, s: f64) -> Vec<f64> {
         self.smooth.clear();
         for &(i, l, [mass, damping, stiffness]) in &self.entries {
@@ -239,7 +248,8 @@ impl Sparse {
             .collect()
     }
 
-    /// Factors the equations of the Newton step; `tangents` holds K or T, one block per port. False if they are singular.
+    /// Factors the equations of the Newton step. `tangents` contains K or T, one block per
+    /// port. Returns false if they are singular.
     pub fn linearise(&mut self, ports: &Ports, along: &Along, tangents: &[f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
@@ -257,7 +267,7 @@ impl Sparse {
             }
         }
         for (row, column, stiffness) in self.closed() {
-            // of the mean, which comes first
+            // for the mean, which is the first harmonic
             self.tangent.add(row * size, column * size, stiffness);
             self.tangent.add(row * size + 1, column * size + 1, stiffness);
         }
@@ -310,31 +320,33 @@ impl Sparse {
         self.tangent.factor()
     }
 
-    /// How many places there are, and unknowns of each.
+    /// Returns the number of places.
     pub fn places(&self) -> usize {
         self.n
     }
 
+    /// Returns the number of unknowns of a place.
     pub fn unknowns(&self) -> usize {
         2 * self.harmonics.len()
     }
 
-    /// Where a place stands in the order of elimination.
+    /// Returns the position of a place in the order of elimination.
     pub fn position(&self, place: usize) -> usize {
         self.position[place]
     }
 
-    /// (place, direction) of an axis.
+    /// Returns (place, direction) of an axis.
     pub fn ends(&self, axis: usize) -> &[(usize, f64)] {
         &self.ends[axis]
     }
 
-    /// Places that the structure couples.
+    /// Returns the pairs of places that the structure couples.
     pub fn couplings(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.entries.iter().filter(|(i, l, _)| i != l).map(|(i, l, _)| (*i, *l))
     }
 
-    /// Adds the structure's dynamic stiffness at all harmonics among the places that have a number.
+    /// Adds the structure's dynamic stiffness at all harmonics, between the
+    /// places that have a number.
     pub fn add_structure(&self, number: impl Fn(usize) -> Option<usize>, matrix: &mut Banded) {
         let size = self.unknowns();
         for &(i, l, entry) in &self.entries {
@@ -350,7 +362,8 @@ impl Sparse {
         }
     }
 
-    /// Forces along the axes, [axis][unknown], become the motions along them by the equations that were factored last.
+    /// Replaces forces along the axes, [axis][unknown], by the motions along
+    /// them, with the equations factored last.
     pub fn receive_all(&mut self, forces: &mut [f64]) {
         let size = self.unknowns();
         self.whole.fill(0.0);
@@ -370,7 +383,8 @@ impl Sparse {
         }
     }
 
-    /// Replaces the residual by the Newton step, with the factors of the equations. False if it is none.
+    /// Replaces the residual by the Newton step, with the factored equations.
+    /// Returns false if the step is not finite.
     pub fn step(&mut self, ports: &Ports, tangents: &[f64], residual: &mut [f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
@@ -409,9 +423,10 @@ impl Sparse {
     }
 }
 
-/// An entry of the dynamic stiffness from those of mass, damping and stiffness, at a harmonic's rate (rad/s).
+/// Returns an entry of the dynamic stiffness from those of mass, damping and
+/// stiffness, at a harmonic's rate (rad/s).
 fn dynamic([mass, damping, stiffness]: [f64; 3], rate: f64, omega: f64) -> Complex64 {
-    // a direction that nothing holds has a mean position by the spring that the dense form gives it
+    // a direction without support has the soft spring of the dense form for its mean
     let hold = if rate == 0.0 { (HOLD * omega).powi(2) } else { 0.0 };
     Complex64::new(stiffness - rate * rate * mass + hold * mass, rate * damping)
 }
@@ -424,7 +439,8 @@ mod tests {
     use std::f64::consts::TAU;
     use std::sync::Arc;
 
-    /// Blades around a disk whose springs differ by up to 1 %, with rigid friction between each and the next, under forces of an engine order.
+    /// Blades around a disk with rigid friction between adjacent blades, under
+    /// engine-order forces. Springs differ by up to 1 %.
     fn ring(blades: usize, limit: f64) -> System {
         let name = |i: usize| format!("b{}", i % blades);
         let mut model = Model::default();
@@ -440,7 +456,8 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// The forces of an engine order add up to nothing on blades that stick together: their rounding has no series to be followed.
+    /// Engine-order forces sum to zero on blades that stick together. Their
+    /// rounding must not request harmonics.
     #[test]
     fn a_ring_at_rest_needs_few_harmonics() {
         let system = ring(24, 1e15);

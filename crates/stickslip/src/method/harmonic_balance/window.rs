@@ -1,10 +1,10 @@
-//! The part of a large structure around some contacts: what lies beyond is held.
+//! Subdomain of a large structure around some contacts. Places outside of it are fixed.
 
 use super::ports::{Ports, block};
 use super::sparse::Sparse;
 use stickslip_numerics::banded::Banded;
 
-/// Which ports and places are neighbours.
+/// Adjacency of ports and places.
 #[derive(Debug, Clone)]
 pub(super) struct Neighbours {
     /// Places of every port.
@@ -29,7 +29,8 @@ impl Neighbours {
         Neighbours { of_port, at_place, links }
     }
 
-    /// The marked ports in clusters of neighbours, with so many axes at most; in order.
+    /// Groups the marked ports into clusters of adjacent ports, with at most
+    /// `most` axes each. Ports are in ascending order.
     pub fn clusters(&self, ports: &Ports, marked: &[bool], most: usize) -> Vec<Vec<usize>> {
         let mut left = marked.to_vec();
         let mut clusters = Vec::new();
@@ -56,12 +57,12 @@ impl Neighbours {
         clusters
     }
 
-    /// A place and those that the structure couples with it.
+    /// Returns a place and the places that the structure couples with it.
     fn near(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::once(place).chain(self.links[place].iter().copied())
     }
 
-    /// The places of some ports and their neighbours, so many times.
+    /// Returns the places of some ports, with `times` layers of adjacent places.
     fn around(&self, cluster: &[usize], times: usize) -> Vec<usize> {
         let mut inside = vec![false; self.at_place.len()];
         let mut places = Vec::new();
@@ -85,18 +86,18 @@ impl Neighbours {
     }
 }
 
-/// What settling contacts by themselves keeps.
+/// Memory of the nonlinear elimination.
 #[derive(Debug, Clone)]
 pub(super) struct Settling {
     pub neighbours: Neighbours,
-    /// Derivatives of the forces where the step began.
+    /// Derivatives of the forces at the beginning of the step.
     pub tangents: Vec<f64>,
-    /// The step of all, in units.
+    /// Newton step of all contacts, in units.
     pub step: Vec<f64>,
-    /// What the forces of clusters have beyond their derivatives, N, and what their own steps have left of the step, m.
+    /// Nonlinear parts of the forces of clusters, N, and the residual of their equations, m.
     pub beyond: Vec<f64>,
     pub left: Vec<f64>,
-    /// Whether it has helped so far at this point.
+    /// True unless the elimination was of little use at this point.
     pub helps: bool,
 }
 
@@ -107,16 +108,16 @@ impl Settling {
     }
 }
 
-/// The linear equations there, of motion under the derivatives of all contacts.
+/// Linear equations of a subdomain: its structure with the derivatives of all its contacts.
 #[derive(Debug)]
 pub(super) struct Window {
-    /// Per axis of the cluster: (number of the place here, direction).
+    /// Per axis of the cluster: (number of the place in the subdomain, direction).
     ends: Vec<Vec<(usize, f64)>>,
-    /// Unknowns of a place.
+    /// Number of unknowns of a place.
     size: usize,
     /// The structure alone, factored.
     alone: Banded,
-    /// The equations, the same factored, and with what was added to the derivatives of the cluster.
+    /// The equations, their factor, and the factor with changed derivatives of the cluster.
     matrix: Banded,
     factored: Banded,
     changed: Banded,
@@ -124,7 +125,8 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Around some ports, with the derivatives `tangents` of all. `None` if the equations are singular.
+    /// Creates the subdomain around some ports, with the derivatives `tangents`
+    /// of all. `None` if the equations are singular.
     pub fn new(
         sparse: &Sparse,
         neighbours: &Neighbours,
@@ -176,17 +178,18 @@ impl Window {
         })
     }
 
-    /// The motion along the axes of the cluster under forces along them, in place of these.
+    /// Replaces forces along the axes of the cluster by the motion along them.
     pub fn receive(&mut self, forces: &mut [f64]) {
         through(&self.ends, self.size, (&self.factored, &mut self.right), forces);
     }
 
-    /// The same of the structure alone.
+    /// Replaces forces by the motion of the structure alone.
     pub fn receive_alone(&mut self, forces: &mut [f64]) {
         through(&self.ends, self.size, (&self.alone, &mut self.right), forces);
     }
 
-    /// Factors the equations with derivatives of the cluster's ports that differ by `slopes`, one block after the other. False if they are singular.
+    /// Factors the equations with the derivatives of the cluster's ports changed by `slopes`,
+    /// one block after the other. Returns false if they are singular.
     pub fn change(&mut self, axes: impl Iterator<Item = usize>, slopes: &[f64]) -> bool {
         self.changed.clone_from(&self.matrix);
         let (mut first, mut from) = (0, 0);
@@ -199,13 +202,13 @@ impl Window {
         self.changed.factor()
     }
 
-    /// The same as [`Window::receive`] with these.
+    /// Replaces forces by the motion with these changed derivatives.
     pub fn receive_changed(&mut self, forces: &mut [f64]) {
         through(&self.ends, self.size, (&self.changed, &mut self.right), forces);
     }
 }
 
-/// Forces along axes become the motions along them.
+/// Replaces forces along axes by the motions along them.
 fn through(ends: &[Vec<(usize, f64)>], size: usize, (matrix, right): (&Banded, &mut [f64]), forces: &mut [f64]) {
     right.fill(0.0);
     for (ends, forces) in ends.iter().zip(forces.chunks_exact(size)) {
@@ -222,7 +225,7 @@ fn through(ends: &[Vec<(usize, f64)>], size: usize, (matrix, right): (&Banded, &
     }
 }
 
-/// Adds the derivative of a port with such ends.
+/// Adds the derivative of a port with the given ends.
 fn add_port(ends: &[Vec<(usize, f64)>], tangent: &[f64], size: usize, matrix: &mut Banded) {
     for (a, row) in tangent.chunks_exact(size * ends.len()).enumerate() {
         for &(i, w) in &ends[a / size] {
@@ -250,7 +253,7 @@ mod tests {
     const BLADES: usize = 40;
     const HARMONICS: [usize; 2] = [1, 3];
 
-    /// A ring and derivatives of its forces without a pattern.
+    /// A ring, with pseudo-random derivatives of its forces.
     fn ring() -> (Sparse, Ports, Vec<f64>, Vec<usize>) {
         let name = |i: usize| format!("b{}", i % BLADES);
         let mut model = Model::default();
@@ -275,7 +278,8 @@ mod tests {
         (sparse, ports, tangents, blocks)
     }
 
-    /// With all places around it a window is the whole structure; with a few it is nearly that.
+    /// A subdomain with all places around it is the whole structure; one with a
+    /// few places is nearly the same.
     #[test]
     fn a_window_moves_as_the_whole_does() {
         let (mut sparse, ports, tangents, blocks) = ring();
@@ -298,7 +302,7 @@ mod tests {
         }
     }
 
-    /// Marked neighbours stand together, as far as a cluster goes.
+    /// Adjacent marked ports form one cluster, up to the size limit.
     #[test]
     fn clusters_are_neighbours() {
         let (sparse, ports, ..) = ring();

@@ -1,4 +1,5 @@
-//! What a drive frequency makes of the equations: receptances, the motion without friction, penalties, where to begin.
+//! The equations at one excitation frequency: receptances, the motion without
+//! friction, penalties, and the initial guess.
 
 use super::super::hold::CLEAR;
 use super::super::penalty::penalty as penalty_of;
@@ -11,14 +12,15 @@ use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
-/// The receptance below which motion counts as imposed, relative to that of the excited structure.
+/// Receptance at the highest harmonic `top` below which a motion counts as imposed, relative to
+/// `1/max(K, Ω² M)/top²` with the largest entries K and M of the structure.
 const RIGID: f64 = 1e-14;
 
 impl Level {
-    /// Prepares for a drive frequency.
+    /// Prepares the equations for an excitation frequency.
     ///
     /// # Errors
-    /// A frequency (rad/s) at which the structure without its joints has a resonance without damping.
+    /// Returns the frequency (rad/s) of an undamped resonance of the structure without its joints.
     pub fn drive(&mut self, system: &System, ports: &Ports, rest: &Rest, omega: f64) -> Result<(), f64> {
         let n = system.dofs();
         let excitation = system.excitation(omega);
@@ -31,7 +33,7 @@ impl Level {
         self.springs.extend(closed.iter().flat_map(|closed| &closed.springs));
         self.free.clear();
         if let Some(sparse) = &mut self.sparse {
-            // at a singular frequency: the next number has none of its zeros
+            // at a singular frequency, take the next floating-point number
             sparse.close(&self.springs);
             sparse.drive(omega).or_else(|_| sparse.drive(omega * (1.0 + f64::EPSILON)))?;
         } else {
@@ -66,14 +68,14 @@ impl Level {
         let [mass, _, stiffness] = system.structure().largest();
         let stiff = stiffness.max(omega * omega * mass);
         let soft = 1.0 / stiff.max(f64::MIN_POSITIVE);
-        // on the real axis: the impedance of the highest harmonic without the resonances that it may meet
+        // at a real rate: the impedance of the highest harmonic without the resonances near it
         let rate = top as f64 * omega;
         let smooth = match &mut self.sparse {
             Some(sparse) => sparse.own_at(rate),
             None => rest.own_at(rate, omega).map_err(|_| rate)?,
         };
         for (penalty, port) in self.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
-            // one for all axes of a port, so that no direction of its plane is another
+            // one penalty for all axes of a port, so that its plane has no preferred direction
             let mean = port.range().map(|q| smooth[q]).sum::<f64>() / port.axes as f64;
             let receptance = mean + port.series;
             let imposed = port.series == 0.0 && receptance <= RIGID * soft / (top * top) as f64;
@@ -96,7 +98,8 @@ impl Level {
         Ok(())
     }
 
-    /// Receptances of the axes with the springs in series, as matrices unless these would be many and modes are at hand.
+    /// Computes the receptances of the axes with the springs in series: by modes if there are
+    /// many axes and the modes are known, otherwise as matrices.
     fn receptance(&self, ports: &Ports, rest: &Rest, omega: f64) -> Result<Receptance, f64> {
         let harmonics = self.harmonics();
         if let Some(structure) = rest.modes_for(ports).filter(|_| !self.with_matrix) {
@@ -112,8 +115,9 @@ impl Level {
         Ok(Receptance::Formed(Formed::new(formed.collect::<Result<_, f64>>()?)))
     }
 
-    /// The motion to begin with: that of the describing functions, or without friction; where contacts alone hold, static rest on them, from which
-    /// a step leads to the motion that sticks.
+    /// Returns the initial guess: the solution by describing functions, or the
+    /// motion without friction. If contacts alone hold a body, returns static
+    /// equilibrium, from which one Newton step finds the motion in stick.
     pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Solution {
         let nh = self.harmonics().len();
         let mut motion = self.unhindered();
@@ -127,11 +131,11 @@ impl Level {
                 let Ok(k) = self.harmonics().binary_search(&h) else { continue };
                 for q in port.range() {
                     let (_, a) = ports.place(q);
-                    // what does the work of all
+                    // the force with the virtual work of all members
                     let work = |member: &Member| member.factor * guess.force(system, (member.joint, a), (h as u32, x));
                     let force: Complex64 = port.members.iter().map(work).sum();
                     if !force.is_finite() {
-                        continue; // rigid friction that does not move at all
+                        continue; // rigid friction without motion
                     }
                     let axis = ports.axis(system, q);
                     let moved = axis.along_complex(x) + axis.imposed_at(h as u32);

@@ -1,19 +1,23 @@
-//! The same period by fewer samples, for derivatives of many contacts.
+//! Coarse sampling of the period, for derivatives of many contacts.
 
 use super::super::ease::Ease;
 use super::super::ports::{Alternation, Ports, REPEATS, block};
 use super::{Level, OPEN, Solution};
 
-/// All samples for one of a sketch, at most, and how many a sketch has at least for the wave of the highest harmonic; it has half of all at most.
-/// Measured: a step by so few leaves 0.01 of the residual, which the next one by the same leaves of that; with five for the wave the error that five harmonics leave
+/// The coarse sampling has at least `1/FEWER` of all samples, at least `SKETCHED` samples per
+/// wave of the highest harmonic, and at most half of all samples.
+///
+/// Measured: a Newton step with coarse derivatives leaves 0.01 of the residual; so does the
+/// next step with the same derivatives. With five samples per wave, the error of five harmonics
 /// of 16 nodes is known to 0.12 instead of 0.05.
 const FEWER: usize = 6;
 const SKETCHED: usize = 8;
-/// Distance of the states from those a period later, relative to their size, at which sketched derivatives are taken: what fewer samples leave out.
+/// Change of the states over a period, relative to their size, at which coarse derivatives are
+/// taken. Fewer samples cause an error of this size.
 const ALMOST: f64 = 1e-3;
 
 impl Level {
-    /// Keeps fewer samples beside all, if that is enough for a sketch.
+    /// Creates the coarse sampling, if it has at most half of all samples.
     pub(in super::super) fn keep_sketch(&mut self) {
         let top = self.harmonics().last().copied().unwrap_or(0);
         let all = self.alternation.samples();
@@ -23,9 +27,11 @@ impl Level {
         self.sketch = few.map(|few| Alternation::new(self.harmonics().to_vec(), few));
     }
 
-    /// The derivatives that [`Slopes::Cheap`] left out, at the motion that was evaluated last. If they are `sketched` those of return maps are taken by
-    /// fewer samples, where the level has such: a step of Newton's method by them leaves some thousandths of the residual, whose own samples are all
-    /// there. Whether some are so.
+    /// Computes the derivatives that [`Slopes::Cheap`] omits, at the motion evaluated last.
+    /// With `sketched`, derivatives of return maps use the coarse sampling, if there is one.
+    ///
+    /// A Newton step with coarse derivatives leaves some thousandths of the residual, which has
+    /// all samples itself. Returns whether some derivatives are coarse.
     pub fn follow_slopes(
         &mut self,
         ports: &Ports,
@@ -58,7 +64,7 @@ impl Level {
                 alternation.begin.clone_from(&self.states[p]);
                 alternation.respond(port, (omega, ease.limits), c, force, Some(slot));
             }
-            // what holds was not sampled
+            // a port that sticks throughout was not sampled
             any |= rough && !alternation.state.is_empty();
             self.states[p].forgets.clone_from(&alternation.forgets);
             self.add_springs(p, port, OPEN + self.tether_share());
@@ -67,17 +73,18 @@ impl Level {
         any
     }
 
-    /// Samples of a period, also while those of a sketch stand in for them.
+    /// Returns the number of samples of a period, also while the coarse sampling is in use.
     pub fn all_samples(&self) -> usize {
         self.sketch.iter().map(|sketch| sketch.samples()).fold(self.alternation.samples(), usize::max)
     }
 
-    /// Whether there are fewer samples beside all.
+    /// Tells whether there is a coarse sampling.
     pub fn keeps_sketch(&self) -> bool {
         self.sketch.is_some()
     }
 
-    /// The sketch becomes what is sampled, and back: forces by fewer samples then, and derivatives that are theirs.
+    /// Exchanges the samplings: forces and their derivatives use the coarse
+    /// one, until the next call.
     pub fn exchange_samples(&mut self) {
         let Some(sketch) = &mut self.sketch else { return };
         sketch.marched = self.alternation.marched;

@@ -1,4 +1,4 @@
-//! The equations as a function of numbers of size one, as continuation follows them.
+//! The equations as a function of unknowns of order one, for continuation.
 
 use super::super::ease::GIVEN;
 use super::super::ports::Ports;
@@ -6,8 +6,9 @@ use super::{Level, Slopes, Solution};
 use num_complex::Complex64;
 
 impl Level {
-    /// Residual of the equations at `unknowns` (per axis a motion or a force, relative to [`unit`]) into `residual`, in the same
-    /// units; the derivative into `jacobian`, row-major. Only in the dense form.
+    /// Computes the residual at `unknowns` (per axis a motion or a force,
+    /// relative to [`unit`]) into `residual`, in the same units. Writes the
+    /// derivative into `jacobian`, row-major. Only in the dense form.
     pub fn residual_at(
         &mut self,
         ports: &Ports,
@@ -32,7 +33,7 @@ impl Level {
         }
     }
 
-    /// The unknowns of a motion, see [`Level::residual_at`].
+    /// Returns the unknowns of a motion, see [`Level::residual_at`].
     pub fn pack(&self, ports: &Ports, motion: &Solution, length: f64) -> Vec<f64> {
         let nh = self.harmonics().len();
         let mut out = Vec::with_capacity(2 * motion.c.len());
@@ -46,7 +47,7 @@ impl Level {
         out
     }
 
-    /// The other way round.
+    /// Writes unknowns into a motion: the inverse of [`Level::pack`].
     pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut Solution) {
         let nh = self.harmonics().len();
         for port in ports.iter() {

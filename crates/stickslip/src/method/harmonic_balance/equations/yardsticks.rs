@@ -1,38 +1,42 @@
-//! What is large and what is small: the length of a motion, the units of residuals, the penalty of contacts, the limits that nothing reaches.
+//! Scaling: the length of a motion, the units of residuals, and slip limits that no motion reaches.
 
 use super::super::kept::weight;
 use super::super::ports::{Port, Ports};
 use super::{Level, Solution};
 use num_complex::Complex64;
 
-/// Where contacts alone hold, the length of a motion counts up to so many times that of its harmonics and of rest.
+/// If contacts alone hold a body, the length of a motion is at most this multiple of the sum of
+/// its harmonics and the motion without friction.
 const FAR: f64 = 4.0;
-/// Share of the mean displacement that constant loads cause on closed contacts, below which no motion is solved more exactly than this share: the
-/// residual is then at the mean's rounding.
+/// Least length, relative to the motion without friction with its mean on closed contacts. At a
+/// smaller length, the rounding of the mean would dominate the residual.
 const STANDING: f64 = 1e-5;
-/// Length of a motion that is none, m: its square is a number still.
+/// Length of a zero motion, m. Its square is still positive.
 const NOTHING: f64 = 1e-150;
 
 impl Level {
-    /// The yardstick of motions: their size, or a hundredth of that without friction, as velocities relative to the drive frequency.
+    /// Returns the length of a motion: its size plus a hundredth of the motion without
+    /// friction, both as velocities relative to the excitation frequency.
     pub fn length(&self, motion: &Solution) -> f64 {
         let nh = self.alternation.harmonics.len();
-        // the mean without friction is far away where only laws hold a direction
+        // without friction the mean is very large if only laws hold a direction
         let norm = |c: &[Complex64], from: usize| {
             let harmonics = c.iter().enumerate().map(|(i, z)| (z.norm_sqr(), self.alternation.harmonics[i % nh]));
             harmonics.filter(|(_, h)| *h >= from).map(|(square, h)| square * weight(h)).sum::<f64>().sqrt()
         };
         let mut size = norm(&motion.c, 0);
         if self.stands() {
-            // a mean that goes far is no yardstick
+            // a large mean must not define the length
             let standing = norm(&self.linear, 0);
             size = size.min(FAR * (norm(&motion.c, 1) + standing)).max(STANDING * standing);
         }
         (size + 1e-2 * norm(&self.linear, 1)).max(NOTHING)
     }
 
-    /// Units of the residual: the motion's length, or the law's scale, but no more than the forces that there are: a limit that nothing reaches says
-    /// nothing of them. Where only laws hold a direction, the mean of the motion is the small difference of large ones, and its unit the larger of these.
+    /// Computes the units of the residual. The unit of motions is the length. The unit of
+    /// forces is the law's scale, but no more than the forces in play: a limit that no force
+    /// reaches is no measure. If only laws hold a direction, the mean is the small difference
+    /// of large terms, and these increase its unit.
     pub(in super::super) fn measure(&mut self, ports: &Ports, motion: &Solution, length: f64) {
         let nh = self.harmonics().len();
         let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
@@ -57,7 +61,8 @@ impl Level {
         }
     }
 
-    /// Factor on slip limits from which nothing slips, not even what moves as if there were no friction.
+    /// Returns the factor on slip limits above which nothing slips, not even
+    /// for the motion without friction.
     pub fn sticking(&self, ports: &Ports) -> f64 {
         let limits = ports.iter().filter(|port| port.is_force()).map(|port| port.scale);
         let least = limits.filter(|limit| *limit > 0.0).fold(f64::INFINITY, f64::min);

@@ -1,4 +1,5 @@
-//! The alternation between frequency and time: the signals of a port over a period, and what its kernels have in common.
+//! Alternating frequency-time (AFT): the signals of a port over a period, and
+//! helpers of all kernels.
 
 use super::memory::REPEATS;
 use super::{Port, StaticState};
@@ -9,40 +10,42 @@ use stickslip_numerics::fourier::Fourier;
 
 pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// The transform's memory for one number of harmonics and samples.
+/// Signals, transforms and scratch memory for one list of harmonics and one number of samples.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Alternation {
-    /// Factor of the joints' [`StaticState`](super::StaticState): the share of the constant loads in the units in which
-    /// laws are evaluated.
+    /// Factor of the joints' [`StaticState`](super::StaticState): the share of the constant
+    /// loads, divided by the factor of the slip limits.
     pub static_share: f64,
-    /// Steps that laws with a memory were marched, in the present search.
+    /// Number of steps of laws with memory in the present search.
     pub marched: usize,
-    /// Distance of the states of these from those a period later, relative to their size, at which they repeat.
+    /// Change of the states over a period, relative to their size, at which they count as periodic.
     pub repeats: f64,
     pub harmonics: Vec<usize>,
     pub fourier: Fourier,
     pairs: Vec<(usize, Complex64)>,
-    /// A signal for whoever needs one.
+    /// A scratch signal.
     pub signal: Vec<f64>,
-    /// Forces of the port evaluated last along its axes, per sample, N; of sliders only after [`Alternation::sample`].
+    /// Forces of the port evaluated last along its axes, per sample, N. Kernels that do not
+    /// sample, such as sliders, set them only in [`Alternation::sample`].
     pub force: [Vec<f64>; MOST_DIRECTIONS],
-    /// Velocities of the port along its axes, for ports that use them, or displacements.
+    /// Displacements and velocities of the port along its axes, for kernels that use them.
     pub(super) displacement: [Vec<f64>; MOST_DIRECTIONS],
     pub(super) velocity: [Vec<f64>; MOST_DIRECTIONS],
-    /// Per sample of a port whose kernel tells slip: it moves.
+    /// True at the samples that slip, for a port whose kernel tells slip.
     pub slips: Vec<bool>,
-    /// The derivative of the force by ω in rad/s, [axis][harmonic], of the motion port evaluated last with its derivative: of a law that knows how
-    /// fast a motion is run through. Kept where ω is unknown.
+    /// Derivative of the force by ω in rad/s, [axis][harmonic], of the motion
+    /// port whose derivative was evaluated last. It is not zero for laws that
+    /// depend on velocity. `None` unless ω is an unknown.
     pub by_frequency: Option<Vec<Complex64>>,
     /// Internal states at t = 0 of the port evaluated last.
     pub state: Vec<f64>,
-    /// States at the samples, for ports that use them.
+    /// States at the samples, for step laws.
     pub(super) trail: Vec<f64>,
-    /// Where the next port with a memory begins, if that is known; used up by it.
+    /// Known states with which the next port with memory begins. The evaluation consumes them.
     pub begin: Beginning,
-    /// `(1 - Π)⁻¹` of the port with a memory that was evaluated last with its derivative, see [`Beginning`].
+    /// `(1 - Π)⁻¹` of the port with memory whose derivative was evaluated last, see [`Beginning`].
     pub forgets: Vec<f64>,
-    /// `e^{2πji/N}`.
+    /// `e^{2πji/N}` for every sample i.
     pub(super) turns: Vec<Complex64>,
     pub(super) argument: Vec<Complex64>,
     pub(super) work: Vec<f64>,
@@ -58,24 +61,26 @@ pub(in super::super) struct Alternation {
     pub(super) march: super::memory::Memory,
 }
 
-/// What is known of the states of a port with a memory in a motion nearby.
+/// Known states of a port with memory in a nearby motion.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct Beginning {
-    /// States at t = 0; empty where they are sought from the first movement on.
+    /// States at t = 0; empty if they follow from the initial step out of static equilibrium.
     pub state: Vec<f64>,
-    /// `(1 - Π)⁻¹`, row by row, with Π what a period leaves of a change of these; empty where nothing is known, or where something is never forgotten.
+    /// `(1 - Π)⁻¹`, row-major. `Π` is the derivative of the states after a period by the states
+    /// before. Empty if it is unknown, or if some state is never forgotten.
     pub forgets: Vec<f64>,
 }
 
 impl Beginning {
-    /// The same where a law forgets where it began; what does not must begin at rest.
+    /// Returns itself if the law forgets its initial states, else the default. A state that is
+    /// never forgotten must begin in static equilibrium.
     pub fn forgotten(&self) -> Self {
         if self.forgets.is_empty() { Beginning::default() } else { self.clone() }
     }
 }
 
 impl Alternation {
-    /// Harmonics times samples.
+    /// Returns the number of harmonics times the number of samples.
     pub fn resolution(&self) -> usize {
         self.pairs.len() * self.turns.len()
     }
@@ -121,7 +126,7 @@ impl Alternation {
         self.signal.len()
     }
 
-    /// Samples of the signal with harmonics `c`, each times `factor(h)`, into `self.signal`.
+    /// Samples the signal with harmonics `c`, each times `factor(h)`, into `self.signal`.
     pub(super) fn synthesise(&mut self, c: &[Complex64], factor: impl Fn(usize) -> Complex64) {
         for (pair, value) in self.pairs.iter_mut().zip(c) {
             pair.1 = value * factor(pair.0);
@@ -129,13 +134,14 @@ impl Alternation {
         self.fourier.synthesise(&self.pairs, &mut self.signal);
     }
 
-    /// Where the joint of a port is before it vibrates: displacements (m) along its axes, and states.
+    /// Returns the static equilibrium of a port: displacements (m) along its axes, and states.
     pub(super) fn at_rest(&self, port: &Port) -> ([f64; MOST_DIRECTIONS], Vec<f64>) {
         let StaticState { displacement, states } = &port.static_state;
         (displacement.map(|u| u * self.static_share), states.iter().map(|z| z * self.static_share).collect())
     }
 
-    /// Any harmonics below half of the samples of the forces that were sampled last along an axis.
+    /// Passes the harmonics `wanted` of the sampled force along an axis to `add`. It skips
+    /// those at or above half of the samples.
     pub fn add_harmonics(&mut self, axis: usize, wanted: &[usize], mut add: impl FnMut(usize, Complex64)) {
         let n = self.samples();
         self.work.copy_from_slice(&self.force[axis]);
@@ -145,7 +151,7 @@ impl Alternation {
         }
     }
 
-    /// Adds the harmonics of the sampled force along an axis.
+    /// Adds the harmonics of the sampled force along an axis to `force`.
     pub(super) fn add_force(&mut self, axis: usize, force: &mut [Complex64]) {
         let mut work = std::mem::take(&mut self.work);
         work.copy_from_slice(&self.force[axis]);
@@ -153,7 +159,7 @@ impl Alternation {
         self.work = work;
     }
 
-    /// Adds the harmonics of a signal, which is used up.
+    /// Adds the harmonics of a signal to `to`. The transform overwrites the signal.
     pub fn add_signal(&mut self, signal: &mut [f64], to: &mut [Complex64]) {
         let n = self.samples();
         let sums = self.fourier.sums(signal);
@@ -162,7 +168,8 @@ impl Alternation {
         }
     }
 
-    /// Adds the harmonics of a signal along an axis to the derivative by ω, if that is kept. The signal is used up.
+    /// Adds the harmonics of a signal along an axis to the derivative by ω, if
+    /// that is kept. The transform overwrites the signal.
     pub(super) fn add_by_frequency(&mut self, axis: usize, signal: &mut [f64]) {
         let nh = self.harmonics.len();
         let Some(mut by_frequency) = self.by_frequency.take() else { return };
@@ -170,7 +177,8 @@ impl Alternation {
         self.by_frequency = Some(by_frequency);
     }
 
-    /// The spectrum of the slope of number `slope`, into the spectrum of number `to`. False if the slope is zero all the time.
+    /// Computes the spectrum of slope number `slope` into spectrum number `to`.
+    /// Returns false if the slope is zero at all samples.
     pub(super) fn slope_spectrum(&mut self, slope: usize, to: usize) -> bool {
         if self.slopes[slope].iter().all(|s| *s == 0.0) {
             return false;
@@ -184,8 +192,8 @@ impl Alternation {
         true
     }
 
-    /// Adds `δf_h = Σ_k (G_{h-k} δy_k + G_{h+k} δy_k*)`, `δy_k = factor(k) δU_k`, from axis `b` of the motion to axis `a` of the force, with the
-    /// spectrum `G` of the slope in the first of the spectra.
+    /// Adds `δf_h = Σ_k (G_{h-k} δy_k + G_{h+k} δy_k*)`, `δy_k = factor(k) δU_k`, from axis `b` of
+    /// the motion to axis `a` of the force. `G` is the spectrum of the slope, `self.spectra[0]`.
     pub(super) fn add_slope(
         &self,
         tangent: &mut [f64],
@@ -204,7 +212,7 @@ impl Alternation {
         }
     }
 
-    /// Makes `count` signals for slopes.
+    /// Allocates at least `count` signals for slopes.
     pub(super) fn reserve_slopes(&mut self, count: usize) {
         let n = self.samples();
         while self.slopes.len() < count {
@@ -213,24 +221,24 @@ impl Alternation {
     }
 }
 
-/// What makes the amplitude of harmonic `h` of a sum over `n` samples.
+/// Returns the factor from a sum over `n` samples to the amplitude of harmonic `h`.
 pub(super) fn share(h: usize, n: usize) -> f64 {
     if h == 0 { 1.0 / n as f64 } else { 2.0 / n as f64 }
 }
 
-/// `δf = minus δU + plus δU*` for real and imaginary parts.
+/// Returns the real 2 × 2 block of `δf = minus δU + plus δU*`.
 #[inline]
 pub(super) fn as_block(minus: Complex64, plus: Complex64) -> [f64; 4] {
     [minus.re + plus.re, plus.im - minus.im, minus.im + plus.im, minus.re - plus.re]
 }
 
-/// `G_{h-k}` and `G_{h+k}` of a real signal.
+/// Returns `G_{h-k}` and `G_{h+k}` of a real signal.
 #[inline]
 pub(super) fn pair(spectrum: &[Complex64], h: usize, k: usize) -> (Complex64, Complex64) {
     (if h >= k { spectrum[h - k] } else { spectrum[k - h].conj() }, spectrum[h + k])
 }
 
-/// Adds a 2 × 2 block; the mean has half the weight of the others and no imaginary part.
+/// Adds a 2 × 2 block. The mean has half the weight of the other harmonics and no imaginary part.
 #[inline]
 pub(super) fn add_block(
     tangent: &mut [f64],
@@ -243,7 +251,8 @@ pub(super) fn add_block(
     add_entries(tangent, size, row, column, block.map(|x| weight * x));
 }
 
-/// The same without the weight. `row` and `column` are numbers of unknown pairs and their harmonics.
+/// Adds a 2 × 2 block without the weight. `a` and `b` are numbers of complex
+/// unknowns, `h` and `k` their harmonics.
 #[inline]
 pub(super) fn add_entries(
     tangent: &mut [f64],

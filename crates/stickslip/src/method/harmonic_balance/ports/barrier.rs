@@ -1,25 +1,29 @@
-//! Rigid friction along one axis between barriers: samples of a force that stays inside its limits, on the way to those that it has.
+//! Interior-point form of rigid friction along one axis: the force of every
+//! sample stays strictly inside its limits.
 //!
-//! With `y = λ + ε v` the force of a sample is `f = Π(y)`, which is the same as `y - f = ξ - η` with `ξ, η ≥ 0`, `ξ (L - f) = 0` and
-//! `η (L + f) = 0`. On the way both products are μ, the same at all instants, and everything that is zero at the end is positive: a force that is held
-//! at its limit in one step may leave it in the next.
+//! With `y = λ + ε v` the force of a sample is the projection `f = Π(y)` onto the limits.
+//! Equivalent are the multipliers `ξ, η ≥ 0` with `y - f = ξ - η` and the complementarity
+//! conditions `ξ (L - f) = 0` and `η (L + f) = 0`. On the interior-point path both products
+//! equal μ > 0, the same at all samples, so that all four factors stay positive. A force at its
+//! limit in one step can therefore leave it in the next.
 
 use super::Alternation;
 use num_complex::Complex64;
 
-/// The products in units of the limit and the largest `y`, at which a force begins: half of its limit where `y` is largest.
+/// Approximate initial force, relative to the limit, where `y` is largest.
 const BEGINS: f64 = 0.5;
-/// Share of the way to the nearest bound that a step may go.
+/// Longest step, as a share of the distance to the nearest bound.
 const INSIDE: f64 = 0.99;
 
 /// The samples of one port.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Barrier {
-    /// N.
+    /// Slip limit, N.
     limit: f64,
-    /// Unit of the products, N²: the limit times the largest `y`, or the limit.
+    /// Unit of the products, N²: the limit times the largest `y`, or the limit
+    /// squared if that is larger.
     unit: f64,
-    /// What it is made of, and its step: see [`Sample`].
+    /// Variables and step of every sample.
     samples: Vec<Sample>,
 }
 
@@ -28,22 +32,23 @@ struct Sample {
     force: f64,
     upper: f64,
     lower: f64,
-    /// `y`, and how `f` follows it.
+    /// `y`, and the derivative of `f` by it.
     argument: f64,
     slope: f64,
-    /// What the products are to be.
+    /// Target values of the products.
     aims: [f64; 2],
     /// Steps of `f`, ξ and η.
     step: [f64; 3],
 }
 
 impl Sample {
-    /// How far the force may rise and fall.
+    /// Returns the distances of the force from its upper and its lower limit.
     fn room(&self, limit: f64) -> [f64; 2] {
         [limit - self.force, limit + self.force]
     }
 
-    /// The step of `f` is `slope (δy + lack)`: what is left once ξ and η follow from it and from their products.
+    /// Returns the term `lack` of the step of `f`, which is `slope (δy + lack)`
+    /// after the elimination of ξ and η.
     fn lack(&self, limit: f64) -> f64 {
         let [above, below] = self.room(limit);
         self.argument - self.force - self.aims[0] / above + self.aims[1] / below
@@ -51,14 +56,14 @@ impl Sample {
 }
 
 impl Barrier {
-    /// Where the way begins, from the harmonics of `y` without the force.
+    /// Creates the initial iterate from the harmonics of `y` without the force.
     pub fn new(limit: f64, alternation: &mut Alternation, y: &[Complex64]) -> Self {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let largest = alternation.signal.iter().fold(limit, |most, y| most.max(y.abs()));
         let begin = |y: &f64| {
             let force = BEGINS * limit * (y / (BEGINS * largest)).tanh();
             let held = y - force;
-            // ξ - η = y - f, ξ η = the square of the largest
+            // ξ - η = y - f, ξ η = largest²
             let more = 0.5 * (held.abs() + held.hypot(2.0 * largest));
             let less = largest * (largest / more);
             let (upper, lower) = if held > 0.0 { (more, less) } else { (less, more) };
@@ -68,7 +73,7 @@ impl Barrier {
         Barrier { limit, unit: limit * largest, samples }
     }
 
-    /// The mean of the products after a share of the step, in units of [`Barrier::unit`].
+    /// Returns the mean of the products after a share of the step, in units of [`Barrier::unit`].
     pub fn gap(&self, share: f64) -> f64 {
         let products = |s: &Sample| {
             let [force, upper, lower] = s.step.map(|step| share * step);
@@ -77,12 +82,13 @@ impl Barrier {
         self.samples.iter().map(products).sum::<f64>() / (2.0 * self.samples.len() as f64 * self.unit)
     }
 
-    /// The same as it is, in units of the square of the limit.
+    /// Returns the mean of the present products, in units of the limit squared.
     pub fn left(&self) -> f64 {
         self.gap(0.0) * self.unit / (self.limit * self.limit)
     }
 
-    /// The derivative of the harmonics of `f` by those of the argument, which are `y`, into `tangent`.
+    /// Linearises the conditions at the argument with the harmonics `y`. Writes the derivative
+    /// of the harmonics of `f` by those of the argument into `tangent`.
     pub fn linearise(&mut self, alternation: &mut Alternation, y: &[Complex64], tangent: &mut [f64]) {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         alternation.reserve_slopes(1);
@@ -98,8 +104,9 @@ impl Barrier {
         }
     }
 
-    /// The harmonics of the force into `image`, as far as the argument is what it is, after a step to products of `gap`; if it is `corrected` with
-    /// those of the last step in them.
+    /// Sets the targets of the products to `gap`. With `corrected`, the targets include the
+    /// second-order terms of the last step (Mehrotra's corrector). Writes the harmonics of the
+    /// force after a step with an unchanged argument into `image`.
     pub fn aim(&mut self, (gap, corrected): (f64, bool), alternation: &mut Alternation, image: &mut [Complex64]) {
         let product = gap * self.unit;
         for (s, force) in self.samples.iter_mut().zip(&mut alternation.force[0]) {
@@ -111,7 +118,8 @@ impl Barrier {
         alternation.add_force(0, image);
     }
 
-    /// The step to the argument with the harmonics `y`, and how much of it stays inside all bounds, at most all.
+    /// Computes the step to the argument with the harmonics `y`. Returns the
+    /// share of it, at most 1, that stays inside all bounds.
     pub fn step(&mut self, alternation: &mut Alternation, y: &[Complex64]) -> f64 {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let mut most = 1.0 / INSIDE;
@@ -130,7 +138,7 @@ impl Barrier {
         INSIDE * most
     }
 
-    /// So much of the step.
+    /// Takes a share of the step.
     pub fn advance(&mut self, share: f64) {
         for s in &mut self.samples {
             s.force += share * s.step[0];
@@ -144,7 +152,8 @@ impl Barrier {
 mod tests {
     use super::*;
 
-    /// Where nothing moves the argument the path leads to the projection of it: held at a limit, or free between them.
+    /// With a fixed argument the path ends at the projection of the argument:
+    /// at a limit, or between the limits.
     #[test]
     fn the_path_ends_at_the_projection() {
         let limit = 0.7;
@@ -161,7 +170,7 @@ mod tests {
                 barrier.advance(share);
             }
             let found = barrier.samples[0].force;
-            // as far as the products let it be off
+            // the error that the remaining products allow
             assert!((found - y.clamp(-limit, limit)).abs() < 1e-8, "{y}: {found}");
         }
     }

@@ -1,4 +1,5 @@
-//! What the march along a motion finds: its turning points, and the intervals between which a slider's force is linear in it.
+//! Events of a motion: its turning points, and the intervals in which a
+//! slider's force is linear in it.
 
 use num_complex::Complex64;
 use stickslip_numerics::fourier::Fourier;
@@ -6,7 +7,7 @@ use stickslip_numerics::fourier::Fourier;
 /// A part of the period in which the force is `stiffness u + offset`.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Interval {
-    /// Phase, rad; the end may lie beyond a period.
+    /// Phase, rad; the end may exceed one period.
     pub(super) begin: f64,
     pub(super) end: f64,
     pub(super) stiffness: f64,
@@ -15,23 +16,23 @@ pub(in super::super) struct Interval {
     pub(super) slips: bool,
 }
 
-/// What the offset moves with.
+/// The quantity on which the offset depends.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum Anchor {
-    /// Nothing: the slider has not slipped since static equilibrium.
+    /// None: the offset is constant, as for a slider that has not slipped since static equilibrium.
     Nothing,
     /// The motion at a phase, rad.
     At(f64),
 }
 
-/// A turning point of the motion: phase (rad) and value (m).
+/// A turning point of the motion: phase (rad) and displacement (m).
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Extreme {
     pub(super) at: f64,
     pub(super) value: f64,
 }
 
-/// Where a motion is looked at to tell its turning points apart.
+/// Samples of a motion that separate its turning points.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Grid {
     pub(super) fourier: Fourier,
@@ -40,11 +41,12 @@ pub(in super::super) struct Grid {
     pub(super) slope: Vec<f64>,
 }
 
-/// Points of the grid for every harmonic, at least: between two of them the motion is a cubic but for a thousandth of the highest harmonic.
+/// Least number of grid points per harmonic. Between two of them the motion is
+/// a cubic up to a thousandth of the highest harmonic.
 const POINTS: usize = 8;
 
 impl Grid {
-    /// For harmonics up to `top`.
+    /// Creates a grid for harmonics up to `top`.
     pub fn new(top: usize) -> Self {
         let points = (POINTS * (top + 1)).next_power_of_two();
         Grid { fourier: Fourier::new(points), pairs: Vec::new(), value: vec![0.0; points], slope: vec![0.0; points] }

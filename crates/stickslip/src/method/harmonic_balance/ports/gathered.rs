@@ -1,8 +1,9 @@
-//! Ports as they are gathered, joint after joint.
+//! Grouping of joints into ports.
 //!
-//! Joints that have one relative motion, and whose forces are multiples of each other in it, have one force port: only the sum of their forces is
-//! decided where they stick, and rounding cannot let one of them slip and not the next. Each joint has its share of that sum: rigid contacts
-//! side by side by their limits.
+//! Joints with proportional relative motions and proportional forces share one
+//! force port. While they stick, only the sum of their forces is determined. With
+//! one port, rounding cannot make one joint slip before the others. Each joint
+//! has a share of the sum; parallel rigid contacts share it by their limits.
 
 use super::sliders::Part;
 use super::{Kernel, Member, Port, Ports, Rigid, StaticState, Times};
@@ -11,17 +12,19 @@ use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
 use crate::model::{Line, PARALLEL, SystemJoint};
 
-/// What there is so far.
+/// The ports of the joints added so far.
 #[derive(Default)]
 pub(super) struct Gathered {
     ports: Ports,
-    /// Of force ports: their number, and the lines of their axes.
+    /// Number of every force port, and the lines of its axes.
     lines: Vec<(usize, Vec<Line>)>,
 }
 
 impl Gathered {
+    /// Adds the ports of joint number `j`.
+    ///
     /// # Errors
-    /// A law whose views harmonic balance cannot take.
+    /// Refuses a law without a view that harmonic balance can use.
     pub fn push(&mut self, j: usize, joint: &SystemJoint) -> Result<(), MethodError> {
         let law = joint.law();
         let unsupported = |misses| MethodError::law(NAME, joint, misses);
@@ -70,10 +73,11 @@ impl Gathered {
         self.ports.list.push(port);
     }
 
-    /// One port for elastic sliders and stops, and one for rigid sliders: both move alike.
+    /// Adds one port for elastic sliders and stops, and one for rigid sliders.
+    /// Both have the same motion.
     fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[Piece]) {
         let mut parts = Vec::new();
-        // rigid sliders side by side are one
+        // parallel rigid sliders act as one
         let (mut rigid, mut scale) = (0.0, 0.0);
         for piece in pieces {
             match *piece {
@@ -98,7 +102,7 @@ impl Gathered {
         }
     }
 
-    /// Adds a force port, or its joint to one that moves as it does.
+    /// Adds a force port, or adds the joint to an existing port with a proportional motion.
     fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, measures: (f64, f64, f64)) {
         let lines: Vec<Line> = of.axes().iter().map(Line::of).collect();
         let found = self.lines.iter().find_map(|(port, its)| {
@@ -114,10 +118,10 @@ impl Gathered {
         }
     }
 
-    /// Gives every port the force of all its joints, and each of these its share.
+    /// Sets the force of every port to that of all its joints, and the shares of these joints.
     pub fn finish(mut self) -> Ports {
         for port in &mut self.ports.list {
-            // what does the same work: so far shares are those of the first one's force
+            // equal virtual work; so far, shares refer to the force of the first joint
             let sum: f64 = port.members.iter().map(|member| member.factor * member.share).sum();
             port.members.iter_mut().for_each(|member| member.share /= sum);
             match &mut port.kernel {
@@ -133,7 +137,7 @@ impl Gathered {
     }
 }
 
-/// The factor by which all motions along some axes are those along others.
+/// Returns the factor between all motions along some axes and those along others.
 fn along(lines: &[Line], others: &[Line]) -> Option<f64> {
     if lines.len() != others.len() {
         return None;
@@ -143,10 +147,11 @@ fn along(lines: &[Line], others: &[Line]) -> Option<f64> {
     factors.all(|factor| factor.is_some_and(|f| (f - first).abs() <= PARALLEL * first.abs())).then_some(first)
 }
 
-/// How many times as large as that of `other` the force is, where the motion is `factor` times that of `other`; `None` if that depends on the motion.
+/// Returns the ratio of the force to that of `other`, for a motion that is `factor` times that
+/// of `other`. `None` if the ratio depends on the motion.
 fn times(kernel: &Kernel, other: &Kernel, factor: f64) -> Option<f64> {
     match (kernel, other) {
-        // it does not ask how fast the motion is
+        // rigid friction does not depend on the speed
         (Kernel::Rigid(rigid), Kernel::Rigid(other)) => Some(rigid.limit / other.limit),
         (Kernel::Prox(one), Kernel::Prox(other)) => {
             let as_fast = (factor.abs() - 1.0).abs() <= PARALLEL;
@@ -165,7 +170,8 @@ mod tests {
     use nalgebra::DMatrix;
     use std::sync::Arc;
 
-    /// The members of every port, by joint, of contacts on three coordinates: their laws, and what their axes have of all of these.
+    /// Returns the joints of every port. The contacts act on three coordinates,
+    /// given by their laws and the weights of their axes.
     fn members(joints: &[(SharedLaw, &[[f64; 3]])]) -> Vec<Vec<usize>> {
         let places = ["x", "y", "z"].map(str::to_owned).to_vec();
         let structure = Structure::new(places, DMatrix::identity(3, 3), DMatrix::zeros(3, 3), DMatrix::identity(3, 3));

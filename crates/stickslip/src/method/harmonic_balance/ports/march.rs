@@ -1,10 +1,15 @@
-//! Laws with memory: their states are run through the samples of a period until they repeat, with the exact derivative of what is computed.
+//! Laws with memory: integration of their states through the samples of a period until the
+//! states repeat, with the exact derivative of the computed result.
 //!
-//! A step makes states and forces of the states before it and of its inputs, which are linear in the harmonics of the motion. The states
-//! `z` at t = 0 repeat if `z = F(z)` over the period: Newton's method with the product `Π` of the steps' derivatives, or more periods where
-//! it does not help. By a harmonic of the motion, `δz = Π δz + δq`. In directions in which nothing is forgotten, as in a contact that
-//! sticks all the time, `1 - Π` is singular: there states and derivatives are those of a joint that was moved straight from
-//! static equilibrium to where the period begins.
+//! A step computes states and forces from the previous states and its inputs. The inputs are
+//! linear in the harmonics of the motion. The states `z` at t = 0 are periodic if `z = F(z)`,
+//! with the map `F` over one period. Newton's method solves this with `Π`, the product of the
+//! steps' derivatives; if it does not converge, the integration continues for more periods.
+//!
+//! The derivative by a harmonic of the motion follows from `δz = Π δz + δq`. If some state is
+//! never forgotten, as in a permanently stuck contact, `1 - Π` is singular. Along such
+//! directions, states and derivatives are those of a joint that moves straight from static
+//! equilibrium to the beginning of the period.
 
 use super::alternation::{Alternation, share};
 use super::memory::{Memory, REPEATS, at_once};
@@ -16,49 +21,57 @@ use std::ops::Range;
 use stickslip_numerics::dense::multiply_in_blocks;
 use stickslip_numerics::interrupt;
 
-/// The same as [`REPEATS`] where they come no closer.
+/// Replaces [`REPEATS`] if the change over a period no longer decreases.
 const ROUNDED: f64 = 1e-9;
-/// Periods, at most: hysteresis that slips forgets in a few.
+/// Maximum number of periods with derivatives; hysteresis that slips forgets in a few.
 const PERIODS: usize = 60;
-/// Periods that are followed without derivatives, at most, and the share of their distance that the next one may leave: a period with derivatives
-/// costs as much as three without.
+/// Maximum number of initial periods without derivatives, and the ratio of successive changes
+/// above which they end. A period with derivatives costs as much as three without.
 const FORGETS: usize = 6;
 const SLOW: f64 = 0.03;
-/// Share of the least distance so far that a period is to leave where the derivative of a motion nearby leads; one may miss it.
+/// Ratio to the least change so far that a step of Broyden's method must reach.
+/// Two misses in a row end the iteration.
 const NEARER: f64 = 0.3;
-/// Singular values of `1 - Π` below this belong to states that nothing forgets.
+/// Singular values of `1 - Π` below this belong to states that are never forgotten.
 const NEUTRAL: f64 = 1e-9;
-/// Harmonics up to which those of a derivative are made by a matrix, not by transforms.
+/// Number of harmonics up to which a matrix product transforms derivatives, instead of FFTs.
 const FEW: usize = 16;
 
-/// A law with memory as a chain of steps.
+/// A law with memory as a sequence of steps.
 pub(super) trait March {
     fn states(&self) -> usize;
-    /// Their size.
+    /// Returns the size of the states.
     fn state_scale(&self) -> f64;
     fn axes(&self) -> usize;
-    /// Inputs of a step for each axis; they are ordered by kind, then by axis.
+    /// Returns the number of inputs of a step for each axis. Inputs are ordered
+    /// by kind, then by axis.
     fn inputs(&self) -> usize;
-    /// Whether the last of the derivatives of a step is that by ω, at the same displacements.
+    /// Tells whether the last derivative of a step is that by ω, at fixed displacements.
     fn knows_frequency(&self) -> bool {
         false
     }
-    /// What the inputs along an axis are when its motion is `Re(U e^{jhθ})`, by U, in the step that ends where `e^{jhθ}` is `at`; steps
-    /// have the length `angle`.
+    /// Returns the factors `w` of the inputs `Re(U w)` along an axis, for the
+    /// motion `Re(U e^{jhθ})` and a step that ends where `e^{jhθ}` equals `at`.
+    /// `angle` is the length of a step.
     fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
-    /// The same for the first movement.
+    /// Returns these factors for the initial step.
     fn first_waves(&self, h: usize) -> [Complex64; 4];
-    /// The steps of a period, from sample 0 to sample 1 and in the end from the last to sample 0: states at sample 0 before and after, and the forces at
-    /// the samples. `rows`, [sample]: derivatives of the states after the step that ends there, then of the forces, by inputs and states before, and by ω
-    /// if it is known.
-    /// False if some step has no solution.
+    /// Takes all steps of a period: from sample 0 to sample 1, and at last from
+    /// the last sample to sample 0. Replaces the states `z` at sample 0 by
+    /// those after the period, and writes the forces at the samples.
+    ///
+    /// `rows`, [sample], receives the derivatives of the step that ends at the sample: those of
+    /// the states after it, then those of the forces. Its columns are the inputs, the states
+    /// before, and ω if that is known. Returns false if a step has no solution.
     fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
-    /// The first movement, straight from static equilibrium to sample 0.
+    /// Takes the initial step, straight from static equilibrium to sample 0.
+    /// Returns false if it has no solution.
     fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
 }
 
 impl Alternation {
-    /// Forces along the axes and their derivative. Without an answer the forces are no numbers.
+    /// Computes the forces along the axes and their derivative. The forces are
+    /// NaN if no periodic states are found.
     pub(super) fn march(&mut self, march: &mut dyn March, force: &mut [Complex64], tangent: Option<&mut [f64]>) {
         let nh = self.harmonics.len();
         let mut memory = std::mem::take(&mut self.march);
@@ -78,7 +91,9 @@ impl Alternation {
         self.march = memory;
     }
 
-    /// States that repeat, into `self.state`, the forces, and the derivatives of all steps if `linear`. Returns Π, or any matrix if not.
+    /// Finds periodic states, into `self.state`, and the forces. With `linear`,
+    /// computes the derivatives of all steps and returns Π; otherwise returns
+    /// an arbitrary matrix. `None` if no periodic states are found.
     fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory, linear: bool) -> Option<DMatrix<f64>> {
         let m = march.states();
         let scale = march.state_scale();
@@ -99,12 +114,13 @@ impl Alternation {
                 return Some(DMatrix::zeros(m, m));
             }
         } else if linear && self.repeats > REPEATS && known.forgets.len() == m * m {
-            // from other samples: a period without derivatives leads near enough, and costs a third of one with them
+            // known states from other samples: one period without derivatives brings them near
+            // enough, at a third of the cost of one with derivatives
             let inverse = DMatrix::from_row_slice(m, m, &known.forgets);
             let change = self.period(march, &z, None)? - &z;
             z += inverse * change;
         } else if !begun {
-            // what slips forgets its beginning in a few periods: no derivative is needed to see that
+            // a law that slips forgets its initial states in a few periods without derivatives
             let mut last = f64::INFINITY;
             for _ in 0..FORGETS {
                 let after = self.period(march, &z, None)?;
@@ -130,7 +146,7 @@ impl Alternation {
                 self.state.extend(z.iter());
                 return Some(product);
             }
-            // a period forgets; Newton's method helps where that is slow
+            // Newton step while the change halves, otherwise one more period
             if gap < 0.5 * last || last.is_infinite() {
                 z += pseudo_inverse(DMatrix::identity(m, m) - product) * (after - &z);
             } else {
@@ -141,10 +157,13 @@ impl Alternation {
         None
     }
 
-    /// From states that repeat in a motion nearby to those that repeat in this one, by what a period forgets in that motion and by what it is seen to
-    /// forget in this one: without derivatives, which cost as much as three periods. Whether they were found, into `self.state`; if not `z` is nearer
-    /// to them all the same.
-    /// Source: Broyden, "A class of methods for solving nonlinear simultaneous equations" (1965), his good one.
+    /// Finds periodic states from those of a nearby motion by Broyden's method. The initial
+    /// inverse Jacobian is that of the nearby motion. No derivatives are needed, which cost as
+    /// much as three periods. Returns whether the states were found, into `self.state`. If not,
+    /// `z` is the last iterate. `None` if a step has no solution.
+    ///
+    /// Source: Broyden, "A class of methods for solving nonlinear simultaneous
+    /// equations" (1965), his good method.
     fn repeat_nearby(
         &mut self,
         march: &mut dyn March,
@@ -164,7 +183,7 @@ impl Alternation {
             if waited > 1 || !gap.is_finite() {
                 return Some(false);
             }
-            // the step that this change of the gap would have asked for
+            // the step that the inverse predicts for this change of the gap
             let seen = &inverse * (&change - &after);
             let size = step.dot(&seen);
             if size != 0.0 {
@@ -177,7 +196,7 @@ impl Alternation {
         Some(true)
     }
 
-    /// A period from the states `z`.
+    /// Integrates one period and returns the states after it. `None` if a step has no solution.
     fn period(
         &mut self,
         march: &mut dyn March,
@@ -196,7 +215,8 @@ impl Alternation {
         march.around(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
     }
 
-    /// The same with the derivative by the states before, and that of the forces.
+    /// Integrates one period with derivatives. Returns the states after it and Π, and writes
+    /// the derivatives of the forces by the initial states.
     fn linear_period(
         &mut self,
         march: &mut dyn March,
@@ -209,7 +229,7 @@ impl Alternation {
         Some((after, Chain::of(march, &memory.rows, n).product(&mut memory.by_state)))
     }
 
-    /// Adds the derivative of the forces. False if the first movement has none.
+    /// Adds the derivative of the forces. Returns false if the first period has no solution.
     fn march_tangent(
         &mut self,
         march: &mut dyn March,
@@ -227,7 +247,7 @@ impl Alternation {
         if !neutral {
             self.forgets.extend(inverse.transpose().iter());
         }
-        // where something is never forgotten, its derivative is that of the first period
+        // states that are never forgotten have the derivative of the first period
         let beginning = if neutral {
             let mut first = std::mem::take(&mut memory.first);
             let rows = self.first_period(march, &mut first);
@@ -247,7 +267,7 @@ impl Alternation {
             let sizes = (d * m, n, wide);
             multiply_in_blocks(&memory.by_state, &memory.projection, &mut memory.of_states, sizes, true);
         }
-        // forces that see where the step ends alone have a slope at every sample
+        // a force that depends only on the end of the step has a slope at every sample
         let one = Complex64::new(1.0, 0.0);
         let ends = |h: &usize| march.inputs() == 2 && march.waves(*h, TAU / n as f64, one)[1] == one;
         let by_ends = few && self.harmonics.iter().all(ends);
@@ -255,7 +275,8 @@ impl Alternation {
         for a in own..d {
             self.momentary_tangent(march, &memory.rows, a, tangent);
         }
-        // of few harmonics all axes at once; the derivatives of long series by as many as there is memory for
+        // few harmonics: all axes at once; a long series: one axis and a group
+        // of harmonics at a time
         let (together, count) = if few { (d, nh) } else { (1, at_once(d, n, nh).0) };
         let moved = if own == 0 { 0 } else { d };
         for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
@@ -265,7 +286,7 @@ impl Alternation {
                 let tall = together * wide_here;
                 self.follow(march, memory, steps, (Input::Solution { first }, together, wide_here, own));
                 if few {
-                    // [sample][axis][column] times the waves of the harmonics
+                    // [sample][axis][column] times the projection on the harmonics
                     memory.spectrum.resize(own * tall * wide, 0.0);
                     let sizes = (own * tall, n, wide);
                     multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
@@ -311,7 +332,8 @@ impl Alternation {
         true
     }
 
-    /// Adds the derivative of a force by where the step ends, at every sample.
+    /// Adds the derivative of the force along axis `a` by the displacement at
+    /// the end of the step, at every sample.
     fn momentary_tangent(&mut self, march: &dyn March, rows: &[f64], a: usize, tangent: &mut [f64]) {
         let (m, d, width) = (march.states(), march.axes(), width(march));
         self.reserve_slopes(1);
@@ -324,7 +346,8 @@ impl Alternation {
         }
     }
 
-    /// What makes the harmonics of a signal, real and imaginary parts, 2 × harmonics for each sample; a mean has no imaginary part.
+    /// Fills the matrix from a signal to its harmonics: real and imaginary parts, 2 × harmonics
+    /// for each sample. A mean has no imaginary part.
     fn fill_projection(&self, projection: &mut Vec<f64>) {
         let n = self.samples();
         if projection.len() == 2 * self.harmonics.len() * n {
@@ -339,10 +362,11 @@ impl Alternation {
         }
     }
 
-    /// What the parts of some harmonics of a motion make of the inputs: [sample][kind][part], and behind the samples for the first movement.
+    /// Fills the derivatives of the inputs by the parts of some harmonics of a motion:
+    /// [sample][kind][part], followed by those of the initial step.
     fn fill_waves(&self, march: &dyn March, Memory { waves, steps, .. }: &mut Memory, range: Range<usize>) {
         let (n, kinds, harmonics) = (self.samples(), march.inputs(), &self.harmonics[range]);
-        // steps are alike but for where they are on the circle
+        // all steps have these factors, rotated on the unit circle
         let one = Complex64::new(1.0, 0.0);
         let each = harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one));
         let fixed: Vec<[Complex64; 4]> = each.chain(harmonics.iter().map(|&h| march.first_waves(h))).collect();
@@ -368,9 +392,13 @@ impl Alternation {
         *steps = fixed;
     }
 
-    /// The derivative of the sampled forces by inputs, with states at t = 0 as they were, into `memory.columns`: [sample][axis][column], for so many axes as are its
-    /// `own`; the changes of these states that repeat into `memory.shift`. The columns are the parts of the harmonics of a motion along so many axes, or the frequency. `beginning`: the
-    /// steps of the first period, if something is never forgotten.
+    /// Computes the derivative of the sampled forces by the inputs at fixed states at t = 0,
+    /// into `memory.columns`: [sample][axis][column], for the first `own` axes. Writes the
+    /// changes of these states that keep them periodic into `memory.shift`.
+    ///
+    /// The columns are the parts of the harmonics of the motion along `count` axes, or the
+    /// frequency. `beginning` contains the steps of the first period if some state is never
+    /// forgotten; the states at t = 0 then change with the inputs.
     fn follow(
         &self,
         march: &dyn March,
@@ -390,7 +418,7 @@ impl Alternation {
         let none = Vec::new();
         let waves = |i: usize| if matches!(input, Input::Frequency) { &none[..] } else { at(i) };
         if let Some(beginning) = beginning {
-            // behind those of the samples stand those of the first movement
+            // the factors of the initial step follow those of the samples
             by.advance(&memory.first[..m * width], waves(n), &next, &mut start);
             for step in 1..=n {
                 let i = step % n;
@@ -398,7 +426,7 @@ impl Alternation {
                 std::mem::swap(&mut start, &mut next);
             }
         }
-        // from states that do not change
+        // one period from the initial change
         memory.columns.resize(n * own * tall, 0.0);
         let mut s = start.clone();
         for step in 1..=n {
@@ -408,13 +436,13 @@ impl Alternation {
             let columns = &mut memory.columns[i * own * tall..][..own * tall];
             let forces = &forces[..own * width];
             let same = forces.iter().zip(states).take_while(|(a, b)| a == b).count() / width;
-            // forces that are states
+            // forces that are states have the same derivatives
             let (alike, other) = columns.split_at_mut(same * tall);
             alike.copy_from_slice(&next[..same * tall]);
             by.advance(&forces[same * width..], waves(i), &s, other);
             std::mem::swap(&mut s, &mut next);
         }
-        // the states at t = 0 follow so that they repeat
+        // the states at t = 0 change so that they stay periodic
         memory.shift.clear();
         memory.shift.resize(m * tall, 0.0);
         for (r, shift) in memory.shift.chunks_exact_mut(tall).enumerate() {
@@ -426,7 +454,8 @@ impl Alternation {
         }
     }
 
-    /// Derivatives of the steps of the first period; those of the first movement into `first`. The forces stay those of the last.
+    /// Computes the derivatives of the steps of the first period, and of the
+    /// initial step into `first`. Restores `self.force`.
     fn first_period(&mut self, march: &mut dyn March, first: &mut Vec<f64>) -> Option<Vec<f64>> {
         let (m, d) = (march.states(), march.axes());
         first.resize((m + d) * width(march), 0.0);
@@ -444,7 +473,7 @@ impl Alternation {
 }
 
 impl Memory {
-    /// Adds to the columns what the changes of the states at t = 0 do to the forces.
+    /// Adds to the columns the effect of the changes of the states at t = 0 on the forces.
     fn shift_columns(&mut self, states: usize, wide: usize) {
         if states == 0 {
             return;
@@ -455,7 +484,8 @@ impl Memory {
     }
 }
 
-/// The derivatives of all steps of a period: [sample][state, then force], each by inputs, then by the states before, from `before` on.
+/// The derivatives of all steps of a period: [sample][state, then force]. The columns are the
+/// inputs, then from `before` on the states before the step.
 struct Chain<'a> {
     rows: &'a [f64],
     width: usize,
@@ -471,7 +501,8 @@ impl<'a> Chain<'a> {
         Chain { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
     }
 
-    /// How many of the last forces depend at no sample on where the step began, nor on states: on two inputs, displacements before and after.
+    /// Returns the number of trailing forces that depend only on the end of the step at every
+    /// sample. The inputs are the displacements before and after the step.
     fn momentary(&self) -> usize {
         let size = (self.states + self.axes) * self.width;
         let remember = |a: usize| {
@@ -482,7 +513,9 @@ impl<'a> Chain<'a> {
         (0..self.axes).rev().take_while(|a| !remember(*a)).count()
     }
 
-    /// Π, the states after a period by those before it; the forces at the samples by these into `forces`, [sample][axis][state].
+    /// Returns Π, the derivative of the states after a period by those before
+    /// it. Writes the derivative of the forces at the samples by these states
+    /// into `forces`, [sample][axis][state].
     fn product(&self, forces: &mut [f64]) -> DMatrix<f64> {
         match self.states {
             0 => DMatrix::zeros(0, 0),
@@ -492,7 +525,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// With so many states: most laws have one or two.
+    /// Computes the product for a fixed number of states; most laws have one or two.
     fn multiplied<const M: usize>(&self, forces: &mut [f64]) -> DMatrix<f64> {
         let mut product: [[f64; M]; M] = std::array::from_fn(|s| std::array::from_fn(|t| f64::from(u8::from(s == t))));
         for step in 1..=self.samples {
@@ -526,38 +559,40 @@ impl<'a> Chain<'a> {
     }
 }
 
-/// Derivatives of a step: by its inputs, by the states before it, and by ω if that is known.
+/// Returns the number of derivatives of a step: by its inputs, by the states
+/// before it, and by ω if that is known.
 fn width(march: &dyn March) -> usize {
     march.inputs() * march.axes() + march.states() + usize::from(march.knows_frequency())
 }
 
-/// By what a derivative is taken.
+/// The variables of a derivative.
 #[derive(Clone, Copy)]
 enum Input {
-    /// The harmonics of the motion along an axis and the next ones.
+    /// The harmonics of the motion along this axis and the next ones.
     Solution { first: usize },
     /// The frequency ω.
     Frequency,
 }
 
-/// Derivatives of what is `Re(U wave)` by the parts of U, of harmonic `h`.
+/// Returns the derivatives of `Re(U wave)` by the real and imaginary part of U, of harmonic `h`.
 fn parts(wave: Complex64, h: usize) -> (f64, f64) {
     (wave.re, if h == 0 { 0.0 } else { -wave.im })
 }
 
-/// How inputs enter a step.
+/// Layout of the derivatives of a step by its inputs.
 struct By {
     input: Input,
     kinds: usize,
     axes: usize,
     width: usize,
-    /// Columns of an axis, and of all.
+    /// Number of columns of one axis, and of all.
     wide: usize,
     tall: usize,
 }
 
 impl By {
-    /// `rows` times the inputs, [kind][column of any axis], and the states, [state][column], into `out`, [row][column].
+    /// Multiplies `rows` by the inputs, [kind][column of any axis], and by the states,
+    /// [state][column]. Writes the result into `out`, [row][column].
     #[inline]
     fn advance(&self, rows: &[f64], waves: &[f64], states: &[f64], out: &mut [f64]) {
         for (row, out) in rows.chunks_exact(self.width).zip(out.chunks_exact_mut(self.tall)) {
@@ -588,7 +623,8 @@ impl By {
     }
 }
 
-/// The sum of weighted inputs and states. What is apart sees none of them, and what sticks along another axis no inputs.
+/// Computes the weighted sum of inputs and states. An open contact has only zero weights; one
+/// that sticks along another axis has no weights of inputs.
 #[inline]
 fn mix(weights: [f64; 4], [from, to, one, two]: [&[f64]; 4], out: &mut [f64]) {
     let states = one.iter().zip(two);
@@ -603,7 +639,7 @@ fn mix(weights: [f64; 4], [from, to, one, two]: [&[f64]; 4], out: &mut [f64]) {
     }
 }
 
-/// Adds `weight` times `values`; most weights of a step are zero.
+/// Adds `weight` times `values`. Most weights of a step are zero.
 #[inline]
 fn add(to: &mut [f64], weight: f64, values: &[f64]) {
     if weight != 0.0 {
@@ -611,7 +647,7 @@ fn add(to: &mut [f64], weight: f64, values: &[f64]) {
     }
 }
 
-/// The inverse where there is one, and zero along directions that are neutral.
+/// Returns the pseudo-inverse, with singular values below [`NEUTRAL`] taken as zero.
 fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let m = matrix.nrows();
     if m == 0 {

@@ -1,15 +1,18 @@
-//! Motion ports of laws by Masing's rules: exact for the series, as sliders are.
+//! Motion ports of laws that obey Masing's rules: exact for the series.
 //!
-//! Between two turning points of the motion the force follows one branch of the law after the other,
-//! `f = f_r ± s B(|u - u_r|/s)` with `s = 2`, or 1 where it is first loading: a loop that closes hands over to the branch
-//! that it interrupted, and where all of the law slips the force is constant. Turning points and the phases at which loops
-//! close are zeros of the series, found by Newton's method; the harmonics of the force are integrals over the branches, by
-//! Gauss's rules on panels that are as short as the highest harmonic asks for. From a turning point at θ_r on the force of a
-//! law with a power as its distribution goes with a power of `(θ - θ_r)²`, so that the first panel of a branch is integrated
-//! in the square root of that distance.
+//! Between two turning points of the motion the force follows one branch of the
+//! law after the other, `f = f_r ± s B(|u - u_r|/s)`. The scale is `s = 2`, or
+//! `s = 1` on first loading. When a loop closes, the force continues on the
+//! branch that the loop interrupted. In full slip the force is constant.
 //!
-//! The derivative is that of the branches: `δf = B' (δu - δu_r) + δf_r`, where `f_r` depends on the return points that are
-//! still remembered.
+//! Turning points and the phases at which loops close are zeros of the series, found by Newton's
+//! method. The harmonics of the force are integrals over the branches, by Gauss quadrature on
+//! panels that are short enough for the highest harmonic. After a turning point at θ_r, the force
+//! of a law with a power-law distribution varies with a power of `(θ - θ_r)²`. The first panel of a
+//! branch is therefore integrated in the square root of that distance.
+//!
+//! The derivative is that of the branches: `δf = B' (δu - δu_r) + δf_r`. `f_r`
+//! depends on the return points that are still remembered.
 
 use super::StaticState;
 use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
@@ -22,24 +25,25 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use stickslip_numerics::quadrature;
 
-/// A return point, or where the law is at rest: displacement (m), and what it moves with.
+/// A return point, or the rest position of the law: displacement (m), and the
+/// quantity it depends on.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     value: f64,
     anchor: Anchor,
 }
 
-/// A part of the period on one branch, from the last of the points that are remembered on it.
+/// A part of the period on one branch, which begins at the last of its return points.
 #[derive(Debug, Clone)]
 struct Branch {
-    /// Phases, rad; the end may lie beyond a period.
+    /// Phases, rad; the end may exceed one period.
     begin: f64,
     end: f64,
     /// The direction of the motion, +1 or -1.
     sign: f64,
-    /// Whether it begins at a turning point.
+    /// True if it begins at a turning point.
     turns: bool,
-    /// The points that are remembered, the law's place of rest first.
+    /// The remembered points, the rest position of the law first.
     points: Range<usize>,
 }
 
@@ -48,11 +52,12 @@ struct Branch {
 pub(in super::super) struct Branches {
     list: Vec<Branch>,
     points: Vec<Point>,
-    /// The points that are remembered on the way.
+    /// The points that are remembered at the present phase.
     memory: Vec<Point>,
 }
 
-/// The force on a branch: `from` a displacement with the force `begin`, in a scale of 1 or 2.
+/// The force on a branch, from the displacement `from` with the force `begin`,
+/// with a scale of 1 or 2.
 struct Curve<'a> {
     law: &'a dyn Masing,
     from: f64,
@@ -62,16 +67,16 @@ struct Curve<'a> {
 }
 
 impl Curve<'_> {
-    /// Force and slope, N and N/m.
+    /// Returns force (N) and slope (N/m).
     fn at(&self, u: f64) -> (f64, f64) {
-        // rounding alone leads back beyond the return point
+        // only rounding places the motion before the return point
         let way = ((u - self.from) * self.sign).max(0.0);
         let (force, slope) = self.law.backbone(way / self.scale);
         (self.begin + self.sign * self.scale * force, slope)
     }
 }
 
-/// First loading, or a branch behind a return point, by the number of legs before it.
+/// Returns the scale of a branch from the number of legs before it: 1 on first loading, else 2.
 fn scale(legs: usize) -> f64 {
     if legs == 0 { 1.0 } else { 2.0 }
 }
@@ -89,7 +94,8 @@ impl Branches {
         self.list.push(Branch { begin, end, sign, turns, points: first..self.points.len() });
     }
 
-    /// The force at the end of the last leg between these points, and its derivative by every one of them, into `slopes`.
+    /// Returns the force at the end of the last leg between these points.
+    /// Writes its derivative by every point into `slopes`.
     fn force(&self, law: &dyn Masing, points: &[Point], slopes: &mut Vec<f64>) -> f64 {
         slopes.clear();
         slopes.resize(points.len(), 0.0);
@@ -104,7 +110,8 @@ impl Branches {
         sum
     }
 
-    /// The curve of a branch, with the derivative of the force where it begins.
+    /// Returns the curve of a branch. Writes the derivative of its initial
+    /// force by every point into `slopes`.
     fn curve<'a>(&self, law: &'a dyn Masing, branch: &Branch, slopes: &mut Vec<f64>) -> Curve<'a> {
         let points = &self.points[branch.points.clone()];
         let begin = self.force(law, points, slopes);
@@ -114,7 +121,8 @@ impl Branches {
 }
 
 impl Alternation {
-    /// Adds the harmonics of the force of a law in the motion `c` to `force`, and their derivative to `tangent`.
+    /// Adds the harmonics of the force of a law in the motion `c` to `force`,
+    /// and their derivative to `tangent`.
     pub(super) fn masing(
         &mut self,
         law: &dyn Masing,
@@ -131,7 +139,7 @@ impl Alternation {
         (self.branches, self.harmonics) = (branches, harmonics);
     }
 
-    /// Samples of the force, and the legs at t = 0.
+    /// Samples the force, and computes the legs at t = 0.
     pub(super) fn sample_masing(&mut self, law: &dyn Law, rest: &StaticState, c: &[Complex64]) {
         let (Some(curve), Some(step)) = (law.masing(), law.step()) else { return };
         self.find(c);
@@ -148,7 +156,7 @@ impl Alternation {
             for i in (sample(branch.begin)..sample(branch.end)).map(|i| i % n) {
                 self.force[0][i] = along.at(self.signal[i]).0;
                 if i == 0 {
-                    // from return point to return point
+                    // one leg from return point to return point
                     let mut before = [branches.points[branch.points.start].value, 0.0, 0.0];
                     self.state.fill(0.0);
                     let points = branches.points[branch.points.clone()].iter().map(|point| point.value);
@@ -162,14 +170,15 @@ impl Alternation {
         (self.branches, self.harmonics) = (branches, harmonics);
     }
 
-    /// The branches of a period of the motion whose turning points have been found, after one period from static equilibrium
-    /// on: by then whatever it forgets is forgotten.
+    /// Computes the branches of a period from the turning points found before.
+    /// The motion first passes one period from static equilibrium; after it the
+    /// law has forgotten all that it can forget.
     fn remember(&self, law: &dyn Masing, rest: &StaticState, series: Series, branches: &mut Branches) {
         branches.clear();
         branches.memory.push(Point { value: 0.0, anchor: Anchor::Nothing });
         let count = self.extremes.len();
         let rest = rest.displacement[0] * self.static_share;
-        // static equilibrium is a return point where the motion turns back there
+        // static equilibrium is a return point if the motion reverses there
         let first = self.extremes.first().map_or(self.grid.value[0], |extreme| extreme.value);
         if (first - rest) * rest < 0.0 {
             let end = Extreme { at: 0.0, value: rest };
@@ -188,7 +197,8 @@ impl Alternation {
         }
     }
 
-    /// The motion goes on to its next turning point; from a phase on, or, before the period that is told, from nowhere.
+    /// Continues the motion to its next turning point. Records the branches from the phase
+    /// `begin` on; `None` is a leg before the recorded period.
     fn add_leg(
         &self,
         law: &dyn Masing,
@@ -199,7 +209,7 @@ impl Alternation {
         let last = branches.memory[branches.memory.len() - 1].value;
         let sign = (end.value - last).signum();
         let (mut begin, mut turns) = (begin, true);
-        // up to where the motion passes `value`
+        // records a branch that ends where the motion passes `value`
         let mut until = |branches: &mut Branches, value: Option<f64>| {
             let Some(from) = begin else { return };
             let to = value.map_or(end.at, |value| {
@@ -229,7 +239,7 @@ impl Alternation {
         branches.memory.push(Point { value: end.value, anchor });
     }
 
-    /// Harmonics of the force, and their derivative.
+    /// Adds the harmonics of the force, and their derivative.
     fn add_branches(
         &mut self,
         law: &dyn Masing,
@@ -285,7 +295,8 @@ impl Alternation {
             for (sum, of_branch) in stiffness.iter_mut().zip(&*of_branch) {
                 *sum += of_branch / TAU;
             }
-            // δf = B' (δu - δu_r) + δf_r: a column and a row for the return point, and one for the force from there on
+            // δf = B' (δu - δu_r) + δf_r: a rank-one term for the return point,
+            // and one for the initial force
             let points = &branches.points[branch.points.clone()];
             for (value, &h) in own.iter_mut().zip(harmonics) {
                 *value = of_branch[h] * share(h);
@@ -310,10 +321,11 @@ impl Alternation {
     }
 }
 
-/// Panels of a period for a motion of no harmonics; two more for each, so that products of two of them are integrated.
+/// Panels of a period for a motion without harmonics. Each harmonic adds two,
+/// so that products of two harmonics are integrated.
 const PANELS: usize = 8;
 
-/// What points and their factors are by the harmonics of the motion: `Σ factor δu* = Re(row δU)`.
+/// Computes the row of points and their factors: `Σ factor δu* = Re(row δU)`.
 fn row<'a>(row: &mut [Complex64], harmonics: &[usize], points: impl IntoIterator<Item = (&'a Point, f64)>) {
     row.fill(ZERO);
     for (point, factor) in points {
@@ -369,7 +381,8 @@ mod tests {
         force
     }
 
-    /// Of a harmonic motion the loss is Segalman's power law, `π a Im f₁`, and beyond full slip that plus a rectangle.
+    /// In a harmonic motion the loss `π a Im f₁` obeys Segalman's power law.
+    /// Beyond full slip a rectangle is added.
     #[test]
     fn the_loss_is_the_closed_form() {
         for pair in LAWS {
@@ -383,14 +396,16 @@ mod tests {
                 expected += 4.0 * law.limit * (a - inside);
                 let force = respond(&law, &[1, 3, 5, 7], &[a.into(), ZERO, ZERO, ZERO], None);
                 let found = PI * a * force[0].im;
-                // a power of the distance from the turning point is integrated to some 1e-9 of the force
+                // the quadrature of a power of the distance from the turning
+                // point has an error of about 1e-9 of the force
                 let error = (found - expected).abs();
                 assert!(error < 1e-9 * expected.max(law.limit * a * 1e-3), "{pair:?} {share}: {found} {expected}");
             }
         }
     }
 
-    /// Motions with loops in loops: harmonics of the force are those of many straight steps, and derivatives are differences.
+    /// Motions with nested loops: the harmonics of the force agree with those of many straight
+    /// steps, and derivatives agree with differences.
     #[test]
     fn the_force_of_any_motion_is_that_of_small_steps() {
         let harmonics = [0, 1, 2, 3, 4, 5];
@@ -471,9 +486,11 @@ mod tests {
         assert!((force - alternation.force[0][1]).abs() < 1e-14);
     }
 
-    /// Orbits of a mass of 1 kg on 1e4 N/m and 2 N s/m with Iwan's law (5 kN/m, 4 N), from micro-slip to far beyond full slip:
-    /// amplitude and loss per cycle by harmonic balance of its own in NumPy, 61 harmonics and 65,536 samples of the closed
-    /// form, which agree with 31 harmonics to 1e-7.
+    /// Orbits of a mass of 1 kg on 1e4 N/m and 2 N s/m with Iwan's law (5 kN/m,
+    /// 4 N), from micro-slip to far beyond full slip.
+    ///
+    /// Amplitude and loss per cycle come from a separate harmonic balance in NumPy, with 61
+    /// harmonics and 65,536 samples of the closed form. They agree with 31 harmonics to 1e-7.
     const ORBITS: [[f64; 6]; 10] = [
         // chi, beta, frequency in Hz, force in N, amplitude in m, loss in J
         [-0.5, 0.3, 17.0, 3.0, 0.002_493_296_736, 0.019_150_365_504],
@@ -504,7 +521,7 @@ mod tests {
             let system = model.assemble().unwrap();
             assert_eq!(Auto.choice(&system).method, "harmonic-balance");
             let methods: [(&dyn Method, f64); 3] = [(&precise, 1e-6), (&Auto, 1e-4), (&Shooting::default(), 3e-5)];
-            // steps take their time
+            // shooting is slow, and runs for a quarter of the cases
             for (method, allowed) in methods.into_iter().take(if k % 4 == 0 { 3 } else { 2 }) {
                 let found = method.solver(&system).unwrap().orbit(TAU * frequency, None).unwrap();
                 let off = (found.places[0].amplitude() / amplitude - 1.0).abs();

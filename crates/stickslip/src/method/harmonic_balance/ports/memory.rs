@@ -1,43 +1,46 @@
-//! Memory that a march through the samples needs again and again.
+//! Scratch memory for the integration of laws with memory.
 
 use num_complex::Complex64;
 
-/// Distance of the states from those a period later, relative to their size, at which they repeat: the rounding of a thousand steps.
+/// Change of the states over a period, relative to their size, at which they
+/// count as periodic: the rounding of a thousand steps.
 pub(in super::super) const REPEATS: f64 = 1e-12;
 
-/// Memory in which the derivatives by the harmonics of a motion are followed, bytes: of those of a long series, some after the others.
+/// Memory for derivatives by the harmonics of a motion, bytes. Those of a long
+/// series are computed in groups of harmonics.
 const AT_ONCE: f64 = 2.5e8;
 
-/// Harmonics of a motion by which the forces of a law at so many samples are derived at once, and what that takes, bytes.
+/// Returns the number of harmonics by which the forces at all samples are
+/// differentiated at once, and the memory for that, bytes.
 pub(in super::super) fn at_once(axes: usize, samples: usize, harmonics: usize) -> (usize, f64) {
-    // parts of the forces at all samples, and what the harmonics make of the inputs
+    // forces at all samples by both parts of one harmonic
     let each = 8.0 * 2.0 * (axes * axes) as f64 * samples as f64;
     let count = harmonics.min((AT_ONCE / each) as usize).max(1);
     (count, each * count as f64)
 }
 
-/// Memory of a march.
+/// Scratch memory of one evaluation.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct Memory {
     /// Derivatives of every step.
     pub(super) rows: Vec<f64>,
-    /// Those of the first movement.
+    /// Derivatives of the initial step.
     pub(super) first: Vec<f64>,
-    /// Forces by the states at t = 0, per sample.
+    /// Derivatives of the forces by the states at t = 0, per sample.
     pub(super) by_state: Vec<f64>,
-    /// What the harmonics of a motion make of the inputs.
+    /// Derivatives of the inputs by the harmonics of a motion.
     pub(super) waves: Vec<f64>,
-    /// Of which steps these are.
+    /// Factors of the steps for which `waves` was computed.
     pub(super) steps: Vec<[Complex64; 4]>,
-    /// Forces by inputs: [sample][axis][column].
+    /// Derivatives of the forces by the inputs: [sample][axis][column].
     pub(super) columns: Vec<f64>,
-    /// Changes of the states at t = 0 that go with these columns, [state][column].
+    /// Changes of the states at t = 0 for these columns, [state][column].
     pub(super) shift: Vec<f64>,
     /// One of the columns over the samples.
     pub(super) signal: Vec<f64>,
-    /// From samples to harmonics, and these.
+    /// Matrix from samples to harmonics, and the harmonics of the columns.
     pub(super) projection: Vec<f64>,
     pub(super) spectrum: Vec<f64>,
-    /// Harmonics of the forces by the states at t = 0.
+    /// Derivatives of the harmonics of the forces by the states at t = 0.
     pub(super) of_states: Vec<f64>,
 }

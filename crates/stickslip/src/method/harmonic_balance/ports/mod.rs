@@ -1,12 +1,15 @@
-//! Ports: where a law meets the equations.
+//! Ports: the interface between a law and the equations of harmonic balance.
 //!
-//! A joint's law becomes one or several ports, by the view that is chosen for it. A port has an axis for each of the law's directions, and an
-//! unknown per axis and harmonic:
-//! - a *motion port* (sliders and stops, rate, step) has the motion `u` and makes the force `f(u)` of it;
-//! - a *force port* (prox) has the force `λ`, and makes `P J(λ + ε u')` of it, which it must be.
+//! A joint's law becomes one or several ports, by the view that is chosen for it. A port has
+//! one axis for each direction of the law, and one complex unknown per axis and harmonic:
+//! - A *motion port* (sliders and stops, Masing, rate, step) has the motion `u`
+//!   as its unknown. It computes the force `f(u)`.
+//! - A *force port* (prox) has the force `λ` as its unknown. It computes the
+//!   image `P J(λ + ε u')`, which must equal `λ`. `J` is the resolvent of the
+//!   law, `P` the truncation to the harmonics of the series.
 //!
-//! Both give the derivative by the unknowns exactly, over all axes and harmonics at once. The equations know nothing else of a law.
-//! Joints that move alike may have one force port together, see [`gathered`].
+//! Both kinds return the exact derivative by all unknowns of the port. The equations use nothing
+//! else of a law. Joints with proportional motions may share one force port, see [`gathered`].
 
 mod alternation;
 mod barrier;
@@ -36,89 +39,95 @@ use crate::model::{Axis, Cyclic, System, SystemJoint};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Directions of joints from which what the structure couples among them is multiplied with and not eliminated: few with many harmonics have steps that are
-/// hard to find by products, and a small matrix.
+/// Number of axes from which GMRES may replace elimination. With few axes and many harmonics,
+/// GMRES converges slowly and the matrix is small.
 pub(super) const MANY_DIRECTIONS: usize = 24;
 
-/// What acts at a port.
+/// The law of a port, by the view that is used.
 #[derive(Debug, Clone)]
 enum Kernel {
-    /// Sliders behind springs, and stops, side by side along one axis: the force is exact for the series.
+    /// Sliders behind springs, and stops, in parallel along one axis. The force
+    /// is exact for the series.
     Sliders(Vec<Part>),
-    /// Rigid sliders side by side along one axis, as one.
+    /// Rigid sliders in parallel along one axis, combined into one.
     Rigid(Rigid),
     /// A law by its resolvent.
     Prox(Times),
-    /// A law by its curve of first loading: the force is exact for the series.
+    /// A law by its curve of first loading. The force is exact for the series.
     Masing(SharedLaw),
     /// A law by its return map.
     Step(SharedLaw),
-    /// A law by its rates.
+    /// A law by the rates of its states.
     Rate(SharedLaw),
 }
 
-/// A joint that acts at a port, along each of the port's axes by its own axis of the same number.
+/// A joint that acts at a port. Each axis of the port corresponds to the
+/// joint's axis of the same number.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Member {
     pub joint: usize,
-    /// Its motion per that of the port.
+    /// Motion of the joint divided by the motion of the port.
     pub factor: f64,
-    /// Its force per that of the port.
+    /// Force of the joint divided by the force of the port.
     pub share: f64,
 }
 
-/// Displacements and states of a joint in static equilibrium under the constant loads, where every vibration begins.
+/// Displacements and states of a joint in static equilibrium under the constant
+/// loads. The history of every motion begins there.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StaticState {
-    /// Along the axes of the port, m.
+    /// Displacements along the axes of the port, m.
     pub displacement: [f64; MOST_DIRECTIONS],
-    /// Internal states of its law, or the forces of its sliders (N); none where the law has none.
+    /// Internal states of the law, or the forces of its sliders (N); empty if the law has none.
     pub states: Vec<f64>,
 }
 
-/// A relative motion along one to three axes with what acts along it: that of a joint, of several that move alike, or of their inner sliders behind
-/// springs.
+/// A relative motion along one to three axes, with the law that acts along it.
+/// It is the motion of one joint, of several joints with proportional motions,
+/// or of their inner sliders behind springs.
 #[derive(Debug, Clone)]
 pub(super) struct Port {
-    /// Its joints; it has the axes of the first.
+    /// The joints of the port. The port has the axes of the first one.
     pub members: Vec<Member>,
-    /// Number of its first axis among those of all ports.
+    /// Number of its first axis among the axes of all ports.
     pub first: usize,
-    /// How many it has.
+    /// Number of axes.
     pub axes: usize,
-    /// Compliance of the spring between the joint and this port, m/N; zero if it is the joint's own motion.
+    /// Compliance of the spring between the joint and this port, m/N; zero if
+    /// the port has the joint's own motion.
     pub series: f64,
-    /// Size of its forces, N; infinite if nothing bounds them. Finite for a force port.
+    /// Size of its forces, N; infinite if they are unbounded. Finite for a force port.
     pub scale: f64,
     /// The penalty above which its resolvent is single-valued, N s/m.
     pub least_penalty: f64,
-    /// Where its joint is before it vibrates.
+    /// Static equilibrium of its joint.
     pub static_state: StaticState,
     kernel: Kernel,
 }
 
 impl Port {
-    /// Its unknown is the force.
+    /// Tells whether the unknown is the force.
     pub fn is_force(&self) -> bool {
         matches!(self.kernel, Kernel::Rigid(_) | Kernel::Prox(_))
     }
 
-    /// Unit of its unknowns: the motion's length, m, or the law's scale, N.
+    /// Returns the unit of its unknowns: the length of the motion (m), or the law's scale (N).
     pub fn unit(&self, length: f64) -> f64 {
         if self.is_force() { self.scale } else { length }
     }
 
-    /// Whether its law is followed through the period, step by step, so that derivatives cost many times what forces cost.
+    /// Tells whether the law is integrated through the period, step by step.
+    /// Derivatives then cost many times as much as forces.
     pub fn marches(&self) -> bool {
         self.steps() || self.stateful().is_some()
     }
 
-    /// Whether it is followed by its return map.
+    /// Tells whether the law is integrated by its return map.
     pub fn steps(&self) -> bool {
         matches!(self.kernel, Kernel::Step(_))
     }
 
-    /// Whether it holds rigidly, so that accelerations jump.
+    /// Tells whether friction is rigid, so that accelerations jump.
     pub fn is_rigid(&self) -> bool {
         match &self.kernel {
             Kernel::Rigid(_) => true,
@@ -127,7 +136,7 @@ impl Port {
         }
     }
 
-    /// The limit of rigid friction along one axis, N.
+    /// Returns the limit of rigid friction along one axis, N.
     pub fn limit(&self) -> Option<f64> {
         match &self.kernel {
             Kernel::Rigid(rigid) => Some(rigid.limit),
@@ -135,7 +144,8 @@ impl Port {
         }
     }
 
-    /// Whether the kernel itself tells slip from stick, sample by sample ([`Alternation::slips`]).
+    /// Tells whether the kernel distinguishes slip from stick at every sample
+    /// ([`Alternation::slips`]).
     pub fn tells_slip(&self) -> bool {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().all(|part| matches!(part, Part::Slider { .. })),
@@ -144,17 +154,17 @@ impl Port {
         }
     }
 
-    /// Numbers of its axes among those of all ports.
+    /// Returns the numbers of its axes among the axes of all ports.
     pub fn range(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.axes
     }
 
-    /// What a joint has of it, if it is one of its own.
+    /// Returns the entry of a joint, if the joint belongs to this port.
     pub fn member(&self, joint: usize) -> Option<&Member> {
         self.members.iter().find(|member| member.joint == joint)
     }
 
-    /// The same kind of port at the same place, whatever the numbers.
+    /// Tells whether two ports have the same kind, axes and joints, whatever their parameters.
     pub fn is_like(&self, other: &Port) -> bool {
         let kind = |port: &Port| (port.first, port.axes, std::mem::discriminant(&port.kernel));
         let alike = |(own, its): (&Member, &Member)| own.joint == its.joint;
@@ -163,8 +173,8 @@ impl Port {
             && self.members.iter().zip(&other.members).all(alike)
     }
 
-    /// Complex stiffness of small motions about rest at a frequency (rad/s), axes × axes, N/m, of
-    /// a motion port.
+    /// Returns the complex stiffness of small motions about rest at a frequency
+    /// (rad/s), axes × axes, N/m. For motion ports.
     pub fn at_rest(&self, omega: f64) -> DMatrix<Complex64> {
         match &self.kernel {
             Kernel::Step(law) | Kernel::Rate(law) => crate::method::guess::at_rest(&**law, omega),
@@ -172,7 +182,7 @@ impl Port {
         }
     }
 
-    /// Stiffness at rest along its axes, N/m, roughly; zero if it is rigid.
+    /// Estimates the stiffness at rest along its axes, N/m; zero if the port is rigid.
     pub fn stiffness(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::stiffness).sum(),
@@ -184,14 +194,15 @@ impl Port {
                 }
             }
             Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => {
-                // a rate law at a frequency at which its states follow
+                // for a rate law, at 1 rad/s, where its states are assumed to follow
                 let at_rest = crate::method::guess::at_rest(&**law, 1.0);
                 (0..self.axes).map(|a| at_rest[(a, a)].norm()).fold(0.0, f64::max)
             }
         }
     }
 
-    /// Stiffness along one of its axes while its faces are closed and stick, N/m; zero where it is rigid, so that its force is an unknown.
+    /// Returns the stiffness along one axis while the faces are closed and stick, N/m. It is
+    /// zero for a force port, whose force is an unknown.
     pub fn closed(&self, axis: usize) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::closed).sum(),
@@ -203,7 +214,8 @@ impl Port {
         }
     }
 
-    /// How far its springs reach before they slip, m; zero if there are none.
+    /// Returns the largest displacement at which its springs begin to slip, m;
+    /// zero without springs.
     pub fn reach(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::reach).fold(0.0, f64::max),
@@ -212,12 +224,13 @@ impl Port {
         }
     }
 
-    /// How far the motion goes while the states of a law cross their range, m; none of a law that has none, or whose force nothing bounds.
+    /// Returns the displacement over which the states of a law cross their range, m. `None` for
+    /// a law without followed states or with an unbounded force.
     pub fn layer(&self) -> Option<f64> {
         self.stateful().map(|_| self.scale / self.stiffness()).filter(|layer| layer.is_finite())
     }
 
-    /// Internal states of a motion port.
+    /// Returns the number of internal states of a motion port.
     fn states(&self) -> usize {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().filter(|part| matches!(part, Part::Slider { .. })).count(),
@@ -227,7 +240,7 @@ impl Port {
         }
     }
 
-    /// The law, if its states are followed.
+    /// Returns the law if it is a rate law with internal states.
     fn stateful(&self) -> Option<&SharedLaw> {
         match &self.kernel {
             Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0) => Some(law),
@@ -235,7 +248,7 @@ impl Port {
         }
     }
 
-    /// The law, if the velocity alone decides its bounded force, which is sampled.
+    /// Returns the law if its force is bounded, sampled, and decided by the velocity alone.
     fn steep(&self) -> Option<&SharedLaw> {
         match &self.kernel {
             Kernel::Prox(times) => Some(&times.law),
@@ -255,14 +268,15 @@ impl Port {
     }
 }
 
-/// The ports of a system; a joint that carries no force has none.
+/// The ports of a system. A joint that carries no force has no port.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ports {
     list: Vec<Port>,
-    /// Joint and number within it of every axis: of several joints the first.
+    /// Joint and axis within the joint, for every axis. A port of several
+    /// joints lists the first one.
     axes: Vec<(usize, usize)>,
     wave: Option<Cyclic>,
-    /// Displacements along all axes in static equilibrium, m; empty where none is known.
+    /// Displacements along all axes in static equilibrium, m; empty if unknown.
     equilibrium: Vec<f64>,
 }
 
@@ -274,8 +288,10 @@ impl std::ops::Deref for Ports {
 }
 
 impl Ports {
+    /// Creates the ports of all joints.
+    ///
     /// # Errors
-    /// A law whose views harmonic balance cannot take.
+    /// Refuses a law without a view that harmonic balance can use.
     pub fn new(system: &System) -> Result<Self, MethodError> {
         Ports::of(system.joints())
     }
@@ -288,10 +304,11 @@ impl Ports {
         Ok(gathered.finish())
     }
 
-    /// Those of a ring's first sector in a travelling wave, and those of the whole ring, sector by sector the same; of any other system all of them.
+    /// Returns the ports of the first sector of a ring in a travelling wave, and the ports of
+    /// the whole ring, sector by sector. For any other system, returns all ports and `None`.
     ///
     /// # Errors
-    /// As [`Ports::new`].
+    /// See [`Ports::new`].
     pub fn of_sector(system: &System) -> Result<(Self, Option<Self>), MethodError> {
         let Some(cyclic) = system.cyclic() else { return Ok((Ports::new(system)?, None)) };
         let joints = system.joints().len() / cyclic.sectors;
@@ -308,12 +325,13 @@ impl Ports {
         Ok((first, Some(all)))
     }
 
-    /// Displacements along all axes in static equilibrium, m; empty where none is known.
+    /// Returns the displacements along all axes in static equilibrium, m; empty if unknown.
     pub fn equilibrium(&self) -> &[f64] {
         &self.equilibrium
     }
 
-    /// Begins every vibration at these states, one for each port; of a ring they are those of its first sector.
+    /// Sets the states from which the history of every motion begins, one for each port. For a
+    /// ring, `states` are those of the first sector.
     pub fn begin_at(&mut self, states: &[StaticState]) {
         let of_ports = self.list.iter().zip(states.iter().cycle());
         self.equilibrium = of_ports.flat_map(|(port, state)| state.displacement[..port.axes].to_vec()).collect();
@@ -325,12 +343,13 @@ impl Ports {
         }
     }
 
-    /// Of all ports.
+    /// Returns the static states of all ports.
     pub fn static_states(&self) -> Vec<StaticState> {
         self.list.iter().map(|port| port.static_state.clone()).collect()
     }
 
-    /// Begins every vibration at these displacements, with states that are so many times these.
+    /// Sets the initial states of all ports to `factor` times those in
+    /// `states`. Displacements stay.
     pub fn scale_static_forces(&mut self, states: &[StaticState], factor: f64) {
         for (port, state) in self.list.iter_mut().zip(states) {
             let own = &mut port.static_state.states;
@@ -338,52 +357,56 @@ impl Ports {
         }
     }
 
-    /// The wave in which the other sectors follow, if these are the ports of the first one alone.
+    /// Returns the travelling wave, if these are the ports of the first sector alone.
     pub fn wave(&self) -> Option<Cyclic> {
         self.wave
     }
 
-    /// Axes of all ports.
+    /// Returns the number of axes of all ports.
     pub fn count(&self) -> usize {
         self.axes.len()
     }
 
-    /// An axis by its number.
+    /// Returns an axis by its number.
     pub fn axis<'a>(&self, system: &'a System, number: usize) -> &'a Axis {
         let (joint, axis) = self.axes[number];
         &system.joints()[joint].axes()[axis]
     }
 
-    /// The joint of an axis, of several the first, and which of its axes it is.
+    /// Returns the joint of an axis (the first joint of its port), and the axis within the joint.
     pub fn place(&self, number: usize) -> (usize, usize) {
         self.axes[number]
     }
 
-    /// Whether some unknown is a force.
+    /// Tells whether any unknown is a force.
     pub fn has_forces(&self) -> bool {
         self.list.iter().any(Port::is_force)
     }
 
-    /// Whether the velocity alone decides a bounded force that is sampled: friction that is steep, falls with velocity, or turns in a plane.
+    /// Tells whether any force is bounded, sampled, and decided by the velocity alone: friction
+    /// that is steep, falls with velocity, or acts in a plane.
     pub fn has_steep(&self) -> bool {
         self.list.iter().any(|port| port.steep().is_some())
     }
 
-    /// Whether such a force, or that of a law whose states are followed, may fall with velocity.
+    /// Tells whether such a force, or the force of a rate law with states, may fall with velocity.
     pub fn has_falling(&self) -> bool {
         let laws = self.list.iter().filter_map(|port| port.steep().or_else(|| port.stateful()));
         laws.into_iter().any(|law| !law.is_incrementally_passive())
     }
 }
 
-/// Where the structure cannot move along a contact, because its motion is imposed, rigid friction changes its sign over this
-/// share of the velocity.
+/// Velocity range over which rigid friction changes its sign, relative to the speed. It applies
+/// where the motion along a contact is imposed, so that the structure cannot move.
 const IMPOSED: f64 = 1e-9;
 
 impl Alternation {
-    /// Harmonics of the force of a motion port that moves with the harmonics `c`, [axis][harmonic], into `force`; the derivative with respect
-    /// to (Re, Im) of the harmonics into `tangent` (row-major, 2 × axes × harmonics squared). The law is taken at `1/share` of the motion
-    /// and gives `share` times that force: with a large share every law is what it is at rest, stuck.
+    /// Computes the harmonics of the force of a motion port that moves with the harmonics `c`,
+    /// [axis][harmonic], into `force`. Writes the derivative by (Re, Im) of the harmonics into
+    /// `tangent` (row-major, 2 × axes × harmonics squared).
+    ///
+    /// The law is evaluated at `1/share` of the motion, and its force is multiplied by `share`.
+    /// A large share raises the slip limits: every joint sticks, as in a very small motion.
     pub fn respond(
         &mut self,
         port: &Port,
@@ -427,8 +450,10 @@ impl Alternation {
         self.argument = motion;
     }
 
-    /// The image of the forces λ of a force port along a motion c: `P J(λ + ε c')`, or the law itself where the motion is imposed, which λ
-    /// does not change (`penalty` infinite). The derivative of the image by `λ + ε c'` into `tangent`; `share` as in [`Alternation::respond`].
+    /// Computes the image of the forces λ of a force port along a motion c: `P J(λ + ε c')`. If
+    /// the motion is imposed (`penalty` infinite), the image is the law's force at that
+    /// velocity, and λ does not change it. Writes the derivative of the image by `λ + ε c'`
+    /// into `tangent`. For `share`, see [`Alternation::respond`].
     pub fn image(
         &mut self,
         port: &Port,
@@ -460,7 +485,7 @@ impl Alternation {
         self.argument = signal;
     }
 
-    /// Samples of the forces of a port in a motion that has been found, see [`Alternation::force`].
+    /// Samples the forces of a port in a converged motion, see [`Alternation::force`].
     pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
         if let Kernel::Sliders(parts) = &port.kernel {
             return self.sample_slides(parts, &port.static_state, c);
@@ -484,7 +509,8 @@ impl Alternation {
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 const _: () = assert!(MOST_DIRECTIONS == 3, "signals of a port are kept for three axes");
 
-/// Where the tangent of every port begins, and the length of all: a port with d axes has a square of 2 d × harmonics.
+/// Returns the start of every port's tangent, and the length of all. A port
+/// with d axes has a square of 2 d × harmonics rows.
 pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
     let mut length = 0;
     let starts = ports
@@ -498,7 +524,7 @@ pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
     (starts, length)
 }
 
-/// The tangent of port number `p`.
+/// Returns the index range of the tangent of port number `p`.
 pub(super) fn block(blocks: &[usize], p: usize, port: &Port, harmonics: usize) -> std::ops::Range<usize> {
     blocks[p]..blocks[p] + (2 * harmonics * port.axes).pow(2)
 }

@@ -1,12 +1,17 @@
 //! Force ports: a law of velocity by its resolvent, rigid, steep or smooth.
 //!
-//! `λ = φ(v)` is for any `ε > 0` the same as `λ = J(λ + ε v)` with `J = (1 + ε φ⁻¹)⁻¹`, which for rigid friction is the projection onto
-//! `[-limit, limit]`. `J` never rises faster than its argument, however steep φ is.
-//! Source: Alart and Curnier (1991); Nacivet et al. (2003); Parikh and Boyd, "Proximal Algorithms" (2014).
+//! For any `ε > 0`, `λ = φ(v)` is equivalent to `λ = J(λ + ε v)` with `J = (1 + ε φ⁻¹)⁻¹`. For
+//! rigid friction `J` is the projection onto `[-limit, limit]`. If φ does not fall with
+//! velocity, the slope of `J` is at most 1, however steep φ is.
 //!
-//! Steep maps change within a sample. Along one axis their mean over it is taken for an argument `y + eξ`, `-1 < ξ < 1`, that is linear there:
-//! so a zero of the velocity is placed within its sample, and the forces stay the gradient of a convex function. In a plane the argument
-//! turns rather than passes through zero, and the value in the middle is taken.
+//! Source: Alart and Curnier (1991); Nacivet et al. (2003); Parikh and Boyd,
+//! "Proximal Algorithms" (2014).
+//!
+//! Steep maps change within a sample. Along one axis the mean of the map over the
+//! sample is taken, for an argument `y + eξ`, `-1 < ξ < 1`, that is linear there.
+//! The mean locates a zero of the velocity within its sample, and the forces stay
+//! the gradient of a convex function. In a plane the argument turns rather than
+//! passes through zero, and the value in the middle of the sample is taken.
 
 use super::Port;
 use super::alternation::{Alternation, add_block, as_block, pair, share};
@@ -14,14 +19,15 @@ use crate::law::{MOST_DIRECTIONS, Mean, Prox, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// A resolvent counts as smooth over a sample if its argument changes there by less than this share of the law's scale: the point value is
-/// then exact to spectral accuracy, and the mean would be the less accurate of the two.
+/// Change of the argument over a sample, relative to the law's scale, below
+/// which a resolvent counts as smooth. The point value is then exact to
+/// spectral accuracy, and more accurate than the mean.
 const SMOOTH: f64 = 0.1;
 
 /// Rigid friction along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rigid {
-    /// N.
+    /// Slip limit, N.
     pub limit: f64,
 }
 
@@ -36,7 +42,8 @@ impl Prox for Rigid {
     }
 }
 
-/// So many times the forces of a law that has a resolvent `J`: `τ φ` has `τ J(y/τ)` with the penalty `ε/τ`.
+/// A law with a resolvent `J`, and its forces multiplied by τ: `τ φ` has the
+/// resolvent `τ J(y/τ)` with the penalty `ε/τ`.
 #[derive(Debug, Clone)]
 pub(super) struct Times {
     pub law: SharedLaw,
@@ -67,7 +74,7 @@ impl Prox for Times {
         self.one().least_penalty() * self.times
     }
     fn mean(&self, y: f64, e: f64, penalty: f64) -> Mean {
-        // the derivative of a resolvent has no unit
+        // the derivative of a resolvent is dimensionless
         let mean = self.one().mean(y / self.times, e / self.times, penalty / self.times);
         Mean { zeroth: self.times * mean.zeroth, first: self.times * mean.first, ..mean }
     }
@@ -84,7 +91,8 @@ impl Prox for Times {
 }
 
 impl Alternation {
-    /// Adds the harmonics of the resolvent of the signal `y`, [axis][harmonic], to `image`, and their derivative to `tangent`.
+    /// Adds the harmonics of the resolvent of the signal `y`, [axis][harmonic],
+    /// to `image`, and their derivative to `tangent`.
     pub(super) fn resolve(
         &mut self,
         prox: &dyn Prox,
@@ -95,15 +103,17 @@ impl Alternation {
         tangent: Option<&mut [f64]>,
     ) {
         if port.axes == 1 {
-            // the projection has kinks wherever it goes
+            // the projection always has kinks
             let mean = port.is_rigid() || self.changes_by(y, 1.0 / port.scale);
-            // where the map is the identity, the force of a sticking contact has to be the signal: the mean over a sample is undone before
+            // in stick the map is the identity and the force must equal the signal: the effect
+            // of the mean over a sample is undone first
             return self.along(|y, e| prox.mean(y, e, penalty), (mean, mean), port.scale, y, image, tangent);
         }
         self.turn(prox, port.axes, penalty, y, image, tangent);
     }
 
-    /// The same of the velocities `v` themselves, where the force does not change them; rigid friction changes its sign over `width` (m/s).
+    /// Adds the harmonics of the force at the velocities `v`, which the force does not change.
+    /// Rigid friction changes its sign over `width` (m/s).
     pub(super) fn velocity(
         &mut self,
         prox: &dyn Prox,
@@ -119,7 +129,7 @@ impl Alternation {
             let law = |v, e| prox.mean_at_velocity(v, e).unwrap_or_default();
             return self.along(law, (mean, false), port.scale, v, image, None);
         }
-        // a force of the limit at that velocity
+        // the force reaches the limit at the velocity `width`
         let penalty = port.scale / width;
         v.iter_mut().for_each(|v| *v *= penalty);
         if port.axes == 1 {
@@ -128,15 +138,15 @@ impl Alternation {
         self.turn(prox, port.axes, penalty, v, image, None);
     }
 
-    /// Whether a signal times `scale` changes by much over a sample.
+    /// Tells whether a signal times `scale` may change over a sample by [`SMOOTH`] or more.
     fn changes_by(&self, y: &[Complex64], scale: f64) -> bool {
         let highest = self.harmonics.last().map_or(1.0, |&h| h as f64);
         let largest: f64 = y.iter().map(|y| y.norm()).sum();
         scale * largest * TAU * highest / self.samples() as f64 >= SMOOTH
     }
 
-    /// A map along one axis. `mean`: it is taken over the sample; `undo`: the signal is widened before, so that the mean of the identity is
-    /// the identity.
+    /// Applies a map along one axis. `mean`: the mean over each sample is taken. `undo`: the
+    /// signal is rescaled first, so that the mean of the identity is the identity.
     fn along(
         &mut self,
         map: impl Fn(f64, f64) -> Mean,
@@ -193,7 +203,7 @@ impl Alternation {
         }
     }
 
-    /// A map along several axes.
+    /// Applies a map along several axes.
     fn turn(
         &mut self,
         prox: &dyn Prox,
@@ -232,12 +242,12 @@ impl Alternation {
     }
 }
 
-/// Half of the change of `e^{jhθ}` over a sample, relative to its middle.
+/// Returns half of the change of `e^{jhθ}` over a sample, relative to its middle.
 fn change(h: usize, n: usize) -> Complex64 {
     Complex64::new(0.0, 0.5 * (h as f64 * TAU / n as f64).sin())
 }
 
-/// Means of x cut off at ±1.
+/// Returns the means of x clamped to [-1, 1].
 #[inline]
 fn saturation(y: f64, e: f64) -> Mean {
     let (at, reach) = (y.abs(), e.abs());
@@ -258,7 +268,7 @@ fn saturation(y: f64, e: f64) -> Mean {
             slope_second: (t * t * t + 1.0) / 6.0,
         }
     } else {
-        // both ends: from ξ = s to ξ = t
+        // both ends of the ramp: from ξ = s to ξ = t
         let (s, t) = ((-1.0 - at) / reach, (1.0 - at) / reach);
         let (s, t) = (s.clamp(-1.0, 1.0), t.clamp(-1.0, 1.0));
         let ramp = |power: i32| (t.powi(power) - s.powi(power)) / f64::from(power);

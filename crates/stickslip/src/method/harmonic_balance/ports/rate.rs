@@ -1,9 +1,12 @@
 //! Motion ports of laws in rate form.
 //!
-//! Without internal states the force is sampled, and its derivative is the spectrum of the sampled slopes. States are integrated along the
-//! series by Radau IIA of order 3 with two stages, one step from sample to sample: displacement and velocity are known at the stages exactly, so
-//! the error over a period falls with the third power of the samples (about 1e-7 of the force at 1024 samples and slip by a tenth
-//! of the state's reach per sample), and no stiffness makes it ring. Where a rate has a kink, the step over it has order 2.
+//! Without internal states the force is sampled, and its derivative is the spectrum of the
+//! sampled slopes. Internal states are integrated along the series by Radau IIA of order 3 with
+//! two stages, one step from sample to sample. Displacement and velocity are exact at the
+//! stages. The error over a period falls with the third power of the number of samples: about
+//! 1e-7 of the force at 1024 samples and slip by a tenth of the state's range per sample. The
+//! method does not oscillate on stiff laws. A step over a kink of the rate has order 2.
+//!
 //! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5.
 
 use super::Port;
@@ -14,21 +17,25 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Newton iterations of one step; three are usual.
+/// Maximum number of Newton iterations of one step; three are usual.
 const ITERATIONS: usize = 60;
-/// Longest change in an iteration, relative to the size of states: some states are logarithms of what they stand for.
+/// Longest change in an iteration, relative to the size of states. Some states
+/// are logarithms of the physical quantity.
 const LONGEST: f64 = 2.0;
-/// Change of the stages, relative to the size of states, at which a step is solved: its square is rounding.
+/// Change of the stages, relative to the size of states, at which a step is solved. Newton's
+/// method squares the error, so that the next change is rounding.
 const SOLVED: f64 = 1e-9;
-/// Coefficients of Radau IIA of order 3; its stages lie at a third of the step and at its end.
+/// Coefficients of Radau IIA of order 3. Its stages lie at a third of the step and at its end.
 const RADAU: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
-/// Share of the step that is left at the first stage.
+/// Share of the step after the first stage.
 const LEFT: f64 = 2.0 / 3.0;
-/// Before the first period the joint is moved from static equilibrium to where the period begins, in this share of a period.
+/// Duration of the initial step from static equilibrium to the beginning of the
+/// period, as a share of the period.
 const LEAD: f64 = 0.25;
 
 impl Alternation {
-    /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and their derivative to `tangent`.
+    /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to
+    /// `force`, and their derivative to `tangent`.
     pub(super) fn rate(
         &mut self,
         rate: &dyn Rate,
@@ -98,7 +105,7 @@ impl Alternation {
         }
     }
 
-    /// The same of a law with internal states.
+    /// Adds the harmonics and the derivative for a law with internal states.
     fn integrate(
         &mut self,
         rate: &dyn Rate,
@@ -145,7 +152,8 @@ impl Alternation {
 /// Displacements or velocities, [axis][sample].
 type Signals = [Vec<f64>; MOST_DIRECTIONS];
 
-/// Steps of a rate law along a sampled motion. Inputs of a step: displacements and velocities at the first stage, then at the end.
+/// Steps of a rate law along a sampled motion. The inputs of a step are displacements and
+/// velocities at the first stage, then at the end.
 struct RateMarch<'a> {
     rate: &'a dyn Rate,
     axes: usize,
@@ -154,14 +162,14 @@ struct RateMarch<'a> {
     length: f64,
     /// Displacements and velocities at the samples.
     at: [&'a Signals; 2],
-    /// The same at the first stage of the step that ends at the sample.
+    /// Displacements and velocities at the first stage of the step that ends at the sample.
     stages: &'a [Signals; 2],
-    /// Displacements and states in static equilibrium, where the first movement begins.
+    /// Displacements and states in static equilibrium, where the initial step begins.
     rest: [f64; MOST_DIRECTIONS],
     at_rest: Vec<f64>,
     points: [RatePoint; 2],
     stage: DVector<f64>,
-    /// The derivative by ω is wanted.
+    /// True if the derivative by ω is requested.
     frequency: bool,
 }
 
@@ -221,11 +229,11 @@ impl RateMarch<'_> {
         let inputs = 4 * d;
         let width = inputs + m + usize::from(self.frequency);
         let (points, omega) = (&self.points, self.omega);
-        // velocities grow with ω, and the time of a step falls
+        // a higher ω raises velocities and shortens the step
         let faster = |slope: &[f64], stage: usize| -> f64 {
             (0..d).map(|a| slope[d + a] * motions[stage].velocity[a] / omega).sum()
         };
-        // stages by inputs and by the states before
+        // derivatives of the stages by inputs and by the states before
         let right = DMatrix::from_fn(2 * m, width, |row, column| {
             let (i, s) = (row / m, row % m);
             match column.checked_sub(inputs) {

@@ -1,16 +1,18 @@
-//! A motion along an axis at any phase: value, slope and curvature of its series, their zeros, and how far it goes.
+//! A motion along an axis at any phase: value, slope and curvature of its
+//! series, its zeros, and its range.
 
 use super::alternation::Alternation;
 use super::events::Grid;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Newton iterations for an event; three are usual, and where they lead astray the middle between bounds is taken.
+/// Maximum number of Newton iterations for an event; three are usual. A step
+/// out of the bracket is replaced by bisection.
 const ITERATIONS: usize = 60;
-/// The same for a turning point from the next point of the grid: three are usual.
+/// Maximum number of Newton iterations from a grid point to a turning point; three are usual.
 const REFINED: usize = 8;
 
-/// Value, slope and curvature of the series at a phase. Harmonics stand at equal distances.
+/// A Fourier series with equally spaced harmonics.
 #[derive(Clone, Copy)]
 pub(super) struct Series<'a> {
     pub(super) harmonics: &'a [usize],
@@ -18,6 +20,7 @@ pub(super) struct Series<'a> {
 }
 
 impl Series<'_> {
+    /// Returns value, slope and curvature at a phase.
     pub(super) fn at(&self, theta: f64) -> (f64, f64, f64) {
         let (mut turn, step) = turns(self.harmonics, theta);
         let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
@@ -32,7 +35,8 @@ impl Series<'_> {
         (value, slope, bend)
     }
 
-    /// The zero of a function between two phases at whose ends its signs differ, with `sign` its sign at the end: `f` gives it and its slope.
+    /// Finds the zero of a function between two phases at which its signs differ. `sign` is its
+    /// sign at the upper end. `f` returns its value and its slope.
     pub(super) fn zero(
         &self,
         (mut low, mut high): (f64, f64),
@@ -62,7 +66,8 @@ impl Series<'_> {
         at
     }
 
-    /// The value at the turning point next to a phase; `None` if it is farther than `reach`.
+    /// Returns the value at the turning point next to a phase. `None` if the
+    /// iteration moves more than `reach`.
     fn turning(&self, mut theta: f64, reach: f64) -> Option<f64> {
         let (mut best, mut moved) = (0.0, 0.0f64);
         for _ in 0..REFINED {
@@ -73,7 +78,7 @@ impl Series<'_> {
                 return None;
             }
             theta -= step;
-            // the vertex of the parabola there: what it leaves out has the third power of the step
+            // the vertex of the local parabola; its error is of third order in the step
             best = value - 0.5 * slope * step;
             if step * step < f64::EPSILON {
                 break;
@@ -84,8 +89,9 @@ impl Series<'_> {
 }
 
 impl Alternation {
-    /// Least and largest value of the motion with harmonics `c`: between two points of the grid it is above both by no more than its curvature allows, and
-    /// from those that come so near to the largest Newton's method leads to turning points.
+    /// Returns the least and the largest value of the motion with harmonics `c`. Between two
+    /// grid points the motion exceeds both by no more than its curvature allows. Newton's
+    /// method refines the grid points that are this close to the extreme ones.
     pub fn range(&mut self, c: &[Complex64]) -> (f64, f64) {
         let Grid { fourier, pairs, value, .. } = &mut self.grid;
         pairs.clear();
@@ -113,13 +119,13 @@ impl Alternation {
     }
 }
 
-/// `e^{jhθ}` of the first harmonic, and what leads from each to the next.
+/// Returns `e^{jhθ}` of the first harmonic, and the factor from each harmonic to the next.
 #[inline]
 pub(super) fn turns(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
     let first = harmonics[0];
     let gap = harmonics.get(1).map_or(0, |h| h - first);
     let step = Complex64::cis(gap as f64 * theta);
-    // 0, 1, … and 1, 3, … need one rotation alone
+    // 0, 1, … and 1, 3, … need only one rotation
     match (first, gap) {
         (0, _) => (Complex64::new(1.0, 0.0), step),
         (1, 2) => {

@@ -1,11 +1,15 @@
 //! Motion ports of sliders behind springs, and of stops: exact for the series.
 //!
-//! A slider that moves once forgets everything before, so that one period is enough. Its history is that of the motion's turning points.
-//! From one to the next the motion is monotone: the slider sticks, `f = ±limit + kt (u - u*)` with the turning point `u*` that ended the slip
-//! before, and then slips, `f = ±limit`. Turning points and the begin of slip are zeros of the series, found by Newton's method between
-//! samples; the harmonics of the force are integrals over the intervals in closed form. So the force is a differentiable function of the
-//! harmonics: in stick `δf = kt (δu - δu*)`, in slip `δf = 0`, and where they meet the force is continuous. Every stick interval
-//! adds one product of a column and a row to the derivative.
+//! A slider that slips once forgets everything before, so that one period is enough. The
+//! turning points of the motion determine its history. Between two of them the motion is
+//! monotone. The slider first sticks, `f = ±limit + kt (u - u*)`, with the turning point `u*`
+//! that ended the slip before. Then it slips, `f = ±limit`.
+//!
+//! Turning points and the onset of slip are zeros of the series, found by Newton's method
+//! between grid points. The harmonics of the force are integrals over the intervals in closed
+//! form. The force is therefore a differentiable function of the harmonics:
+//! `δf = kt (δu - δu*)` in stick, `δf = 0` in slip, and the force is continuous between them.
+//! Every stick interval adds one rank-one term to the derivative.
 
 use super::StaticState;
 use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
@@ -14,7 +18,7 @@ use super::series::{Series, turns};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
-/// One of the parts that stand side by side.
+/// One of the parallel parts of a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Part {
     /// A slider behind a spring (N/m, N).
@@ -24,7 +28,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// At rest, N/m.
+    /// Returns the stiffness at rest, N/m.
     pub fn stiffness(&self) -> f64 {
         match *self {
             Part::Slider { stiffness, .. } => stiffness,
@@ -38,14 +42,14 @@ impl Part {
         }
     }
 
-    /// While it touches, N/m.
+    /// Returns the stiffness in contact, N/m.
     pub fn closed(&self) -> f64 {
         match *self {
             Part::Slider { stiffness, .. } | Part::Stop { stiffness, .. } => stiffness,
         }
     }
 
-    /// How far the spring of a slider reaches, m.
+    /// Returns the elongation at which the spring of a slider begins to slip, m; zero for a stop.
     pub fn reach(&self) -> f64 {
         match *self {
             Part::Slider { stiffness, limit } => limit / stiffness,
@@ -54,7 +58,7 @@ impl Part {
     }
 }
 
-/// The force of each part's slider in static equilibrium, N; zero of a stop.
+/// Returns the force of each part's slider in static equilibrium, N; zero for a stop.
 fn held<'a>(parts: &'a [Part], rest: &'a StaticState) -> impl Iterator<Item = f64> + 'a {
     let mut states = rest.states.iter();
     parts.iter().map(move |part| match part {
@@ -63,11 +67,12 @@ fn held<'a>(parts: &'a [Part], rest: &'a StaticState) -> impl Iterator<Item = f6
     })
 }
 
-/// Distance of an event from its last iterate, in samples, that is rounding.
+/// Newton step of an event, in grid steps, that counts as rounding.
 const PLACED: f64 = 1e-11;
 
 impl Alternation {
-    /// Adds the harmonics of the force of the parts in the motion `c` to `force`, and their derivative to `tangent`.
+    /// Adds the harmonics of the force of the parts in the motion `c` to
+    /// `force`, and their derivative to `tangent`.
     pub(super) fn slide(
         &mut self,
         parts: &[Part],
@@ -86,7 +91,8 @@ impl Alternation {
         self.harmonics = harmonics;
     }
 
-    /// Samples of the force, of slip, and the forces of the sliders at t = 0.
+    /// Samples the force and the slip of the parts. Writes the forces of the
+    /// sliders at t = 0 into `self.state`.
     pub(super) fn sample_slides(&mut self, parts: &[Part], rest: &StaticState, c: &[Complex64]) {
         self.find(c);
         self.synthesise(c, |_| Complex64::new(1.0, 0.0));
@@ -118,7 +124,7 @@ impl Alternation {
         self.harmonics = harmonics;
     }
 
-    /// The motion on the grid that tells its turning points apart, and these.
+    /// Samples the motion on the grid, and finds its turning points.
     pub(super) fn find(&mut self, c: &[Complex64]) {
         let Grid { fourier, pairs, value, slope } = &mut self.grid;
         pairs.clear();
@@ -140,7 +146,7 @@ impl Alternation {
             });
             extremes.push(Extreme { at, value: series.at(at).0 });
         };
-        // between two points the slope changes by no more
+        // upper bound of the change of the slope between two grid points
         let change: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum::<f64>() * angle;
         for i in 0..n {
             if slope[i].abs() > change {
@@ -154,13 +160,14 @@ impl Alternation {
                 add((low, low + angle), low + angle * v / (v - z), if z > 0.0 { 1.0 } else { -1.0 });
                 continue;
             }
-            // a pair between two samples: the slope of Hermite's cubic is v + 2 p s + 3 q s², 0 < s < 1
+            // a pair of zeros between two grid points: the slope of the cubic Hermite
+            // interpolant is v + 2 p s + 3 q s², 0 < s < 1
             let (p, q) = (3.0 * (w - u) - 2.0 * v - z, v + z - 2.0 * (w - u));
             let under = p * p - 3.0 * q * v;
             if q == 0.0 || under <= 0.0 || p * q >= 0.0 {
                 continue;
             }
-            // the slope has its own extreme, on the other side of zero, between them
+            // between the grid points the slope has an extreme on the other side of zero
             let middle = -p / (3.0 * q);
             let theta = low + angle * middle;
             if middle < 1.0 && (series.at(theta).1 > 0.0) != (v > 0.0) {
@@ -172,8 +179,8 @@ impl Alternation {
         }
     }
 
-    /// The intervals of one part; motion and turning points have been found. `rest`: its displacement and force in static
-    /// equilibrium.
+    /// Computes the intervals of one part, from the motion and its turning points. `rest` is
+    /// its displacement and its force in static equilibrium.
     fn history(&mut self, part: &Part, rest: [f64; 2], series: Series) {
         self.intervals.clear();
         match *part {
@@ -202,7 +209,7 @@ impl Alternation {
         let (mut hold, mut from, mut anchor) = (held, rest, Anchor::Nothing);
         let still = held + kt * (self.grid.value[0] - rest);
         if count == 0 && still.abs() > limit {
-            // dragged to where nothing moves any more
+            // the slider was dragged to a position at which nothing moves any more
             self.intervals.push(Interval { slips: false, ..drag(0.0, TAU, limit.copysign(still)) });
             return;
         }
@@ -236,7 +243,7 @@ impl Alternation {
                 self.intervals.push(drag(onset, end, slip));
                 (hold, from, anchor, begin) = (slip, value, Anchor::At(end), end);
             } else if leg == first + count {
-                // by rounding alone
+                // only reached through rounding
                 self.intervals.push(hold_at(hold, from, anchor, begin, end));
             }
         }
@@ -256,7 +263,7 @@ impl Alternation {
         for leg in 0..count {
             let (a, b) = (self.extremes[leg], self.extremes[(leg + 1) % count]);
             let end = b.at + if leg + 1 == count { TAU } else { 0.0 };
-            // one passage out of the gap, and the next one back
+            // the first passage out of the gap, into contact
             if a.value <= gap && b.value > gap {
                 opened = Some((leg, self.passage(series, (a.at, end), gap, 1.0)));
                 break;
@@ -284,12 +291,13 @@ impl Alternation {
         }
     }
 
-    /// The phase between two neighbouring turning points at which the motion passes `value`, upwards or downwards.
+    /// Returns the phase between two adjacent turning points at which the
+    /// motion passes `value`. `upwards` is 1 or -1.
     pub(super) fn passage(&self, series: Series, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
         let n = self.grid.value.len() as isize;
         let angle = TAU / n as f64;
         let u = |i: isize| self.grid.value[i.rem_euclid(n) as usize];
-        // samples strictly between, by halving
+        // bisection over the grid points strictly between
         let (mut low, mut high) = ((before / angle).floor() as isize, (after / angle).ceil() as isize);
         while high - low > 1 {
             let middle = low + (high - low) / 2;
@@ -304,7 +312,7 @@ impl Alternation {
         })
     }
 
-    /// Harmonics of the force, and their derivative.
+    /// Adds the harmonics of the force, and their derivative.
     fn add_intervals(
         &mut self,
         harmonics: &[usize],
@@ -365,7 +373,7 @@ impl Alternation {
     }
 }
 
-/// Adds `f Re(row δU)` to the derivative by the parts of U.
+/// Adds `f Re(row δU)` to a row of the derivative by the parts of U.
 #[inline]
 pub(super) fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
     for (to, r) in to.chunks_exact_mut(2).zip(row) {
@@ -374,7 +382,7 @@ pub(super) fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
     }
 }
 
-/// `∫ e^{-jmθ} dθ` over an interval, for m from zero on.
+/// Computes `∫ e^{-jmθ} dθ` over an interval, for m = 0, 1, …
 pub(super) fn integrate_over((begin, end): (f64, f64), out: &mut [Complex64]) {
     let width = end - begin;
     if width >= TAU {

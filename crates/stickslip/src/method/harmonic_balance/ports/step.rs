@@ -1,7 +1,8 @@
-//! Motion ports of laws in step form: the return map is taken from sample to sample.
+//! Motion ports of laws in step form: the return map is applied from sample to sample.
 //!
-//! A straight step is exact for elastic-plastic laws along one direction; between samples the motion is curved, and what that
-//! leaves out is `(2π h/N)²/8` of the motion at harmonic h, some 5e-6 at 1024 samples.
+//! A straight step is exact for elastic-plastic laws in one direction. Between
+//! samples the motion is curved. The straight step neglects `(2π h/N)²/8` of
+//! the motion at harmonic h, about 5e-6 at h = 1 and 1024 samples.
 
 use super::Port;
 use super::alternation::{Alternation, Beginning, add_entries};
@@ -10,8 +11,8 @@ use crate::law::{MOST_DIRECTIONS, Reach, Step, StepPoint};
 use num_complex::Complex64;
 
 impl Alternation {
-    /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and their derivative to `tangent`. Where it is known that the
-    /// motion holds nothing is sampled.
+    /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and
+    /// their derivative to `tangent`. A motion that provably sticks throughout is not sampled.
     pub(super) fn step(
         &mut self,
         step: &dyn Step,
@@ -61,7 +62,7 @@ impl Alternation {
         }
     }
 
-    /// The same by the samples of a period.
+    /// Integrates the law through the samples of a period.
     pub(super) fn step_by_step(
         &mut self,
         step: &dyn Step,
@@ -89,12 +90,13 @@ impl Alternation {
     }
 }
 
-/// Steps of a law from sample to sample. Inputs of a step: displacements before it, then after it.
+/// Steps of a law from sample to sample. The inputs of a step are the
+/// displacements before it, then after it.
 struct StepMarch<'a> {
     step: &'a dyn Step,
     axes: usize,
     at: &'a [Vec<f64>; MOST_DIRECTIONS],
-    /// Displacements and states in static equilibrium, where the first movement begins.
+    /// Displacements and states in static equilibrium, where the initial step begins.
     rest: [f64; MOST_DIRECTIONS],
     states: Vec<f64>,
     point: StepPoint,
@@ -188,7 +190,8 @@ mod tests {
         }
     }
 
-    /// What is known of a motion that holds is what its samples give; a larger motion is not taken for one.
+    /// For a motion that sticks, the shortcut agrees with the samples. A larger
+    /// motion does not use the shortcut.
     #[test]
     fn motions_that_hold_are_those_of_their_samples() {
         let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 2 };
@@ -223,7 +226,8 @@ mod tests {
         }
     }
 
-    /// From what was seen of a motion nearby the states are found that are found from rest, in fewer periods.
+    /// From the states of a nearby motion, the evaluation finds the same states
+    /// as from static equilibrium, in fewer periods.
     #[test]
     fn states_follow_from_those_of_a_motion_nearby() {
         let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 1.0, tangents: 2 };

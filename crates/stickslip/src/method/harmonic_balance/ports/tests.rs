@@ -1,4 +1,5 @@
-//! Every kind of port: its derivative against differences, and orbits against closed forms and other methods.
+//! Tests of every kind of port: derivatives against differences, orbits against
+//! closed forms and other methods.
 
 use super::super::equations::Level;
 use super::super::rest::Rest;
@@ -22,15 +23,16 @@ static PLANE: LawInfo =
 /// Laws of two directions, each with one view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Plane {
-    /// A spring and a slider in series, coupled: radial return of the elastic force; stiffness and limit are [`STIFFNESS`] and [`LIMIT`].
+    /// A spring and a slider in series, coupled: radial return of the elastic force. Its
+    /// stiffness is [`STIFFNESS`], its limit [`LIMIT`].
     Masing,
-    /// A spring and a damper that both stiffen with the stretch.
+    /// A spring and a damper that both stiffen with the displacement.
     Stiffening,
-    /// The same with a force that follows the spring's with a delay.
+    /// A stiffening law with a force that follows with a delay.
     Relaxing,
     /// Rigid friction.
     Rigid,
-    /// It offers no view.
+    /// A law without a view.
     Unknown,
 }
 
@@ -130,7 +132,7 @@ fn laws() -> Vec<SharedLaw> {
     ]
 }
 
-/// The ports of a law between two nodes, and how many axes they have.
+/// Returns the ports of a law between coordinates and the ground, one coordinate per direction.
 fn ports_of(law: &SharedLaw) -> Ports {
     let d = law.directions();
     let places = (0..d).map(|i| format!("p{i}")).collect();
@@ -139,7 +141,7 @@ fn ports_of(law: &SharedLaw) -> Ports {
     Ports::new(&System::builder(structure.unwrap()).joint("j", law.clone(), axes).build().unwrap()).unwrap()
 }
 
-/// What no port can be made of is refused by the joint, the law, and what would do.
+/// A law without a suitable view is refused. The error names the joint, the law and an alternative.
 #[test]
 fn refusals_name_the_law_and_what_would_do() {
     let jump = Arc::new(Stribeck { limit: 1.0, static_limit: 1.5, velocity: 0.0 });
@@ -159,12 +161,13 @@ fn refusals_name_the_law_and_what_would_do() {
     }
 }
 
-/// Values without a pattern between -1 and 1.
+/// Returns a pseudo-random value between -1 and 1.
 fn noise(i: usize) -> f64 {
     ((i * 7919 + 13) as f64).sin()
 }
 
-/// The derivative of every port's force or image, at motions that slip and at small ones that do not.
+/// The derivative of every port's force or image agrees with differences, for
+/// motions that slip and for small motions that stick.
 #[test]
 fn derivatives_agree_with_differences() {
     let omega = 0.9;
@@ -182,7 +185,7 @@ fn derivatives_agree_with_differences() {
             let mut force_at = |c: &[Complex64], tangent: Option<&mut [f64]>| {
                 let mut force = vec![ZERO; count];
                 if port.is_force() {
-                    // the signal of the image is the force alone where nothing moves
+                    // without motion the argument of the image is the force alone
                     alternation.image(port, (omega, 1.0, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
                 } else {
                     alternation.respond(port, (omega, 1.0), c, &mut force, tangent);
@@ -192,7 +195,8 @@ fn derivatives_agree_with_differences() {
             let mut tangent = vec![0.0; 4 * count * count];
             force_at(&c, Some(&mut tangent));
             let largest = tangent.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
-            // a difference leaves out the kinks of sampled maps that lie within its step: one slope in 512 samples now and then
+            // a difference misses the kinks of sampled maps within its step:
+            // occasionally one slope in 512 samples
             let (step, kinks) = (1e-6 * size, if law.pieces().is_some() { 1e-7 } else { 2e-3 });
             for k in (0..2 * count).filter(|k| !(is_real(k / 2) && k % 2 == 1)) {
                 let moved = |by: f64| {
@@ -221,7 +225,8 @@ fn derivatives_agree_with_differences() {
     }
 }
 
-/// One mass on a spring with a damper and a joint to the ground, driven at harmonic 1 and, with `constant`, at harmonic 0.
+/// One mass on a spring with a damper and a joint to the ground. A force acts
+/// at harmonic 1, and at harmonic 0 with `constant`.
 fn oscillator(law: SharedLaw, force: f64, constant: f64) -> System {
     let mut model = Model::default();
     model.masses.push(Mass::new("m", 1.0));
@@ -239,7 +244,8 @@ fn balanced(system: &System, harmonics: usize, omega: f64) -> Orbit {
     method.solver(system).unwrap().orbit(omega, None).unwrap()
 }
 
-/// One harmonic of Duffing's oscillator is `(1 - ω² + ¾ b a²)² a² + (c ω a)² = F²`, exactly.
+/// With one harmonic, Duffing's oscillator has the closed form
+/// `(1 - ω² + ¾ b a²)² a² + (c ω a)² = F²`.
 #[test]
 fn one_harmonic_of_duffings_oscillator_is_the_closed_form() {
     let (b, force) = (0.5, 0.1);
@@ -251,7 +257,8 @@ fn one_harmonic_of_duffings_oscillator_is_the_closed_form() {
     }
 }
 
-/// Springs that stiffen, stops, and hysteresis with states: the orbit is that of integration in time, with and without a constant force.
+/// Stiffening springs, stops and hysteresis with states: the orbit agrees with time
+/// integration, with and without a constant force.
 #[test]
 fn orbits_agree_with_integration() {
     let laws: [(SharedLaw, f64); 5] = [
@@ -282,7 +289,8 @@ fn orbits_agree_with_integration() {
     }
 }
 
-/// A body that only a stop holds rests where the stop's force is the constant one: `k (u - gap) = F`.
+/// A body held by a stop alone rests where the force of the stop balances the
+/// constant force: `k (u - gap) = F`.
 #[test]
 fn a_body_that_only_a_law_holds_has_its_mean_where_the_law_bears_it() {
     let mut model = Model::default();
@@ -294,12 +302,12 @@ fn a_body_that_only_a_law_holds_has_its_mean_where_the_law_bears_it() {
     model.forces.push(Force { on: "m".into(), amplitude: 0.5, phase: 0.0, harmonic: 0 });
     let orbit = balanced(&model.assemble().unwrap(), 5, 0.7);
     let place = &orbit.places[0];
-    // in touch all the time: linear about the mean
+    // in contact all the time: linear about the mean
     let amplitude = 0.05 / (2.0f64 - 0.49).hypot(0.07);
     assert!((place.mean - 0.35).abs() < 1e-6 && (place.amplitude() - amplitude).abs() < 1e-6, "{place:?}");
 }
 
-/// A coupled law of a plane that is moved along a line is the law of that line.
+/// A coupled law of a plane, moved along a line, agrees with the law of that line.
 #[test]
 fn along_a_line_a_coupled_law_is_that_of_one_direction() {
     let pairs: [(SharedLaw, SharedLaw); 2] = [
@@ -320,7 +328,8 @@ fn along_a_line_a_coupled_law_is_that_of_one_direction() {
         let (orbit, reference) = (balanced(&system, 21, 0.9), balanced(&oscillator(line, 0.5, 0.0), 21, 0.9));
         let size = reference.places[0].amplitude();
         for (place, share) in orbit.places.iter().zip([cos, sin]) {
-            // steps between samples leave out the curvature of the motion, and a sampled kink the rest
+            // steps between samples neglect the curvature of the motion; a
+            // sampled kink causes the rest of the error
             assert!((place.amplitude() - share * size).abs() < 2e-4 * size, "{place:?} {size}");
         }
         let lost = reference.energy.friction;
@@ -328,8 +337,8 @@ fn along_a_line_a_coupled_law_is_that_of_one_direction() {
     }
 }
 
-/// Round a circle of radius r a coupled slider loses `2π r F cos φ` in a period, where the spring's stretch `F/k` leads the slider's radius
-/// by the angle of `sin φ = F/(k r)`.
+/// On a circle of radius r a coupled slider dissipates `2π r F cos φ` per period. The spring's
+/// elongation `F/k` leads the slider's radius by the angle φ with `sin φ = F/(k r)`.
 #[test]
 fn round_a_circle_the_loss_is_the_closed_form() {
     let ports = ports_of(&(Arc::new(Plane::Masing) as SharedLaw));
@@ -343,13 +352,15 @@ fn round_a_circle_the_loss_is_the_closed_form() {
     };
     let lead = (LIMIT / (STIFFNESS * radius)).asin();
     let expected = 2.0 * PI * radius * LIMIT * lead.cos();
-    // the radial return lags by its step: of first order where the direction turns, so that two numbers of samples tell the limit
+    // the radial return has a first-order error where the direction turns; two
+    // numbers of samples extrapolate to the limit
     let (coarse, fine) = (work(1024), work(2048));
     assert!((fine - expected).abs() < 1e-3 * expected, "{fine} {expected}");
     assert!((2.0 * fine - coarse - expected).abs() < 1e-5 * expected, "{coarse} {fine} {expected}");
 }
 
-/// Two masses that share inertia: the response is `(K + jΩC - Ω²M)⁻¹ F` with the whole mass matrix.
+/// Two masses with inertial coupling: the response is `(K + jΩC - Ω²M)⁻¹ F`
+/// with the full mass matrix.
 #[test]
 fn a_full_mass_matrix_is_that_of_the_equations() {
     let (mass, stiffness) = (dmatrix![1.0, 0.4; 0.4, 1.0], dmatrix![2.0, -1.0; -1.0, 2.0]);
@@ -372,7 +383,8 @@ fn a_full_mass_matrix_is_that_of_the_equations() {
     }
 }
 
-/// A row of nodes in a plane with coupled laws of every view between them: the banded form finds the motion of the dense one.
+/// A row of nodes in a plane with coupled laws of every view between them: the
+/// banded form finds the motion of the dense form.
 #[test]
 fn banded_and_dense_agree_in_a_plane() {
     let nodes = 24;
