@@ -70,6 +70,8 @@ pub(super) struct Balance {
     /// Number of consecutive failed points that used much of the work limit, see
     /// [`budget::ENOUGH`].
     pub(super) in_vain: usize,
+    /// Lower work limit of the present point, if it has an orbit whose error it tries to reduce.
+    pub(super) limit: Option<Work>,
     /// The last orbits, newest first.
     pub(super) recent: VecDeque<Recent>,
     /// Frequency (rad/s) and state from which the next searches continue, see
@@ -131,6 +133,7 @@ impl Balance {
             static_start,
             levels: BTreeMap::new(),
             in_vain: 0,
+            limit: None,
             recent: VecDeque::new(),
             begun: None,
             followed: Vec::new(),
@@ -162,6 +165,7 @@ impl Balance {
     /// Resets the work counters for a new point.
     pub(super) fn begin_point(&mut self, drive: f64) {
         self.drive = drive;
+        self.limit = None;
         self.levels.values_mut().for_each(Level::begin_point);
     }
 
@@ -174,7 +178,8 @@ impl Balance {
 
     /// Returns the work limit of the point.
     fn allowed(&self) -> Work {
-        budget::allowed_after(self.in_vain)
+        let allowed = budget::allowed_after(self.in_vain);
+        self.limit.map_or(allowed, |limit| limit.and_at_most(allowed))
     }
 
     /// Returns true if the point has used its work limit.

@@ -37,6 +37,15 @@ pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
     BEGUN * step <= WORK * (allowed.eliminated - taken.eliminated)
 }
 
+/// Work of a point, relative to that of its first orbit, up to which longer series may reduce the
+/// error of that orbit: a few doublings of the number of harmonics.
+const IMPROVES: f64 = 8.0;
+
+/// Returns the work limit of a point that found its first orbit with this work.
+pub(super) fn to_improve(taken: Work) -> Work {
+    taken.times(IMPROVES)
+}
+
 /// Returns the work limit of the next point after this number of consecutive failed points that
 /// used more than [`ENOUGH`].
 pub(super) fn allowed_after(in_vain: usize) -> Work {
@@ -61,6 +70,11 @@ impl Work {
     /// Returns both parts multiplied by `share`.
     pub fn times(self, share: f64) -> Work {
         Work { eliminated: share * self.eliminated, marched: share * self.marched }
+    }
+
+    /// Returns the smaller of each part.
+    pub fn and_at_most(self, other: Work) -> Work {
+        Work { eliminated: self.eliminated.min(other.eliminated), marched: self.marched.min(other.marched) }
     }
 
     /// Returns true if either part exceeds that of `limit`.

@@ -2,7 +2,7 @@
 //! tolerance.
 
 use super::balance::Balance;
-use super::budget::Work;
+use super::budget::{self, Work};
 use super::equations::{self, Level, Solution};
 use super::estimate::{Compared, estimate};
 use super::options::{NAME, TOLERANCE};
@@ -177,6 +177,9 @@ impl Balance {
                 let closer = before.is_none_or(|before| judged <= 0.5 * before);
                 if judged <= tolerance || !closer || !self.can_go_on(top) {
                     return Ok(orbit);
+                }
+                if returned.is_none() {
+                    self.limit = Some(budget::to_improve(self.taken(None)));
                 }
                 *returned = Some(orbit);
                 error = judged;
