@@ -21,6 +21,8 @@ const LOAD_STEP: f64 = 1e-3;
 /// Tolerance for the damper in tolerances of the blades. The contacts do not damp the ringing
 /// of the damper.
 const LOOSER: f64 = 300.0;
+/// Instants of a period at which slip limits are checked.
+const INSTANTS: usize = 256;
 /// Periods between two compared amplitudes.
 const WINDOW: usize = 40;
 
@@ -318,6 +320,35 @@ impl LooseDamper {
             motion.advance(&self.load * (step as f64 / LOAD_STEPS as f64).min(1.0))?;
         }
         Some((motion.x, motion.friction))
+    }
+
+    /// Returns the amplitudes of the linear motion on two contacts that stick for the whole period.
+    ///
+    /// Returns `None` if no constant friction force keeps both contacts within their slip limits
+    /// at every instant.
+    pub fn stuck(&self, omega: f64) -> Option<Vec<f64>> {
+        let [m, c, k] = &self.matrices;
+        let mut held = k.clone();
+        for (axis, stiffness) in self.faces.iter().flat_map(|face| face.iter().zip(self.stiffness)) {
+            held += axis * axis.transpose() * stiffness;
+        }
+        let dynamic = (held - m * (omega * omega)).map(|re| Complex64::new(re, 0.0))
+            + c.map(|im| Complex64::new(0.0, omega * im));
+        let x = dynamic.lu().solve(&self.excitation)?;
+        let (still, _) = self.pressed()?;
+        let sticks = self.faces.iter().zip(self.along(&still)).all(|(face, [_, depth])| {
+            let force = |axis: usize| face[axis].map(|w| Complex64::new(w, 0.0)).dot(&x) * self.stiffness[axis];
+            let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+            for instant in 0..INSTANTS {
+                let turn = Complex64::cis(TAU * instant as f64 / INSTANTS as f64);
+                let [friction, normal] = [0, 1].map(|axis| (force(axis) * turn).re);
+                let limit = self.friction * (self.stiffness[1] * depth + normal);
+                low = low.max(-limit - friction);
+                high = high.min(limit - friction);
+            }
+            low <= high
+        });
+        sticks.then(|| x.iter().map(|x| x.norm()).collect())
     }
 
     /// Returns half the peak-to-peak value of all displacements in the settled motion from
