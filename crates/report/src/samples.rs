@@ -18,7 +18,7 @@ fn text(name: &str, values: &[&str]) -> Column {
 
 fn record(points: &[(&str, u64)]) -> Record {
     Record {
-        version: "0.1.0".into(),
+        version: "0.2.0".into(),
         study: serde_json::json!({ "parameters": { "m": 0.182, "k": 105103.0, "Ft": [2.0, 4.0, 6.0, 8.0] } }),
         methods: Vec::new(),
         seed: Some(7),
