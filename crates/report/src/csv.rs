@@ -13,7 +13,7 @@ use stickslip_study::dataset::{Table, Values};
 /// The output `csv`.
 pub const OUTPUT: Output = Output {
     name: "csv",
-    summary: "every table as NAME.csv, numbers with all their digits",
+    summary: "every table as NAME.csv, with numbers in full precision",
     make: |dataset| SINK.files(dataset),
     sink: Some(SINK),
     usual: true,

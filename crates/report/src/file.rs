@@ -137,7 +137,7 @@ pub enum ReportError {
         cause: std::io::Error,
     },
     /// The name cannot be a file name.
-    #[error("`{name}` cannot name the file of a {what}: use letters, digits, `_`, `-` and `.`")]
+    #[error("`{name}` is not a valid file name for a {what}: use letters, digits, `_`, `-` and `.`")]
     Name {
         /// The rejected name.
         name: String,
@@ -145,7 +145,7 @@ pub enum ReportError {
         what: &'static str,
     },
     /// Two tables would be written to the same file.
-    #[error("two tables are named `{0}`; each needs a name of its own")]
+    #[error("two tables have the name `{0}`; give each table a different name")]
     SameName(String),
     /// The columns of a table differ in length.
     #[error("table `{table}`: column `{column}` has {rows} rows, the first column has {expected}")]
@@ -160,7 +160,7 @@ pub enum ReportError {
         expected: usize,
     },
     /// No output has this name.
-    #[error("there is no output `{name}`; there are: {known}")]
+    #[error("unknown output `{name}`; the outputs are: {known}")]
     UnknownOutput {
         /// The requested name.
         name: String,
@@ -168,7 +168,7 @@ pub enum ReportError {
         known: String,
     },
     /// A library could not encode a file.
-    #[error("cannot make {file}: {reason}")]
+    #[error("cannot create {file}: {reason}")]
     Encode {
         /// Name of the file.
         file: String,

@@ -67,10 +67,10 @@ impl Head {
         let (ours, theirs) = (&self.outline.record, &other.outline.record);
         let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs}, not {ours}"));
         if ours.version != theirs.version {
-            return differs("it is of version", &ours.version, &theirs.version);
+            return differs("it was written by version", &ours.version, &theirs.version);
         }
         if self.outline.name != other.outline.name {
-            return differs("it is of the study", &self.outline.name, &other.outline.name);
+            return differs("it belongs to the study", &self.outline.name, &other.outline.name);
         }
         let of = |record: &Value, key: &str| record[key].clone();
         let (text, its_text) = (of(&ours.study, "file"), of(&theirs.study, "file"));
@@ -78,13 +78,9 @@ impl Head {
             let (text, its_text) = (text.as_str().unwrap_or_default(), its_text.as_str().unwrap_or_default());
             let line = 1 + text.lines().zip(its_text.lines()).take_while(|(a, b)| a == b).count();
             let at = |text: &str| {
-                text.lines().nth(line - 1).map_or("its end".to_owned(), |line| format!("`{}`", line.trim()))
+                text.lines().nth(line - 1).map_or("the end of the file".to_owned(), |line| format!("`{}`", line.trim()))
             };
-            return Some(format!(
-                "it is of another state of the study file: its line {line} is {}, not {}",
-                at(its_text),
-                at(text)
-            ));
+            return Some(format!("its study file is different: line {line} is {}, not {}", at(its_text), at(text)));
         }
         if of(&ours.study, "set") != of(&theirs.study, "set") {
             let words = |record: &Value| {
@@ -92,17 +88,24 @@ impl Head {
                 let set: Vec<String> = set.iter().map(|(name, value)| format!("--set {name}={value}")).collect();
                 if set.is_empty() { "without --set".to_owned() } else { format!("with {}", set.join(" ")) }
             };
-            return differs("it is of a run", &words(&ours.study), &words(&theirs.study));
+            return differs("it belongs to a run", &words(&ours.study), &words(&theirs.study));
         }
         let method = |record: &Value| record["cases"][0]["method"]["kind"].as_str().unwrap_or("none").to_owned();
         if method(&ours.study) != method(&theirs.study) {
-            return differs("it is of a run with the method", &method(&ours.study), &method(&theirs.study));
+            return differs("it belongs to a run with the method", &method(&ours.study), &method(&theirs.study));
         }
         if of(&ours.study, "matrices") != of(&theirs.study, "matrices") {
-            return Some("the files of its [structure] and [disk] hold other matrices, nodes or deviations now than when it began".to_owned());
+            return Some(
+                "the files of [structure] and [disk] have changed since the start of the run: they \
+                         contain other matrices, nodes or deviations"
+                    .to_owned(),
+            );
         }
         if of(&ours.study, "cases") != of(&theirs.study, "cases") || self.units != other.units {
-            return Some("a file that the study reads has changed since: its cases have other values".to_owned());
+            return Some(
+                "a file that the study reads has changed since the start of the run: its cases have different values"
+                    .to_owned(),
+            );
         }
         None
     }
@@ -123,7 +126,8 @@ pub enum JournalError {
         units: usize,
     },
     /// Another program removed or replaced the file.
-    #[error("{} was removed or replaced while the run went on: what it held is gone, and nothing more is written", path.display())]
+    #[error("{} was removed or replaced during the run: its results are lost, and the run stops. Run the study \
+             again", path.display())]
     Vanished {
         /// Path of the journal.
         path: PathBuf,
@@ -146,13 +150,13 @@ pub enum JournalError {
         reason: String,
     },
     /// The program was aborted before the journal contained any data.
-    #[error("{}: nothing is kept in it, begin anew", path.display())]
+    #[error("{}: the journal is empty; start the run again without --resume", path.display())]
     Nothing {
         /// Path of the journal.
         path: PathBuf,
     },
     /// Another run writes to this folder.
-    #[error("another run is writing into {}: wait for its end, or give this one another --out", folder.display())]
+    #[error("another run is writing into {}: wait until it ends, or choose another --out", folder.display())]
     Busy {
         /// The folder.
         folder: PathBuf,
@@ -164,8 +168,8 @@ pub enum JournalError {
 
 fn kept(units: usize) -> String {
     match units {
-        0 => "nothing is kept yet".to_owned(),
-        _ => "what was kept before stays: --resume goes on from there".to_owned(),
+        0 => "no results are stored yet".to_owned(),
+        _ => "the earlier results are stored: resume the run with --resume".to_owned(),
     }
 }
 
@@ -276,7 +280,7 @@ impl Journal {
             Ok(()) if magic == *MAGIC => {}
             Err(cause) if cause.kind() == ErrorKind::UnexpectedEof => return Err(JournalError::Nothing { path }),
             Err(cause) => return Err(reading(cause)),
-            _ => return Err(not("this is no journal of a run of this version")),
+            _ => return Err(not("this file is not a journal of a run by this version")),
         }
         let mut at = MAGIC.len() as u64;
         let mut next = |at: &mut u64| -> Result<Option<Vec<u8>>, JournalError> {
@@ -288,7 +292,8 @@ impl Journal {
             return Err(JournalError::Nothing { path });
         };
         let head = serde_json::from_slice(&head[1..]);
-        let head = head.map_err(|error| not(&format!("this is no journal of a run of this version: {error}")))?;
+        let head =
+            head.map_err(|error| not(&format!("this file is not a journal of a run by this version: {error}")))?;
         let mut journal = Journal::empty(path.clone(), file, head);
         journal.end = at;
         while !journal.sealed
@@ -460,8 +465,10 @@ impl Journal {
     pub(crate) fn blocks(&self) -> impl Iterator<Item = Result<Block, JournalError>> + '_ {
         self.frames.iter().map(|(at, length)| {
             let reading = |cause| JournalError::Read { path: self.path.clone(), cause };
-            let not =
-                || JournalError::Not { path: self.path.clone(), reason: "it has changed while it was read".to_owned() };
+            let not = || JournalError::Not {
+                path: self.path.clone(),
+                reason: "the file was changed while it was read; run the command again".to_owned(),
+            };
             // A separate handle, because the handle in `self` stays at the end for writing.
             let mut file = File::open(&self.path).map_err(reading)?;
             file.seek(SeekFrom::Start(*at)).map_err(reading)?;
@@ -620,11 +627,11 @@ mod tests {
         let mut changed = own.clone();
         changed.outline.record.study["cases"][1] = Value::Null;
         for (other, words) in [
-            (head("pair.toml", text, &[], "auto"), "of the study pair, not couple"),
+            (head("pair.toml", text, &[], "auto"), "it belongs to the study pair, not couple"),
             (head("couple.toml", &text.replace("= 241", "= 242"), &[], "auto"), "points = 242 }`, not `frequency"),
             (head("couple.toml", text, &[("kt", "9 N/mm")], "auto"), "with --set kt=9 N/mm, not without --set"),
             (head("couple.toml", text, &[], "harmonic-balance"), "with the method harmonic-balance, not auto"),
-            (old, "of version 0.0.9, not"),
+            (old, "by version 0.0.9, not"),
             (changed, "a file that the study reads has changed"),
         ] {
             let difference = own.difference(&other).unwrap();

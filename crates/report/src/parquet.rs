@@ -23,7 +23,7 @@ use stickslip_study::dataset::{Table, Values};
 /// The output `parquet`.
 pub const OUTPUT: Output = Output {
     name: "parquet",
-    summary: "every table as NAME.parquet, columns with types for other programs",
+    summary: "every table as NAME.parquet, with typed columns for other programs",
     make: |dataset| SINK.files(dataset),
     sink: Some(SINK),
     usual: false,

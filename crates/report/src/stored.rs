@@ -32,7 +32,7 @@ pub struct Stored {
 #[derive(Debug, thiserror::Error)]
 pub enum StoredError {
     /// The folder has no record.
-    #[error("there are no results in {}: it has no record.json{}", folder.display(), beside(.inside))]
+    #[error("no results in {}: the folder has no record.json{}", folder.display(), beside(.inside))]
     Nothing {
         /// The folder.
         folder: PathBuf,
@@ -40,7 +40,8 @@ pub enum StoredError {
         inside: Vec<PathBuf>,
     },
     /// The folder holds a comparison, which has no study that could draw it.
-    #[error("{} holds a comparison; name the folders of the runs that it compares", folder.display())]
+    #[error("{} contains a comparison, which cannot be drawn again: give the folders of the compared \
+             runs", folder.display())]
     Comparison {
         /// The folder.
         folder: PathBuf,
@@ -63,7 +64,7 @@ pub enum StoredError {
         reason: String,
     },
     /// The file of a table in the record does not exist.
-    #[error("{} is not there, and figures are drawn from the tables: {reason}", path.display())]
+    #[error("cannot find {}, which the figure needs: {reason}", path.display())]
     NoTable {
         /// Path of the table.
         path: PathBuf,
@@ -71,7 +72,7 @@ pub enum StoredError {
         reason: &'static str,
     },
     /// A table does not match its record.
-    #[error("{}, line {line}: {reason}; the file was changed after the run, run the study again", path.display())]
+    #[error("{}, line {line}: {reason}; the file was changed after the run: run the study again", path.display())]
     Table {
         /// Path of the table.
         path: PathBuf,
@@ -81,7 +82,7 @@ pub enum StoredError {
         reason: String,
     },
     /// The study in the record cannot be read.
-    #[error("{}: the study in it cannot be read: {cause}", path.display())]
+    #[error("{}: cannot read the study in this record: {cause}", path.display())]
     Study {
         /// Path of the record.
         path: PathBuf,
@@ -92,7 +93,11 @@ pub enum StoredError {
 
 fn beside(inside: &[PathBuf]) -> String {
     let names: Vec<String> = inside.iter().map(|folder| folder.display().to_string()).collect();
-    if names.is_empty() { String::new() } else { format!("; there are results in {}", names.join(", ")) }
+    if names.is_empty() {
+        String::new()
+    } else {
+        format!("; these folders inside it have results: {}", names.join(", "))
+    }
 }
 
 /// Maximum number of subfolders with results that an error message names.
@@ -115,20 +120,23 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
     }
     let wrong = |reason: String| StoredError::Record { path: path.clone(), reason };
     let bytes = std::fs::read(&path).map_err(|cause| StoredError::Read { path: path.clone(), cause })?;
-    let record: Value =
-        serde_json::from_slice(&bytes).map_err(|error| wrong(format!("this is no record of a run: {error}")))?;
+    let record: Value = serde_json::from_slice(&bytes)
+        .map_err(|error| wrong(format!("this file is not the record of a run: {error}")))?;
     let text = |value: &Value, key: &str| {
         value[key]
             .as_str()
             .map(str::to_owned)
-            .ok_or_else(|| wrong(format!("this is no record of a run: no text `{key}`")))
+            .ok_or_else(|| wrong(format!("this file is not the record of a run: the text `{key}` is missing")))
     };
     let version = text(&record, "version")?;
     let newer = numbers(&version) > numbers(env!("CARGO_PKG_VERSION"));
     let schema = record["study"]["schema"].as_i64();
     if newer || schema.is_some_and(|schema| schema > stickslip_study::schema::VERSION) {
         let own = env!("CARGO_PKG_VERSION");
-        return Err(wrong(format!("the results are of version {version}, which is newer than this one, {own}")));
+        return Err(wrong(format!(
+            "the results were written by version {version}, which is newer than this version ({own}): install \
+             the newer version"
+        )));
     }
     let kind = text(&record, "kind")?;
     if kind == COMPARISON {
@@ -136,7 +144,10 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
     }
     let study = study_of(&record["study"], &path)?;
     if study.kind().name != kind {
-        return Err(wrong(format!("the record says `{kind}`, its study is a `{}`", study.kind().name)));
+        return Err(wrong(format!(
+            "the record states the kind `{kind}`, but its study has the kind `{}`",
+            study.kind().name
+        )));
     }
     let entries = record["tables"].as_array().ok_or_else(|| wrong("the record lists no tables".to_owned()))?;
     let tables = entries.iter().map(|entry| table(folder, entry, &record, &wrong)).collect::<Result<Vec<_>, _>>()?;
@@ -179,7 +190,7 @@ fn numbers(version: &str) -> Vec<u64> {
 pub fn study_of(stored: &Value, path: &Path) -> Result<Study, StoredError> {
     let wrong = |reason: &str| StoredError::Record { path: path.to_owned(), reason: reason.to_owned() };
     let (Some(name), Some(text)) = (stored["name"].as_str(), stored["file"].as_str()) else {
-        return Err(wrong("there is no study in the record"));
+        return Err(wrong("the record contains no study"));
     };
     let set: Vec<(String, String)> = serde_json::from_value(stored["set"].clone()).unwrap_or_default();
     let failed = |cause| StoredError::Study { path: path.to_owned(), cause: Box::new(cause) };
@@ -199,19 +210,21 @@ fn table(
 ) -> Result<Table, StoredError> {
     let file = entry["file"].as_str().unwrap_or_default();
     let Some(name) = file_name(file, "table").ok().and_then(|file| file.strip_suffix(".csv")) else {
-        return Err(wrong(format!("`{file}` is no name of a table")));
+        return Err(wrong(format!("`{file}` is not the file name of a table")));
     };
     let names: Vec<String> = serde_json::from_value(entry["columns"].clone()).unwrap_or_default();
     let sorts: Vec<String> = serde_json::from_value(entry["values"].clone()).unwrap_or_default();
     let (Some(rows), false, true) = (entry["rows"].as_u64(), names.is_empty(), sorts.len() == names.len()) else {
-        return Err(wrong(format!("it does not say what {file} holds; run the study again with this version")));
+        return Err(wrong(format!(
+            "the record does not describe the columns of {file}; run the study again with this version"
+        )));
     };
     let path = folder.join(file);
     if !path.is_file() {
         let written = record["files"].as_array().is_some_and(|files| files.iter().any(|name| name == file));
         let reason = match written {
-            true => "it was removed after the run, run the study again",
-            false => "the run was told to write only other outputs, run it again with csv among them",
+            true => "the file was removed after the run; run the study again",
+            false => "the run did not write csv files; run it again with `csv` among its outputs",
         };
         return Err(StoredError::NoTable { path, reason });
     }
@@ -222,14 +235,16 @@ fn table(
         .zip(&sorts)
         .map(|(name, sort)| Some(Column { name: name.clone(), values: empty(sort)? }))
         .collect::<Option<Vec<_>>>()
-        .ok_or_else(|| wrong(format!("it does not say what {file} holds; run the study again with this version")))?;
+        .ok_or_else(|| {
+            wrong(format!("the record does not describe the columns of {file}; run the study again with this version"))
+        })?;
     let mut reader = ::csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes.as_slice());
     let mut line = 1;
     let mut found = 0;
     for (number, cells) in reader.records().enumerate() {
         let cells = cells.map_err(|error| {
             let at = error.position().map_or(line, ::csv::Position::line);
-            failed(at, "this is no line of a table in UTF-8".to_owned())
+            failed(at, "this line is not valid CSV in UTF-8".to_owned())
         })?;
         line = cells.position().map_or(line, ::csv::Position::line);
         if number == 0 {
@@ -241,12 +256,12 @@ fn table(
         }
         for (column, cell) in columns.iter_mut().zip(&cells) {
             push(&mut column.values, cell)
-                .map_err(|what| failed(line, format!("`{cell}` in the column `{}` is no {what}", column.name)))?;
+                .map_err(|what| failed(line, format!("`{cell}` in the column `{}` is not {what}", column.name)))?;
         }
         found += 1;
     }
     if found != rows {
-        return Err(failed(line, format!("the table ends after {found} rows, it had {rows}")));
+        return Err(failed(line, format!("the table has {found} rows, but the record states {rows}")));
     }
     Ok(Table { name: name.to_owned(), columns })
 }
@@ -254,10 +269,10 @@ fn table(
 /// Compares the header of a table with the record. The error describes the difference.
 fn header(names: &[String], cells: &::csv::StringRecord) -> Result<(), String> {
     if let Some((i, (cell, name))) = cells.iter().zip(names).enumerate().find(|(_, (cell, name))| cell != name) {
-        return Err(format!("column {} is `{cell}`, it was `{name}`", i + 1));
+        return Err(format!("column {} is `{cell}`, but the record states `{name}`", i + 1));
     }
     if cells.len() != names.len() {
-        return Err(format!("{} columns, there were {}", cells.len(), names.len()));
+        return Err(format!("{} columns, but the record states {}", cells.len(), names.len()));
     }
     Ok(())
 }
@@ -276,8 +291,8 @@ fn empty(sort: &str) -> Option<Values> {
 fn push(values: &mut Values, cell: &str) -> Result<(), &'static str> {
     match values {
         Values::Number(v) if cell.is_empty() => v.push(f64::NAN),
-        Values::Number(v) => v.push(cell.parse().map_err(|_| "number")?),
-        Values::Integer(v) => v.push(cell.parse().map_err(|_| "count")?),
+        Values::Number(v) => v.push(cell.parse().map_err(|_| "a number")?),
+        Values::Integer(v) => v.push(cell.parse().map_err(|_| "a count")?),
         Values::Text(v) => v.push(cell.to_owned()),
         Values::Flag(v) => v.push(match cell {
             "" => None,
@@ -449,18 +464,21 @@ amplitude = "2 N"
     fn tables_that_were_changed_name_their_line() {
         type Change = fn(&str) -> String;
         let cases: [(Change, &str); 6] = [
-            (|t| t.replacen("frequency_Hz", "frequency", 1), "line 1: column 2 is `frequency`, it was `frequency_Hz`"),
+            (
+                |t| t.replacen("frequency_Hz", "frequency", 1),
+                "line 1: column 2 is `frequency`, but the record states `frequency_Hz`",
+            ),
             (
                 |t| t.lines().take(4).map(|l| format!("{l}\n")).collect(),
-                "line 4: the table ends after 3 rows, it had 18",
+                "line 4: the table has 3 rows, but the record states 18",
             ),
             (
                 |t| t.replacen("\n1.0,14.625,", "\n1.0,fourteen,", 1),
-                "line 3: `fourteen` in the column `frequency_Hz` is no number",
+                "line 3: `fourteen` in the column `frequency_Hz` is not a number",
             ),
             (|t| t.replacen("\n1.0,14.625,", "\n14.625,", 1), "line 3: "),
-            (|t| t.replacen("true", "yes", 1), "line 2: `yes` in the column `stable` is no `true` or `false`"),
-            (|_| String::new(), "line 1: the table ends after 0 rows, it had 18"),
+            (|t| t.replacen("true", "yes", 1), "line 2: `yes` in the column `stable` is not `true` or `false`"),
+            (|_| String::new(), "line 1: the table has 0 rows, but the record states 18"),
         ];
         let (_out, folder) = written(KINDS[0]);
         let path = folder.join("curve.csv");
@@ -494,17 +512,17 @@ amplitude = "2 N"
         };
         assert!(with(&|_| ()).is_ok());
         let words = |change: &dyn Fn(&mut Value)| with(change).unwrap_err().to_string();
-        assert!(words(&|r| r["version"] = "99.0.0".into()).contains("newer than this one"));
-        assert!(words(&|r| r["study"]["schema"] = 9.into()).contains("newer than this one"));
-        assert!(words(&|r| r["kind"] = "modes".into()).contains("its study is a `orbit`"));
-        assert!(words(&|r| r["tables"][0]["file"] = "../../x.csv".into()).contains("no name of a table"));
+        assert!(words(&|r| r["version"] = "99.0.0".into()).contains("newer than this version"));
+        assert!(words(&|r| r["study"]["schema"] = 9.into()).contains("newer than this version"));
+        assert!(words(&|r| r["kind"] = "modes".into()).contains("its study has the kind `orbit`"));
+        assert!(words(&|r| r["tables"][0]["file"] = "../../x.csv".into()).contains("is not the file name of a table"));
         assert!(words(&|r| r["tables"][0]["values"] = Value::Null).contains("run the study again"));
-        assert!(words(&|r| r["study"]["file"] = "schema = 1".into()).contains("cannot be read"));
+        assert!(words(&|r| r["study"]["file"] = "schema = 1".into()).contains("cannot read the study"));
         assert!(words(&|r| r["kind"] = COMPARISON.into()).contains("comparison"));
         fs::write(&path, "{").unwrap();
-        assert!(read(&folder).unwrap_err().to_string().contains("no record of a run"));
+        assert!(read(&folder).unwrap_err().to_string().contains("not the record of a run"));
         fs::write(&path, "[]").unwrap();
-        assert!(read(&folder).unwrap_err().to_string().contains("no record of a run"));
+        assert!(read(&folder).unwrap_err().to_string().contains("not the record of a run"));
     }
 
     #[test]

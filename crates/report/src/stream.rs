@@ -32,9 +32,9 @@ impl FromStr for Shard {
         let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((number, of)) if (1..=of).contains(&number) && of <= MOST_SHARDS => Ok(Shard { number, of }),
-            _ => {
-                Err(format!("expected a part as in 3/16, from 1/16 to 16/16, of {MOST_SHARDS} at most, found `{text}`"))
-            }
+            _ => Err(format!(
+                "expected a shard such as 3/16 (number/total, at most {MOST_SHARDS} shards), found `{text}`"
+            )),
         }
     }
 }
@@ -92,7 +92,7 @@ pub enum StreamError {
     Name(#[from] ReportError),
     /// The journal in the folder belongs to a different run.
     #[error(
-        "{} cannot be gone on with: {difference}. Run that again, or begin anew without --resume{}",
+        "cannot resume {}: {difference}. Run the earlier study again, or start from the beginning without --resume{}",
         folder.display(),
         if *long { " and with --restart" } else { "" }
     )]
@@ -106,7 +106,8 @@ pub enum StreamError {
     },
     /// The folder holds a long unfinished run.
     #[error(
-        "{} holds {units} of {of} units of an earlier run, {minutes:.0} minutes of work: go on with --resume, or throw it away with --restart",
+        "{} contains {units} of {of} units of an earlier run ({minutes:.0} minutes of work): continue with \
+         --resume, or discard it with --restart",
         folder.display()
     )]
     Unfinished {
@@ -215,7 +216,7 @@ pub enum MergeError {
     #[error(transparent)]
     Journal(#[from] JournalError),
     /// The folder contains no shard.
-    #[error("there is no part of a study in {}: name the folders that `stickslip run --shard` has written", .0.display())]
+    #[error("no part of a study in {}: give the folders that `stickslip run --shard` wrote", .0.display())]
     Nothing(PathBuf),
     /// A shard belongs to a different run.
     #[error("{} does not belong to {}: {difference}", folder.display(), first.display())]
@@ -228,7 +229,7 @@ pub enum MergeError {
         difference: String,
     },
     /// A shard is unfinished.
-    #[error("{} is unfinished, {units} of its {of} units are there: run it again with --resume", folder.display())]
+    #[error("{} is unfinished ({units} of its {of} units): run it again with --resume", folder.display())]
     Unfinished {
         /// Folder of the shard.
         folder: PathBuf,
@@ -238,7 +239,7 @@ pub enum MergeError {
         of: usize,
     },
     /// Two shards contain the same unit.
-    #[error("{} and {} both have unit {unit}: name each part once", a.display(), b.display())]
+    #[error("{} and {} both contain unit {unit}: give each part once", a.display(), b.display())]
     Overlap {
         /// Folder of the first shard.
         a: PathBuf,
@@ -248,7 +249,8 @@ pub enum MergeError {
         unit: usize,
     },
     /// Some units are in no shard.
-    #[error("units {} to {to} of {units} are in none of the parts{after}: run the shard that has them, or name its folder", from + 1)]
+    #[error("units {} to {to} of {units} are missing in the given parts{after}: run the shard that contains \
+             them, or add its folder", from + 1)]
     Missing {
         /// First missing unit, from 0.
         from: usize,

@@ -49,7 +49,11 @@ impl Terminal {
             let _ = writeln!(out, "{}", self.paint("2", &line));
         }
         if dataset.record.interrupted {
-            let _ = writeln!(out, "{}", self.paint("33", "interrupted: these are the points finished until then"));
+            let _ = writeln!(
+                out,
+                "{}",
+                self.paint("33", "interrupted: the results contain only the points finished before the interruption")
+            );
         }
         let width = self.width.map_or(WIDTH, |width| width.clamp(NARROWEST, WIDTH));
         for table in &dataset.tables {

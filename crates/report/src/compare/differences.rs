@@ -45,7 +45,7 @@ impl Differences {
     pub(super) fn add(&mut self, (first, label): (&Stored, &str), (other, run): (&Stored, &str)) {
         for table in &first.dataset.tables {
             let Some(with) = other.dataset.tables.iter().find(|t| t.name == table.name) else {
-                self.notes.push(format!("{}: {run} has no such table.", table.name));
+                self.notes.push(format!("{}: {run} does not contain this table.", table.name));
                 continue;
             };
             let completed = (completed(first, table, (other, with)), completed(other, with, (first, table)));
@@ -57,7 +57,7 @@ impl Differences {
                     if keys.is_empty() { "nothing".to_owned() } else { keys.join(", ") }
                 };
                 self.notes.push(format!(
-                    "{}: not compared, its rows are told apart by {} in {label}, by {} in {run}.",
+                    "{}: not compared, because its rows are identified by {} in {label}, but by {} in {run}.",
                     table.name,
                     words(&reading),
                     words(&reading_with)
@@ -84,7 +84,7 @@ impl Differences {
             if reading.abscissa.is_none() && rows.len() != rows_with.len() {
                 let place = if key.is_empty() { String::new() } else { format!(" at {key}") };
                 self.notes.push(format!(
-                    "{}: {} rows{place} in {label}, {} in {run}.",
+                    "{}: {} rows{place} in {label}, but {} in {run}.",
                     table.name,
                     rows.len(),
                     rows_with.len()
@@ -92,7 +92,10 @@ impl Differences {
             }
             let Some((pairs, interpolated)) = pairs(tables, reading.abscissa.as_deref(), &rows, &rows_with) else {
                 let place = if key.is_empty() { String::new() } else { format!(" at {key}") };
-                self.notes.push(format!("{}: not compared{place}, the curves turn differently often.", table.name));
+                self.notes.push(format!(
+                    "{}: not compared{place}, because the curves have different numbers of turning points.",
+                    table.name
+                ));
                 continue;
             };
             interpolates |= interpolated && !pairs.is_empty();
@@ -116,7 +119,7 @@ impl Differences {
         }
         if common < groups.len().max(others.len()) {
             self.notes.push(format!(
-                "{}: {common} of {} cases and places in {label} and {} in {run} are the same, only these are compared.",
+                "{}: only the cases and places of both runs are compared ({common}); {label} has {}, {run} has {}.",
                 table.name,
                 groups.len(),
                 others.len()

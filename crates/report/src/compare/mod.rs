@@ -30,10 +30,10 @@ use stickslip_study::dataset::{Dataset, Figure, Record};
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// Only one run was given.
-    #[error("a comparison needs two runs: name the folders of both")]
+    #[error("a comparison needs at least two runs: give the folder of each")]
     Single,
     /// The runs have different kinds.
-    #[error("{} holds results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
+    #[error("{} contains results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
     Kinds {
         /// Folder of the first run.
         folder: PathBuf,
@@ -68,7 +68,8 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
     }
     let labels = labels(runs);
     let mut notes = vec![format!(
-        "Differences are against {}; relative ones are relative to the largest size in that column there.",
+        "Every run is compared with {}. Relative differences refer to the largest absolute value of the column \
+         in that run.",
         labels[0]
     )];
     for (run, label) in runs.iter().zip(&labels).filter(|(run, _)| run.dataset.record.interrupted) {
@@ -123,7 +124,10 @@ pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<
     match crate::stored::read(&folder) {
         // Unreadable results may still be a run.
         Err(StoredError::Nothing { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
-        _ => Err(ReportError::Write { path: folder, cause: std::io::Error::other("the results of a run are there") }),
+        _ => Err(ReportError::Write {
+            path: folder,
+            cause: std::io::Error::other("the folder contains the results of a run; choose another --out"),
+        }),
     }
 }
 

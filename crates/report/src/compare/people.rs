@@ -24,7 +24,7 @@ pub fn for_people(comparison: &Dataset) -> Dataset {
         if table.name == DIFFERENCES {
             let same = shown_differences(table);
             if !same.is_empty() {
-                people.notes.push(format!("The same in all runs: {}.", same.join(", ")));
+                people.notes.push(format!("Equal in all runs: {}.", same.join(", ")));
             }
         }
     }

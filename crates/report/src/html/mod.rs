@@ -26,7 +26,7 @@ use traces::traces;
 /// The output `html`.
 pub const OUTPUT: Output = Output {
     name: "html",
-    summary: "figure.html, interactive, with one script for all figures beside their folders",
+    summary: "figure.html, interactive; all figures share one script in the folder above",
     make: files,
     sink: None,
     usual: true,
@@ -58,8 +58,8 @@ pub(crate) fn document(title: &str, style: &str, body: &str, script_path: &str) 
          <noscript><style>.live, .legend {{ display: none; }} .still {{ display: block; }}</style></noscript>\n\
          <script src=\"{path}\" onerror=\"document.documentElement.classList.add('missing')\"></script>\n\
          <script>{DRAW}</script>\n</head>\n<body>\n\
-         <p class=\"lost\">The file <code>{path}</code> is missing, so figures cannot be zoomed: it belongs to the folder \
-         of results from which this page was taken.</p>\n{body}\n</body>\n</html>\n"
+         <p class=\"lost\">The file <code>{path}</code> is missing, so the figures are static. Copy it from the \
+         folder of results that this page comes from.</p>\n{body}\n</body>\n</html>\n"
     )
 }
 
