@@ -95,7 +95,8 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
             Err(other) => {
                 match (other.kind, count) {
                     (Kind::Names, None) => complain!(
-                        "error: {}: names of rows, which are looked at beside the square matrix whose rows they name; write stickslip inspect MATRIX {}",
+                        "error: {}: this file contains row names; give it together with the square matrix, as \
+                         in `stickslip inspect MATRIX {}`",
                         file.display(),
                         file.display()
                     ),
@@ -160,7 +161,7 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
             if let Some(sparse) = converted(&matrix, &out)
                 .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
             {
-                let beside = if out.is_empty() { "" } else { ", but for rows without an entry or with 1e36" };
+                let beside = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
                 let _ = writeln!(text, "  {}{beside}", definite(&sparse));
             }
             let role = Role::of(file, name);
@@ -188,7 +189,7 @@ fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::Matrix> {
 fn definite(matrix: &sparse::Matrix) -> &'static str {
     match sparse_definite(matrix) {
         Some(true) => "positive definite",
-        Some(false) => "positive semidefinite: some motion has none of it",
+        Some(false) => "positive semidefinite: it is zero for some motion",
         None => "not positive semidefinite",
     }
 }
@@ -200,17 +201,19 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
 fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
     let of = |role: Role| square.iter().filter(|named| named.role == Some(role)).collect::<Vec<_>>();
     let (stiffness, mass, why) = match (&of(Role::Stiffness)[..], &of(Role::Mass)[..], square) {
-        ([stiffness], [mass], _) => (*stiffness, *mass, "by their names"),
-        ([stiffness], [], [a, b]) => (*stiffness, if a.role.is_none() { a } else { b }, "by the name of the stiffness"),
-        ([], [mass], [a, b]) => (if a.role.is_none() { a } else { b }, *mass, "by the name of the mass"),
+        ([stiffness], [mass], _) => (*stiffness, *mass, "according to their names"),
+        ([stiffness], [], [a, b]) => {
+            (*stiffness, if a.role.is_none() { a } else { b }, "according to the name of the stiffness")
+        }
+        ([], [mass], [a, b]) => (if a.role.is_none() { a } else { b }, *mass, "according to the name of the mass"),
         ([], [], [a, b]) => {
             let larger = a.matrix.largest() >= b.matrix.largest();
             let (stiffness, mass) = if larger { (a, b) } else { (b, a) };
-            (stiffness, mass, "by its larger entries: their names do not say")
+            (stiffness, mass, "because the entries of the first are larger (the names do not show the roles)")
         }
         _ => {
-            return Err("which matrix is the stiffness and which the mass is not told by their names (K and M, or stiffness and mass): \
-                        name the two files alone"
+            return Err("the names do not show which matrix is the stiffness and which the mass (K and M, or \
+                        stiffness and mass): give only these two files"
                 .to_owned());
         }
     };
@@ -248,12 +251,12 @@ impl Pair {
         let of_damping = of_damping.filter(|damping| damping.rows() == rows);
         if of_mass.rows() != rows {
             let (stiffness, mass, other) = (&stiffness.name, &mass.name, of_mass.rows());
-            return Err(format!("{stiffness} as stiffness has {rows} rows, and {mass} as mass {other}"));
+            return Err(format!("the stiffness {stiffness} has {rows} rows, but the mass {mass} has {other}"));
         }
         let out = constrained(&[&stiffness.matrix, &of_mass], rows);
         let names = stiffness.matrix.names().or(of_mass.names()).or(beside.filter(|names| names.len() == rows));
         if out.len() == rows {
-            return Err("no row of both is free".to_owned());
+            return Err("all rows are constrained".to_owned());
         }
         let free = (0..rows).filter(|row| out.binary_search(row).is_err());
         let names: Vec<String> = free.map(|row| names.map_or_else(String::new, |names| names[row].clone())).collect();
@@ -273,7 +276,7 @@ impl fmt::Display for Pair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.constrained > 0 {
             let rows = if self.constrained == 1 { "row is" } else { "rows are" };
-            writeln!(f, "  {} {rows} constrained, and left out", self.constrained)?;
+            writeln!(f, "  {} {rows} constrained and removed", self.constrained)?;
         }
         match &self.frequencies {
             Ok(lowest) => {
@@ -283,7 +286,7 @@ impl fmt::Display for Pair {
                 writeln!(f, "  lowest frequencies, Hz: {} (times in seconds)", hertz(1.0))?;
                 writeln!(f, "                          {} (times in milliseconds)", hertz(1e3))?;
                 if lowest.len() < LOWEST {
-                    writeln!(f, "                          there are no more of them")?;
+                    writeln!(f, "                          the structure has no further frequencies")?;
                 }
             }
             Err(error) => writeln!(f, "  no frequencies: {error}")?,
@@ -295,21 +298,21 @@ impl fmt::Display for Pair {
         let Some(&(_, first)) = self.mass.first() else {
             return writeln!(
                 f,
-                "  mass: no row is called by a direction (449.x), so that nobody can tell it, nor the units"
+                "  mass: unknown, because no row name contains a direction (as in 449.x); the units cannot be checked"
             );
         };
         let each: Vec<String> = self.mass.iter().map(|(along, total)| format!("along {along} {total:.6e}")).collect();
-        writeln!(f, "  mass of what is free, in its units: {}", each.join(", "))?;
+        writeln!(f, "  mass of the free rows, in the units of the file: {}", each.join(", "))?;
         for set in unit_sets::TABLE {
             let kilograms = set.mass * first;
-            let usual = if USUAL.contains(&kilograms) { ", as a blade may have" } else { "" };
+            let usual = if USUAL.contains(&kilograms) { ", plausible for a blade" } else { "" };
             writeln!(f, "    {kilograms:.4e} kg if units = \"{}\"{usual}", set.name)?;
         }
         let (from, to) = (USUAL.start(), USUAL.end());
         writeln!(
             f,
-            "  the files do not say their units: take those with which it weighs what it does; blades have {from} kg to {to} kg. Frequencies tell seconds \
-             from milliseconds only"
+            "  the files do not state their units: choose the units that give the correct mass; blades have \
+             {from} kg to {to} kg. The frequencies only distinguish seconds from milliseconds"
         )
     }
 }

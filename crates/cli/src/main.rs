@@ -99,9 +99,9 @@ fn main() -> ExitCode {
 /// study.
 fn new(name: &str, file: Option<&Path>) -> Ending {
     let Some(template) = templates::find(name) else {
-        let meant = templates::nearest(name).map_or_else(String::new, |near| format!("did you mean `{near}`? "));
+        let meant = templates::nearest(name).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
         let names: Vec<&str> = templates::TABLE.iter().map(|t| t.name).collect();
-        complain!("error: there is no template `{name}`; {meant}there are {}", names.join(", "));
+        complain!("error: unknown template `{name}`{meant}; the templates are {}", names.join(", "));
         return Ending::WrongInput;
     };
     let own = PathBuf::from(format!("{name}.toml"));
@@ -116,12 +116,13 @@ fn new(name: &str, file: Option<&Path>) -> Ending {
         .and_then(|mut f| f.write_all(template.study.as_bytes()));
     match written {
         Ok(()) => {
-            complain!("{} is written; `stickslip run {}` computes it", file.display(), file.display());
+            complain!("wrote {}; run it with `stickslip run {}`", file.display(), file.display());
             Ending::Done
         }
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             complain!(
-                "error: {} is there already and stays as it is; name another file, as in `stickslip new {name} other.toml`, or `-` to print it",
+                "error: {} already exists and is unchanged; give another file name, as in `stickslip new {name} \
+                 other.toml`, or `-` to print the study",
                 file.display()
             );
             Ending::WrongInput

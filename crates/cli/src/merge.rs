@@ -21,7 +21,9 @@ pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String
         Ok(journals) => journals,
         Err(error) => return wrong(error.to_string()),
     };
-    let Some(first) = journals.first() else { return wrong("there is nothing to join".to_owned()) };
+    let Some(first) = journals.first() else {
+        return wrong("nothing to merge: the folders contain no parts".to_owned());
+    };
     let mut outline = first.head().outline.clone();
     // The wall time includes those of all parts and of their checks.
     outline.record.wall_time_s = journals.iter().map(|journal| journal.head().outline.record.wall_time_s).sum();

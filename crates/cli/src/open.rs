@@ -30,7 +30,7 @@ pub fn show(file: &Path) -> Result<(), String> {
     let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
     let mut command = Command::new(program);
     command.args(arguments).arg(path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    let said = |reason: String| format!("{} cannot be shown: {reason}; open it by hand", file.display());
+    let said = |reason: String| format!("cannot open {}: {reason}; open it manually", file.display());
     let mut child = command.spawn().map_err(|error| said(format!("{program}: {error}")))?;
     // A program that fails ends soon. A successful one may run as long as the browser.
     let until = std::time::Instant::now() + PATIENCE;

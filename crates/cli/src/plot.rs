@@ -39,7 +39,7 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
                 match error {
                     // The location in the recorded study helps the user.
                     Some(StoredError::Study { path, cause }) => {
-                        complain!("error: {}: the study in it cannot be read", path.display());
+                        complain!("error: {}: cannot read the study in this record", path.display());
                         show(&cause);
                     }
                     Some(error) => complain!("error: {error}"),
@@ -54,7 +54,7 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
     }
     for run in runs.iter().filter(|run| run.dataset.record.interrupted) {
         complain!(
-            "warning: {}: the run was interrupted, only the points finished until then are drawn",
+            "warning: {}: the run was interrupted; the figure shows only the points finished before the interruption",
             run.folder.display()
         );
     }
@@ -72,7 +72,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     };
     if study.kind().name != run.dataset.kind {
         complain!(
-            "error: {} is a study of the kind `{}`, {} holds results of the kind `{}`",
+            "error: {} is a study of the kind `{}`, but {} contains results of the kind `{}`",
             file.display(),
             study.kind().name,
             run.folder.display(),
@@ -82,13 +82,14 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     }
     if study.wants_references() && !run.study.wants_references() && run.dataset.kind == "response" {
         complain!(
-            "warning: {} has no reference curves, which are computed; run the study again for them",
+            "warning: {} contains no reference curves; run the study again to compute them",
             run.folder.display()
         );
     }
     if !run.draw_like(&study) {
         complain!(
-            "warning: {} has changed in more than its figure; {} is drawn as it was computed, run the study again for the rest",
+            "warning: {} differs from the run in more than its figure; the figure shows the computed results in \
+             {}. Run the study again for the other changes",
             file.display(),
             run.folder.display()
         );
@@ -100,7 +101,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
 fn each(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
     for run in runs {
         if run.dataset.figure.panels.is_empty() {
-            complain!("warning: {}: there is nothing to draw", run.folder.display());
+            complain!("warning: {}: the results contain nothing to draw", run.folder.display());
         }
         let files = match run.write_figure(outputs) {
             Ok(files) => files,

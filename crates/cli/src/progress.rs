@@ -30,7 +30,7 @@ pub fn stop_flag() -> Arc<AtomicBool> {
         if let Ok(mut first) = first.lock() {
             *first = Some(Instant::now());
         }
-        complain!("\nstopping: finished parts are kept; Ctrl-C again ends at once");
+        complain!("\nstopping: finished points are kept; press Ctrl-C again to end at once");
     });
     stop
 }
@@ -138,7 +138,7 @@ fn bar(points: Option<u64>, what: &str) -> ProgressBar {
     let bar = points.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let template = match points {
         Some(_) => "{msg} {bar:24} {pos}/{len} points, {left}",
-        None => "{msg} {pos} points, as many as the curve needs",
+        None => "{msg} {pos} points (the total depends on the curve)",
     };
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn Write| {

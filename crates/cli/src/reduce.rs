@@ -34,23 +34,25 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
         Ending::WrongInput
     };
     let Some(substructure) = &model.substructure else {
-        return wrong("there is no [structure] that could be reduced");
+        return wrong("the study has no [structure] to reduce");
     };
     if let Reduction::None { .. } = substructure.reduction {
         return wrong(
-            "all rows of its [structure] are kept, since there are few or reduce = false says so: nothing is to be saved; say how far the reduction is to \
-             reach, as in reduce = { up_to = \"5 kHz\" }",
+            "nothing to reduce: the study keeps all rows of its [structure], because they are few or because of \
+             reduce = false. State the frequency range of the reduction, as in reduce = { up_to = \"5 kHz\" }",
         );
     }
     if let Some(disk) = &substructure.disk {
         if exports.is_some() {
             return wrong(
-                "the sector of a disk is saved at one speed: leave out `stiffened`, and name the file of that speed under `stiffness`",
+                "the sector of a disk can be saved at one speed only: remove `stiffened`, and give the matrix \
+                 of that speed as `stiffness`",
             );
         }
         if !disk.blade.is_empty() || disk.deviations.iter().any(|deviation| *deviation != 0.0) {
             return wrong(
-                "the blades of this disk differ, and what is left out of a sector is chosen for blades that do not: leave out `blade` and `mistuning`",
+                "the blades of this disk differ, but the reduction of a sector requires equal blades: remove \
+                 `blade` and `mistuning`",
             );
         }
     }
@@ -61,13 +63,13 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     };
     match few.and_then(|few| save(&few, out).map(|()| few)) {
         Ok(few) => print(&format!(
-            "{}: {} rows, {}\n  written to {}; put {} in the place of {}\n",
+            "{}: {} rows, {}\n  written to {}; in the study file, replace {} by {}\n",
             file.display(),
             substructure.component.dofs(),
             few.what,
             out.display(),
-            out.join(TABLES).display(),
             if few.sector.is_some() { "[structure], [[place]] and [disk]" } else { "[structure] and [[place]]" },
+            out.join(TABLES).display(),
         )),
         Err(message) => failed(&message),
     }

@@ -164,7 +164,7 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
         Err(ending) => return ending,
     };
     if wanted.watch && request.files.iter().any(|file| file == Path::new(STDIN)) {
-        complain!("error: standard input does not change, --watch needs files");
+        complain!("error: --watch needs files, not standard input");
         return Ending::WrongInput;
     }
     let threads = match pool(destination) {
@@ -184,7 +184,7 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
         if let Ending::Failed(message) = &ending {
             speak::error(message);
         }
-        complain!("waiting for a change; Ctrl-C ends");
+        complain!("waiting for a change of the files; Ctrl-C ends");
         while contents(request.files) == before {
             std::thread::sleep(LOOK);
             if stop.load(Ordering::Relaxed) {
@@ -227,7 +227,10 @@ fn once(
     };
     let mut names = BTreeSet::new();
     if let Some(twice) = studies.iter().map(Checked::study).find(|study| !names.insert(study.name())) {
-        complain!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
+        complain!(
+            "error: two files have the name `{}`, so their results would be in the same folder; rename one file",
+            twice.name()
+        );
         return Ending::WrongInput;
     }
     if let Some(error) =
@@ -280,7 +283,7 @@ fn one(
                 "from": range.start, "to": range.end, "kept": journal.units().len() }),
     );
     if !journal.units().is_empty() {
-        complain!("{}: {} of {} units are kept from before", study.name(), journal.units().len(), range.len());
+        complain!("{}: {} of {} units come from an earlier run", study.name(), journal.units().len(), range.len());
     }
     let progress = Progress::new(wanted.progress, points, done, study.name());
     let counter = progress.clone();
@@ -307,7 +310,7 @@ fn one(
         Ok(assembled) => assembled,
         Err(error) => {
             return Ending::Failed(format!(
-                "{error}; what was computed stays in {}: --resume makes the results of it",
+                "{error}; the computed units are in {}: --resume writes the results from them",
                 folder.join("").display()
             ));
         }
@@ -326,12 +329,13 @@ fn one(
             let beside = if results == whole || !interrupted {
                 String::new()
             } else {
-                format!("; the whole run in {} stays", whole.join("").display())
+                format!("; the complete run in {} is unchanged", whole.join("").display())
             };
-            let on = if interrupted { "; --resume goes on from there" } else { "" };
+            let on = if interrupted { "; continue with --resume" } else { "" };
             let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
                 true => {
-                    "interrupted before any part was finished, which is a stretch of points or a curve that is followed as a whole; the record is in"
+                    "interrupted before any unit of work was finished (a stretch of points, or a whole followed \
+                     curve); the record is in"
                 }
                 false => "interrupted; the finished points are in",
             };
@@ -345,7 +349,7 @@ fn one(
 fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Ending {
     let folder = journal.folder().join("").display().to_string();
     if !whole {
-        return Ending::Failed(format!("interrupted; the finished units are in {folder}; --resume goes on from there"));
+        return Ending::Failed(format!("interrupted; the finished units are in {folder}; continue with --resume"));
     }
     if let Err(error) = journal.seal() {
         return Ending::Failed(error.to_string());
@@ -357,7 +361,7 @@ fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Endi
     );
     if !speak::is_for_programs() {
         complain!(
-            "{}: part {shard} is in {folder}; `stickslip merge` joins the parts when all are there",
+            "{}: part {shard} is in {folder}; when all parts are computed, merge them with `stickslip merge`",
             study.name()
         );
     }
@@ -383,7 +387,7 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
     }
     let ending = if json && !is_whole {
         Ending::Failed(format!(
-            "--json prints tables of up to {MOST_ROWS} rows; the results are in {}",
+            "--json cannot print tables with more than {MOST_ROWS} rows; the results are in {}",
             files.first().map_or(String::new(), |file| file.with_file_name("").display().to_string())
         ))
     } else if json {
@@ -424,7 +428,7 @@ fn complain(dataset: &Dataset) {
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
         if let Some(points) = dataset.record.points.get(status) {
             complain!(
-                "{}: {points} {status}, less accurate than was asked; the notes in record.json say how far",
+                "{}: {points} {status}: less accurate than requested; the notes in record.json state the error",
                 dataset.name
             );
         }
@@ -444,7 +448,7 @@ pub(crate) fn show_figure(files: &[PathBuf]) {
         Some(Ok(())) => {}
         // The results exist even if they cannot be shown.
         Some(Err(message)) => complain!("{message}"),
-        None => complain!("there is no figure to show: it is not among the outputs of --only"),
+        None => complain!("no figure to open: --only does not include svg, png or html"),
     }
 }
 
@@ -473,7 +477,7 @@ pub fn paper(destination: &Destination, open: bool) -> Ending {
                 complain!("{message}");
             }
             if context.stopped() {
-                Ending::Failed("interrupted; the finished figures are written".to_owned())
+                Ending::Failed("interrupted; the finished figures were written".to_owned())
             } else if outcome.failed > 0 {
                 Ending::SomeFailed
             } else {
@@ -489,6 +493,6 @@ fn pool(destination: &Destination) -> Result<usize, Ending> {
     if let Some(threads) = destination.threads {
         builder = builder.num_threads(usize::from(threads));
     }
-    builder.build_global().map_err(|error| Ending::Failed(format!("no threads: {error}")))?;
+    builder.build_global().map_err(|error| Ending::Failed(format!("cannot create threads: {error}")))?;
     Ok(rayon::current_num_threads())
 }
