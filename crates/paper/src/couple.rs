@@ -114,7 +114,8 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
             "two peaks, at 121.25 Hz and 120.75 Hz",
             "\u{201c}There are two response peaks, at the frequencies fr = 121.25 Hz and fr = 120.75 Hz.\u{201d} (Sec. 4)",
             format!(
-                "{at}: a1 peaks at {} Hz, a3 at {} Hz. (The first number fixes the inferred k, so that a1 at 2 N is no independent test.)",
+                "{at}: a1 peaks at {} Hz, a3 at {} Hz. (The first number determines the inferred k, so a1 at 2 \
+                 N is not an independent test.)",
                 list(f1.iter().copied(), 3),
                 list(f3.iter().copied(), 3)
             ),
@@ -124,7 +125,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
             "121.25 Hz is the eigenfrequency of the excited body m - m1/2",
             "The first peak \u{201c}corresponds to the eigenfrequency of the first excited body with mass m \u{2212} m1/2\u{201d}. (Sec. 4)",
             format!(
-                "\u{221a}(k/(m \u{2212} m1/2))/2\u{3c0} = {first:.4} Hz with the inferred k; a1 peaks {} Hz beside it ({at}).",
+                "√(k/(m − m1/2))/2π = {first:.4} Hz with the inferred k; the peak of a1 deviates by {} Hz ({at}).",
                 list(f1.iter().map(|f| f - first), 3)
             ),
             in_all(&f1.iter().map(|f| (f - first).abs() <= PRINTED).collect::<Vec<_>>()),
@@ -133,7 +134,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
             "120.75 Hz is that of the connected bodies m + m1/2",
             "The second peak \u{201c}is given by connected bodies m + m1/2\u{201d}. (Sec. 4)",
             format!(
-                "\u{221a}(k/(m + m1/2))/2\u{3c0} = {second:.4} Hz; a3 peaks {} Hz beside it ({at}).",
+                "√(k/(m + m1/2))/2π = {second:.4} Hz; the peak of a3 deviates by {} Hz ({at}).",
                 list(f3.iter().map(|f| f - second), 3)
             ),
             in_all(&f3.iter().map(|f| (f - second).abs() <= PRINTED).collect::<Vec<_>>()),
@@ -183,7 +184,8 @@ fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Opt
         name,
         text,
         format!(
-            "At {} N the peaks are {} cm, within {}; beside the peak the amplitudes differ by up to {} of it, at {frequency:.2} Hz.",
+            "At {} N the peaks are {} cm and agree within {}; away from the peak the amplitudes differ by up to \
+             {} of it, at {frequency:.2} Hz.",
             last.limit,
             list(last.peak.iter().map(|peak| 100.0 * peak.amplitude), 3),
             percent(last.peak_spread()),
@@ -293,7 +295,8 @@ pub fn figure7(results: &Results, further: &Further) -> Option<Part> {
             "\u{201c}The results \u{2026} in Fig. 6 and Fig. 7 seem not to be realistic, as the gained amplitudes of vibrations up to 5 cm cannot occur in a \
              real turbine.\u{201d} (Sec. 4)",
             format!(
-                "Highest peak of both figures: {:.3} cm. (It fixes the inferred b, so that this is no independent test.)",
+                "Highest peak of both figures: {:.3} cm. (It determines the inferred b, so this is not an \
+                 independent test.)",
                 100.0 * top
             ),
             small(top / 0.05 - 1.0, SIMILAR, APPROXIMATE),
@@ -340,8 +343,9 @@ pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
         "heights and positions depend strongly on all parameters",
         "\u{201c}Their heights and positions strongly depend on all parameters of 3V characteristic of connecting element.\u{201d} (Sec. 6)",
         format!(
-            "From Fig. 6 at Ft = 2 N, each of Ft, kt, m1 changed by a factor of two: {} of 6 largest changes are strong, that is more than {} in height, \
-             or more than half the half-power width ({:.3} Hz) in frequency.",
+            "Starting from Fig. 6 at Ft = 2 N, each of Ft, kt and m1 changes by a factor of two. {} of 6 \
+             largest changes are strong: more than {} in height, or more than half the half-power width ({:.3} \
+             Hz) in frequency.",
             strong.iter().filter(|s| **s).count(),
             percent(DIFFERENT),
             0.5 * width
@@ -388,8 +392,9 @@ pub fn figure8(results: &Results) -> Option<Part> {
             "\u{201c}\u{2026} valid also for vibration with small amplitudes, of course when the conditions of physical similarity such as the ratio \
              of forces F0/Ft0 are fulfilled.\u{201d} (Sec. 4)",
             format!(
-                "With the paper\u{2019}s arctangent law \u{3b1} F0/\u{221a}(km) is a condition too. Difference to Fig. 6, as a part of the \
-                 highest peak of its panel: {kept:.1e} with \u{3b1} = 25 s/mm kept, {scaled:.1e} with \u{3b1} = 250 s/mm."
+                "With the paper’s arctangent law, α F0/√(km) is also a condition. Difference to Fig. 6, \
+                 relative to the highest peak of its panel: {kept:.1e} with α = 25 s/mm, {scaled:.1e} with α = \
+                 250 s/mm."
             ),
             small(kept, IMAGE, SIMILAR),
         ));
@@ -442,7 +447,8 @@ pub fn figure10(results: &Results) -> Option<Part> {
             "\u{201c}Comparing the last figure with the first subfigure in Fig. 6 \u{2026} the peak amplitudes of response curves with the symmetric and \
              non-symmetric friction elements are similar.\u{201d} (Sec. 5)",
             format!(
-                "Ft = 2 N: excited blade {:.3} against {:.3} cm ({}), other blade {:.3} against {:.3} cm ({}).",
+                "Ft = 2 N: excited blade {:.3} cm, in Fig. 6 {:.3} cm ({}); other blade {:.3} cm, in Fig. 6 \
+                 {:.3} cm ({}).",
                 first(&symmetric, BLADE1),
                 first(&couple, BLADE1),
                 percent(excited),
@@ -457,8 +463,9 @@ pub fn figure10(results: &Results) -> Option<Part> {
             "\u{201c}The courses of responses in both cases are different, but the damping effect of symmetric and non-symmetric structure are \
              approximately the same.\u{201d} (Sec. 5)",
             format!(
-                "{at}: peak of the excited blade {} cm symmetric, {} cm non-symmetric; excess {}. Friction between equal blades damps only their \
-                 motion against each other; their common motion alone peaks at F0/(2 b \u{3c9}0) = {floor:.2} cm.",
+                "{at}: peak of the excited blade {} cm symmetric, {} cm non-symmetric; excess {}. Friction \
+                 between equal blades damps only their relative motion; their common motion alone has a peak of \
+                 F0/(2 b ω0) = {floor:.2} cm.",
                 list(heights(&symmetric, BLADE1), 3),
                 list(heights(&couple, BLADE1), 3),
                 excess.iter().map(|v| percent(*v)).collect::<Vec<_>>().join(", ")
@@ -496,7 +503,7 @@ pub fn optimum(further: &Further) -> Option<Part> {
         if curve.interior {
             format!("lowest {:.4} cm at Ft = {:.3} N", 100.0 * curve.lowest.1, curve.lowest.0)
         } else {
-            format!("no lowest point inside, floor {:.4} cm", 100.0 * curve.lowest.1)
+            format!("no minimum inside the range, lowest value {:.4} cm", 100.0 * curve.lowest.1)
         }
     };
     let section = Section {

@@ -66,7 +66,8 @@ pub fn exact(results: &Results) -> Option<Part> {
     let section = Section {
         heading: "Fig. 2: the exact loops".to_owned(),
         paragraphs: vec![
-            "A spring and a slider in series, without mass, moved by a cos(\u{3c9}t). The force is what moves the element."
+            "A spring and a slider in series, without mass, moved by a cos(ωt). The force is the one that moves \
+             the element."
                 .to_owned(),
         ],
         figure: Some(Figure { title: String::new(), ..results.get("fig02")?.figure.clone() }),
@@ -83,9 +84,9 @@ pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
     let section = Section {
         heading: "Figs. 3 and 4: the approximate elements".to_owned(),
         paragraphs: vec![
-            "Fig. 3: the slider with the arctangent law, Eq. (2), \u{3b1} = 25 s/mm, without mass. Fig. 4: the same law at a mass of 2 g between \
-             spring and slider. How much the arctangent rounds the loop depends on \u{3b1} a \u{3c9} alone, so the smallest \
-             loop is the least similar one."
+            "Fig. 3: the slider with the arctangent law, Eq. (2), α = 25 s/mm, without mass. Fig. 4: the same \
+             law at a mass of 2 g between spring and slider. The rounding of the loop by the arctangent depends \
+             on α a ω alone, so the smallest loop is the least similar one."
                 .to_owned(),
         ],
         figure: merged(
@@ -277,7 +278,8 @@ pub fn coulomb(results: &Results) -> Option<Part> {
     let section = Section {
         heading: "Fig. 4 with true Coulomb friction".to_owned(),
         paragraphs: vec![
-            "What the caption of Fig. 4 says, against what its text says: the loops of the element with mass when the slider obeys Coulomb\u{2019}s law."
+            "The caption of Fig. 4 contradicts its text. This section shows the loops of the element with mass \
+             and a slider that obeys Coulomb’s law."
                 .to_owned(),
         ],
         figure: merged(results, "", &[("fig04a_coulomb", "Coulomb"), ("fig04b_coulomb", "Coulomb")]),

@@ -43,7 +43,7 @@ pub fn open(further: &Further) -> Part {
         ],
         ["Eq. (4), line 4", "derivative of v3", "derivative of v2"],
         ["Eq. (4), line 6", "x31", "x3"],
-        ["\u{3b1} = 25 s/mm", "25 s/mm beside SI units", "25000 s/m"],
+        ["\u{3b1} = 25 s/mm", "25 s/mm among SI units", "25000 s/m"],
         [
             "Sec. 5",
             "spring at body 1, friction at body 2",
@@ -56,7 +56,8 @@ pub fn open(further: &Further) -> Part {
         ],
     ];
     let mut paragraphs = vec![
-        "The equations and numbers that the paper does not print, or prints wrong, and what stands here instead."
+        "The paper does not print these equations and numbers, or prints them wrong. The table shows what this \
+         report uses instead."
             .to_owned(),
     ];
     if let Some(couple) = &further.couple {
@@ -66,7 +67,7 @@ pub fn open(further: &Further) -> Part {
         ));
     }
     let section = Section {
-        heading: "What the paper leaves open".to_owned(),
+        heading: "Data that the paper does not state".to_owned(),
         paragraphs,
         tables: vec![PageTable {
             caption: String::new(),
@@ -93,10 +94,11 @@ pub fn record(results: &Results) -> Part {
         ]
     });
     let section = Section {
-        heading: "How far the numbers may be trusted".to_owned(),
+        heading: "Accuracy of the numbers".to_owned(),
         paragraphs: vec![
-            "Every point is a periodic motion, closed by Newton\u{2019}s method and checked by its own balance of energy; a point that fails is counted, \
-             never drawn. Largest values over all points of a figure; the folder of each figure holds the tables."
+            "Every point is a periodic solution, found by Newton’s method and checked by its energy balance. A \
+             failed point is counted, but never drawn. The table shows the largest values over all points of a \
+             figure; the folder of each figure contains its tables."
                 .to_owned(),
         ],
         tables: vec![PageTable {

@@ -91,7 +91,7 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
         say(&format!("{}: {points} points{failed}, {:.2} s", dataset.title, dataset.record.wall_time_s));
         results.insert(study, dataset);
     }
-    say("Further cases that the claims ask for: other slip limits, contact stiffnesses, frequencies");
+    say("Additional cases for the claims: other slip limits, contact stiffnesses, frequencies");
     let further = Further::new(context, extent.points);
     let parts: Vec<Part> = [
         elements::exact(&results),
@@ -123,15 +123,16 @@ fn page(parts: Vec<Part>) -> Page {
     Page {
         title: "Blade couple with dry friction connection: figures and claims".to_owned(),
         introduction: vec![
-            "Every figure of Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 \
-             (2015) 31-40, computed anew, beside what its text claims of it."
+            "Every figure of Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and \
+             Computational Mechanics 9 (2015) 31-40, computed again and compared with the claims of its text."
                 .to_owned(),
             format!(
-                "Every verdict follows from the measured number by a fixed rule: two quantities are similar up to {:.0} %, \
-                 approximately the same up to {:.0} %, and nobody would call them similar beyond {:.0} %; a frequency is met within {} Hz, half \
-                 the step in which the paper prints it; a claim about several cases needs all of them, and is qualified if \
-                 only some agree. Unless said otherwise friction is exact Coulomb friction; the last sections compare the paper's arctangent law, \
-                 and list what the paper leaves open and had to be inferred.",
+                "Every verdict follows from the measured number by a fixed rule. Two quantities are similar up \
+                 to {:.0} %, approximately the same up to {:.0} %, and not similar beyond {:.0} %. A frequency \
+                 matches within {} Hz, half the step in which the paper prints it. A claim about several cases \
+                 needs all of them; it holds with a qualification if only some agree. Friction is exact Coulomb \
+                 friction unless stated otherwise. The last sections compare the paper's arctangent law, and \
+                 list the data that the paper does not state and that had to be inferred.",
                 100.0 * verdict::SIMILAR,
                 100.0 * verdict::APPROXIMATE,
                 100.0 * verdict::DIFFERENT,
@@ -195,7 +196,7 @@ mod tests {
         }
         let report = std::fs::read_to_string(out.path().join("report.html")).unwrap();
         for heading in
-            ["Fig. 2", "Figs. 3 and 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 10", "What the paper leaves open"]
+            ["Fig. 2", "Figs. 3 and 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 10", "Data that the paper does not state"]
         {
             assert!(report.contains(&format!("<h2>{heading}")), "{heading}");
         }
