@@ -19,10 +19,9 @@ pub fn around(
     let mut said = said.into_iter().flatten();
     match (said.next(), said.next()) {
         (first, None) => Ok(first),
-        _ => Err(error::model(
-            py,
-            "`engine_order`, `nodal_diameter` and `sector` say different things: give one of them",
-        )),
+        _ => {
+            Err(error::model(py, "`engine_order`, `nodal_diameter` and `sector` exclude each other: give one of them"))
+        }
     }
 }
 
@@ -42,7 +41,7 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
         .iter()
         .find(|key| key.extract::<String>().map_or(true, |key| !["of", "deviation", "seed"].contains(&key.as_str())))
     {
-        return Err(error::model(py, format!("`mistuning` has no key {key}; it has of, deviation and seed")));
+        return Err(error::model(py, format!("`mistuning` has no key {key}; its keys are of, deviation and seed")));
     }
     let missing = |key: &str| {
         error::model(
@@ -54,15 +53,15 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
     let of = match &names(&of)?[..] {
         [name] => Mistuned::Mass(name.clone()),
         [a, b] => Mistuned::Spring([a.clone(), b.clone()]),
-        _ => return Err(error::model(py, "`of` is the name of a mass, or the two ends of a spring")),
+        _ => return Err(error::model(py, "`of` must be the name of a mass, or the two ends of a spring")),
     };
     if !of.is_in(sector) {
         let message = match &of {
             Mistuned::Spring([a, b]) => {
-                format!("there is no spring between `{a}` and `{b}`: write its ends as in `spring`")
+                format!("no spring between `{a}` and `{b}`: write its ends in the order of `spring`")
             }
             _ => format!(
-                "there is no mass `{}` in a sector; of a spring name both ends, as in (\"blade\", \"ground\")",
+                "the sector has no mass `{}`; for a spring give both ends, as in (\"blade\", \"ground\")",
                 names(&given.get_item("of")?.ok_or_else(|| missing("of"))?)?[0]
             ),
         };
@@ -72,9 +71,14 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
     let mut deviations = quantity::many(&deviation, Some(Dimension::NONE), "`deviation`")?;
     let listed = deviations.len() != 1 || (deviation.hasattr("__len__")? && deviation.cast::<PyString>().is_err());
     match (listed, given.get_item("seed")?) {
-        (true, Some(_)) => return Err(error::model(py, "a list of deviations needs no `seed`")),
+        (true, Some(_)) => {
+            return Err(error::model(py, "`seed` does not apply to a list of deviations: remove `seed`"));
+        }
         (true, None) if deviations.len() != sectors => {
-            let message = format!("there are {} deviations, and the disk has {sectors} sectors", deviations.len());
+            let message = format!(
+                "`deviation` has {} values, but the disk has {sectors} sectors: give one value per sector",
+                deviations.len()
+            );
             return Err(error::model(py, message));
         }
         (true, None) => {}
@@ -84,7 +88,7 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
         }
     }
     if let Some(message) = too_far(&deviations) {
-        return Err(error::model(py, format!("{message}; deviations are shares: 0.02 is 2 %")));
+        return Err(error::model(py, format!("{message}; deviations are fractions: 0.02 is 2 %")));
     }
     Ok((of, deviations))
 }
@@ -97,15 +101,20 @@ pub fn ring(
     given: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Result<Model, ModelError>> {
     if sector.ring.is_some() {
-        return Err(error::model(py, "this model is a disk already; state one sector"));
+        return Err(error::model(py, "this model is already a disk; call `disk` on the model of one sector"));
     }
     if sector.substructure.is_some() {
-        let message = "a sector by its matrices needs the node pairs of its two sides: state it with [structure] and [disk], in a file or for Study.from_dict";
+        let message = "a sector given by matrices needs the node pairs of its two sides: use [structure] and \
+                       [disk] in a study file or in Study.from_dict";
         return Err(error::model(py, message));
     }
     let most = MOST_MASSES / sector.masses.len().max(1);
     if disk.sectors > most {
-        let message = format!("{} sectors of {} masses; the limit is {MOST_MASSES}", disk.sectors, sector.masses.len());
+        let message = format!(
+            "{} sectors with {} masses each exceed the limit of {MOST_MASSES} masses",
+            disk.sectors,
+            sector.masses.len()
+        );
         return Err(error::model(py, message));
     }
     let mistuned = given.map(|given| mistuning(given, sector, disk.sectors)).transpose()?;

@@ -80,7 +80,7 @@ impl PyLaw {
     ) -> PyResult<f64> {
         let Some(written) = &slf.get().written else {
             return Err(PyTypeError::new_err(
-                "the derivatives of laws that are built in are exact; a law of `rate_law` has some to check",
+                "only a law made by `rate_law` can be checked: the derivatives of built-in laws are exact",
             ));
         };
         written.kernel.bind(slf.py()).call_method1("check_derivatives", (slf, u, v, z, tolerance))?.extract()
@@ -167,7 +167,7 @@ pub fn _law(py: Python<'_>, name: &str, values: Vec<f64>) -> PyResult<PyLaw> {
     if values.len() != row.parameters.len() {
         return Err(error::model(
             py,
-            format!("this is no pickled law: `{name}` has {} parameters", row.parameters.len()),
+            format!("this is not a valid pickle of a law: `{name}` has {} parameters", row.parameters.len()),
         ));
     }
     let values = row.parameters.iter().map(|parameter| parameter.key).zip(values).collect();
@@ -179,7 +179,7 @@ pub fn _law(py: Python<'_>, name: &str, values: Vec<f64>) -> PyResult<PyLaw> {
 fn row(py: Python<'_>, name: &str) -> PyResult<&'static LawInfo> {
     law::find(name).ok_or_else(|| {
         let names: Vec<&str> = law::TABLE.iter().map(|row| row.name).collect();
-        error::model(py, format!("there is no law `{name}`; there are {}", names.join(", ")))
+        error::model(py, format!("unknown law `{name}`; the laws are {}", names.join(", ")))
     })
 }
 
@@ -200,7 +200,10 @@ pub fn named(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>)
     }
     if let Some(unknown) = given.keys().find(|key| row.parameters.iter().all(|parameter| parameter.key != **key)) {
         let keys: Vec<&str> = row.parameters.iter().map(|parameter| parameter.key).collect();
-        return Err(error::model(py, format!("law `{name}` has no parameter `{unknown}`; it has {}", keys.join(", "))));
+        return Err(error::model(
+            py,
+            format!("law `{name}` has no parameter `{unknown}`; its parameters are {}", keys.join(", ")),
+        ));
     }
     let mut values: BTreeMap<&str, f64> = BTreeMap::new();
     // The dimension of a parameter may depend on the value of a parameter with a fixed
@@ -287,7 +290,7 @@ pub fn _rate_law(
         if !stickslip::model::is_identifier(&key) {
             return Err(error::model(
                 py,
-                format!("parameter `{key}` of law `{name}` must have letters, digits and _ as its name"),
+                format!("the name of parameter `{key}` of law `{name}` must consist of letters, digits and _"),
             ));
         }
         let (value, dimension) = quantity::of_any_dimension(&value, &format!("`{key}` of law `{name}`"))?;

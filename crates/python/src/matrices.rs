@@ -17,13 +17,14 @@ type Entries = Vec<(usize, usize, f64)>;
 fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> {
     let py = value.py();
     let size = |rows: usize, columns: usize| {
-        let message = format!("the {what} matrix is {rows} x {columns}, and there are {n} rows: it must be {n} x {n}");
+        let message =
+            format!("the {what} matrix is {rows} x {columns}, but the structure has {n} rows: it must be {n} x {n}");
         Err(error::model(py, message))
     };
     if py.import("numpy")?.call_method1("iscomplexobj", (value,))?.extract::<bool>()? {
         let message = format!(
-            "the {what} matrix has complex numbers, and matrices of a structure are real: of a stiffness K (1 + jη) give K, and the loss as \
-             `damping` or `damping_ratio`"
+            "the {what} matrix is complex, but structural matrices must be real: for a stiffness K (1 + jη) \
+             give K, and state the loss as `damping` or `damping_ratio`"
         );
         return Err(error::model(py, message));
     }
@@ -95,7 +96,10 @@ pub fn places(py: Python<'_>, given: &Bound<'_, PyAny>, n: usize) -> PyResult<(V
                 true => Ok(vec![(number, 1.0)]),
                 false => Err(error::model(
                     py,
-                    format!("`{name}` names row {number}, and the last of the matrices is {}", n.saturating_sub(1)),
+                    format!(
+                        "`{name}` refers to row {number}, but the last row of the matrices is {}",
+                        n.saturating_sub(1)
+                    ),
                 )),
             }
         };

@@ -105,8 +105,8 @@ impl PyModel {
 
     fn system(&self, py: Python<'_>) -> PyResult<System> {
         if self.around.iter().flatten().any(Option::is_some) {
-            let message = "`engine_order`, `nodal_diameter` and `sector` say how a force goes around a disk: this is one sector of it, and \
-                           model.disk(24) is the ring of 24";
+            let message = "`engine_order`, `nodal_diameter` and `sector` describe an excitation around a disk, \
+                           but this model is one sector: use model.disk(24) for a disk of 24 sectors";
             return Err(error::model(py, message));
         }
         alone(py, || self.model.assemble())?.map_err(|cause| refused(py, &cause, &self.model))
@@ -146,7 +146,7 @@ impl PyModel {
         if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
             return Err(error::model(
                 py,
-                format!("`start` must hold displacements and velocities, {n} numbers, found {}", start.len()),
+                format!("`start` must contain {n} numbers (displacements and velocities), found {}", start.len()),
             ));
         }
         let outcome = alone(py, || found.solver.orbit(omega, start.as_deref()));
@@ -161,7 +161,8 @@ impl PyModel {
         let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
         if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.start.len()) {
             let message = format!(
-                "`start` has {} numbers, and by this method an orbit of this model begins with {}: give the `start` of such an orbit",
+                "`start` has {} numbers, but orbits of this model by this method have {}: use the `start` of \
+                 such an orbit",
                 start.len(),
                 orbit.start.len()
             );
@@ -226,7 +227,7 @@ impl Told {
 fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<(Box<dyn Method>, Options)> {
     let Some(row) = method::find(name) else {
         let names: Vec<&str> = method::TABLE.iter().map(|row| row.name).collect();
-        return Err(error::method(py, format!("there is no method `{name}`; there are {}", names.join(", "))));
+        return Err(error::method(py, format!("unknown method `{name}`; the methods are {}", names.join(", "))));
     };
     let mut options = Options::new();
     for (key, value) in given.into_iter().flatten() {
@@ -235,7 +236,7 @@ fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyRes
             let keys: Vec<&str> = row.options.iter().map(|option| option.key).collect();
             let message = match keys.len() {
                 0 => format!("method `{name}` has no options, found `{key}`"),
-                _ => format!("method `{name}` has no option `{key}`; it has {}", keys.join(", ")),
+                _ => format!("method `{name}` has no option `{key}`; its options are {}", keys.join(", ")),
             };
             return Err(error::method(py, message));
         };
@@ -300,7 +301,8 @@ impl PyModel {
         let (names, places) = matrices::places(py, &places, n)?;
         let component = matrices::component(py, names, &mass, damping.as_ref(), &stiffness)?;
         if damping_ratio.is_some() && reduce.is_none() {
-            let message = "`damping_ratio` is that of modes: give `reduce` too, the highest frequency of interest, as in reduce=\"2 kHz\"";
+            let message = "`damping_ratio` applies to modes and requires `reduce`, the highest frequency of \
+                           interest, as in reduce=\"2 kHz\"";
             return Err(error::model(py, message));
         }
         let damping = match (damping_ratio, damping) {
@@ -453,12 +455,12 @@ impl PyModel {
     /// An example is ``model.set({"shroud.limit": "3 N", "a.mass": 0.2, "a-ground.stiffness":
     /// 1e5, "a.force": 5})``.
     fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyAny>) -> PyResult<()> {
-        let values = quantity::dictionary(values, "what `set` is given")?;
+        let values = quantity::dictionary(values, "the argument of `set`")?;
         let along = parameters::along(py, &self.model, Some(&values), &mut vec![1.0])?;
         if let Some((name, values)) = along.iter().find(|(_, values)| values.len() > 1) {
             return Err(error::model(
                 py,
-                format!("`{name}` takes one value here, found {}; `response` varies it", values.len()),
+                format!("`{name}` needs one value, found {}; use `response` to vary it", values.len()),
             ));
         }
         let mut model = self.model.clone();
@@ -488,7 +490,10 @@ impl PyModel {
         let system = self.system(py)?;
         let structure = system.structure();
         if structure.dofs() > stickslip::structure::MOST_IN_FULL {
-            return Err(error::model(py, format!("matrices of {} places are too large in full", structure.dofs())));
+            return Err(error::model(
+                py,
+                format!("the full matrices of {} degrees of freedom are too large", structure.dofs()),
+            ));
         }
         let out = PyDict::new(py);
         for (name, matrix) in
@@ -551,7 +556,7 @@ impl PyModel {
         let start = start.map(|start| quantity::numbers(start, "`start`")).transpose()?;
         if start.iter().flatten().any(|value| !value.is_finite()) {
             let message =
-                "`start` must hold numbers, as the `start` of a neighbouring orbit does; found one that is not finite";
+                "`start` must contain finite numbers, like the `start` of an orbit; found a non-finite number";
             return Err(error::model(py, message));
         }
         let plain = options.is_none_or(|options| options.is_empty());
@@ -765,7 +770,7 @@ pub fn _orbit(
     start: Option<Vec<f64>>,
 ) -> PyResult<PyOrbit> {
     let made = || {
-        let row = method::find(method).ok_or_else(|| error::method(py, format!("there is no method `{method}`")))?;
+        let row = method::find(method).ok_or_else(|| error::method(py, format!("unknown method `{method}`")))?;
         let built = (row.build)(&options).map_err(|cause| error::method(py, cause))?;
         Ok((built, options.clone()))
     };

@@ -225,7 +225,7 @@ impl PyOrbit {
             None => 0,
             Some(name) => self.orbit.joints.iter().position(|one| one.name == name).ok_or_else(|| {
                 let names: Vec<&str> = self.orbit.joints.iter().map(|one| one.name.as_str()).collect();
-                PyKeyError::new_err(format!("there is no joint `{name}`, there are {}", names.join(", ")))
+                PyKeyError::new_err(format!("unknown joint `{name}`; the joints are {}", names.join(", ")))
             })?,
         };
         let d = self.system.joints()[index].axes().len();

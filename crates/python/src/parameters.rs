@@ -73,8 +73,8 @@ pub fn along(
         let name: String = name.extract()?;
         let Some(dimension) = dimension(model, &name) else {
             let message = format!(
-                "`{name}` is no parameter of the model: say JOINT.KEY for a parameter of its law, PLACE.mass, PLACE.force, PLACE.motion, \
-                 A-B.stiffness or A-B.damping"
+                "the model has no parameter `{name}`: use JOINT.KEY for a parameter of a law, PLACE.mass, \
+                 PLACE.force, PLACE.motion, A-B.stiffness or A-B.damping"
             );
             return Err(error::model(py, message));
         };
@@ -91,7 +91,8 @@ pub fn along(
             len if len == count => {}
             1 => list.resize(count, list[0]),
             len => {
-                let message = format!("`{name}` has {len} values where {count} are asked for: give as many, or one");
+                let message =
+                    format!("`{name}` has {len} values, but {count} are required: give {count} values, or one");
                 return Err(error::model(py, message));
             }
         }

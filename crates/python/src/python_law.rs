@@ -82,7 +82,7 @@ fn build(values: &[f64]) -> SharedLaw {
     let laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
     match laws.get(&number).and_then(Weak::upgrade) {
         Some(written) => written.law(values.to_vec()),
-        None => unreachable!("a law is built from one that is there"),
+        None => unreachable!("the registry contains the law of every existing instance"),
     }
 }
 
@@ -192,10 +192,7 @@ impl Shown {
             let array = array.cast_into::<PyArray2<f64>>().map_err(PyErr::from)?.readonly();
             if array.len() != length {
                 let (name, found) = (self.written.info.name, array.len());
-                return Err(error::model(
-                    py,
-                    format!("law `{name}` returned {found} {what} where {length} were expected"),
-                ));
+                return Err(error::model(py, format!("law `{name}` returned {found} {what}, expected {length}")));
             }
             Ok(array.as_array().iter().copied().collect::<Vec<f64>>())
         };

@@ -27,7 +27,7 @@ pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResul
             dimension.name_and_unit().map_or_else(|| dimension.to_string(), |(name, unit)| format!("{name} ({unit})"));
         error::model(
             py,
-            format!("{what} must be a {unit}: a number in SI or a string with a unit, found {}", kind(value)),
+            format!("{what} must be a {unit}: a number in SI units or a string with a unit, found {}", kind(value)),
         )
     })?;
     if !number.is_finite() {
@@ -184,7 +184,7 @@ fn is_sequence(value: &Bound<'_, PyAny>) -> PyResult<bool> {
 
 fn no_sequence(value: &Bound<'_, PyAny>, what: &str) -> PyErr {
     let message = format!(
-        "{what} must be one value or a list of them, numbers in SI or strings with units, found {}",
+        "{what} must be one value or a list of them, numbers in SI units or strings with units, found {}",
         kind(value)
     );
     error::model(value.py(), message)

@@ -114,9 +114,10 @@ impl PyResultSet {
     fn __getitem__(&self, table: &str) -> PyResult<Table> {
         match self.dataset.tables.iter().position(|one| one.name == table) {
             Some(index) => Ok(self.table(index)),
-            None => {
-                Err(PyKeyError::new_err(format!("there is no table `{table}`, there are {}", self.tables().join(", "))))
-            }
+            None => Err(PyKeyError::new_err(format!(
+                "unknown table `{table}`; the tables are {}",
+                self.tables().join(", ")
+            ))),
         }
     }
 
@@ -248,7 +249,9 @@ fn same_table(one: &dataset::Table, other: &dataset::Table) -> bool {
 #[pyfunction]
 pub fn _result(py: Python<'_>, bytes: &[u8]) -> PyResult<PyResultSet> {
     let dataset = py.detach(|| rmp_serde::from_slice(bytes));
-    dataset.map(PyResultSet::new).map_err(|cause| error::report(py, format!("this is no pickled result: {cause}")))
+    dataset
+        .map(PyResultSet::new)
+        .map_err(|cause| error::report(py, format!("this is not a valid pickle of a result: {cause}")))
 }
 
 /// Converts a value to plain Python data.
@@ -325,7 +328,7 @@ impl Table {
     fn __getitem__<'py>(slf: Bound<'py, Self>, column: &str) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
         let Some(found) = this.table().column(column) else {
-            let message = format!("there is no column `{column}`, there are {}", this.columns().join(", "));
+            let message = format!("unknown column `{column}`; the columns are {}", this.columns().join(", "));
             return Err(PyKeyError::new_err(message));
         };
         let owner = slf.clone().into_any();
@@ -423,7 +426,10 @@ impl Table {
         let (py, table) = (slf.py(), slf.get().table());
         let at = if index < 0 { table.rows().checked_add_signed(index) } else { Some(index as usize) };
         let Some(index) = at.filter(|at| *at < table.rows()) else {
-            return Err(PyIndexError::new_err(format!("there is no row {index}, there are {}", table.rows())));
+            return Err(PyIndexError::new_err(format!(
+                "row {index} does not exist; the table has {} rows",
+                table.rows()
+            )));
         };
         let row = PyDict::new(py);
         for column in &table.columns {
@@ -476,7 +482,9 @@ impl Table {
 #[pyfunction]
 pub fn _table(py: Python<'_>, bytes: &[u8]) -> PyResult<Table> {
     let table = py.detach(|| rmp_serde::from_slice(bytes));
-    table.map(Table::alone).map_err(|cause| error::report(py, format!("this is no pickled table: {cause}")))
+    table
+        .map(Table::alone)
+        .map_err(|cause| error::report(py, format!("this is not a valid pickle of a table: {cause}")))
 }
 
 fn tables<'py>(table: &Bound<'py, Table>, function: &str) -> PyResult<Bound<'py, PyAny>> {

@@ -87,9 +87,14 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
 
 /// Recreates a model from its parts and laws.
 pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), String> {
-    let stored: Stored = rmp_serde::from_slice(bytes).map_err(|cause| format!("this is no pickled model: {cause}"))?;
+    let stored: Stored =
+        rmp_serde::from_slice(bytes).map_err(|cause| format!("this is not a valid pickle of a model: {cause}"))?;
     if stored.joints.len() != laws.len() {
-        return Err(format!("this is no pickled model: {} joints and {} laws", stored.joints.len(), laws.len()));
+        return Err(format!(
+            "this is not a valid pickle of a model: {} joints and {} laws",
+            stored.joints.len(),
+            laws.len()
+        ));
     }
     let (substructure, places) = stored.structure.map(StoredStructure::made).transpose()?.unzip();
     let joints = stored.joints.into_iter().zip(laws);

@@ -105,7 +105,8 @@ fn typed(
             text.to_str()?.to_owned()
         } else {
             let number = quantity::number(&value)?.filter(|number| number.is_finite()).ok_or_else(|| {
-                let message = format!("`{name}` takes a finite number in SI or a string with a unit, found {value}");
+                let message =
+                    format!("`{name}` must be a finite number in SI units or a string with a unit, found {value}");
                 error::model(value.py(), message)
             })?;
             let unit = match dimension(&name)? {
@@ -167,7 +168,7 @@ impl PyStudy {
             Some(found) => PyStudy::from_text(py, found.study, found.name, set),
             None => {
                 let names: Vec<&str> = templates::TABLE.iter().map(|one| one.name).collect();
-                let message = format!("there is no template `{template}`; there are {}", names.join(", "));
+                let message = format!("unknown template `{template}`; the templates are {}", names.join(", "));
                 Err(error::model(py, message))
             }
         }

@@ -58,7 +58,7 @@ pub fn apart<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send 
         // The result of an abandoned thread has no receiver.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| watched.watch(work))));
     });
-    spawned.map_err(|cause| error::exception(py, "StickslipError", format!("no thread: {cause}")))?;
+    spawned.map_err(|cause| error::exception(py, "StickslipError", format!("cannot create a thread: {cause}")))?;
     let receive = Mutex::new(receive);
     loop {
         let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
@@ -114,8 +114,8 @@ impl Drop for Lent {
 fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
     let process = std::process::id();
     if *PROCESS.get_or_init(|| process) != process {
-        let message = "this process was forked from one in which Stickslip had begun to work, and has none of its threads: \
-                       start processes with multiprocessing's method \"spawn\" or \"forkserver\"";
+        let message = "this process was forked after Stickslip started its threads, which a fork does not \
+                       inherit: start processes with multiprocessing's method \"spawn\" or \"forkserver\"";
         return Err(error::exception(py, "StickslipError", message.to_owned()));
     }
     let number = threads.unwrap_or(0);
@@ -129,7 +129,7 @@ fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
         None => rayon::ThreadPoolBuilder::new()
             .num_threads(number)
             .build()
-            .map_err(|cause| error::exception(py, "StickslipError", format!("no threads: {cause}")))?,
+            .map_err(|cause| error::exception(py, "StickslipError", format!("cannot create threads: {cause}")))?,
     };
     let stop = Stop::new();
     pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
