@@ -1,7 +1,7 @@
 //! `stickslip inspect`: describes matrix files, and checks whether they can belong to a
 //! structure.
 
-use crate::ending::{Ending, print};
+use crate::exit_status::{Ending, print};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write};

@@ -1,27 +1,27 @@
 //! The `stickslip` command.
 
-/// Prints a message on standard error; see [`speak`].
+/// Prints a message on standard error; see [`messages`].
 macro_rules! complain {
     ($($text:tt)*) => {
-        $crate::speak::line(&format!($($text)*))
+        $crate::messages::line(&format!($($text)*))
     };
 }
 
 mod args;
-mod ending;
+mod browser;
+mod exit_status;
 mod inspect;
 mod list;
 mod merge;
-mod open;
+mod messages;
 mod plot;
 mod progress;
 mod reduce;
 mod run;
-mod speak;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
-use ending::{Ending, print};
+use exit_status::{Ending, print};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -90,7 +90,7 @@ fn main() -> ExitCode {
         }
     };
     if let Ending::Failed(message) = &ending {
-        speak::error(message);
+        messages::error(message);
     }
     ending.code()
 }

@@ -1,6 +1,6 @@
 //! `stickslip merge`: merges the parts of a study.
 
-use crate::ending::Ending;
+use crate::exit_status::Ending;
 use crate::run;
 use std::path::{Path, PathBuf};
 use stickslip_report::assemble::{Parts, assemble};
@@ -14,7 +14,7 @@ pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String
         Err(ending) => return ending,
     };
     let wrong = |message: String| {
-        crate::speak::error(&message);
+        crate::messages::error(&message);
         Ending::WrongInput
     };
     let journals = match stream::merged(folders) {

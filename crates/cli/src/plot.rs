@@ -1,6 +1,6 @@
 //! `stickslip plot`: draws stored results and comparisons of runs. It computes no points.
 
-use crate::ending::{Ending, print};
+use crate::exit_status::{Ending, print};
 use crate::run::{outputs, show, show_figure};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@
 //! finished points, as do SIGTERM and SIGHUP.
 
 use crate::args::Progress as Shown;
-use crate::speak;
+use crate::messages;
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use serde_json::json;
 use std::fmt::Write;
@@ -119,7 +119,7 @@ impl Progress {
 
 impl Lines {
     fn say(&self) {
-        speak::event(
+        messages::event(
             "progress",
             json!({
                 "study": self.study,

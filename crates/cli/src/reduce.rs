@@ -1,7 +1,7 @@
 //! `stickslip reduce`: saves the reduced structure of a study as files for other studies.
 
-use crate::ending::{Ending, print};
-use crate::{run, speak};
+use crate::exit_status::{Ending, print};
+use crate::{messages, run};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
     };
     let failed = |message: &str| Ending::Failed(format!("{}: {message}", file.display()));
     let wrong = |message: &str| {
-        speak::error(&format!("{}: {message}", file.display()));
+        messages::error(&format!("{}: {message}", file.display()));
         Ending::WrongInput
     };
     let Some(substructure) = &model.substructure else {

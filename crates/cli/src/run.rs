@@ -1,9 +1,9 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Destination;
-use crate::ending::{Ending, print};
+use crate::exit_status::{Ending, print};
 use crate::progress::{self, Progress};
-use crate::{open, speak};
+use crate::{browser, messages};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
@@ -14,8 +14,9 @@ use std::time::Duration;
 use stickslip::orbit::Accuracy;
 use stickslip_report::assemble::{Assembled, Parts, assemble};
 use stickslip_report::journal::{Journal, JournalError};
+use stickslip_report::output::json::write_dataset_json;
 use stickslip_report::stream::{self, Shard, Start, StreamError};
-use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal};
+use stickslip_report::{Outputs, check_writable, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
 use stickslip_study::schema::MOST_BYTES;
@@ -83,8 +84,8 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
 
 /// Prints an error of a study file with its location underlined.
 pub(crate) fn show(error: &StudyError) {
-    if speak::is_for_programs() {
-        return speak::error(&error.to_string());
+    if messages::is_for_programs() {
+        return messages::error(&error.to_string());
     }
     let report = miette::Report::new(error.clone());
     complain!("{report:?}");
@@ -157,7 +158,7 @@ pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Endin
 /// Runs `stickslip run`.
 pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>) -> Ending {
     if wanted.progress == crate::args::Progress::Json {
-        speak::for_programs();
+        messages::for_programs();
     }
     let outputs = match outputs(wanted.only, wanted.also) {
         Ok(outputs) => outputs,
@@ -182,7 +183,7 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
         // The browser shows the figure after the first run; a reload shows later ones.
         open &= matches!(ending, Ending::WrongInput);
         if let Ending::Failed(message) = &ending {
-            speak::error(message);
+            messages::error(message);
         }
         complain!("waiting for a change of the files; Ctrl-C ends");
         while contents(request.files) == before {
@@ -268,7 +269,7 @@ fn one(
     let mut journal = match stream::begin(checked, &destination.out, wanted.shard, wanted.start, threads) {
         Ok(journal) => journal,
         Err(error @ (StreamError::Other { .. } | StreamError::Unfinished { .. } | StreamError::Name(_))) => {
-            speak::error(&error.to_string());
+            messages::error(&error.to_string());
             return Ending::WrongInput;
         }
         Err(error) => return Ending::Failed(error.to_string()),
@@ -277,7 +278,7 @@ fn one(
     let range = journal.head().range.clone();
     // The number of points of adaptive frequencies and of a shard is unknown in advance.
     let points = Some(study.points() as u64).filter(|_| !study.is_adaptive() && wanted.shard.is_none());
-    speak::event(
+    messages::event(
         "begin",
         json!({ "study": study.name(), "kind": study.kind().name, "points": points, "units": journal.head().units,
                 "from": range.start, "to": range.end, "kept": journal.units().len() }),
@@ -355,11 +356,11 @@ fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Endi
         return Ending::Failed(error.to_string());
     }
     let failed = journal.tally().points().keys().any(|status| status != CONVERGED);
-    speak::event(
+    messages::event(
         "end",
         json!({ "study": study.name(), "status": if failed { "some-failed" } else { "done" }, "points": journal.tally().points() }),
     );
-    if !speak::is_for_programs() {
+    if !messages::is_for_programs() {
         complain!(
             "{}: part {shard} is in {folder}; when all parts are computed, merge them with `stickslip merge`",
             study.name()
@@ -379,7 +380,7 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
         (false, true) => "some-failed",
         (false, false) => "done",
     };
-    speak::event("written", json!({ "study": dataset.name, "files": files }));
+    messages::event("written", json!({ "study": dataset.name, "files": files }));
     // The summary on a terminal contains these messages.
     let summary = !json && std::io::stdout().is_terminal();
     if !(summary && std::io::stderr().is_terminal()) {
@@ -398,7 +399,7 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
     } else {
         Ending::Done
     };
-    speak::event("end", json!({ "study": dataset.name, "status": status, "points": dataset.record.points }));
+    messages::event("end", json!({ "study": dataset.name, "status": status, "points": dataset.record.points }));
     if open {
         show_figure(files);
     }
@@ -444,7 +445,7 @@ fn complain(dataset: &Dataset) {
 
 /// Opens the figure among these files in the browser.
 pub(crate) fn show_figure(files: &[PathBuf]) {
-    match open::figure(files).map(open::show) {
+    match browser::figure(files).map(browser::show) {
         Some(Ok(())) => {}
         // The results exist even if they cannot be shown.
         Some(Err(message)) => complain!("{message}"),
@@ -473,7 +474,7 @@ pub fn paper(destination: &Destination, open: bool) -> Ending {
             if let ending @ Ending::Failed(_) = print(&outcome.summary) {
                 return ending;
             }
-            if open && let Err(message) = open::show(&outcome.report) {
+            if open && let Err(message) = browser::show(&outcome.report) {
                 complain!("{message}");
             }
             if context.stopped() {
