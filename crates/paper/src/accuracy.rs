@@ -1,7 +1,7 @@
 //! Data that the paper does not state, and the accuracy of the report's numbers.
 
-use crate::further::Further;
-use crate::part::Part;
+use crate::additional_cases::Further;
+use crate::finding::Part;
 use crate::studies::Results;
 use crate::text::{list, words};
 use stickslip_report::{PageTable, Section};

@@ -7,19 +7,19 @@
 //! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and
 //! Computational Mechanics 9 (2015) 31-40.
 
-mod couple;
-mod elements;
-mod evidence;
-mod further;
+mod accuracy;
+mod additional_cases;
+mod finding;
+mod loops;
 mod measure;
 mod optimum;
-mod part;
+mod responses;
 mod studies;
 mod text;
 mod verdict;
 
-use further::Further;
-use part::{Finding, Part};
+use additional_cases::Further;
+use finding::{Finding, Part};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_report::{Outputs, Page, ReportError, Section, Verdict, write_dataset};
@@ -94,18 +94,18 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     say("Additional cases for the claims: other slip limits, contact stiffnesses, frequencies");
     let further = Further::new(context, extent.points);
     let parts: Vec<Part> = [
-        elements::exact(&results),
-        elements::approximate(&results, &further),
-        elements::coulomb(&results),
-        couple::figure6(&results, &further),
-        couple::figure7(&results, &further),
-        couple::dependence(&results, &further),
-        couple::figure8(&results),
-        couple::figure10(&results),
-        couple::optimum(&further),
-        couple::laws(&results),
-        Some(evidence::open(&further)),
-        Some(evidence::record(&results)),
+        loops::exact(&results),
+        loops::approximate(&results, &further),
+        loops::coulomb(&results),
+        responses::figure6(&results, &further),
+        responses::figure7(&results, &further),
+        responses::dependence(&results, &further),
+        responses::figure8(&results),
+        responses::figure10(&results),
+        responses::optimum(&further),
+        responses::laws(&results),
+        Some(accuracy::open(&further)),
+        Some(accuracy::record(&results)),
     ]
     .into_iter()
     .flatten()

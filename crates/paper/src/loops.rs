@@ -1,8 +1,8 @@
 //! Figs. 2-4: the loops of the friction elements, and the paper's claims about them.
 
-use crate::further::Further;
+use crate::additional_cases::Further;
+use crate::finding::{Finding, Part, finding};
 use crate::measure::{Loop, largest};
-use crate::part::{Finding, Part, finding};
 use crate::studies::Results;
 use crate::text::{join, list, percent, words};
 use crate::verdict::{APPROXIMATE, DIFFERENT, SIMILAR, in_all, small};

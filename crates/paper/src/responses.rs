@@ -1,9 +1,9 @@
 //! Figs. 6-8 and 10: the response of the blade couple, and the paper's claims about it.
 
-use crate::further::Further;
+use crate::additional_cases::Further;
+use crate::finding::{Finding, Part, finding};
 use crate::measure::{Curve, largest};
 use crate::optimum::{self, Optimum};
-use crate::part::{Finding, Part, finding};
 use crate::studies::Results;
 use crate::text::{list, percent, words};
 use crate::verdict::{APPROXIMATE, DIFFERENT, PRINTED, SIMILAR, both, in_all, monotone, small};
