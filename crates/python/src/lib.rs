@@ -3,24 +3,24 @@
 
 mod arrow;
 mod disk;
-mod drawn;
 mod error;
+mod figures;
 mod law;
-mod lend;
 mod lock;
+mod many_orbits;
 mod matrices;
 mod model;
+mod numpy_view;
 mod orbit;
+mod orbit_table;
 mod parameters;
-mod points;
+mod pickle;
 mod progress;
 mod python_law;
 mod quantity;
 mod result;
-mod rows;
-mod stored;
 mod study;
-mod watch;
+mod supervision;
 
 use pyo3::prelude::*;
 

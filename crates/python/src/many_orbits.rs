@@ -1,7 +1,7 @@
 //! Many orbits of a model in one call: at many frequencies, or for many values of parameters.
 
+use crate::orbit_table::Row;
 use crate::parameters::{self, Along};
-use crate::rows::Row;
 use crate::{disk, error};
 use pyo3::prelude::*;
 use rayon::prelude::*;

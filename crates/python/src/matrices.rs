@@ -1,7 +1,7 @@
 //! Mass, damping and stiffness matrices from NumPy and SciPy.
 
 use crate::error;
-use crate::watch::apart;
+use crate::supervision::apart;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -1,14 +1,14 @@
 //! Models built in Python, and their results: orbits, responses, loops, modes.
 
 use crate::law::PyLaw;
+use crate::many_orbits::{Asked, along_frequencies, along_parameters, said};
 use crate::orbit::{PyOrbit, instants};
-use crate::points::{Asked, along_frequencies, along_parameters, said};
+use crate::orbit_table::{self, Row};
 use crate::progress::{bar, close};
 use crate::result::PyResultSet;
-use crate::rows::{self, Row};
 use crate::study::PyStudy;
-use crate::watch::{Watch, alone, apart, watched};
-use crate::{disk, drawn, error, matrices, parameters, quantity, stored};
+use crate::supervision::{Watch, alone, apart, watched};
+use crate::{disk, error, figures, matrices, parameters, pickle, quantity};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -615,8 +615,8 @@ impl PyModel {
             .iter()
             .map(|(name, values)| Column::numbers(&name.replace(['.', '-'], "_"), values.clone()))
             .collect();
-        let table = rows::table("curve", first, &asked.system, &*asked.method, &rows);
-        let figure = drawn::curves(&table, &asked.system, along.first().map(|(name, _)| name.as_str()));
+        let table = orbit_table::table("curve", first, &asked.system, &*asked.method, &rows);
+        let figure = figures::curves(&table, &asked.system, along.first().map(|(name, _)| name.as_str()));
         Ok(self.result("response", "Response", vec![table], figure, told))
     }
 
@@ -637,7 +637,7 @@ impl PyModel {
     ) -> PyResult<PyResultSet> {
         let (start, points) = (Instant::now(), instants(py, points)?);
         let found = self.orbit(py, frequency, method, None, options)?;
-        let (tables, figure) = drawn::loops(&found, points);
+        let (tables, figure) = figures::loops(&found, points);
         let row = Row::new(&found.system, found.orbit.omega, Ok(&found.orbit));
         let told = Told::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
         Ok(self.result("hysteresis", "Hysteresis", tables, figure, told))
@@ -684,7 +684,7 @@ impl PyModel {
         let moved = system.clone();
         let outcome = apart(py, move || self::mode(&moved, request))?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
-        let (table, figure) = drawn::mode(&found, &system);
+        let (table, figure) = figures::mode(&found, &system);
         let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
         told.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
         told.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
@@ -702,7 +702,7 @@ impl PyModel {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let bytes =
-            stored::bytes(&self.model, &self.around, self.study.is_some()).map_err(|cause| error::model(py, cause))?;
+            pickle::bytes(&self.model, &self.around, self.study.is_some()).map_err(|cause| error::model(py, cause))?;
         let laws = self.model.joints.iter().map(|joint| Py::new(py, PyLaw::of(joint.law.clone())));
         let laws = PyList::new(py, laws.collect::<PyResult<Vec<_>>>()?)?;
         Ok((py.import("stickslip._core")?.getattr("_model")?, (PyBytes::new(py, &bytes), laws, self.study.clone())))
@@ -736,7 +736,7 @@ pub fn _model(
     study: Option<(PyStudy, usize)>,
 ) -> PyResult<PyModel> {
     let laws = laws.iter().map(|law| law.law.clone()).collect();
-    let (mut model, around) = stored::model(bytes, laws).map_err(|cause| error::model(py, cause))?;
+    let (mut model, around) = pickle::model(bytes, laws).map_err(|cause| error::model(py, cause))?;
     if let Some((study, case)) = &study {
         let of_study = study.model_of(py, *case)?;
         (model.substructure, model.places) = (of_study.substructure, of_study.places);

@@ -1,7 +1,7 @@
 //! Orbits in Python; their values are computed on demand.
 
 use crate::model::{PyModel, Recipe};
-use crate::watch::alone;
+use crate::supervision::alone;
 use crate::{error, quantity};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyKeyError;

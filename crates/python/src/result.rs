@@ -1,6 +1,6 @@
 //! Results of a study: tables, a figure and the record of the run.
 
-use crate::{arrow, error, lend};
+use crate::{arrow, error, numpy_view};
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
@@ -336,10 +336,10 @@ impl Table {
         match &found.values {
             // SAFETY: the array refers to the table, which keeps the immutable dataset
             #[allow(unsafe_code)]
-            Values::Number(values) => Ok(unsafe { lend::array(values, owner) }.into_any()),
+            Values::Number(values) => Ok(unsafe { numpy_view::array(values, owner) }.into_any()),
             // SAFETY: the array refers to the table, which keeps the immutable dataset
             #[allow(unsafe_code)]
-            Values::Integer(values) => Ok(unsafe { lend::array(values, owner) }.into_any()),
+            Values::Integer(values) => Ok(unsafe { numpy_view::array(values, owner) }.into_any()),
             Values::Text(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "str")),
             Values::Flag(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "object")),
         }

@@ -3,7 +3,7 @@
 use crate::model::PyModel;
 use crate::progress::{bar, close};
 use crate::result::{PyResultSet, Table};
-use crate::watch::{Watch, alone, apart, watched};
+use crate::supervision::{Watch, alone, apart, watched};
 use crate::{error, quantity};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
