@@ -1,6 +1,6 @@
 //! Roles of the columns of a table: keys that identify rows, and the abscissa of its curves.
 
-use crate::stored::Stored;
+use crate::run::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
 use stickslip_study::{Case, VariedValue};
@@ -55,7 +55,7 @@ impl Reading {
         for row in 0..table.rows() {
             let key: Vec<String> = columns
                 .iter()
-                .map(|column| format!("{} = {}", column.name, crate::csv::cell(&column.values, row)))
+                .map(|column| format!("{} = {}", column.name, crate::output::csv::cell(&column.values, row)))
                 .collect();
             let key = key.join(", ");
             let at = *known.entry(key.clone()).or_insert_with(|| {

@@ -1,9 +1,9 @@
 //! Differences between runs: the largest in every column, and all differences of peaks and
 //! optima.
 
-use super::pairs::{Pair, difference, pairs};
-use super::reading::{Reading, completed};
-use crate::stored::Stored;
+use super::column_roles::{Reading, completed};
+use super::row_matching::{Pair, difference, pairs};
+use crate::run::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
 /// Prefix of columns with values of the first run.
@@ -105,7 +105,7 @@ impl Differences {
                 for pair in &pairs {
                     largest.look(name, (a[pair.first], pair.value(name, b)), &|| {
                         let x = reading.abscissa.as_deref().and_then(|name| table.column(name));
-                        let x = x.map(|x| format!("{} = {}", x.name, crate::csv::cell(&x.values, pair.first)));
+                        let x = x.map(|x| format!("{} = {}", x.name, crate::output::csv::cell(&x.values, pair.first)));
                         [Some(key.clone()), x]
                             .into_iter()
                             .flatten()
@@ -161,7 +161,9 @@ impl Differences {
         for key in reading.keys.iter().filter_map(|key| table.column(key)) {
             made.push(match &key.values {
                 Values::Number(values) => Column::numbers(&key.name, pairs.iter().map(|p| values[p.first]).collect()),
-                values => Column::texts(&key.name, pairs.iter().map(|p| crate::csv::cell(values, p.first)).collect()),
+                values => {
+                    Column::texts(&key.name, pairs.iter().map(|p| crate::output::csv::cell(values, p.first)).collect())
+                }
             });
         }
         for name in columns {

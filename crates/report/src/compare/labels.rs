@@ -1,7 +1,7 @@
 //! Labels of runs: the parameters, methods and options in which they differ, otherwise the
 //! folder.
 
-use crate::stored::Stored;
+use crate::run::stored::Stored;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -8,18 +8,18 @@
 //! - A relative difference refers to the largest absolute value in that column of the first
 //!   run, so that it stays finite at a zero of the curve.
 
+mod column_roles;
 mod differences;
 mod labels;
 mod overlay;
-mod pairs;
-mod people;
-mod reading;
+mod row_matching;
+mod table;
 
-pub use people::for_people;
+pub use table::for_people;
 
-use crate::file::{ReportError, file_name};
+use crate::output::result_file::{ReportError, file_name};
 use crate::output::{Outputs, write_dataset};
-use crate::stored::{COMPARISON, Stored, StoredError};
+use crate::run::stored::{COMPARISON, Stored, StoredError};
 use differences::Differences;
 use labels::{folder_name, labels};
 use overlay::overlay;
@@ -121,7 +121,7 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
 /// [`ReportError`] if the folder holds a run or a file cannot be written.
 pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
     let folder = out.join(file_name(&comparison.name, "comparison")?);
-    match crate::stored::read(&folder) {
+    match crate::run::stored::read(&folder) {
         // Unreadable results may still be a run.
         Err(StoredError::Nothing { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
         _ => Err(ReportError::Write {

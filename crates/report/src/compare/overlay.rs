@@ -5,7 +5,7 @@ use stickslip_study::units;
 /// Line styles of successive runs: a dashed curve does not hide a curve below it.
 const STYLES: [Style; 3] = [Style::Solid, Style::Dashed, Style::Dotted];
 /// Number of colours of the palette.
-const COLOURS: usize = crate::colour::PALETTE.len();
+const COLOURS: usize = crate::figure::colour::PALETTE.len();
 
 /// Combines figures. Panels with the same title and quantities become one.
 ///

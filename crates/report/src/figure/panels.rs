@@ -3,8 +3,8 @@
 //! These are the grid of panels, the axis ranges, the drawing order, the legend and the
 //! colours.
 
-use crate::axis::{MARGIN, Range};
-use crate::colour::Colour;
+use crate::figure::axis::{MARGIN, Range};
+use crate::figure::colour::Colour;
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sharing, Style};
 
 /// Returns the number of columns and rows of the grid of panels.

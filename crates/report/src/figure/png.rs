@@ -1,7 +1,7 @@
 //! Writes the figure as pixels: the SVG at twice its size, with the embedded font only.
 
-use crate::file::{File, Output, ReportError};
-use crate::font::{self, Weight};
+use crate::figure::font::{self, Weight};
+use crate::output::result_file::{File, Output, ReportError};
 use resvg::{tiny_skia, usvg};
 use stickslip_study::dataset::{Dataset, Figure};
 
@@ -37,7 +37,7 @@ fn draw(figure: &Figure) -> Result<tiny_skia::Pixmap, ReportError> {
         options.fontdb_mut().load_font_data(font::data(weight).to_vec());
     }
     options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
-    let tree = usvg::Tree::from_str(&crate::svg::to_svg(figure), &options)
+    let tree = usvg::Tree::from_str(&crate::figure::svg::to_svg(figure), &options)
         .map_err(|e| ReportError::encode("figure.png", e))?;
     let size = tree.size();
     let pixels = |length: f32| (length * SCALE).ceil() as u32;
@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn every_colour_of_the_palette_is_on_the_image() {
         let pixmap = draw(&samples::many().figure).unwrap();
-        for colour in crate::colour::PALETTE.map(|pair| pair[0]) {
+        for colour in crate::figure::colour::PALETTE.map(|pair| pair[0]) {
             let rgb = u32::from_str_radix(&colour[1..], 16).unwrap();
             let close = |p: &tiny_skia::PremultipliedColorU8| {
                 let near = |value: u8, shift: u32| i64::from(value).abs_diff(i64::from((rgb >> shift) & 255)) < 12;

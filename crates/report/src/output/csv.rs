@@ -3,7 +3,7 @@
 //! A number has the fewest digits that read back as the same 64-bit value. NaN and unknown
 //! flags are empty cells. Equal datasets give equal bytes.
 
-use crate::file::{Output, ReportError, Rows, Sink, even};
+use crate::output::result_file::{Output, ReportError, Rows, Sink, even};
 use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::Write;

@@ -8,7 +8,7 @@
 //! all come from one run. An interrupted run does not replace a complete run: its results go to
 //! `NAME.interrupted`.
 
-use crate::file::{File, ReportError, file_name};
+use crate::output::result_file::{File, ReportError, file_name};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;

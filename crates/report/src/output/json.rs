@@ -2,7 +2,7 @@
 //!
 //! Two runs of the same study differ in the wall time only.
 
-use crate::file::{File, Output, ReportError};
+use crate::output::result_file::{File, Output, ReportError};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use stickslip_study::dataset::{Dataset, Table, Values};
 

@@ -1,23 +1,33 @@
 //! The table of outputs, and the function that writes all files of a study or none.
+//!
+//! - `result_file`: a file of results, an output, and the errors of writing.
+//! - `folder`: replaces the results of a run completely or not at all.
+//! - `csv`, `parquet`, `json`: one output each; figures are in `figure`.
 
-use crate::file::{File, Output, ReportError, file_name, write_once};
-use crate::folder;
-use crate::json::{Shape, with_shapes};
+pub mod csv;
+pub mod folder;
+pub mod json;
+pub mod parquet;
+pub mod result_file;
+
+use json::{Shape, with_shapes};
+use result_file::{File, Output, ReportError, file_name, write_once};
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Dataset;
 
 /// All outputs, in the order in which they are written.
 pub static TABLE: &[Output] = &[
-    crate::csv::OUTPUT,
-    crate::parquet::OUTPUT,
-    crate::json::OUTPUT,
-    crate::svg::OUTPUT,
-    crate::png::OUTPUT,
-    crate::html::OUTPUT,
+    csv::OUTPUT,
+    parquet::OUTPUT,
+    json::OUTPUT,
+    crate::figure::svg::OUTPUT,
+    crate::figure::png::OUTPUT,
+    crate::figure::html::OUTPUT,
 ];
 
 /// Names of the outputs that are figures.
-pub(crate) const FIGURES: [&str; 3] = [crate::svg::OUTPUT.name, crate::png::OUTPUT.name, crate::html::OUTPUT.name];
+pub(crate) const FIGURES: [&str; 3] =
+    [crate::figure::svg::OUTPUT.name, crate::figure::png::OUTPUT.name, crate::figure::html::OUTPUT.name];
 
 /// A selection of outputs to write.
 #[derive(Debug, Clone)]
@@ -118,8 +128,8 @@ pub(crate) fn with_record(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::write_file;
     use crate::samples;
+    use result_file::write_file;
 
     #[test]
     fn writes_every_file_whole_and_leaves_nothing_else() {
@@ -148,7 +158,7 @@ mod tests {
         assert_eq!(found, names);
         // The script of the interactive figure is next to the study's folder, and is written
         // once.
-        let script = out.path().join(crate::html::script_name());
+        let script = out.path().join(crate::figure::html::script_name());
         let written = std::fs::metadata(&script).unwrap().modified().unwrap();
         write_dataset(&samples::hysteresis(), out.path(), &Outputs::all()).unwrap();
         assert_eq!(std::fs::metadata(&script).unwrap().modified().unwrap(), written);
@@ -156,7 +166,7 @@ mod tests {
         // A damaged script is written again.
         std::fs::write(&script, "half a scr").unwrap();
         write_dataset(&samples::response(), out.path(), &Outputs::only(&["html"]).unwrap()).unwrap();
-        assert_eq!(std::fs::read_to_string(&script).unwrap(), crate::html::script());
+        assert_eq!(std::fs::read_to_string(&script).unwrap(), crate::figure::html::script());
         // A second run replaces the files.
         write_dataset(&samples::response(), out.path(), &Outputs::only(&["csv"]).unwrap()).unwrap();
     }

@@ -11,7 +11,7 @@
 //! Source: the Apache Parquet format 2.9 (`Encodings.md`, `parquet.thrift`), and Thrift's
 //! compact protocol.
 
-use crate::file::{Output, ReportError, Rows, Sink, even};
+use crate::output::result_file::{Output, ReportError, Rows, Sink, even};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;

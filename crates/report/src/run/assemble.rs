@@ -3,11 +3,11 @@
 //! The files do not depend on the division into blocks and journals. Memory holds one block,
 //! and as many rows as the figure shows.
 
-use crate::file::{File, Output, ReportError, Rows, file_name};
-use crate::folder::{self, Aside};
-use crate::journal::{Journal, JournalError};
-use crate::json::Shape;
+use crate::output::folder::{self, Aside};
+use crate::output::json::Shape;
+use crate::output::result_file::{File, Output, ReportError, Rows, file_name};
 use crate::output::{FIGURES, Outputs, with_record};
+use crate::run::journal::{Journal, JournalError};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -4,8 +4,8 @@
 //! table that does not match its record was changed by hand. It gives an error with file and
 //! line.
 
-use crate::file::{File, ReportError, file_name, write_once};
-use crate::folder::{self, RECORD};
+use crate::output::folder::{self, RECORD};
+use crate::output::result_file::{File, ReportError, file_name, write_once};
 use crate::output::{FIGURES, Outputs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -422,11 +422,11 @@ amplitude = "2 N"
             write_dataset(&dataset, out.path(), &Outputs::all()).unwrap();
             let stored = read(&out.path().join("rub")).unwrap();
             assert!(!dataset.figure.panels.is_empty(), "{kind}");
-            assert_eq!(crate::svg::to_svg(&stored.dataset.figure), crate::svg::to_svg(&dataset.figure));
+            assert_eq!(crate::figure::svg::to_svg(&stored.dataset.figure), crate::figure::svg::to_svg(&dataset.figure));
             // Comparing numbers would fail for NaN; comparing cells does not.
             assert_eq!(stored.dataset.tables.len(), dataset.tables.len());
             for (a, b) in stored.dataset.tables.iter().zip(&dataset.tables) {
-                assert_eq!(crate::csv::to_csv(a).unwrap(), crate::csv::to_csv(b).unwrap(), "{kind}");
+                assert_eq!(crate::output::csv::to_csv(a).unwrap(), crate::output::csv::to_csv(b).unwrap(), "{kind}");
             }
             assert_eq!(stored.dataset.record, dataset.record);
             assert_eq!((&stored.dataset.notes, &stored.dataset.failures), (&dataset.notes, &dataset.failures));

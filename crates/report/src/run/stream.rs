@@ -2,11 +2,11 @@
 //! into shards.
 //!
 //! A run of `NAME` keeps its [`Journal`] in `out/NAME.running/`.
-//! [`assemble`](crate::assemble::assemble) makes the results from it. The journal of a shard
+//! [`assemble`](crate::run::assemble::assemble) makes the results from it. The journal of a shard
 //! stays in `out/NAME.shard-3-of-16/` until all shards are [`merged`].
 
-use crate::file::{ReportError, file_name};
-use crate::journal::{FILE, Head, Journal, JournalError};
+use crate::output::result_file::{ReportError, file_name};
+use crate::run::journal::{FILE, Head, Journal, JournalError};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,9 @@
 //! Summary of a dataset for the terminal: small tables, points, notes, failures and file names.
 
-use crate::answers::worst_first;
-use crate::stored::COMPARISON;
+mod peak_table;
+
+use crate::run::stored::COMPARISON;
+use peak_table::worst_first;
 use serde_json::Value as Json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -254,7 +256,10 @@ const DIFFERENCE_DIGITS: i32 = 3;
 /// Returns heading and formatted cells of a column.
 fn column(name: &str, values: &Values, written: Option<&str>) -> (String, Vec<String>) {
     let Values::Number(numbers) = values else {
-        return (name.replace('_', " "), (0..values.len()).map(|row| clean(&crate::csv::cell(values, row))).collect());
+        return (
+            name.replace('_', " "),
+            (0..values.len()).map(|row| clean(&crate::output::csv::cell(values, row))).collect(),
+        );
     };
     if let Some(unit) = written {
         let (quantity, ..) = unit_of(name, 0.0);

@@ -1,10 +1,10 @@
 //! Layout of the interactive figure in plotly's format: panels, axes, titles and colour bar.
 
-use super::ink::{FINE_GRID, GRID, GROUND, Ink, LINE, TEXT, ZERO, axis_name, plain, power};
-use crate::axis::{self, Range};
-use crate::colour::Colour;
-use crate::font;
-use crate::frame::{self, Axes};
+use super::palette::{FINE_GRID, GRID, GROUND, Ink, LINE, TEXT, ZERO, axis_name, plain, power};
+use crate::figure::axis::{self, Range};
+use crate::figure::colour::Colour;
+use crate::figure::font;
+use crate::figure::panels::{self, Axes};
 use serde_json::{Value, json};
 use stickslip_study::dataset::{Axis, Figure, Panel, Scale};
 
@@ -56,7 +56,7 @@ pub(super) enum Page {
 pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
     let count = figure.panels.len().max(1);
     let narrow = page == Page::Narrow;
-    let columns = if narrow { 1 } else { frame::grid(figure).0 };
+    let columns = if narrow { 1 } else { panels::grid(figure).0 };
     let rows = count.div_ceil(columns);
     let plot_height = match (columns, rows) {
         (1, 1) => 460.0,
@@ -64,7 +64,7 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         (2, 1) => 380.0,
         _ => 270.0,
     };
-    let axes = frame::axes(figure);
+    let axes = panels::axes(figure);
     let widest = |(panel, axes): (&Panel, &Axes)| {
         let ticks = axis::ticks_of(&panel.y, axes.y, NAMED);
         ticks.labels.iter().map(|l| font::width(l, TICK, font::Weight::Regular)).fold(0.0, f64::max)
@@ -110,8 +110,8 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         let top = (1.0 - row * (plot_height + row_gap) / inside).clamp(0.0, 1.0);
         let bottom = (top - plot_height / inside).max(0.0);
         let panels = &figure.panels;
-        let x_partner = (0..i).find(|&j| !panel.picture && frame::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
-        let y_partner = (0..i).find(|&j| !panel.picture && frame::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
+        let x_partner = (0..i).find(|&j| !panel.picture && panels::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
+        let y_partner = (0..i).find(|&j| !panel.picture && panels::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
         let mut x =
             axis(own.x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)), [limit, ROOM[0]]);
         x["title"]["text"] = json!(broken(&x_titles[i]));
@@ -148,7 +148,7 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         if !titles[i].is_empty() {
             notes.push(title);
         }
-        if !frame::has_data(panel) {
+        if !panels::has_data(panel) {
             let mut empty = note;
             empty["text"] = json!("no data");
             empty["y"] = json!((top + bottom) / 2.0);

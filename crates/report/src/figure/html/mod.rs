@@ -8,15 +8,15 @@
 //! most eight axes. The legend is part of the page and not of the plot: it wraps at any width
 //! and covers nothing.
 
-mod ink;
 mod layout;
+mod palette;
 mod traces;
 
-use crate::file::{File, Output, ReportError};
-use crate::frame::{self, AREA, Entry, PALE};
-use crate::svg::escape;
-use ink::{Ink, plain};
+use crate::figure::panels::{self, AREA, Entry, PALE};
+use crate::figure::svg::escape;
+use crate::output::result_file::{File, Output, ReportError};
 use layout::{NARROW, Page, layout};
+use palette::{Ink, plain};
 use serde_json::json;
 use std::fmt::Write;
 use std::sync::OnceLock;
@@ -156,7 +156,7 @@ pub fn script_name() -> String {
 
 /// Returns the figure for a page: interactive on screen, static in print or without the script.
 pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
-    let (columns, _) = frame::grid(figure);
+    let (columns, _) = panels::grid(figure);
     let mut ink = Ink::new(figure);
     let data = traces(figure, &mut ink);
     let wide = layout(figure, Page::Wide, &mut ink);
@@ -172,13 +172,13 @@ pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
         "<div class=\"figure\">\n{}<div id=\"{id}\" class=\"live\" style=\"min-height: {height}px\"></div>\n\
          <div class=\"still\">{}</div>\n</div>\n<script>stickslip(\"{id}\", {data});</script>",
         legend(figure, id),
-        crate::svg::to_svg(figure)
+        crate::figure::svg::to_svg(figure)
     )
 }
 
 /// Returns the legend: buttons that show and hide curves.
 fn legend(figure: &Figure, id: &str) -> String {
-    let (entries, more) = frame::legend(figure);
+    let (entries, more) = panels::legend(figure);
     if entries.is_empty() {
         return String::new();
     }
@@ -238,9 +238,9 @@ fn sample(entry: &Entry) -> String {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::ink::axis_name;
+    use super::palette::axis_name;
     use super::*;
-    use crate::axis;
+    use crate::figure::axis;
     use crate::samples;
     use serde_json::Value;
     use std::collections::BTreeSet;
@@ -307,7 +307,7 @@ pub(crate) mod tests {
                 }
             }
             let shown = traces.iter().filter(|t| t["showlegend"] == true).count();
-            let (entries, _) = frame::legend(figure);
+            let (entries, _) = panels::legend(figure);
             assert_eq!(shown, entries.len());
             let buttons = legend(figure, "figure");
             for entry in entries {

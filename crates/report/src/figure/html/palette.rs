@@ -1,10 +1,10 @@
 //! Helpers shared by traces and layout: colours for light and dark pages, axis names, literal
 //! text.
 
-use crate::axis::{self, Range};
-use crate::colour::Colour;
-use crate::frame::{AREA, Shades};
-use crate::svg::escape;
+use crate::figure::axis::{self, Range};
+use crate::figure::colour::Colour;
+use crate::figure::panels::{AREA, Shades};
+use crate::figure::svg::escape;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::Figure;
 

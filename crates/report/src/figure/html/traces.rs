@@ -1,27 +1,27 @@
 //! The curves of the interactive figure as plotly traces.
 
-use super::ink::{GROUND, Ink, axis_name, plain, power};
-use crate::axis::{self, Range};
-use crate::colour::Colour;
-use crate::frame::{self, Axes, Entry, PALE};
+use super::palette::{GROUND, Ink, axis_name, plain, power};
+use crate::figure::axis::{self, Range};
+use crate::figure::colour::Colour;
+use crate::figure::panels::{self, Axes, Entry, PALE};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Style};
 
 pub(super) fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
-    let (entries, _) = frame::legend(figure);
+    let (entries, _) = panels::legend(figure);
     // In an image, a label with several colours has a grey legend entry from a trace without
     // points.
     let several: Vec<&Entry> = entries.iter().filter(|entry| entry.colour == Colour::many()).collect();
     let mut traces: Vec<Value> = several.iter().map(|entry| legend_trace(entry, ink)).collect();
     let mut seen: BTreeSet<&str> = several.iter().map(|entry| entry.label.as_str()).collect();
     let listed: BTreeSet<&str> = entries.iter().map(|entry| entry.label.as_str()).collect();
-    for (index, (panel, axes)) in figure.panels.iter().zip(frame::axes(figure)).enumerate() {
+    for (index, (panel, axes)) in figure.panels.iter().zip(panels::axes(figure)).enumerate() {
         let said = figure.panels.len() == 1;
         let drawn = Drawn { index, panel, axes, alone: said, x: Form::of(axes.x), y: Form::of(axes.y) };
-        for series in frame::layers(panel) {
+        for series in panels::layers(panel) {
             let label = series.label.as_str();
-            let named = listed.contains(label) && frame::drawn(panel, series).next().is_some() && seen.insert(label);
+            let named = listed.contains(label) && panels::drawn(panel, series).next().is_some() && seen.insert(label);
             traces.extend(drawn.traces(series, named, ink));
         }
     }
@@ -77,7 +77,7 @@ impl Drawn<'_> {
         let mut trace = self.trace(series, named, ink);
         let shade = ink.shades.colour(series);
         let colour = ink.use_of(&shade);
-        let crowd = frame::crowded(self.panel);
+        let crowd = panels::crowded(self.panel);
         match series.style {
             Style::Marks => {
                 trace["mode"] = json!("markers");
@@ -88,7 +88,7 @@ impl Drawn<'_> {
                 };
             }
             Style::Missing => {
-                let y = self.axes.y.at(frame::row_of_crosses(series));
+                let y = self.axes.y.at(panels::row_of_crosses(series));
                 trace["y"] = json!(self.y.numbers(series.x.iter().map(|_| y)));
                 trace["mode"] = json!("markers");
                 trace["marker"] = json!({ "symbol": "x-thin", "size": 6, "line": { "color": colour, "width": 1.5 } });
@@ -105,7 +105,7 @@ impl Drawn<'_> {
                 let dots = self.lonely_points(series, &trace, &colour);
                 let thin = matches!(series.emphasis, Emphasis::Pale | Emphasis::OwnReference);
                 let width = if thin || crowd { 1.0 } else { 2.0 };
-                let dash = dash(frame::line_style(series));
+                let dash = dash(panels::line_style(series));
                 trace["mode"] = json!("lines");
                 trace["line"] = json!({ "color": colour, "width": width, "simplify": false, "dash": dash });
                 return dots.into_iter().chain([trace]).collect();
@@ -124,8 +124,8 @@ impl Drawn<'_> {
         let (x, y) = (hover("x", &panel.x, self.x.power), hover("y", &panel.y, self.y.power));
         let mut trace = json!({
             "type": if series.x.len() > MANY_POINTS { "scattergl" } else { "scatter" },
-            "x": self.x.numbers(frame::points(panel, series).map(|p| p.0)),
-            "y": self.y.numbers(frame::points(panel, series).map(|p| p.1)),
+            "x": self.x.numbers(panels::points(panel, series).map(|p| p.0)),
+            "y": self.y.numbers(panels::points(panel, series).map(|p| p.1)),
             "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
             "name": plain(&series.label), "legendgroup": series.label, "showlegend": named,
             "connectgaps": false,
@@ -156,10 +156,10 @@ impl Drawn<'_> {
             return;
         }
         // plotly measures the height of a bar from its foot.
-        let feet = |i: usize| frame::base(self.panel, series, i).unwrap_or(self.axes.y.from);
+        let feet = |i: usize| panels::base(self.panel, series, i).unwrap_or(self.axes.y.from);
         let count = series.x.len().min(series.y.len());
         trace["base"] = json!(self.y.numbers((0..count).map(feet)));
-        let heights = frame::points(self.panel, series).enumerate().map(|(i, p)| p.1 - feet(i));
+        let heights = panels::points(self.panel, series).enumerate().map(|(i, p)| p.1 - feet(i));
         trace["y"] = json!(self.y.numbers(heights));
     }
 
@@ -172,7 +172,7 @@ impl Drawn<'_> {
         let value = format!("{} = %{{z:.4~g}} {}", plain(&shown.quantity), plain(&axis::unit(shown, 0)));
         Some(json!({
             "type": "heatmap", "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
-            "x": self.x.numbers(frame::edges(&series.x[..count], self.axes.x).into_iter()), "y": [y - 0.5, y + 0.5 + OVERLAP],
+            "x": self.x.numbers(panels::edges(&series.x[..count], self.axes.x).into_iter()), "y": [y - 0.5, y + 0.5 + OVERLAP],
             "z": [shades.numbers(series.shades[..count].iter().copied())], "coloraxis": "coloraxis", "showlegend": false,
             "hovertemplate": format!("{}<br>{value}<extra>{}</extra>", hover("x", &self.panel.x, self.x.power), plain(&name)),
         }))
@@ -198,10 +198,10 @@ impl Drawn<'_> {
 ///
 /// An outline follows the upper edge, returns along the lower edge, and ends with a gap.
 fn outline(panel: &Panel, series: &Series, range: Range) -> (Vec<f64>, Vec<f64>) {
-    let points: Vec<(usize, (f64, f64))> = frame::points(panel, series).enumerate().collect();
+    let points: Vec<(usize, (f64, f64))> = panels::points(panel, series).enumerate().collect();
     let (mut x, mut y) = (Vec::new(), Vec::new());
-    for piece in points.split(|(_, p)| !frame::drawable(*p)).filter(|piece| !piece.is_empty()) {
-        let lower = piece.iter().rev().map(|(i, p)| (p.0, frame::base(panel, series, *i).unwrap_or(range.from)));
+    for piece in points.split(|(_, p)| !panels::drawable(*p)).filter(|piece| !piece.is_empty()) {
+        let lower = piece.iter().rev().map(|(i, p)| (p.0, panels::base(panel, series, *i).unwrap_or(range.from)));
         for p in piece.iter().map(|(_, p)| *p).chain(lower).chain([(f64::NAN, f64::NAN)]) {
             x.push(p.0);
             y.push(p.1);
@@ -221,9 +221,9 @@ fn dash(style: Style) -> &'static str {
 
 /// Returns the points between two gaps, which a line does not show.
 fn lonely(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
-    let points: Vec<(f64, f64)> = frame::points(panel, series).collect();
+    let points: Vec<(f64, f64)> = panels::points(panel, series).collect();
     points
-        .split(|p| !frame::drawable(*p))
+        .split(|p| !panels::drawable(*p))
         .filter_map(|piece| if let [point] = piece { Some(*point) } else { None })
         .collect()
 }

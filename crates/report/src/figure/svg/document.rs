@@ -1,8 +1,8 @@
 //! Incremental writer of an SVG document: lines, areas, marks and text.
 
 use super::style::{AXIS, CROSS, LABEL, MARK, TEXT};
-use crate::clip::Point;
-use crate::font::{self, Weight};
+use crate::figure::clip::Point;
+use crate::figure::font::{self, Weight};
 use std::fmt::Write;
 
 /// Style of a line.

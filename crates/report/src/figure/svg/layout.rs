@@ -1,11 +1,11 @@
 //! Layout of a figure: positions of all parts. Every text is measured before it is placed.
 
 use super::style::{BAR, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
-use crate::axis::{self, Range, Ticks};
-use crate::clip::{Point, Window};
-use crate::colour::Colour;
-use crate::font::{self, Weight};
-use crate::frame::{self, Axes, Entry, Shades};
+use crate::figure::axis::{self, Range, Ticks};
+use crate::figure::clip::{Point, Window};
+use crate::figure::colour::Colour;
+use crate::figure::font::{self, Weight};
+use crate::figure::panels::{self, Axes, Entry, Shades};
 use stickslip_study::dataset::{Axis, Figure, Panel};
 
 /// Positions of all parts of a figure.
@@ -60,7 +60,7 @@ pub(super) struct PlotArea {
 
 impl Layout {
     pub(super) fn new(figure: &Figure) -> Layout {
-        let (columns, rows) = frame::grid(figure);
+        let (columns, rows) = panels::grid(figure);
         let (plot_width, plot_height) = match columns {
             1 => (620.0, 380.0),
             2 => (430.0, if rows == 1 { 330.0 } else { 270.0 }),
@@ -69,7 +69,7 @@ impl Layout {
         let mut panels: Vec<PlotArea> = figure
             .panels
             .iter()
-            .zip(frame::axes(figure))
+            .zip(panels::axes(figure))
             .map(|(panel, axes)| PlotArea::new(panel, &axes, plot_width, plot_height))
             .collect();
         // Adjacent panels with the same axis share one title at the outer edge.
@@ -81,7 +81,7 @@ impl Layout {
         for i in (0..panels.len()).rev() {
             // Panels with a different x quantity keep their y titles, because a reader expects
             // them there.
-            let same = i > 0 && frame::alike(&figure.panels[i].x, &figure.panels[i - 1].x);
+            let same = i > 0 && panels::alike(&figure.panels[i].x, &figure.panels[i - 1].x);
             if same && i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
                 panels[i].y_title.clear();
             }
@@ -104,7 +104,7 @@ impl Layout {
 
         let title = font::wrap(&figure.title, TITLE, Weight::Bold, width - 2.0 * MARGIN);
         let mut y = MARGIN + TITLE * LEADING * title.len() as f64;
-        let (legend, bottom) = place_legend(frame::legend(figure), width, y);
+        let (legend, bottom) = place_legend(panels::legend(figure), width, y);
         y = bottom + 4.0;
         for row in 0..rows {
             let members = (row * columns)..((row + 1) * columns).min(panels.len());
@@ -181,7 +181,7 @@ impl PlotArea {
 
     /// Lays out a picture: equal scales on both axes, without ticks and titles.
     fn of_picture(panel: &Panel, axes: &Axes, width: f64, height: f64) -> PlotArea {
-        let (x, y) = frame::level(axes.x, axes.y, width / height);
+        let (x, y) = panels::level(axes.x, axes.y, width / height);
         PlotArea {
             left: 0.0,
             top: 0.0,

@@ -15,11 +15,11 @@ mod style;
 
 pub(crate) use document::escape;
 
-use crate::clip::{self, Point};
-use crate::colour::Colour;
-use crate::file::{File, Output, ReportError};
-use crate::font::Weight;
-use crate::frame::{self, AREA, PALE, Shades};
+use crate::figure::clip::{self, Point};
+use crate::figure::colour::Colour;
+use crate::figure::font::Weight;
+use crate::figure::panels::{self, AREA, PALE, Shades};
+use crate::output::result_file::{File, Output, ReportError};
 use document::{Pen, Svg, Text};
 use layout::{Bar, Layout, Placed, PlotArea, SAMPLE};
 use stickslip_study::dataset::{Dataset, Emphasis, Figure, Panel, Series, Style};
@@ -175,23 +175,23 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
         let x = plot.left - plot.y_title_offset - LABEL * (0.25 + LEADING * (plot.y_title.len() - 1 - i) as f64);
         svg.text(line, Text { upright: true, ..Text::at(x, plot.top + plot.height / 2.0) });
     }
-    if !frame::has_data(panel) {
+    if !panels::has_data(panel) {
         svg.text("no data", Text { colour: "#777777", ..Text::at(middle, plot.top + plot.height / 2.0) });
     }
-    let crowd = frame::crowded(panel);
+    let crowd = panels::crowded(panel);
     let bars: Vec<&Series> = panel.series.iter().filter(|s| s.style == Style::Bars).collect();
-    for series in frame::layers(panel) {
+    for series in panels::layers(panel) {
         let colour = &shades.colour(series).light;
         match series.style {
             Style::Marks => {
                 let size = if crowd { SMALL_MARK } else { MARK };
-                let at = frame::drawn(panel, series).map(|p| plot.map(p));
+                let at = panels::drawn(panel, series).map(|p| plot.map(p));
                 for point in at.filter(|p| plot.window().contains(*p)) {
                     svg.mark(point, colour, size);
                 }
             }
             Style::Missing => {
-                let y = plot.top + plot.height * (1.0 - frame::row_of_crosses(series));
+                let y = plot.top + plot.height * (1.0 - panels::row_of_crosses(series));
                 for point in series.x.iter().map(|x| (x_of(x), y)).filter(|p| plot.window().contains(*p)) {
                     svg.cross(point, colour);
                 }
@@ -199,7 +199,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
             Style::Stripe => draw_stripe(svg, series, plot, shades),
             Style::Band => draw_band(svg, panel, series, plot, colour),
             Style::Bars => {
-                let slot = frame::bar_slot(panel, plot.x);
+                let slot = panels::bar_slot(panel, plot.x);
                 let which = bars.iter().position(|s| std::ptr::eq(*s, series)).unwrap_or(0);
                 let slot =
                     Slot { width: slot / bars.len() as f64, shift: slot * (which as f64 / bars.len() as f64 - 0.5) };
@@ -210,7 +210,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
                 let thin = pale || crowd || series.emphasis == Emphasis::OwnReference;
                 let width = if thin { THIN } else { LINE };
                 let opacity = if pale { PALE } else { 1.0 };
-                let pen = Pen { colour, width, dashes: dashes(frame::line_style(series)), opacity };
+                let pen = Pen { colour, width, dashes: dashes(panels::line_style(series)), opacity };
                 draw_line(svg, panel, series, plot, &pen);
             }
         }
@@ -220,8 +220,8 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
 
 /// Draws the pieces of a curve between its gaps. A single point becomes a dot.
 fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen: &Pen<'_>) {
-    let points: Vec<Point> = frame::points(panel, series).collect();
-    for piece in points.split(|p| !frame::drawable(*p)) {
+    let points: Vec<Point> = panels::points(panel, series).collect();
+    for piece in points.split(|p| !panels::drawable(*p)) {
         let piece: Vec<Point> = piece.iter().map(|p| plot.map(*p)).collect();
         match piece.as_slice() {
             [] => {}
@@ -239,11 +239,11 @@ fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen
 /// Draws the pieces of a band between its gaps as areas.
 fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, colour: &str) {
     let floor = plot.top + plot.height;
-    let points: Vec<(Point, f64)> = frame::points(panel, series)
+    let points: Vec<(Point, f64)> = panels::points(panel, series)
         .enumerate()
         .map(|(i, p)| {
             let upper = plot.map(p);
-            (upper, frame::base(panel, series, i).map_or(floor, |base| plot.map((p.0, base)).1))
+            (upper, panels::base(panel, series, i).map_or(floor, |base| plot.map((p.0, base)).1))
         })
         .collect();
     for piece in points.split(|((x, y), _)| !(x.is_finite() && y.is_finite())) {
@@ -257,7 +257,7 @@ fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, col
 /// Draws the cells of a stripe, as high as the distance between stripes.
 fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, shades: &Shades) {
     let Some(y) = series.y.first() else { return };
-    for ((from, to, _), colour) in frame::cells(series, plot.x, shades) {
+    for ((from, to, _), colour) in panels::cells(series, plot.x, shades) {
         let ((left, top), (right, bottom)) = (plot.map((from, y + 0.5)), plot.map((to, y - 0.5)));
         let corners = box_around(left, top, right - left, bottom - top);
         svg.tile(&plot.window().polygon(&corners), &colour.light);
@@ -273,9 +273,9 @@ struct Slot {
 fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, slot: &Slot, colour: &str) {
     let opacity = if series.emphasis == Emphasis::Pale { PALE } else { 1.0 };
     let scale = plot.width / plot.x.span();
-    for (i, point) in frame::points(panel, series).enumerate().filter(|(_, p)| frame::drawable(*p)) {
+    for (i, point) in panels::points(panel, series).enumerate().filter(|(_, p)| panels::drawable(*p)) {
         let (x, y) = plot.map(point);
-        let base = frame::base(panel, series, i).map_or(plot.top + plot.height, |base| plot.map((point.0, base)).1);
+        let base = panels::base(panel, series, i).map_or(plot.top + plot.height, |base| plot.map((point.0, base)).1);
         let corners = box_around(x + slot.shift * scale, y, slot.width * scale, base - y);
         svg.area(&plot.window().polygon(&corners), colour, opacity);
     }
@@ -284,7 +284,7 @@ fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, slo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::font;
+    use crate::figure::font;
     use crate::samples;
 
     #[test]
@@ -301,7 +301,7 @@ mod tests {
                     all.contains(&panel.title) && all.contains(&panel.x.quantity) && all.contains(&panel.y.quantity)
                 );
             }
-            for entry in frame::legend(&dataset.figure).0 {
+            for entry in panels::legend(&dataset.figure).0 {
                 let titles = dataset.figure.panels.iter().filter(|p| p.title == entry.label).count();
                 assert_eq!(texts.iter().filter(|t| **t == entry.label).count(), 1 + titles, "{}", entry.label);
             }

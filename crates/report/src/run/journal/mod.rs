@@ -13,10 +13,10 @@
 //! bytes after the last valid frame, which the abort left incomplete. A block counts as kept
 //! when the file system confirms that it is on disk and the file is still at its path.
 
-mod bytes;
+mod encoding;
 mod frame;
 
-use crate::json::Shape;
+use crate::output::json::Shape;
 use frame::{LONGEST, PREFIX, check, frame};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -301,7 +301,7 @@ impl Journal {
         {
             match payload.first() {
                 Some(&BLOCK) => {
-                    let Some((block, time)) = bytes::read(&payload[1..]) else { break };
+                    let Some((block, time)) = encoding::read(&payload[1..]) else { break };
                     if block.units.start != journal.units.end {
                         break;
                     }
@@ -380,7 +380,7 @@ impl Journal {
         let Some(block) = self.waiting.take() else { return Ok(()) };
         self.time = self.before + self.begun.elapsed().as_secs_f64();
         let mut payload = vec![BLOCK];
-        bytes::write(&block, self.time, &mut payload);
+        encoding::write(&block, self.time, &mut payload);
         let at = self.end;
         self.frame(&payload)?;
         self.frames.push((at, payload.len() as u32));
@@ -473,7 +473,7 @@ impl Journal {
             let mut file = File::open(&self.path).map_err(reading)?;
             file.seek(SeekFrom::Start(*at)).map_err(reading)?;
             let payload = frame(&mut file, PREFIX + u64::from(*length)).map_err(reading)?.ok_or_else(not)?;
-            Ok(bytes::read(payload.get(1..).unwrap_or_default()).ok_or_else(not)?.0)
+            Ok(encoding::read(payload.get(1..).unwrap_or_default()).ok_or_else(not)?.0)
         })
     }
 }
