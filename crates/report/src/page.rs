@@ -6,7 +6,7 @@
 
 use crate::figure::html::{document, fragment, script, script_name};
 use crate::figure::svg::escape;
-use crate::output::result_file::{ReportError, write_file, write_once};
+use crate::output::result_file::{ReportError, write_file, write_if_changed};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Figure;
@@ -141,7 +141,7 @@ impl Page {
     /// # Errors
     /// [`ReportError::Write`] with the path and the cause.
     pub fn write(&self, path: &Path) -> Result<PathBuf, ReportError> {
-        write_once(&path.with_file_name(script_name()), script().as_bytes())?;
+        write_if_changed(&path.with_file_name(script_name()), script().as_bytes())?;
         write_file(path, self.to_html().as_bytes())
     }
 

@@ -11,15 +11,15 @@ const KEYS: [&str; 5] = ["mass", "joint", "loop", "index", "stretch"];
 /// Tables whose rows are identified by the excitation frequency.
 const BY_FREQUENCY: [&str; 5] = ["orbit", "orbits", "multipliers", "loops", "loops_summary"];
 /// Roles of the columns of a table.
-pub(super) struct Reading {
+pub(super) struct ColumnRoles {
     /// Columns that identify rows.
     pub(super) keys: Vec<String>,
     /// Abscissa of the curves in the other columns.
     pub(super) abscissa: Option<String>,
 }
 
-impl Reading {
-    pub(super) fn new(run: &Stored, table: &Table) -> Reading {
+impl ColumnRoles {
+    pub(super) fn new(run: &Stored, table: &Table) -> ColumnRoles {
         let has = |name: &str| table.columns.iter().any(|column| column.name == name);
         let case = run.study.case(0).ok();
         let names = |values: &[VariedValue]| values.iter().map(|value| value.column().0).collect::<Vec<_>>();
@@ -44,7 +44,7 @@ impl Reading {
         let frequency = BY_FREQUENCY.contains(&table.name.as_str()).then_some("frequency_Hz");
         let named = KEYS.into_iter().chain(["drive_frequency_Hz"]).chain(frequency).map(str::to_owned);
         let keys = given.into_iter().chain(named).filter(|name| has(name) && Some(name) != abscissa.as_ref()).collect();
-        Reading { keys, abscissa: abscissa.filter(|name| has(name)) }
+        ColumnRoles { keys, abscissa: abscissa.filter(|name| has(name)) }
     }
 
     /// Returns the rows of each group, in the order of the table.
@@ -94,7 +94,7 @@ fn fixed(case: &Case) -> Vec<VariedValue> {
 }
 
 /// Returns the table with a column for every parameter that only the other run varies.
-pub(super) fn completed(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
+pub(super) fn with_parameter_columns(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
     let mut table = table.clone();
     let (Ok(case), Ok(varied)) = (run.study.case(0), other.study.case(0).map(|case| case.varied)) else { return table };
     for value in fixed(&case).iter().filter(|value| varied.iter().any(|varied| varied.name == value.name)) {

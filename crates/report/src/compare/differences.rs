@@ -1,8 +1,8 @@
 //! Differences between runs: the largest in every column, and all differences of peaks and
 //! optima.
 
-use super::column_roles::{Reading, completed};
-use super::row_matching::{Pair, difference, pairs};
+use super::column_roles::{ColumnRoles, with_parameter_columns};
+use super::row_matching::{MatchedRow, difference, pairs};
 use crate::run::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
@@ -27,13 +27,13 @@ struct Largest {
 /// The tables of differences, extended with every run.
 #[derive(Debug, Default)]
 pub(super) struct Differences {
-    rows: Vec<Row>,
+    rows: Vec<DifferenceRow>,
     found: Vec<Table>,
     pub(super) notes: Vec<String>,
 }
 
 #[derive(Debug)]
-struct Row {
+struct DifferenceRow {
     table: String,
     column: String,
     run: String,
@@ -48,11 +48,14 @@ impl Differences {
                 self.notes.push(format!("{}: {run} does not contain this table.", table.name));
                 continue;
             };
-            let completed = (completed(first, table, (other, with)), completed(other, with, (first, table)));
+            let completed = (
+                with_parameter_columns(first, table, (other, with)),
+                with_parameter_columns(other, with, (first, table)),
+            );
             let (table, with) = (&completed.0, &completed.1);
-            let (reading, reading_with) = (Reading::new(first, table), Reading::new(other, with));
+            let (reading, reading_with) = (ColumnRoles::new(first, table), ColumnRoles::new(other, with));
             if reading.keys != reading_with.keys || reading.abscissa != reading_with.abscissa {
-                let words = |reading: &Reading| {
+                let words = |reading: &ColumnRoles| {
                     let keys: Vec<&str> = reading.keys.iter().chain(&reading.abscissa).map(String::as_str).collect();
                     if keys.is_empty() { "nothing".to_owned() } else { keys.join(", ") }
                 };
@@ -68,7 +71,7 @@ impl Differences {
         }
     }
 
-    fn table(&mut self, tables: (&Table, &Table), reading: &Reading, run: &str, label: &str) {
+    fn table(&mut self, tables: (&Table, &Table), reading: &ColumnRoles, run: &str, label: &str) {
         let (table, with) = tables;
         let groups = reading.groups(table);
         let others: BTreeMap<String, Vec<usize>> = reading.groups(with).into_iter().collect();
@@ -76,7 +79,7 @@ impl Differences {
             reading.values(table).into_iter().filter(|name| with.numbers(name).is_some()).collect();
         let mut largest: Vec<Largest> = columns.iter().map(|_| Largest::default()).collect();
         let (mut interpolates, mut exact, mut common) = (false, false, 0);
-        let mut one_by_one: Vec<Pair> = Vec::new();
+        let mut one_by_one: Vec<MatchedRow> = Vec::new();
         for (key, rows) in &groups {
             let Some(rows_with) = others.get(key) else { continue };
             common += 1;
@@ -138,7 +141,7 @@ impl Differences {
             self.found(tables, reading, &columns, &one_by_one, run);
         }
         for (name, largest) in columns.into_iter().zip(largest).filter(|(_, largest)| largest.points > 0) {
-            self.rows.push(Row {
+            self.rows.push(DifferenceRow {
                 table: table.name.clone(),
                 column: name.to_owned(),
                 run: run.to_owned(),
@@ -152,9 +155,9 @@ impl Differences {
     fn found(
         &mut self,
         (table, with): (&Table, &Table),
-        reading: &Reading,
+        reading: &ColumnRoles,
         columns: &[&str],
-        pairs: &[Pair],
+        pairs: &[MatchedRow],
         run: &str,
     ) {
         let mut made: Vec<Column> = vec![Column::texts("run", pairs.iter().map(|_| run.to_owned()).collect())];
@@ -172,7 +175,7 @@ impl Differences {
             let relative = a.iter().zip(&b).map(|(a, b)| if a == b { 0.0 } else { (b - a) / a.abs() }).collect();
             made.push(Column::numbers(&format!("{FIRST}{name}"), a));
             made.push(Column::numbers(name, b));
-            made.push(Column::numbers(&format!("{}_change", stem(name)), relative));
+            made.push(Column::numbers(&format!("{}_change", without_unit(name)), relative));
         }
         match self.found.iter_mut().find(|t| t.name == table.name) {
             None => self.found.push(Table { name: table.name.clone(), columns: made }),
@@ -192,8 +195,10 @@ impl Differences {
 
     pub(super) fn tables(self) -> Vec<Table> {
         let rows = &self.rows;
-        let words = |name: &str, of: &dyn Fn(&Row) -> String| Column::texts(name, rows.iter().map(of).collect());
-        let numbers = |name: &str, of: &dyn Fn(&Row) -> f64| Column::numbers(name, rows.iter().map(of).collect());
+        let words =
+            |name: &str, of: &dyn Fn(&DifferenceRow) -> String| Column::texts(name, rows.iter().map(of).collect());
+        let numbers =
+            |name: &str, of: &dyn Fn(&DifferenceRow) -> f64| Column::numbers(name, rows.iter().map(of).collect());
         let columns = vec![
             words("table", &|row| row.table.clone()),
             words("column", &|row| row.column.clone()),
@@ -225,7 +230,7 @@ fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
 }
 
 /// Returns the name of a column without its unit.
-fn stem(name: &str) -> &str {
+fn without_unit(name: &str) -> &str {
     ["_Hz", "_m", "_N", "_rad"].iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name)
 }
 
@@ -259,7 +264,7 @@ mod tests {
         largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
         assert_eq!(largest.points, 1);
         // This also holds between two points of a curve.
-        let half = Pair { first: 0, other: (0, 1, 0.5) };
+        let half = MatchedRow { first: 0, other: (0, 1, 0.5) };
         assert_eq!(half.value("blade_phase_deg", &[179.0, -179.0]), 180.0);
         assert_eq!(half.value("blade_amplitude_m", &[179.0, -179.0]), 0.0);
     }

@@ -15,7 +15,7 @@ mod overlay;
 mod row_matching;
 mod table;
 
-pub use table::for_people;
+pub use table::for_terminal;
 
 use crate::output::result_file::{ReportError, file_name};
 use crate::output::{Outputs, write_dataset};
@@ -123,7 +123,7 @@ pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<
     let folder = out.join(file_name(&comparison.name, "comparison")?);
     match crate::run::stored::read(&folder) {
         // Unreadable results may still be a run.
-        Err(StoredError::Nothing { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
+        Err(StoredError::NoRecord { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
         _ => Err(ReportError::Write {
             path: folder,
             cause: std::io::Error::other("the folder contains the results of a run; choose another --out"),

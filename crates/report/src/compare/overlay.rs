@@ -14,8 +14,8 @@ pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
     let names = curve_names(figures);
     let mut panels: Vec<Panel> = Vec::new();
     for (run, (label, figure)) in figures.iter().enumerate() {
-        let run = Run { index: run, label, names: &names };
-        let (places, by_order) = places(&panels, figure);
+        let run = OverlaidRun { index: run, label, names: &names };
+        let (places, by_order) = match_panels(&panels, figure);
         for (panel, place) in figure.panels.iter().zip(places) {
             let at = place.unwrap_or_else(|| {
                 panels.push(Panel { series: Vec::new(), ..panel.clone() });
@@ -53,7 +53,7 @@ fn curve_names<'f>(figures: &[(&str, &'f Figure)]) -> Vec<&'f str> {
 ///
 /// If all titles differ but the axes agree, panels are assigned in order, and the flag is
 /// `true`: the titles then name what differs between the runs.
-fn places(known: &[Panel], figure: &Figure) -> (Vec<Option<usize>>, bool) {
+fn match_panels(known: &[Panel], figure: &Figure) -> (Vec<Option<usize>>, bool) {
     let key = |panel: &Panel| (panel.title.clone(), panel.x.quantity.clone(), panel.y.quantity.clone());
     let fits =
         |a: &Panel, b: &Panel| a.x.quantity == b.x.quantity && a.y.quantity == b.y.quantity && factors(b, a).is_some();
@@ -77,14 +77,14 @@ fn style_key(figures: &[(&str, &Figure)]) -> String {
 }
 
 /// One of the runs in a combined figure.
-struct Run<'f> {
+struct OverlaidRun<'f> {
     index: usize,
     label: &'f str,
     /// Labels of the curves of all runs.
     names: &'f [&'f str],
 }
 
-impl Run<'_> {
+impl OverlaidRun<'_> {
     /// Adds a panel of this run to the common panel.
     fn add(&self, panel: &Panel, target: &mut Panel) {
         let Some(factors) = factors(panel, target) else { return };

@@ -3,14 +3,14 @@
 use stickslip_study::dataset::Table;
 /// A row of the first run, and two rows of the other run with the weight of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Pair {
+pub(super) struct MatchedRow {
     pub(super) first: usize,
     pub(super) other: (usize, usize, f64),
 }
 
-impl Pair {
-    pub(super) fn rows(first: usize, other: usize) -> Pair {
-        Pair { first, other: (other, other, 0.0) }
+impl MatchedRow {
+    pub(super) fn rows(first: usize, other: usize) -> MatchedRow {
+        MatchedRow { first, other: (other, other, 0.0) }
     }
 
     pub(super) fn value(&self, column: &str, values: &[f64]) -> f64 {
@@ -37,7 +37,7 @@ fn pieces(x: &[f64], rows: &[usize]) -> Vec<Vec<usize>> {
 }
 
 /// Interpolates the other run at the abscissae of the first within their common range.
-fn interpolated(x: (&[f64], &[f64]), first: &[usize], other: &[usize]) -> Vec<Pair> {
+fn interpolated(x: (&[f64], &[f64]), first: &[usize], other: &[usize]) -> Vec<MatchedRow> {
     let mut sorted = other.to_vec();
     sorted.sort_by(|a, b| x.1[*a].total_cmp(&x.1[*b]));
     let pair = |row: &usize| {
@@ -45,10 +45,10 @@ fn interpolated(x: (&[f64], &[f64]), first: &[usize], other: &[usize]) -> Vec<Pa
         let next = sorted.partition_point(|row| x.1[*row] < at);
         let right = *sorted.get(next)?;
         if x.1[right] == at {
-            return Some(Pair::rows(*row, right));
+            return Some(MatchedRow::rows(*row, right));
         }
         let left = sorted[next.checked_sub(1)?];
-        Some(Pair { first: *row, other: (left, right, (at - x.1[left]) / (x.1[right] - x.1[left])) })
+        Some(MatchedRow { first: *row, other: (left, right, (at - x.1[left]) / (x.1[right] - x.1[left])) })
     };
     first.iter().filter_map(pair).collect()
 }
@@ -61,9 +61,9 @@ pub(super) fn pairs(
     abscissa: Option<&str>,
     first: &[usize],
     other: &[usize],
-) -> Option<(Vec<Pair>, bool)> {
+) -> Option<(Vec<MatchedRow>, bool)> {
     let both = |name: &str| Some((tables.0.numbers(name)?, tables.1.numbers(name)?));
-    let one_by_one = || first.iter().zip(other).map(|(a, b)| Pair::rows(*a, *b)).collect::<Vec<_>>();
+    let one_by_one = || first.iter().zip(other).map(|(a, b)| MatchedRow::rows(*a, *b)).collect::<Vec<_>>();
     let Some(x) = abscissa.and_then(both) else {
         if first.len() == other.len() {
             return Some((one_by_one(), false));
@@ -75,7 +75,7 @@ pub(super) fn pairs(
         for row in first {
             let distance = |other: usize| (x.0[*row] - x.1[other]).abs();
             let nearest = (0..left.len()).min_by(|a, b| distance(left[*a]).total_cmp(&distance(left[*b])));
-            found.extend(nearest.map(|at| Pair::rows(*row, left.remove(at))));
+            found.extend(nearest.map(|at| MatchedRow::rows(*row, left.remove(at))));
         }
         return Some((found, false));
     };
@@ -127,6 +127,6 @@ mod tests {
         };
         let (a, b) = (table(&[1.0, 5.0]), table(&[4.9]));
         let (found, interpolated) = pairs((&b, &a), None, &[0], &[0, 1]).unwrap();
-        assert_eq!((found, interpolated), (vec![Pair::rows(0, 1)], false));
+        assert_eq!((found, interpolated), (vec![MatchedRow::rows(0, 1)], false));
     }
 }

@@ -6,9 +6,9 @@ use stickslip_study::dataset::{Column, Dataset, Table, Values};
 /// Returns the comparison with units and percentages. Quantities that are equal in all runs are
 /// omitted.
 #[must_use]
-pub fn for_people(comparison: &Dataset) -> Dataset {
-    let mut people = comparison.clone();
-    for table in &mut people.tables {
+pub fn for_terminal(comparison: &Dataset) -> Dataset {
+    let mut formatted = comparison.clone();
+    for table in &mut formatted.tables {
         let several = table.column("run").is_some_and(|column| match &column.values {
             Values::Text(runs) => runs.iter().any(|run| *run != runs[0]),
             _ => false,
@@ -24,11 +24,11 @@ pub fn for_people(comparison: &Dataset) -> Dataset {
         if table.name == DIFFERENCES {
             let same = shown_differences(table);
             if !same.is_empty() {
-                people.notes.push(format!("Equal in all runs: {}.", same.join(", ")));
+                formatted.notes.push(format!("Equal in all runs: {}.", same.join(", ")));
             }
         }
     }
-    people
+    formatted
 }
 
 /// Formats the differences. Returns the names of columns without any difference.

@@ -4,7 +4,7 @@ use stickslip_study::dataset::{Axis, Scale};
 
 /// Range of an axis: finite and not empty. Both ends are positive on a logarithmic axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Range {
+pub(crate) struct AxisRange {
     pub from: f64,
     pub to: f64,
     pub scale: Scale,
@@ -21,30 +21,30 @@ pub(crate) const MARGIN: f64 = 0.05;
 /// values are rounding errors.
 const DECADES: f64 = 16.0;
 
-impl Range {
+impl AxisRange {
     /// Returns the default range of an axis without data.
-    pub(crate) fn unit(scale: Scale) -> Range {
-        Range { from: if scale == Scale::Log { 0.1 } else { 0.0 }, to: 1.0, scale }
+    pub(crate) fn unit(scale: Scale) -> AxisRange {
+        AxisRange { from: if scale == Scale::Log { 0.1 } else { 0.0 }, to: 1.0, scale }
     }
 
     /// Returns the range given for the axis, if it is valid.
-    pub(crate) fn fixed(axis: &Axis) -> Option<Range> {
+    pub(crate) fn fixed(axis: &Axis) -> Option<AxisRange> {
         let [from, to] = axis.range?;
         let good = from.is_finite() && to.is_finite() && from < to && (axis.scale == Scale::Linear || from > 0.0);
-        let range = Range { from, to, scale: axis.scale };
+        let range = AxisRange { from, to, scale: axis.scale };
         (good && range.span().is_finite() && range.span() > 0.0).then_some(range)
     }
 
     /// Returns `true` if the axis can show the value.
-    pub(crate) fn takes(scale: Scale, value: f64) -> bool {
+    pub(crate) fn accepts(scale: Scale, value: f64) -> bool {
         value.is_finite() && (scale == Scale::Linear || value > 0.0)
     }
 
-    pub(crate) fn around(values: impl Iterator<Item = f64>, scale: Scale) -> Option<Range> {
-        let range = values.filter(|v| Range::takes(scale, *v)).map(|v| v.clamp(-LARGEST, LARGEST)).fold(
+    pub(crate) fn around(values: impl Iterator<Item = f64>, scale: Scale) -> Option<AxisRange> {
+        let range = values.filter(|v| AxisRange::accepts(scale, *v)).map(|v| v.clamp(-LARGEST, LARGEST)).fold(
             None,
-            |range: Option<Range>, v| {
-                Some(range.map_or(Range { from: v, to: v, scale }, |r| Range {
+            |range: Option<AxisRange>, v| {
+                Some(range.map_or(AxisRange { from: v, to: v, scale }, |r| AxisRange {
                     from: r.from.min(v),
                     to: r.to.max(v),
                     scale,
@@ -53,17 +53,17 @@ impl Range {
         )?;
         Some(match scale {
             Scale::Linear => range,
-            Scale::Log => Range { from: range.from.max(range.to * power_of_ten(-DECADES as i32)), ..range },
+            Scale::Log => AxisRange { from: range.from.max(range.to * power_of_ten(-DECADES as i32)), ..range },
         })
     }
 
-    pub(crate) fn union(self, other: Range) -> Range {
-        Range { from: self.from.min(other.from), to: self.to.max(other.to), ..self }
+    pub(crate) fn union(self, other: AxisRange) -> AxisRange {
+        AxisRange { from: self.from.min(other.from), to: self.to.max(other.to), ..self }
     }
 
     /// Converts a value to the linear measure of the axis: the value or its logarithm to base
     /// 10.
-    pub(crate) fn measure(self, value: f64) -> f64 {
+    pub(crate) fn to_linear(self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
             Scale::Log => log10(value),
@@ -72,19 +72,19 @@ impl Range {
 
     /// Returns the length of the axis in its linear measure.
     pub(crate) fn span(self) -> f64 {
-        self.measure(self.to) - self.measure(self.from)
+        self.to_linear(self.to) - self.to_linear(self.from)
     }
 
     /// Returns the relative position of a value: 0 at the lower end, 1 at the upper end.
-    pub(crate) fn part(self, value: f64) -> f64 {
-        (self.measure(value) - self.measure(self.from)) / self.span()
+    pub(crate) fn fraction(self, value: f64) -> f64 {
+        (self.to_linear(value) - self.to_linear(self.from)) / self.span()
     }
 
-    /// Returns the value at a relative position: the inverse of [`Range::part`].
-    pub(crate) fn at(self, part: f64) -> f64 {
+    /// Returns the value at a relative position: the inverse of [`AxisRange::fraction`].
+    pub(crate) fn value_at(self, part: f64) -> f64 {
         match self.scale {
             Scale::Linear => self.from + part * (self.to - self.from),
-            Scale::Log => exp10(self.measure(self.from) + part * self.span()),
+            Scale::Log => exp10(self.to_linear(self.from) + part * self.span()),
         }
     }
 
@@ -97,12 +97,12 @@ impl Range {
     }
 
     /// Extends both ends by `margin` times the span. A constant gets a range around it.
-    pub(crate) fn widened(self, margin: f64) -> Range {
+    pub(crate) fn widened(self, margin: f64) -> AxisRange {
         if self.scale == Scale::Log {
             let pad = if self.span() <= NARROWEST { 0.5 } else { margin * self.span() };
             let factor = exp10(pad);
             let least = f64::MIN_POSITIVE;
-            return Range {
+            return AxisRange {
                 from: (self.from / factor).max(least),
                 to: (self.to * factor).clamp(2.0 * least, LARGEST),
                 ..self
@@ -113,7 +113,7 @@ impl Range {
             size if self.span() <= NARROWEST * size => 0.1 * size,
             _ => margin * self.span(),
         };
-        Range { from: self.from - pad, to: self.to + pad, ..self }
+        AxisRange { from: self.from - pad, to: self.to + pad, ..self }
     }
 }
 
@@ -167,7 +167,7 @@ pub(crate) fn power_of_ten(power: i32) -> f64 {
 /// labels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Ticks {
-    pub at: Vec<f64>,
+    pub positions: Vec<f64>,
     pub labels: Vec<String>,
     pub minor: Vec<f64>,
     pub power: i32,
@@ -175,53 +175,53 @@ pub(crate) struct Ticks {
 
 /// A logarithmic axis with fewer decades has the ticks of a linear axis, because it may contain
 /// no power of ten.
-const SHORT: f64 = 0.7;
+const MIN_LOG_DECADES: f64 = 0.7;
 /// Up to this number of decades, minor ticks are at 2 to 9 times each power of ten.
-const FINE: f64 = 9.0;
+const MAX_FINE_DECADES: f64 = 9.0;
 
 /// Returns about `count` ticks at round values inside the range.
-pub(crate) fn ticks(range: Range, count: f64) -> Ticks {
+pub(crate) fn ticks(range: AxisRange, count: f64) -> Ticks {
     match range.scale {
-        Scale::Log if range.span() >= SHORT => logarithmic(range, count),
+        Scale::Log if range.span() >= MIN_LOG_DECADES => logarithmic(range, count),
         _ => linear(range, count),
     }
 }
 
 /// Returns the ticks of `axis`: its names if it has any, integers only if its values are
 /// integers.
-pub(crate) fn ticks_of(axis: &Axis, range: Range, count: f64) -> Ticks {
+pub(crate) fn axis_ticks(axis: &Axis, range: AxisRange, count: f64) -> Ticks {
     if !axis.names.is_empty() {
         return named(&axis.names, range, count);
     }
     let ticks = ticks(range, count);
-    if axis.whole && ticks.at.iter().any(|at| at.fract() != 0.0) { whole(range, count) } else { ticks }
+    if axis.whole && ticks.positions.iter().any(|at| at.fract() != 0.0) { whole(range, count) } else { ticks }
 }
 
 /// Places ticks at every first, second or fifth integer. Wider steps are integers anyway.
-fn whole(range: Range, count: f64) -> Ticks {
+fn whole(range: AxisRange, count: f64) -> Ticks {
     let steps = [1.0, 2.0, 5.0];
     let step = steps.into_iter().find(|step| range.to - range.from <= step * count).unwrap_or(steps[2]);
     let (first, last) = ((range.from / step).ceil() as i64, (range.to / step).floor() as i64);
     let at: Vec<f64> = (first..=last).map(|i| i as f64 * step).collect();
     let labels = at.iter().map(|v| signed(format!("{v:.0}"))).collect();
-    Ticks { at, labels, minor: vec![], power: 0 }
+    Ticks { positions: at, labels, minor: vec![], power: 0 }
 }
 
 /// Number of names per numeric tick: names may stand closer together.
 const NAMES: f64 = 2.0;
 
 /// Shows all names, or every second, fifth, tenth and so on.
-fn named(names: &[String], range: Range, count: f64) -> Ticks {
+fn named(names: &[String], range: AxisRange, count: f64) -> Ticks {
     let inside: Vec<usize> = (0..names.len()).filter(|i| range.contains(*i as f64)).collect();
     let steps = (0..6).flat_map(|power| [1, 2, 5].map(|digit| digit * 10usize.pow(power)));
     let fits = |step: &usize| inside.len().div_ceil(*step) as f64 <= NAMES * count;
     let step = steps.into_iter().find(fits).unwrap_or(usize::MAX);
     let shown: Vec<usize> = inside.into_iter().filter(|i| i.is_multiple_of(step)).collect();
     let labels = shown.iter().map(|i| names[*i].clone()).collect();
-    Ticks { at: shown.iter().map(|i| *i as f64).collect(), labels, minor: vec![], power: 0 }
+    Ticks { positions: shown.iter().map(|i| *i as f64).collect(), labels, minor: vec![], power: 0 }
 }
 
-fn linear(range: Range, count: f64) -> Ticks {
+fn linear(range: AxisRange, count: f64) -> Ticks {
     let span = range.to - range.from;
     let rough = span / count.max(1.0);
     let magnitude = power_of_ten(log10(rough).floor() as i32);
@@ -244,14 +244,14 @@ fn linear(range: Range, count: f64) -> Ticks {
     };
     let decimals = (0..15).find(whole).unwrap_or(15) as usize;
     let labels = at.iter().map(|v| signed(format!("{:.decimals$}", scaled(*v)))).collect();
-    Ticks { at, labels, minor: vec![], power }
+    Ticks { positions: at, labels, minor: vec![], power }
 }
 
 /// Places about `count` ticks on a logarithmic axis.
 ///
 /// Ticks are at 1, 2 and 5 times the powers of ten, at 1 and 3 times, at the powers, or at
 /// every n-th power.
-fn logarithmic(range: Range, count: f64) -> Ticks {
+fn logarithmic(range: AxisRange, count: f64) -> Ticks {
     let decades = range.span();
     let (first, last) = (log10(range.from).floor() as i32, log10(range.to).ceil() as i32);
     let inside = |v: &f64| *v >= range.from * (1.0 - 1e-9) && *v <= range.to * (1.0 + 1e-9) && *v > 0.0;
@@ -266,15 +266,15 @@ fn logarithmic(range: Range, count: f64) -> Ticks {
         .find(|at| at.len() as f64 <= count + 1.0)
         .unwrap_or_else(|| every((decades / count).ceil() as i32, &[1.0]));
     let minor = match decades {
-        d if d <= FINE => every(1, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
-        d if d <= 10.0 * FINE => every(1, &[1.0]),
+        d if d <= MAX_FINE_DECADES => every(1, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
+        d if d <= 10.0 * MAX_FINE_DECADES => every(1, &[1.0]),
         _ => vec![],
     };
     let minor = minor.into_iter().filter(|m| !at.iter().any(|v| (v - m).abs() <= 1e-9 * m)).collect();
     // All labels are decimals, or all are powers: mixed labels are hard to compare.
     let plain = at.iter().all(|v| (0.999e-3..1.001e4).contains(v));
     let labels = at.iter().map(|v| if plain { decimal(*v) } else { powers(*v) }).collect();
-    Ticks { at, labels, minor, power: 0 }
+    Ticks { positions: at, labels, minor, power: 0 }
 }
 
 /// Formats 0.05, 2 or 1000: a round number without trailing zeros.
@@ -338,8 +338,8 @@ fn superscript(power: i32) -> String {
 mod tests {
     use super::*;
 
-    fn range(from: f64, to: f64, scale: Scale) -> Range {
-        Range { from, to, scale }
+    fn range(from: f64, to: f64, scale: Scale) -> AxisRange {
+        AxisRange { from, to, scale }
     }
 
     fn labels(from: f64, to: f64) -> (Vec<String>, i32) {
@@ -355,7 +355,7 @@ mod tests {
         assert_eq!(labels(0.0, 3e300).1, 300);
         for (from, to) in [(0.0, 1e-299), (-1e300, 1e300), (1e9, 1e9 + 1.0), (1.0, 1.0 + 1e-9), (0.0, 0.7)] {
             let t = ticks(range(from, to, Scale::Linear), 6.0);
-            assert!((3..=13).contains(&t.at.len()), "{from} {to}: {t:?}");
+            assert!((3..=13).contains(&t.positions.len()), "{from} {to}: {t:?}");
             let mut distinct = t.labels.clone();
             distinct.dedup();
             assert_eq!(distinct, t.labels);
@@ -364,12 +364,13 @@ mod tests {
 
     #[test]
     fn no_tick_stands_between_whole_numbers() {
-        let count = |from, to, count| ticks_of(&Axis::new("disks", "").whole(), range(from, to, Scale::Linear), count);
+        let count =
+            |from, to, count| axis_ticks(&Axis::new("disks", "").whole(), range(from, to, Scale::Linear), count);
         assert_eq!(count(0.0, 2.1, 7.0).labels, ["0", "1", "2"]);
         assert_eq!(count(-0.4, 5.4, 3.0).labels, ["0", "2", "4"]);
         assert_eq!(count(0.0, 12.0, 5.0).labels, ["0", "5", "10"]);
         assert_eq!(count(0.0, 120.0, 5.0).labels, ["0", "25", "50", "75", "100"]);
-        assert!(count(0.2, 0.8, 5.0).at.is_empty());
+        assert!(count(0.2, 0.8, 5.0).positions.is_empty());
     }
 
     #[test]
@@ -377,7 +378,7 @@ mod tests {
         let log = |from, to, count| ticks(range(from, to, Scale::Log), count);
         let t = log(0.8, 120.0, 8.0);
         assert_eq!(t.labels, ["1", "2", "5", "10", "20", "50", "100"]);
-        assert_eq!(t.at, [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]);
+        assert_eq!(t.positions, [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]);
         assert_eq!(t.minor, [0.8, 0.9, 3.0, 4.0, 6.0, 7.0, 8.0, 9.0, 30.0, 40.0, 60.0, 70.0, 80.0, 90.0]);
         assert_eq!(log(0.8, 120.0, 4.0).labels, ["1", "3", "10", "30", "100"]);
         assert_eq!(log(1e-6, 1e-2, 6.0).labels, ["10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²"]);
@@ -386,7 +387,10 @@ mod tests {
         assert_eq!(log(1e-12, 1e12, 6.0).minor.len(), 25 - 7);
         assert_eq!(log(121.0, 123.0, 4.0).labels, ["121.0", "121.5", "122.0", "122.5", "123.0"]);
         for t in [log(1e-308, 1e307, 6.0), log(1e-3, 1e300, 3.0), log(5e-324, 1e-300, 5.0)] {
-            assert!((2..=10).contains(&t.at.len()) && t.at.iter().all(|v| v.is_finite() && *v > 0.0), "{t:?}");
+            assert!(
+                (2..=10).contains(&t.positions.len()) && t.positions.iter().all(|v| v.is_finite() && *v > 0.0),
+                "{t:?}"
+            );
         }
     }
 
@@ -407,20 +411,20 @@ mod tests {
     #[test]
     fn places_on_a_logarithmic_axis_are_even_in_ratios() {
         let axis = range(1.0, 1e4, Scale::Log);
-        assert_eq!([1.0, 10.0, 100.0, 1e4].map(|v| (axis.part(v) * 1e12).round() / 1e12), [0.0, 0.25, 0.5, 1.0]);
-        let constant = Range::around([3.0, -1.0, 0.0].into_iter(), Scale::Log).unwrap().widened(0.0);
+        assert_eq!([1.0, 10.0, 100.0, 1e4].map(|v| (axis.fraction(v) * 1e12).round() / 1e12), [0.0, 0.25, 0.5, 1.0]);
+        let constant = AxisRange::around([3.0, -1.0, 0.0].into_iter(), Scale::Log).unwrap().widened(0.0);
         assert!(constant.from > 0.9 && constant.from < 1.0 && constant.to > 9.0, "{constant:?}");
-        assert!(Range::around([0.0, -1.0, f64::NAN].into_iter(), Scale::Log).is_none());
+        assert!(AxisRange::around([0.0, -1.0, f64::NAN].into_iter(), Scale::Log).is_none());
     }
 
     #[test]
     fn impossible_ends_count_as_absent() {
         let axis = Axis::new("a", "m");
-        assert_eq!(Range::fixed(&axis.clone().between(2.0, 1.0)), Some(range(1.0, 2.0, Scale::Linear)));
+        assert_eq!(AxisRange::fixed(&axis.clone().between(2.0, 1.0)), Some(range(1.0, 2.0, Scale::Linear)));
         for [from, to] in [[1.0, 1.0], [f64::NAN, 1.0], [0.0, f64::INFINITY], [f64::MIN, f64::MAX]] {
-            assert_eq!(Range::fixed(&Axis { range: Some([from, to]), ..axis.clone() }), None);
+            assert_eq!(AxisRange::fixed(&Axis { range: Some([from, to]), ..axis.clone() }), None);
         }
-        assert_eq!(Range::fixed(&axis.log().between(0.0, 1.0)), None);
+        assert_eq!(AxisRange::fixed(&axis.log().between(0.0, 1.0)), None);
     }
 
     #[test]

@@ -6,7 +6,7 @@ pub(crate) type Point = (f64, f64);
 
 /// A rectangle on the page in px.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Window {
+pub(crate) struct ClipRect {
     pub left: f64,
     pub top: f64,
     pub right: f64,
@@ -16,12 +16,12 @@ pub(crate) struct Window {
 /// Tolerance of the window in px, so that rounding does not remove a mark from the edge.
 const EDGE: f64 = 0.01;
 /// Flatness tolerance in px: 1/40 of the line width. A point this close to the line is removed.
-const FLAT: f64 = 0.04;
+const FLATNESS: f64 = 0.04;
 /// A line with more points than this is first reduced column by column, because flattening is
 /// slow.
 const DENSE: usize = 4000;
 
-impl Window {
+impl ClipRect {
     pub(crate) fn contains(&self, (x, y): Point) -> bool {
         x >= self.left - EDGE && x <= self.right + EDGE && y >= self.top - EDGE && y <= self.bottom + EDGE
     }
@@ -97,7 +97,7 @@ impl Window {
 }
 
 /// Returns the line without the points that make no visible difference.
-pub(crate) fn visible(points: Vec<Point>) -> Vec<Point> {
+pub(crate) fn simplified(points: Vec<Point>) -> Vec<Point> {
     flattened(&thinned(points))
 }
 
@@ -118,7 +118,7 @@ fn thinned(points: Vec<Point>) -> Vec<Point> {
     kept
 }
 
-/// Removes the points within [`FLAT`] of the line through the kept points.
+/// Removes the points within [`FLATNESS`] of the line through the kept points.
 ///
 /// Source: Douglas and Peucker (1973).
 fn flattened(points: &[Point]) -> Vec<Point> {
@@ -132,7 +132,7 @@ fn flattened(points: &[Point]) -> Vec<Point> {
         let farthest = (from + 1..to)
             .map(|i| (i, distance(points[i], points[from], points[to])))
             .max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((middle, _)) = farthest.filter(|(_, far)| *far > FLAT) {
+        if let Some((middle, _)) = farthest.filter(|(_, far)| *far > FLATNESS) {
             keep[middle] = true;
             open.push((from, middle));
             open.push((middle, to));
@@ -154,7 +154,7 @@ fn distance(p: Point, a: Point, b: Point) -> f64 {
 mod tests {
     use super::*;
 
-    const WINDOW: Window = Window { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
+    const WINDOW: ClipRect = ClipRect { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
 
     #[test]
     fn a_line_that_leaves_and_returns_is_two_pieces() {
@@ -193,11 +193,11 @@ mod tests {
     fn what_is_left_out_lies_on_the_line_that_is_kept() {
         let points: Vec<Point> =
             (0..1000).map(|i| f64::from(i) * 0.5).map(|x| (x, 200.0 / (1.0 + ((x - 250.0) / 20.0).powi(2)))).collect();
-        let kept = visible(points.clone());
+        let kept = simplified(points.clone());
         assert!(kept.len() < 200, "{}", kept.len());
         for p in points {
             let off = kept.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min);
-            assert!(off <= FLAT, "{p:?}: {off}");
+            assert!(off <= FLATNESS, "{p:?}: {off}");
         }
     }
 }

@@ -60,7 +60,7 @@ impl Colour {
     }
 
     /// Legend colour of a label that is drawn in several colours.
-    pub(crate) fn many() -> Colour {
+    pub(crate) fn several() -> Colour {
         Colour::pair(["#555555", "#b8b8b8"])
     }
 
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn every_colour_stands_out_from_its_background() {
         for (dark, ground, least) in [(0, "#ffffff", 2.2), (1, "#16181d", 3.5)] {
-            let greys = [Colour::many(), Colour::reference()].map(|c| if dark == 0 { c.light } else { c.dark });
+            let greys = [Colour::several(), Colour::reference()].map(|c| if dark == 0 { c.light } else { c.dark });
             for colour in PALETTE.iter().map(|pair| pair[dark]).chain(greys.iter().map(String::as_str)) {
                 assert!(contrast(colour, ground) > least, "{colour}: {}", contrast(colour, ground));
             }

@@ -3,7 +3,7 @@
 //! These are the grid of panels, the axis ranges, the drawing order, the legend and the
 //! colours.
 
-use crate::figure::axis::{MARGIN, Range};
+use crate::figure::axis::{AxisRange, MARGIN};
 use crate::figure::colour::Colour;
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sharing, Style};
 
@@ -35,7 +35,7 @@ pub(crate) fn grid(figure: &Figure) -> (usize, usize) {
 pub(crate) fn points<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
     let (x_scale, y_scale) = (panel.x.scale, panel.y.scale);
     let nothing = (f64::NAN, f64::NAN);
-    let shown = move |(x, y): &(f64, f64)| Range::takes(x_scale, *x) && Range::takes(y_scale, *y);
+    let shown = move |(x, y): &(f64, f64)| AxisRange::accepts(x_scale, *x) && AxisRange::accepts(y_scale, *y);
     series.x.iter().copied().zip(series.y.iter().copied()).map(move |p| if shown(&p) { p } else { nothing })
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn drawn<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item
 /// `None` means the lower end of a logarithmic axis.
 pub(crate) fn base(panel: &Panel, series: &Series, index: usize) -> Option<f64> {
     let base = series.base.get(index).copied().unwrap_or(0.0);
-    Range::takes(panel.y.scale, base).then_some(base)
+    AxisRange::accepts(panel.y.scale, base).then_some(base)
 }
 
 /// Returns `true` if the panel has at least one point to draw.
@@ -63,7 +63,7 @@ pub(crate) fn has_data(panel: &Panel) -> bool {
 }
 
 /// Returns the series of a panel in drawing order, background first.
-pub(crate) fn layers(panel: &Panel) -> Vec<&Series> {
+pub(crate) fn drawing_order(panel: &Panel) -> Vec<&Series> {
     let mut series: Vec<&Series> = panel.series.iter().collect();
     series.sort_by_key(|s| match (s.style, s.emphasis) {
         (Style::Marks | Style::Missing, _) => 5,
@@ -86,20 +86,20 @@ pub(crate) fn line_style(series: &Series) -> Style {
 
 /// Colours of a figure: from the palette, or by value if the series have many values.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shades {
+pub(crate) struct ColourScheme {
     /// Quantity and range of the colour scale, if colours follow values.
-    pub bar: Option<(Axis, Range)>,
+    pub bar: Option<(Axis, AxisRange)>,
 }
 
 /// Up to this number of values, the palette and the legend distinguish the series.
-const NAMED: usize = 7;
+const MAX_NAMED_VALUES: usize = 7;
 
-impl Shades {
-    pub(crate) fn of(figure: &Figure) -> Shades {
-        Shades { bar: Shades::bar(figure) }
+impl ColourScheme {
+    pub(crate) fn of(figure: &Figure) -> ColourScheme {
+        ColourScheme { bar: ColourScheme::bar(figure) }
     }
 
-    fn bar(figure: &Figure) -> Option<(Axis, Range)> {
+    fn bar(figure: &Figure) -> Option<(Axis, AxisRange)> {
         let axis = figure.varied.as_ref()?;
         let mut values: Vec<f64> = figure
             .panels
@@ -115,8 +115,8 @@ impl Shades {
         // A smallest value that is not positive makes the colour scale linear.
         let axis = Axis { scale: if positive { axis.scale } else { Scale::Linear }, ..axis.clone() };
         let all = values.iter().chain(&shaded).copied();
-        let range = Range::fixed(&axis).or_else(|| Range::around(all, axis.scale))?.widened(0.0);
-        (values.len() > NAMED || !shaded.is_empty()).then_some((axis, range))
+        let range = AxisRange::fixed(&axis).or_else(|| AxisRange::around(all, axis.scale))?.widened(0.0);
+        (values.len() > MAX_NAMED_VALUES || !shaded.is_empty()).then_some((axis, range))
     }
 
     /// Returns the value of a series as text if its colour shows it: `kt = 8 N/mm`.
@@ -131,43 +131,48 @@ impl Shades {
     pub(crate) fn colour(&self, series: &Series) -> Colour {
         match (&self.bar, series.value) {
             _ if series.emphasis == Emphasis::Reference => Colour::reference(),
-            (Some((_, range)), Some(value)) if value.is_finite() => Colour::sequential(range.part(value)),
+            (Some((_, range)), Some(value)) if value.is_finite() => Colour::sequential(range.fraction(value)),
             _ => Colour::palette(series.colour),
         }
     }
 }
 
-/// Cell of a stripe: start, end, value.
-pub(crate) type Cell = (f64, f64, f64);
+/// Cell of a stripe.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StripeCell {
+    pub from: f64,
+    pub to: f64,
+    pub colour: Colour,
+}
 
-/// Returns the cells of a stripe with their colours.
+/// Returns the cells of a stripe.
 ///
 /// Each point occupies the interval up to half the distance to the adjacent points. Adjacent
 /// points with the same colour share a cell.
-pub(crate) fn cells(series: &Series, x: Range, shades: &Shades) -> Vec<(Cell, Colour)> {
-    let Some((_, range)) = &shades.bar else { return Vec::new() };
+pub(crate) fn cells(series: &Series, x: AxisRange, scheme: &ColourScheme) -> Vec<StripeCell> {
+    let Some((_, range)) = &scheme.bar else { return Vec::new() };
     let count = series.x.len().min(series.shades.len());
     let edges = edges(&series.x[..count], x);
-    let mut cells: Vec<(Cell, Colour)> = Vec::new();
+    let mut cells: Vec<StripeCell> = Vec::new();
     for (i, value) in series.shades[..count].iter().enumerate().filter(|(_, value)| value.is_finite()) {
-        let step = (range.part(*value).clamp(0.0, 1.0) * SHADES).round() / SHADES;
+        let step = (range.fraction(*value).clamp(0.0, 1.0) * COLOUR_STEPS).round() / COLOUR_STEPS;
         let colour = Colour::sequential(step);
         match cells.last_mut() {
-            Some((cell, same)) if *same == colour && cell.1 == edges[i] => cell.1 = edges[i + 1],
-            _ => cells.push(((edges[i], edges[i + 1], *value), colour)),
+            Some(cell) if cell.colour == colour && cell.to == edges[i] => cell.to = edges[i + 1],
+            _ => cells.push(StripeCell { from: edges[i], to: edges[i + 1], colour }),
         }
     }
     cells
 }
 
 /// Number of colour steps; with this number the scale looks continuous.
-const SHADES: f64 = 100.0;
+const COLOUR_STEPS: f64 = 100.0;
 
 /// Returns the borders of the cells of ascending points.
 ///
 /// The first and last borders are at the first and last points. A single point occupies the
 /// whole axis.
-pub(crate) fn edges(points: &[f64], x: Range) -> Vec<f64> {
+pub(crate) fn edges(points: &[f64], x: AxisRange) -> Vec<f64> {
     match points {
         [] => Vec::new(),
         [_] => vec![x.from, x.to],
@@ -180,7 +185,7 @@ pub(crate) fn edges(points: &[f64], x: Range) -> Vec<f64> {
 
 /// Legend entry: the common appearance of all series with one label.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub(crate) struct LegendEntry {
     pub label: String,
     pub colour: Colour,
     /// Line style, if a series with this label is a line.
@@ -196,7 +201,7 @@ pub(crate) struct Entry {
 }
 
 /// Maximum number of legend entries. The legend states only the number of further labels.
-const MOST: usize = 24;
+const MAX_LEGEND_ENTRIES: usize = 24;
 
 /// Returns the legend of a figure and the number of labels that it omits.
 ///
@@ -205,19 +210,19 @@ const MOST: usize = 24;
 /// - A series without a label or without points has no entry.
 /// - A series whose colour shows its value has no entry, unless its label stands for several
 ///   values and is not the panel's title.
-pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
-    let shades = Shades::of(figure);
-    let mut entries: Vec<(Entry, Option<f64>, bool)> = Vec::new();
+pub(crate) fn legend(figure: &Figure) -> (Vec<LegendEntry>, usize) {
+    let scheme = ColourScheme::of(figure);
+    let mut entries: Vec<(LegendEntry, Option<f64>, bool)> = Vec::new();
     let all = figure.panels.iter().flat_map(|panel| panel.series.iter().map(move |series| (panel, series)));
     for (panel, series) in all {
         if series.label.trim().is_empty() || drawn(panel, series).next().is_none() {
             continue;
         }
-        let colour = shades.colour(series);
+        let colour = scheme.colour(series);
         // References and missing points apply to all colours, so they always have a legend
         // entry.
         let nameless = !series.emphasis.is_reference() && series.style != Style::Missing;
-        let value = series.value.filter(|_| shades.bar.is_some() && nameless);
+        let value = series.value.filter(|_| scheme.bar.is_some() && nameless);
         let (line, marks, area) = match line_style(series) {
             Style::Marks => (None, true, None),
             style @ Style::Missing => (None, false, Some(style)),
@@ -228,7 +233,7 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
         match entries.iter_mut().find(|(entry, _, _)| entry.label == series.label) {
             Some((entry, known, named)) => {
                 if entry.colour != colour {
-                    entry.colour = Colour::many();
+                    entry.colour = Colour::several();
                 }
                 *named |= value.is_none() || *known != value && panel.title != series.label;
                 entry.line = entry.line.or(line);
@@ -239,23 +244,28 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<Entry>, usize) {
             None => {
                 let label = series.label.clone();
                 let reference = series.emphasis.is_reference();
-                entries.push((Entry { label, colour, line, marks, area, pale, reference }, value, value.is_none()));
+                entries.push((
+                    LegendEntry { label, colour, line, marks, area, pale, reference },
+                    value,
+                    value.is_none(),
+                ));
             }
         }
     }
-    let mut entries: Vec<Entry> = entries.into_iter().filter(|(_, _, named)| *named).map(|(entry, ..)| entry).collect();
+    let mut entries: Vec<LegendEntry> =
+        entries.into_iter().filter(|(_, _, named)| *named).map(|(entry, ..)| entry).collect();
     entries.sort_by_key(|entry| match entry.area {
         _ if entry.reference => 2,
         Some(Style::Missing) => 1,
         area => u8::from(entry.line.is_none() && area.is_none()),
     });
-    let more = entries.len().saturating_sub(MOST);
-    entries.truncate(MOST);
+    let more = entries.len().saturating_sub(MAX_LEGEND_ENTRIES);
+    entries.truncate(MAX_LEGEND_ENTRIES);
     (entries, more)
 }
 
 /// Panels of one quantity share their range if each of them uses at least this part of it.
-const SHARE: f64 = 0.2;
+const MIN_USED_FRACTION: f64 = 0.2;
 /// References extend the vertical range to at most this multiple of the results.
 ///
 /// A resonance without friction would otherwise flatten the curves of interest.
@@ -264,11 +274,11 @@ const REFERENCE_REACH: f64 = 2.0;
 /// Returns `true` if the number of results requires thin lines and small marks.
 pub(crate) fn crowded(panel: &Panel) -> bool {
     let results = panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal && s.style != Style::Missing);
-    results.count() > CROWD
+    results.count() > CROWDED_ABOVE
 }
 
 /// A panel with more results than this is crowded.
-const CROWD: usize = 40;
+const CROWDED_ABOVE: usize = 40;
 
 /// Opacity of pale curves and of areas.
 pub(crate) const PALE: f64 = 0.4;
@@ -278,18 +288,18 @@ pub(crate) const AREA: f64 = 0.25;
 /// quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Axes {
-    pub x: Range,
-    pub y: Range,
-    pub own_x: bool,
-    pub own_y: bool,
+    pub x: AxisRange,
+    pub y: AxisRange,
+    pub x_differs: bool,
+    pub y_differs: bool,
 }
 
 /// Returns the axes of every panel.
 pub(crate) fn axes(figure: &Figure) -> Vec<Axes> {
-    let raw: Vec<Option<(Range, Range)>> = figure.panels.iter().map(extent).collect();
+    let raw: Vec<Option<(AxisRange, AxisRange)>> = figure.panels.iter().map(extent).collect();
     let x = shared(figure, &raw, |panel| &panel.x, |pair| pair.0);
     let y = shared(figure, &raw, |panel| &panel.y, |pair| pair.1);
-    let ranges: Vec<(Range, Range)> = figure
+    let ranges: Vec<(AxisRange, AxisRange)> = figure
         .panels
         .iter()
         .zip(x.into_iter().zip(y))
@@ -298,36 +308,38 @@ pub(crate) fn axes(figure: &Figure) -> Vec<Axes> {
             let curve = panel.series.iter().all(|series| is_curve(panel, series));
             let floor = y.scale == Scale::Linear && y.from >= 0.0 && y.from <= 0.4 * y.to && y.to > 0.0;
             let wide = y.widened(MARGIN);
-            let y = if floor { Range { from: 0.0, ..wide } } else { wide };
+            let y = if floor { AxisRange { from: 0.0, ..wide } } else { wide };
             let x = x.widened(if curve { 0.0 } else { MARGIN });
-            (Range::fixed(&panel.x).unwrap_or(x), Range::fixed(&panel.y).unwrap_or(y))
+            (AxisRange::fixed(&panel.x).unwrap_or(x), AxisRange::fixed(&panel.y).unwrap_or(y))
         })
         .collect();
-    let differs = |i: usize, axis: fn(&Panel) -> &Axis, range: fn(&(Range, Range)) -> Range| {
+    let differs = |i: usize, axis: fn(&Panel) -> &Axis, range: fn(&(AxisRange, AxisRange)) -> AxisRange| {
         let panels = &figure.panels;
         raw[i].is_some()
             && (0..panels.len()).any(|j| {
-                raw[j].is_some() && alike(axis(&panels[i]), axis(&panels[j])) && range(&ranges[i]) != range(&ranges[j])
+                raw[j].is_some()
+                    && same_quantity(axis(&panels[i]), axis(&panels[j]))
+                    && range(&ranges[i]) != range(&ranges[j])
             })
     };
     (0..ranges.len())
         .map(|i| Axes {
             x: ranges[i].0,
             y: ranges[i].1,
-            own_x: differs(i, |p| &p.x, |r| r.0),
-            own_y: differs(i, |p| &p.y, |r| r.1),
+            x_differs: differs(i, |p| &p.x, |r| r.0),
+            y_differs: differs(i, |p| &p.y, |r| r.1),
         })
         .collect()
 }
 
 /// Returns `true` if two axes show the same quantity with the same unit and scale.
-pub(crate) fn alike(a: &Axis, b: &Axis) -> bool {
+pub(crate) fn same_quantity(a: &Axis, b: &Axis) -> bool {
     (&a.quantity, &a.unit, a.scale) == (&b.quantity, &b.unit, b.scale)
 }
 
 /// Returns the ranges of the data of a panel.
-fn extent(panel: &Panel) -> Option<(Range, Range)> {
-    let fixed = Range::fixed(&panel.x);
+fn extent(panel: &Panel) -> Option<(AxisRange, AxisRange)> {
+    let fixed = AxisRange::fixed(&panel.x);
     let inside = |p: &(f64, f64)| fixed.is_none_or(|range| range.contains(p.0));
     let values = |reference: bool| {
         let shown = panel.series.iter().filter(|series| series.style != Style::Missing);
@@ -340,23 +352,23 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
                 .flat_map(move |(i, (_, y))| [Some(y), base(panel, series, i).filter(|_| area)].into_iter().flatten())
         })
     };
-    let mut x = Range::around(panel.series.iter().flat_map(|s| drawn(panel, s).map(|p| p.0)), panel.x.scale)?;
+    let mut x = AxisRange::around(panel.series.iter().flat_map(|s| drawn(panel, s).map(|p| p.0)), panel.x.scale)?;
     if x.scale == Scale::Linear && panel.series.iter().any(|s| s.style == Style::Bars) {
         // The distance from an outer bar to the frame equals that between two bars.
-        let half = 0.5 * bar_slot(panel, x) / BAR;
-        x = Range { from: x.from - half, to: x.to + half, ..x };
+        let half = 0.5 * bar_slot(panel, x) / BAR_WIDTH_FRACTION;
+        x = AxisRange { from: x.from - half, to: x.to + half, ..x };
     }
-    let results = Range::around(values(false), panel.y.scale);
-    let references = Range::around(values(true), panel.y.scale);
+    let results = AxisRange::around(values(false), panel.y.scale);
+    let references = AxisRange::around(values(true), panel.y.scale);
     let y = match (results, references) {
         (Some(results), Some(references)) if results.scale == Scale::Linear => {
             let reach = REFERENCE_REACH * results.from.abs().max(results.to.abs());
             let cut = |v: f64| if reach > 0.0 { v.clamp(-reach, reach) } else { v };
-            results.union(Range { from: cut(references.from), to: cut(references.to), ..references })
+            results.union(AxisRange { from: cut(references.from), to: cut(references.to), ..references })
         }
         (Some(results), Some(references)) => results.union(references),
         // All data lie outside the fixed range.
-        (results, references) => results.or(references).unwrap_or(Range::unit(panel.y.scale)),
+        (results, references) => results.or(references).unwrap_or(AxisRange::unit(panel.y.scale)),
     };
     Some((x, y))
 }
@@ -364,29 +376,30 @@ fn extent(panel: &Panel) -> Option<(Range, Range)> {
 /// Widens one of two ranges so that a unit has the same length on both axes.
 ///
 /// `aspect` is the width of the plot divided by its height.
-pub(crate) fn level(x: Range, y: Range, aspect: f64) -> (Range, Range) {
-    let around = |range: Range, span: f64| {
+pub(crate) fn equal_scale(x: AxisRange, y: AxisRange, aspect: f64) -> (AxisRange, AxisRange) {
+    let around = |range: AxisRange, span: f64| {
         let middle = 0.5 * (range.from + range.to);
-        Range { from: middle - 0.5 * span, to: middle + 0.5 * span, ..range }
+        AxisRange { from: middle - 0.5 * span, to: middle + 0.5 * span, ..range }
     };
     let high = y.span().max(x.span() / aspect);
     (around(x, high * aspect), around(y, high))
 }
 
 /// Width of the bars relative to the smallest distance between two of them.
-const BAR: f64 = 0.8;
+const BAR_WIDTH_FRACTION: f64 = 0.8;
 
 /// Returns the width of all bars at one abscissa, in axis measure (logarithmic if the axis is).
-pub(crate) fn bar_slot(panel: &Panel, x: Range) -> f64 {
+pub(crate) fn bar_slot(panel: &Panel, x: AxisRange) -> f64 {
     let bars = panel.series.iter().filter(|s| s.style == Style::Bars);
-    let mut at: Vec<f64> = bars.flat_map(|s| drawn(panel, s).map(|p| x.measure(p.0))).collect();
+    let mut at: Vec<f64> = bars.flat_map(|s| drawn(panel, s).map(|p| x.to_linear(p.0))).collect();
     at.sort_by(f64::total_cmp);
     let gap = at.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 1e-9).fold(f64::INFINITY, f64::min);
-    BAR * match x.scale {
-        _ if gap.is_finite() => gap,
-        Scale::Linear => 1.0,
-        Scale::Log => 0.3,
-    }
+    BAR_WIDTH_FRACTION
+        * match x.scale {
+            _ if gap.is_finite() => gap,
+            Scale::Linear => 1.0,
+            Scale::Log => 0.3,
+        }
 }
 
 /// Distance between rows of crosses, and from the first row to the lower edge, relative to the
@@ -413,19 +426,21 @@ fn is_curve(panel: &Panel, series: &Series) -> bool {
 /// a reader can compare them.
 fn shared(
     figure: &Figure,
-    raw: &[Option<(Range, Range)>],
+    raw: &[Option<(AxisRange, AxisRange)>],
     axis: fn(&Panel) -> &Axis,
-    pick: fn(&(Range, Range)) -> Range,
-) -> Vec<Range> {
+    pick: fn(&(AxisRange, AxisRange)) -> AxisRange,
+) -> Vec<AxisRange> {
     (0..raw.len())
         .map(|i| {
             let own = axis(&figure.panels[i]);
-            let members: Vec<Range> = (0..raw.len())
-                .filter(|&j| alike(axis(&figure.panels[j]), own))
+            let members: Vec<AxisRange> = (0..raw.len())
+                .filter(|&j| same_quantity(axis(&figure.panels[j]), own))
                 .filter_map(|j| raw[j].as_ref().map(pick))
                 .collect();
-            let Some(union) = members.iter().copied().reduce(Range::union) else { return Range::unit(own.scale) };
-            let legible = || members.iter().all(|r| r.span() >= SHARE * union.span());
+            let Some(union) = members.iter().copied().reduce(AxisRange::union) else {
+                return AxisRange::unit(own.scale);
+            };
+            let legible = || members.iter().all(|r| r.span() >= MIN_USED_FRACTION * union.span());
             match (&raw[i], figure.sharing) {
                 (None, _) | (_, Sharing::Always) => union,
                 (Some(_), Sharing::WhereLegible) if legible() => union,
@@ -459,9 +474,9 @@ mod tests {
     fn a_label_stands_once_in_the_legend() {
         let (entries, more) = legend(&samples::response().figure);
         assert_eq!(entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), ["a₁", "a₂", "a₃", "peak"]);
-        let peak = Entry {
+        let peak = LegendEntry {
             label: "peak".into(),
-            colour: Colour::many(),
+            colour: Colour::several(),
             line: None,
             marks: true,
             area: None,
@@ -480,11 +495,11 @@ mod tests {
             (entries.iter().map(|e| e.label.as_str()).collect::<Vec<_>>(), more),
             (vec!["peak", "free", "stuck"], 0)
         );
-        let (axis, range) = Shades::of(&figure).bar.unwrap();
+        let (axis, range) = ColourScheme::of(&figure).bar.unwrap();
         assert_eq!((axis.quantity.as_str(), range.from, range.to), ("Ft", 1.0, 400.0));
-        let shades = Shades::of(&figure);
+        let scheme = ColourScheme::of(&figure);
         let colours: Vec<Colour> =
-            figure.panels[0].series.iter().filter(|s| s.label.starts_with("Ft")).map(|s| shades.colour(s)).collect();
+            figure.panels[0].series.iter().filter(|s| s.label.starts_with("Ft")).map(|s| scheme.colour(s)).collect();
         assert_eq!((colours.first(), colours.last()), (Some(&Colour::sequential(0.0)), Some(&Colour::sequential(1.0))));
         let few = samples::cases(7).figure;
         let masses = samples::masses().figure;
@@ -493,12 +508,12 @@ mod tests {
         untitled.panels.iter_mut().for_each(|panel| panel.title.clear());
         let names: Vec<String> = legend(&untitled).0.into_iter().map(|e| e.label).collect();
         assert_eq!(names, ["blade", "contact", "shroud"]);
-        assert_eq!(Shades::of(&masses).bar.unwrap().1.part(64.0), 6.0 / 11.0);
-        assert_eq!((legend(&few).0.len(), Shades::of(&few).bar), (7 + 3, None));
+        assert_eq!(ColourScheme::of(&masses).bar.unwrap().1.fraction(64.0), 6.0 / 11.0);
+        assert_eq!((legend(&few).0.len(), ColourScheme::of(&few).bar), (7 + 3, None));
         // Without values: the first labels, and the number of further labels.
         let unnamed = Figure { varied: None, ..figure };
         let (entries, more) = legend(&unnamed);
-        assert_eq!((entries.len(), more), (MOST, 400 + 3 - MOST));
+        assert_eq!((entries.len(), more), (MAX_LEGEND_ENTRIES, 400 + 3 - MAX_LEGEND_ENTRIES));
     }
 
     #[test]
@@ -530,8 +545,9 @@ mod tests {
         };
         let figure =
             |sharing, heights: [f64; 2]| Figure { sharing, panels: heights.map(panel).to_vec(), ..Figure::default() };
-        let tops =
-            |figure: &Figure| axes(figure).iter().map(|a| ((a.y.to * 1e9).round() / 1e9, a.own_y)).collect::<Vec<_>>();
+        let tops = |figure: &Figure| {
+            axes(figure).iter().map(|a| ((a.y.to * 1e9).round() / 1e9, a.y_differs)).collect::<Vec<_>>()
+        };
         assert_eq!(tops(&figure(Sharing::WhereLegible, [2.0, 4.0])), [(4.2, false); 2]);
         assert_eq!(tops(&figure(Sharing::WhereLegible, [0.2, 4.0])), [(0.21, true), (4.2, true)]);
         assert_eq!(tops(&figure(Sharing::Always, [0.2, 4.0])), [(4.2, false); 2]);

@@ -11,7 +11,7 @@ pub const OUTPUT: Output = Output {
     summary: "figure.png, for documents that cannot take SVG",
     make: files,
     sink: None,
-    usual: true,
+    is_default: true,
 };
 
 /// Pixels per unit of the SVG: a figure of 1000 units prints at 300 dpi on 170 mm.

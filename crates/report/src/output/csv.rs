@@ -3,7 +3,7 @@
 //! A number has the fewest digits that read back as the same 64-bit value. NaN and unknown
 //! flags are empty cells. Equal datasets give equal bytes.
 
-use crate::output::result_file::{Output, ReportError, Rows, Sink, even};
+use crate::output::result_file::{Output, ReportError, Sink, TableWriter, check_equal_lengths};
 use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::Write;
@@ -16,7 +16,7 @@ pub const OUTPUT: Output = Output {
     summary: "every table as NAME.csv, with numbers in full precision",
     make: |dataset| SINK.files(dataset),
     sink: Some(SINK),
-    usual: true,
+    is_default: true,
 };
 
 const SINK: Sink = Sink { extension: "csv", begin };
@@ -31,19 +31,19 @@ pub fn to_csv(table: &Table) -> Result<Vec<u8>, ReportError> {
     SINK.file(table)
 }
 
-struct Lines<'a>(Box<dyn Write + 'a>);
+struct CsvWriter<'a>(Box<dyn Write + 'a>);
 
-fn begin<'a>(table: &Table, mut writer: Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError> {
+fn begin<'a>(table: &Table, mut writer: Box<dyn Write + 'a>) -> Result<Box<dyn TableWriter + 'a>, ReportError> {
     if !table.columns.is_empty() {
         let header = lines(table, |text| text.write_record(table.columns.iter().map(|column| &column.name)))?;
         writer.write_all(&header).map_err(|cause| failed(table, &cause))?;
     }
-    Ok(Box::new(Lines(writer)))
+    Ok(Box::new(CsvWriter(writer)))
 }
 
-impl Rows for Lines<'_> {
+impl TableWriter for CsvWriter<'_> {
     fn rows(&mut self, table: &Table) -> Result<(), ReportError> {
-        even(table)?;
+        check_equal_lengths(table)?;
         let stretches: Vec<Range<usize>> =
             (0..table.rows()).step_by(ROWS).map(|from| from..(from + ROWS).min(table.rows())).collect();
         let texts: Vec<Result<Vec<u8>, ReportError>> =
@@ -63,16 +63,16 @@ fn failed(table: &Table, reason: &dyn std::fmt::Display) -> ReportError {
     ReportError::encode(format!("{}.csv", table.name), reason)
 }
 
-type Text = ::csv::Writer<Vec<u8>>;
+type RecordWriter = ::csv::Writer<Vec<u8>>;
 
 /// Returns the bytes that `write` writes.
-fn lines(table: &Table, write: impl FnOnce(&mut Text) -> ::csv::Result<()>) -> Result<Vec<u8>, ReportError> {
+fn lines(table: &Table, write: impl FnOnce(&mut RecordWriter) -> ::csv::Result<()>) -> Result<Vec<u8>, ReportError> {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
     write(&mut writer).map_err(|cause| failed(table, &cause))?;
     writer.into_inner().map_err(|cause| failed(table, &cause))
 }
 
-fn cells(table: &Table, rows: Range<usize>, writer: &mut Text) -> ::csv::Result<()> {
+fn cells(table: &Table, rows: Range<usize>, writer: &mut RecordWriter) -> ::csv::Result<()> {
     let mut text = String::new();
     for row in rows {
         for column in &table.columns {

@@ -19,25 +19,25 @@ use std::path::{Path, PathBuf};
 pub(crate) const RECORD: &str = "record.json";
 
 /// Files that every run may write in addition to its tables, even if no record lists them.
-const KNOWN: [&str; 4] = [RECORD, "figure.svg", "figure.png", "figure.html"];
+const ALWAYS_OWNED: [&str; 4] = [RECORD, "figure.svg", "figure.png", "figure.html"];
 
 /// Suffix of the folder for an interrupted run when the folder `NAME` holds a complete run.
-const ASIDE: &str = "interrupted";
+const INTERRUPTED_SUFFIX: &str = "interrupted";
 
 /// Returns the folder for the results of a run.
 ///
 /// The folder is `out/NAME`, or `out/NAME.interrupted` if this run was interrupted and
 /// `out/NAME` holds a complete run.
-pub(crate) fn of_run(out: &Path, name: &str, interrupted: bool) -> PathBuf {
+pub(crate) fn run_folder(out: &Path, name: &str, interrupted: bool) -> PathBuf {
     let folder = out.join(name);
-    if interrupted && holds_whole_run(&folder) { out.join(format!("{name}.{ASIDE}")) } else { folder }
+    if interrupted && holds_whole_run(&folder) { out.join(format!("{name}.{INTERRUPTED_SUFFIX}")) } else { folder }
 }
 
 /// Returns `true` if the folder holds the results of a complete run.
 fn holds_whole_run(folder: &Path) -> bool {
     match record(folder) {
         Some(record) => record["interrupted"] != Value::Bool(true),
-        None => KNOWN.iter().any(|name| folder.join(name).is_file()),
+        None => ALWAYS_OWNED.iter().any(|name| folder.join(name).is_file()),
     }
 }
 
@@ -50,7 +50,7 @@ fn written_before(folder: &Path) -> BTreeSet<String> {
     let record = record(folder).unwrap_or_default();
     let files = record["files"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let tables = record["tables"].as_array().into_iter().flatten().filter_map(|table| table["file"].as_str());
-    let names = files.chain(tables).chain(KNOWN).filter(|name| file_name(name, "result").is_ok());
+    let names = files.chain(tables).chain(ALWAYS_OWNED).filter(|name| file_name(name, "result").is_ok());
     names.filter(|name| folder.join(name).is_file()).map(str::to_owned).collect()
 }
 
@@ -61,34 +61,34 @@ fn written_before(folder: &Path) -> BTreeSet<String> {
 /// # Errors
 /// [`ReportError`] names the file and the cause. The content of the folder is then as before.
 pub(crate) fn replace(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
-    Aside::new(aside(folder)).replace(folder, files)
+    Staging::new(staging_folder(folder)).replace(folder, files)
 }
 
 /// Replaces only these files of a run; its other files stay.
 ///
 /// # Errors
 /// See [`replace`].
-pub(crate) fn exchange(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
-    put(folder, files, Aside::new(aside(folder)), &BTreeSet::new)
+pub(crate) fn replace_some(folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
+    commit(folder, files, Staging::new(staging_folder(folder)), &BTreeSet::new)
 }
 
 /// Returns the temporary folder for new files. The process id separates two runs that write
 /// into the same folder.
-fn aside(folder: &Path) -> PathBuf {
+fn staging_folder(folder: &Path) -> PathBuf {
     folder.join(format!(".{}.part", std::process::id()))
 }
 
 /// Files written incrementally to a temporary folder on the file system of their destination.
 #[derive(Debug)]
-pub(crate) struct Aside {
+pub(crate) struct Staging {
     folder: PathBuf,
     written: Vec<(String, fs::File)>,
 }
 
-impl Aside {
+impl Staging {
     /// Uses `folder` as the temporary folder, which is created with the first file.
-    pub fn new(folder: PathBuf) -> Aside {
-        Aside { folder, written: Vec::new() }
+    pub fn new(folder: PathBuf) -> Staging {
+        Staging { folder, written: Vec::new() }
     }
 
     fn new_files(&self) -> PathBuf {
@@ -118,7 +118,7 @@ impl Aside {
     /// [`ReportError`] names the file and the cause. The content of the folder is then as
     /// before.
     pub fn replace(self, folder: &Path, files: &[File]) -> Result<Vec<PathBuf>, ReportError> {
-        put(folder, files, self, &|| written_before(folder))
+        commit(folder, files, self, &|| written_before(folder))
     }
 
     /// Removes the files that were begun, because they are no longer needed.
@@ -129,14 +129,14 @@ impl Aside {
     }
 }
 
-fn put(
+fn commit(
     folder: &Path,
     files: &[File],
-    aside: Aside,
+    staging: Staging,
     before: &dyn Fn() -> BTreeSet<String>,
 ) -> Result<Vec<PathBuf>, ReportError> {
     let mut names = BTreeSet::new();
-    let begun = aside.written.iter().map(|(name, _)| name.as_str());
+    let begun = staging.written.iter().map(|(name, _)| name.as_str());
     for name in begun.chain(files.iter().map(|file| file.name.as_str())) {
         if !names.insert(file_name(name, "result")?) {
             return Err(ReportError::SameName(name.to_owned()));
@@ -146,7 +146,7 @@ fn put(
             return Err(ReportError::Write { path, cause: std::io::ErrorKind::IsADirectory.into() });
         }
     }
-    let names: Vec<&str> = aside
+    let names: Vec<&str> = staging
         .written
         .iter()
         .map(|(name, _)| name.as_str())
@@ -158,20 +158,20 @@ fn put(
         move |cause| ReportError::Write { path, cause }
     };
     fs::create_dir_all(folder).map_err(failed(folder))?;
-    let (new, old) = (aside.new_files(), aside.folder.join("old"));
+    let (new, old) = (staging.new_files(), staging.folder.join("old"));
     let done = [&new, &old]
         .into_iter()
         .try_for_each(|part| fs::create_dir_all(part).map_err(failed(folder)))
         .and_then(|()| files.iter().try_for_each(|file| write(&new.join(&file.name), file).map_err(failed(folder))))
         .and_then(|()| {
-            let mut begun = aside.written.iter();
+            let mut begun = staging.written.iter();
             begun.try_for_each(|(name, file)| file.sync_all().map_err(failed(&folder.join(name))))
         })
         .and_then(|()| swap(folder, &new, &old, &names, before()));
     // Only files of this run are removed. A file that cannot be removed is not an error.
     let _ = fs::remove_dir_all(&old);
     drop(names);
-    aside.remove();
+    staging.remove();
     if done.is_err() && fresh {
         let _ = fs::remove_dir(folder);
     }
@@ -256,7 +256,7 @@ mod tests {
     }
 
     fn only(names: &[&str]) -> Outputs {
-        Outputs::only(names).unwrap()
+        Outputs::select(names).unwrap()
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub const OUTPUT: Output = Output {
     summary: "record.json: versions, resolved study, seed, points by status",
     make: files,
     sink: None,
-    usual: true,
+    is_default: true,
 };
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
@@ -21,19 +21,19 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
 
 /// Columns and number of rows of a table, for the record.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shape {
+pub(crate) struct TableShape {
     /// The columns, without rows.
     pub header: Table,
     pub rows: usize,
 }
 
-impl Shape {
-    pub fn of(table: &Table) -> Shape {
-        Shape { header: table.header(), rows: table.rows() }
+impl TableShape {
+    pub fn of(table: &Table) -> TableShape {
+        TableShape { header: table.header(), rows: table.rows() }
     }
 
     /// Adds more rows of the same table.
-    pub fn add(&mut self, more: Shape) {
+    pub fn add(&mut self, more: TableShape) {
         self.header.append(more.header);
         self.rows += more.rows;
     }
@@ -52,12 +52,12 @@ impl Shape {
 /// # Errors
 /// [`ReportError::Encode`] if a value cannot be written as JSON.
 pub fn to_json(dataset: &Dataset, files: &[String]) -> Result<String, ReportError> {
-    let shapes: Vec<Shape> = dataset.tables.iter().map(Shape::of).collect();
-    with_shapes(dataset, &shapes, files)
+    let shapes: Vec<TableShape> = dataset.tables.iter().map(TableShape::of).collect();
+    record_json(dataset, &shapes, files)
 }
 
 /// Returns the record of a run whose tables are not completely in memory.
-pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String]) -> Result<String, ReportError> {
+pub(crate) fn record_json(dataset: &Dataset, shapes: &[TableShape], files: &[String]) -> Result<String, ReportError> {
     let record = &dataset.record;
     let value = serde_json::json!({
         "name": dataset.name,
@@ -78,7 +78,7 @@ pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String])
             "file": format!("{}.csv", t.header.name),
             "rows": t.rows,
             "columns": t.header.columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
-            "values": t.header.columns.iter().map(|c| sort(&c.values)).collect::<Vec<_>>(),
+            "values": t.header.columns.iter().map(|c| value_type(&c.values)).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
         "study": record.study,
     });
@@ -87,7 +87,7 @@ pub(crate) fn with_shapes(dataset: &Dataset, shapes: &[Shape], files: &[String])
 }
 
 /// Returns the type name of a column's cells, which reading the table back requires.
-pub(crate) fn sort(values: &Values) -> &'static str {
+pub(crate) fn value_type(values: &Values) -> &'static str {
     match values {
         Values::Number(_) => "number",
         Values::Integer(_) => "integer",
@@ -103,17 +103,17 @@ pub(crate) fn sort(values: &Values) -> &'static str {
 /// # Errors
 /// Returns an error if `writer` fails.
 pub fn write_dataset_json(dataset: &Dataset, writer: impl std::io::Write) -> Result<(), std::io::Error> {
-    serde_json::to_writer(writer, &Whole(dataset)).map_err(std::io::Error::from)
+    serde_json::to_writer(writer, &DatasetJson(dataset)).map_err(std::io::Error::from)
 }
 
-struct Whole<'a>(&'a Dataset);
-struct Tables<'a>(&'a [Table]);
-struct Rows<'a>(&'a Table);
-struct Row<'a>(&'a Table, usize);
+struct DatasetJson<'a>(&'a Dataset);
+struct TablesJson<'a>(&'a [Table]);
+struct RowList<'a>(&'a Table);
+struct RowObject<'a>(&'a Table, usize);
 
-impl Serialize for Whole<'_> {
+impl Serialize for DatasetJson<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Whole(dataset) = self;
+        let DatasetJson(dataset) = self;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("name", &dataset.name)?;
         map.serialize_entry("title", &dataset.title)?;
@@ -122,26 +122,26 @@ impl Serialize for Whole<'_> {
         map.serialize_entry("notes", &dataset.notes)?;
         map.serialize_entry("failures", &dataset.failures)?;
         map.serialize_entry("record", &dataset.record)?;
-        map.serialize_entry("tables", &Tables(&dataset.tables))?;
+        map.serialize_entry("tables", &TablesJson(&dataset.tables))?;
         map.end()
     }
 }
 
-impl Serialize for Tables<'_> {
+impl Serialize for TablesJson<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|table| (&table.name, Rows(table))))
+        serializer.collect_map(self.0.iter().map(|table| (&table.name, RowList(table))))
     }
 }
 
-impl Serialize for Rows<'_> {
+impl Serialize for RowList<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq((0..self.0.rows()).map(|row| Row(self.0, row)))
+        serializer.collect_seq((0..self.0.rows()).map(|row| RowObject(self.0, row)))
     }
 }
 
-impl Serialize for Row<'_> {
+impl Serialize for RowObject<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Row(table, row) = self;
+        let RowObject(table, row) = self;
         let mut map = serializer.serialize_map(Some(table.columns.len()))?;
         for column in &table.columns {
             match &column.values {

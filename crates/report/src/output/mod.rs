@@ -10,8 +10,8 @@ pub mod json;
 pub mod parquet;
 pub mod result_file;
 
-use json::{Shape, with_shapes};
-use result_file::{File, Output, ReportError, file_name, write_once};
+use json::{TableShape, record_json};
+use result_file::{File, Output, ReportError, file_name, write_if_changed};
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Dataset;
 
@@ -35,7 +35,7 @@ pub struct Outputs(Vec<&'static Output>);
 
 impl Default for Outputs {
     fn default() -> Outputs {
-        Outputs::usual()
+        Outputs::defaults()
     }
 }
 
@@ -46,13 +46,13 @@ impl Outputs {
     }
 
     /// Selects the default outputs.
-    pub fn usual() -> Outputs {
-        Outputs(TABLE.iter().filter(|output| output.usual).collect())
+    pub fn defaults() -> Outputs {
+        Outputs(TABLE.iter().filter(|output| output.is_default).collect())
     }
 
     /// Returns these outputs together with `others`.
     #[must_use]
-    pub fn and(&self, others: &Outputs) -> Outputs {
+    pub fn union(&self, others: &Outputs) -> Outputs {
         let is_in = |outputs: &Outputs, output: &Output| outputs.iter().any(|known| known.name == output.name);
         Outputs(TABLE.iter().filter(|output| is_in(self, output) || is_in(others, output)).collect())
     }
@@ -60,7 +60,7 @@ impl Outputs {
     /// Selects the outputs with these names, in the order of [`TABLE`].
     /// # Errors
     /// [`ReportError::UnknownOutput`] for a name that is not in [`TABLE`].
-    pub fn only<S: AsRef<str>>(names: &[S]) -> Result<Outputs, ReportError> {
+    pub fn select<S: AsRef<str>>(names: &[S]) -> Result<Outputs, ReportError> {
         if let Some(unknown) = names.iter().map(S::as_ref).find(|name| TABLE.iter().all(|output| output.name != *name))
         {
             return Err(ReportError::UnknownOutput { name: unknown.to_owned(), known: known() });
@@ -95,9 +95,9 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
     for output in outputs.iter() {
         files.extend((output.make)(dataset)?);
     }
-    let shapes: Vec<Shape> = dataset.tables.iter().map(Shape::of).collect();
+    let shapes: Vec<TableShape> = dataset.tables.iter().map(TableShape::of).collect();
     let files = with_record(dataset, &shapes, out, &[], files)?;
-    folder::replace(&folder::of_run(out, name, dataset.record.interrupted), &files)
+    folder::replace(&folder::run_folder(out, name, dataset.record.interrupted), &files)
 }
 
 /// Writes the files that studies share, and returns the other files of the run with the record.
@@ -105,7 +105,7 @@ pub fn write_dataset(dataset: &Dataset, out: &Path, outputs: &Outputs) -> Result
 /// The record lists the returned files and those in `begun`, which are already on disk.
 pub(crate) fn with_record(
     dataset: &Dataset,
-    shapes: &[Shape],
+    shapes: &[TableShape],
     out: &Path,
     begun: &[String],
     files: Vec<File>,
@@ -116,11 +116,11 @@ pub(crate) fn with_record(
     }
     let names: Vec<String> = begun.iter().cloned().chain(files.iter().map(|file| file.name.clone())).collect();
     for file in files.iter_mut().filter(|file| file.name == folder::RECORD) {
-        file.content = with_shapes(dataset, shapes, &names)?.into_bytes();
+        file.content = record_json(dataset, shapes, &names)?.into_bytes();
     }
     // Shared files come first: a page must not appear before its script.
     for file in &shared {
-        write_once(&out.join(file_name(&file.name, "result")?), &file.content)?;
+        write_if_changed(&out.join(file_name(&file.name, "result")?), &file.content)?;
     }
     Ok(files)
 }
@@ -147,9 +147,9 @@ mod tests {
             "figure.html",
         ];
         assert_eq!(names, expected);
-        let usual = Outputs::usual();
+        let usual = Outputs::defaults();
         assert!(usual.iter().all(|output| output.name != "parquet") && usual.iter().count() == TABLE.len() - 1);
-        assert_eq!(usual.and(&Outputs::only(&["parquet"]).unwrap()).iter().count(), TABLE.len());
+        assert_eq!(usual.union(&Outputs::select(&["parquet"]).unwrap()).iter().count(), TABLE.len());
         let folder = out.path().join("fig06");
         let mut found: Vec<_> =
             std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -165,10 +165,10 @@ mod tests {
         assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 3);
         // A damaged script is written again.
         std::fs::write(&script, "half a scr").unwrap();
-        write_dataset(&samples::response(), out.path(), &Outputs::only(&["html"]).unwrap()).unwrap();
+        write_dataset(&samples::response(), out.path(), &Outputs::select(&["html"]).unwrap()).unwrap();
         assert_eq!(std::fs::read_to_string(&script).unwrap(), crate::figure::html::script());
         // A second run replaces the files.
-        write_dataset(&samples::response(), out.path(), &Outputs::only(&["csv"]).unwrap()).unwrap();
+        write_dataset(&samples::response(), out.path(), &Outputs::select(&["csv"]).unwrap()).unwrap();
     }
 
     #[test]
@@ -206,8 +206,11 @@ mod tests {
 
     #[test]
     fn an_unknown_output_is_named_with_those_that_exist() {
-        let error = Outputs::only(&["svg", "pdf"]).unwrap_err().to_string();
+        let error = Outputs::select(&["svg", "pdf"]).unwrap_err().to_string();
         assert!(error.contains("`pdf`") && error.contains("svg") && error.contains("html"), "{error}");
-        assert_eq!(Outputs::only(&["png", "csv"]).unwrap().iter().map(|o| o.name).collect::<Vec<_>>(), ["csv", "png"]);
+        assert_eq!(
+            Outputs::select(&["png", "csv"]).unwrap().iter().map(|o| o.name).collect::<Vec<_>>(),
+            ["csv", "png"]
+        );
     }
 }

@@ -3,7 +3,7 @@
 //! A file has a fifth of the size of CSV, and polars reads it twice as fast (200,000 rows of a
 //! response).
 //!
-//! Numbers are doubles. NaN and unknown flags are null. Rows form groups of `GROUP`. Each
+//! Numbers are doubles. NaN and unknown flags are null. Rows form groups of `ROWS_PER_GROUP`. Each
 //! column of a group is one page, compressed by deflate: dictionary-encoded if values repeat,
 //! byte-stream-split otherwise. Equal rows give equal bytes, however they are divided into
 //! calls.
@@ -11,7 +11,7 @@
 //! Source: the Apache Parquet format 2.9 (`Encodings.md`, `parquet.thrift`), and Thrift's
 //! compact protocol.
 
-use crate::output::result_file::{Output, ReportError, Rows, Sink, even};
+use crate::output::result_file::{Output, ReportError, Sink, TableWriter, check_equal_lengths};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
@@ -26,15 +26,15 @@ pub const OUTPUT: Output = Output {
     summary: "every table as NAME.parquet, with typed columns for other programs",
     make: |dataset| SINK.files(dataset),
     sink: Some(SINK),
-    usual: false,
+    is_default: false,
 };
 
 const SINK: Sink = Sink { extension: "parquet", begin };
 
 /// Number of rows in a group; one column of a group has a megabyte.
-const GROUP: usize = 131_072;
+const ROWS_PER_GROUP: usize = 131_072;
 /// A dictionary is used if each value occurs at least this often on average.
-const REPEATED: usize = 4;
+const MIN_REPETITIONS: usize = 4;
 const MAGIC: &[u8; 4] = b"PAR1";
 
 // Enumeration values of the format.
@@ -52,22 +52,22 @@ const DICTIONARY_PAGE: i64 = 2;
 const UTF8: i64 = 0;
 const UINT_64: i64 = 14;
 
-struct File<'a> {
+struct ParquetWriter<'a> {
     writer: Box<dyn Write + 'a>,
-    at: u64,
+    offset: u64,
     /// Rows that are not yet written.
     table: Table,
     rows: usize,
-    groups: Vec<Group>,
+    groups: Vec<RowGroup>,
 }
 
-struct Group {
+struct RowGroup {
     rows: usize,
-    chunks: Vec<Chunk>,
+    chunks: Vec<ColumnChunk>,
 }
 
 /// A column of a group.
-struct Chunk {
+struct ColumnChunk {
     encoding: i64,
     /// Length of the dictionary page in bytes, including its header.
     dictionary: usize,
@@ -77,13 +77,18 @@ struct Chunk {
     nulls: usize,
     range: Option<[[u8; 8]; 2]>,
     /// Offset in the file and length, in bytes.
-    at: u64,
+    offset: u64,
     length: usize,
 }
 
-fn begin<'a>(table: &Table, writer: Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError> {
-    let mut file =
-        File { writer, at: 0, table: Table { columns: Vec::new(), ..table.clone() }, rows: 0, groups: Vec::new() };
+fn begin<'a>(table: &Table, writer: Box<dyn Write + 'a>) -> Result<Box<dyn TableWriter + 'a>, ReportError> {
+    let mut file = ParquetWriter {
+        writer,
+        offset: 0,
+        table: Table { columns: Vec::new(), ..table.clone() },
+        rows: 0,
+        groups: Vec::new(),
+    };
     file.write(MAGIC)?;
     file.table.columns = table.columns.clone();
     file.table.columns.iter_mut().for_each(|column| keep_from(&mut column.values, usize::MAX));
@@ -100,12 +105,12 @@ fn keep_from(values: &mut Values, from: usize) {
     }
 }
 
-impl Rows for File<'_> {
+impl TableWriter for ParquetWriter<'_> {
     fn rows(&mut self, table: &Table) -> Result<(), ReportError> {
-        even(table)?;
+        check_equal_lengths(table)?;
         self.table.append(table.clone());
-        while self.table.rows() >= GROUP {
-            self.group(GROUP)?;
+        while self.table.rows() >= ROWS_PER_GROUP {
+            self.group(ROWS_PER_GROUP)?;
         }
         Ok(())
     }
@@ -122,33 +127,34 @@ impl Rows for File<'_> {
     }
 }
 
-impl File<'_> {
+impl ParquetWriter<'_> {
     fn failed(&self, cause: &std::io::Error) -> ReportError {
         ReportError::encode(format!("{}.parquet", self.table.name), cause)
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), ReportError> {
         self.writer.write_all(bytes).map_err(|cause| self.failed(&cause))?;
-        self.at += bytes.len() as u64;
+        self.offset += bytes.len() as u64;
         Ok(())
     }
 
     /// Writes the first `rows` rows as a group.
     fn group(&mut self, rows: usize) -> Result<(), ReportError> {
-        let mut chunks: Vec<Chunk> = self.table.columns.par_iter().map(|column| chunk(&column.values, rows)).collect();
+        let mut chunks: Vec<ColumnChunk> =
+            self.table.columns.par_iter().map(|column| chunk(&column.values, rows)).collect();
         for chunk in &mut chunks {
-            (chunk.at, chunk.length) = (self.at, chunk.bytes.len());
+            (chunk.offset, chunk.length) = (self.offset, chunk.bytes.len());
             self.write(&std::mem::take(&mut chunk.bytes))?;
         }
         self.table.columns.iter_mut().for_each(|column| keep_from(&mut column.values, rows));
         self.rows += rows;
-        self.groups.push(Group { rows, chunks });
+        self.groups.push(RowGroup { rows, chunks });
         Ok(())
     }
 
     fn footer(&self) -> Vec<u8> {
         let columns = &self.table.columns;
-        let mut out = Compact::default();
+        let mut out = ThriftWriter::default();
         out.number(1, 1);
         out.list(2, STRUCT, columns.len() + 1);
         out.structure(|root| {
@@ -176,7 +182,7 @@ impl File<'_> {
                 element.list(1, STRUCT, group.chunks.len());
                 for (chunk, column) in group.chunks.iter().zip(columns) {
                     element.structure(|element| {
-                        element.long(2, chunk.at as i64);
+                        element.long(2, chunk.offset as i64);
                         element.field(3, STRUCT);
                         element.structure(|meta| chunk.describe(&column.values, &column.name, group.rows, meta));
                     });
@@ -198,8 +204,8 @@ impl File<'_> {
     }
 }
 
-impl Chunk {
-    fn describe(&self, values: &Values, name: &str, rows: usize, meta: &mut Compact) {
+impl ColumnChunk {
+    fn describe(&self, values: &Values, name: &str, rows: usize, meta: &mut ThriftWriter) {
         let kind = match values {
             Values::Number(_) => DOUBLE,
             Values::Integer(_) => INT64,
@@ -216,9 +222,9 @@ impl Chunk {
         meta.long(5, rows as i64);
         meta.long(6, self.plain as i64);
         meta.long(7, self.length as i64);
-        meta.long(9, self.at as i64 + self.dictionary as i64);
+        meta.long(9, self.offset as i64 + self.dictionary as i64);
         if self.dictionary > 0 {
-            meta.long(11, self.at as i64);
+            meta.long(11, self.offset as i64);
         }
         meta.field(12, STRUCT);
         meta.structure(|statistics| {
@@ -234,7 +240,7 @@ impl Chunk {
 }
 
 /// Encodes the first `rows` values of a column.
-fn chunk(values: &Values, rows: usize) -> Chunk {
+fn chunk(values: &Values, rows: usize) -> ColumnChunk {
     match values {
         Values::Number(v) => {
             let there: Vec<f64> = v[..rows].iter().copied().filter(|value| !value.is_nan()).collect();
@@ -244,38 +250,39 @@ fn chunk(values: &Values, rows: usize) -> Chunk {
             let range = range.map(|(least, most)| {
                 [(if least == 0.0 { -0.0 } else { least }).to_le_bytes(), (most + 0.0).to_le_bytes()]
             });
-            let levels = levels(v[..rows].iter().map(|value| !value.is_nan()));
+            let levels = definition_levels(v[..rows].iter().map(|value| !value.is_nan()));
             let plain = |value: &f64, out: &mut Vec<u8>| out.extend(value.to_le_bytes());
-            let chunk = by_dictionary(&there, |value| value.to_bits(), plain, &levels, rows).unwrap_or_else(|| {
-                let mut body = levels.clone();
-                for byte in 0..8 {
-                    body.extend(there.iter().map(|value| value.to_le_bytes()[byte]));
-                }
-                data(BYTE_STREAM_SPLIT, &body, rows)
-            });
-            Chunk { nulls: rows - there.len(), range, ..chunk }
+            let chunk =
+                dictionary_encoded(&there, |value| value.to_bits(), plain, &levels, rows).unwrap_or_else(|| {
+                    let mut body = levels.clone();
+                    for byte in 0..8 {
+                        body.extend(there.iter().map(|value| value.to_le_bytes()[byte]));
+                    }
+                    data(BYTE_STREAM_SPLIT, &body, rows)
+                });
+            ColumnChunk { nulls: rows - there.len(), range, ..chunk }
         }
         Values::Integer(v) => {
             let range = v[..rows].iter().min().zip(v[..rows].iter().max());
             let plain = |value: &u64, out: &mut Vec<u8>| out.extend(value.to_le_bytes());
-            let chunk = by_dictionary(&v[..rows], |value| *value, plain, &[], rows).unwrap_or_else(|| {
+            let chunk = dictionary_encoded(&v[..rows], |value| *value, plain, &[], rows).unwrap_or_else(|| {
                 data(PLAIN, &v[..rows].iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>(), rows)
             });
-            Chunk { range: range.map(|(least, most)| [least.to_le_bytes(), most.to_le_bytes()]), ..chunk }
+            ColumnChunk { range: range.map(|(least, most)| [least.to_le_bytes(), most.to_le_bytes()]), ..chunk }
         }
         Values::Flag(v) => {
             let there: Vec<bool> = v[..rows].iter().copied().flatten().collect();
-            let mut body = levels(v[..rows].iter().map(Option::is_some));
+            let mut body = definition_levels(v[..rows].iter().map(Option::is_some));
             body.extend(there.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))));
             // The bits of an incomplete last byte are its low bits.
-            Chunk { nulls: rows - there.len(), ..data(PLAIN, &body, rows) }
+            ColumnChunk { nulls: rows - there.len(), ..data(PLAIN, &body, rows) }
         }
         Values::Text(v) => {
             let plain = |value: &String, out: &mut Vec<u8>| {
                 out.extend((value.len() as u32).to_le_bytes());
                 out.extend(value.as_bytes());
             };
-            by_dictionary(&v[..rows], Clone::clone, plain, &[], rows).unwrap_or_else(|| {
+            dictionary_encoded(&v[..rows], Clone::clone, plain, &[], rows).unwrap_or_else(|| {
                 let mut body = Vec::new();
                 v[..rows].iter().for_each(|value| plain(value, &mut body));
                 data(PLAIN, &body, rows)
@@ -285,13 +292,13 @@ fn chunk(values: &Values, rows: usize) -> Chunk {
 }
 
 /// Encodes values as indices into a dictionary. Returns `None` if too few values repeat.
-fn by_dictionary<T, K: Hash + Eq>(
+fn dictionary_encoded<T, K: Hash + Eq>(
     values: &[T],
     key: impl Fn(&T) -> K,
     plain: impl Fn(&T, &mut Vec<u8>),
     levels: &[u8],
     rows: usize,
-) -> Option<Chunk> {
+) -> Option<ColumnChunk> {
     let (mut known, mut dictionary) = (HashMap::new(), Vec::new());
     let mut numbers = Vec::with_capacity(values.len());
     for value in values {
@@ -301,14 +308,14 @@ fn by_dictionary<T, K: Hash + Eq>(
             plain(value, &mut dictionary);
         }
         numbers.push(number);
-        if known.len() * REPEATED > values.len() {
+        if known.len() * MIN_REPETITIONS > values.len() {
             return None;
         }
     }
     let width = (u32::BITS - (known.len() as u32).saturating_sub(1).leading_zeros()).max(1);
     let mut body = levels.to_vec();
     body.push(width as u8);
-    hybrid(&numbers, width, &mut body);
+    rle_bit_packed(&numbers, width, &mut body);
     let first = page(&dictionary, |header| {
         header.field(7, STRUCT);
         header.structure(|page| {
@@ -317,20 +324,34 @@ fn by_dictionary<T, K: Hash + Eq>(
         });
         DICTIONARY_PAGE
     });
-    let Chunk { bytes, plain, .. } = data(RLE_DICTIONARY, &body, rows);
+    let ColumnChunk { bytes, plain, .. } = data(RLE_DICTIONARY, &body, rows);
     let (first, first_plain) = first;
     let dictionary = first.len();
-    Some(Chunk { bytes: [first, bytes].concat(), plain: plain + first_plain, dictionary, ..Chunk::new(RLE_DICTIONARY) })
+    Some(ColumnChunk {
+        bytes: [first, bytes].concat(),
+        plain: plain + first_plain,
+        dictionary,
+        ..ColumnChunk::new(RLE_DICTIONARY)
+    })
 }
 
-impl Chunk {
-    fn new(encoding: i64) -> Chunk {
-        Chunk { encoding, dictionary: 0, bytes: Vec::new(), plain: 0, nulls: 0, range: None, at: 0, length: 0 }
+impl ColumnChunk {
+    fn new(encoding: i64) -> ColumnChunk {
+        ColumnChunk {
+            encoding,
+            dictionary: 0,
+            bytes: Vec::new(),
+            plain: 0,
+            nulls: 0,
+            range: None,
+            offset: 0,
+            length: 0,
+        }
     }
 }
 
 /// Returns a data page.
-fn data(encoding: i64, body: &[u8], rows: usize) -> Chunk {
+fn data(encoding: i64, body: &[u8], rows: usize) -> ColumnChunk {
     let (bytes, plain) = page(body, |header| {
         header.field(5, STRUCT);
         header.structure(|page| {
@@ -341,19 +362,19 @@ fn data(encoding: i64, body: &[u8], rows: usize) -> Chunk {
         });
         DATA_PAGE
     });
-    Chunk { bytes, plain, ..Chunk::new(encoding) }
+    ColumnChunk { bytes, plain, ..ColumnChunk::new(encoding) }
 }
 
 /// Returns a compressed page with its header, and its uncompressed length.
 ///
 /// `describe` writes the page-specific part of the header and returns the type of the page.
-fn page(body: &[u8], describe: impl Fn(&mut Compact) -> i64) -> (Vec<u8>, usize) {
+fn page(body: &[u8], describe: impl Fn(&mut ThriftWriter) -> i64) -> (Vec<u8>, usize) {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     // Writing to memory cannot fail.
     let _ = encoder.write_all(body);
     let compressed = encoder.finish().unwrap_or_default();
-    let kind = describe(&mut Compact::default());
-    let mut header = Compact::default();
+    let kind = describe(&mut ThriftWriter::default());
+    let mut header = ThriftWriter::default();
     header.number(1, kind);
     header.number(2, body.len() as i64);
     header.number(3, compressed.len() as i64);
@@ -364,14 +385,14 @@ fn page(body: &[u8], describe: impl Fn(&mut Compact) -> i64) -> (Vec<u8>, usize)
 }
 
 /// Encodes which values exist as definition levels: the length in bytes, then runs.
-fn levels(there: impl Iterator<Item = bool>) -> Vec<u8> {
+fn definition_levels(there: impl Iterator<Item = bool>) -> Vec<u8> {
     let mut runs = Vec::new();
-    hybrid(&there.map(u32::from).collect::<Vec<_>>(), 1, &mut runs);
+    rle_bit_packed(&there.map(u32::from).collect::<Vec<_>>(), 1, &mut runs);
     [(runs.len() as u32).to_le_bytes().to_vec(), runs].concat()
 }
 
 /// Encodes numbers of `width` bits: runs of one value, and bit-packed groups of eight.
-fn hybrid(numbers: &[u32], width: u32, out: &mut Vec<u8>) {
+fn rle_bit_packed(numbers: &[u32], width: u32, out: &mut Vec<u8>) {
     let (mut at, mut packed) = (0, 0);
     let pack = |from: usize, to: usize, out: &mut Vec<u8>| {
         if from == to {
@@ -425,12 +446,12 @@ const STRUCT: u8 = 12;
 
 /// A structure being written. Its fields must come in ascending order of their numbers.
 #[derive(Default)]
-struct Compact {
+struct ThriftWriter {
     bytes: Vec<u8>,
     last: u8,
 }
 
-impl Compact {
+impl ThriftWriter {
     fn field(&mut self, number: u8, kind: u8) {
         self.bytes.push((number - self.last) << 4 | kind);
         self.last = number;
@@ -470,9 +491,9 @@ impl Compact {
         }
     }
 
-    /// Writes a structure as an element of a list, or after its [`Compact::field`].
-    fn structure(&mut self, write: impl FnOnce(&mut Compact)) {
-        let mut inner = Compact::default();
+    /// Writes a structure as an element of a list, or after its [`ThriftWriter::field`].
+    fn structure(&mut self, write: impl FnOnce(&mut ThriftWriter)) {
+        let mut inner = ThriftWriter::default();
         write(&mut inner);
         self.bytes.extend(inner.end());
     }
@@ -531,7 +552,7 @@ mod tests {
 
     #[test]
     fn however_rows_come_the_bytes_are_the_same() {
-        let table = table(2 * GROUP + 1234);
+        let table = table(2 * ROWS_PER_GROUP + 1234);
         let whole = SINK.file(&table).unwrap();
         let mut bytes = Vec::new();
         let mut file = begin(&table, Box::new(&mut bytes)).unwrap();
@@ -594,7 +615,7 @@ mod tests {
                 .collect();
             for count in [0, 1, 7, 8, 9, 63, 4999, 5000] {
                 let mut bytes = Vec::new();
-                hybrid(&numbers[..count], width, &mut bytes);
+                rle_bit_packed(&numbers[..count], width, &mut bytes);
                 assert_eq!(unpacked(&bytes, width, count), numbers[..count], "{width} bits, {count}");
             }
         }

@@ -18,12 +18,12 @@ pub struct Output {
     /// a table.
     pub sink: Option<Sink>,
     /// `true` if the output is written by default.
-    pub usual: bool,
+    pub is_default: bool,
 }
 
 /// Begins the file of a table in a writer. The table gives the columns; its rows are not
 /// written.
-pub type Begin = for<'a> fn(&Table, Box<dyn Write + 'a>) -> Result<Box<dyn Rows + 'a>, ReportError>;
+pub type BeginTable = for<'a> fn(&Table, Box<dyn Write + 'a>) -> Result<Box<dyn TableWriter + 'a>, ReportError>;
 
 /// Writer of one file per table, to which rows are appended as they are computed.
 #[derive(Debug, Clone, Copy)]
@@ -32,11 +32,11 @@ pub struct Sink {
     pub extension: &'static str,
     /// Begins the file of a table in a writer. The table gives the columns; its rows are not
     /// written.
-    pub begin: Begin,
+    pub begin: BeginTable,
 }
 
 /// The file of a table while it is being written.
-pub trait Rows {
+pub trait TableWriter {
     /// Appends these rows. The columns must be those that the file was begun with.
     ///
     /// # Errors
@@ -88,7 +88,7 @@ impl Sink {
 }
 
 /// Returns an error if the columns of a table differ in length.
-pub(crate) fn even(table: &Table) -> Result<(), ReportError> {
+pub(crate) fn check_equal_lengths(table: &Table) -> Result<(), ReportError> {
     let rows = table.rows();
     match table.columns.iter().find(|column| column.values.len() != rows) {
         None => Ok(()),
@@ -184,7 +184,7 @@ impl ReportError {
 }
 
 /// Writes a file unless it already exists with this content.
-pub(crate) fn write_once(path: &Path, content: &[u8]) -> Result<(), ReportError> {
+pub(crate) fn write_if_changed(path: &Path, content: &[u8]) -> Result<(), ReportError> {
     if std::fs::read(path).is_ok_and(|found| found == content) {
         return Ok(());
     }

@@ -3,9 +3,9 @@
 //! The files do not depend on the division into blocks and journals. Memory holds one block,
 //! and as many rows as the figure shows.
 
-use crate::output::folder::{self, Aside};
-use crate::output::json::Shape;
-use crate::output::result_file::{File, Output, ReportError, Rows, file_name};
+use crate::output::folder::{self, Staging};
+use crate::output::json::TableShape;
+use crate::output::result_file::{File, Output, ReportError, TableWriter, file_name};
 use crate::output::{FIGURES, Outputs, with_record};
 use crate::run::journal::{Journal, JournalError};
 use std::io::BufWriter;
@@ -37,7 +37,7 @@ pub struct Parts<'a> {
     /// Journals in the order of their units.
     pub journals: &'a [Journal],
     /// Blocks that are in no journal.
-    pub rest: &'a [Block],
+    pub unjournaled: &'a [Block],
 }
 
 /// Results that have been written.
@@ -54,7 +54,7 @@ pub struct Assembled {
 /// Writes the chosen outputs of `study` into `out/NAME/`.
 ///
 /// The result is the same as that of [`write_dataset`](crate::write_dataset). Tables are first
-/// written incrementally to the folder `aside`.
+/// written incrementally to the folder `staging`.
 ///
 /// # Errors
 /// [`AssembleError`] if a file cannot be written or read. The earlier content of the folder and
@@ -64,17 +64,17 @@ pub fn assemble(
     study: &Study,
     outputs: &Outputs,
     out: &Path,
-    aside: &Path,
+    staging: &Path,
 ) -> Result<Assembled, AssembleError> {
-    let mut aside = Aside::new(aside.to_owned());
-    let done = written(parts, study, outputs, out, &mut aside);
+    let mut staging = Staging::new(staging.to_owned());
+    let done = written(parts, study, outputs, out, &mut staging);
     match done {
         Ok((dataset, is_whole, files)) => {
-            let folder = folder::of_run(out, file_name(&dataset.name, "study")?, dataset.record.interrupted);
-            Ok(Assembled { files: aside.replace(&folder, &files)?, dataset, is_whole })
+            let folder = folder::run_folder(out, file_name(&dataset.name, "study")?, dataset.record.interrupted);
+            Ok(Assembled { files: staging.replace(&folder, &files)?, dataset, is_whole })
         }
         Err(error) => {
-            aside.remove();
+            staging.remove();
             Err(error)
         }
     }
@@ -85,7 +85,7 @@ fn written(
     study: &Study,
     outputs: &Outputs,
     out: &Path,
-    aside: &mut Aside,
+    staging: &mut Staging,
 ) -> Result<(Dataset, bool, Vec<File>), AssembleError> {
     let (mut tally, mut shapes, mut time) = (Tally::default(), Vec::new(), 0.0);
     for journal in parts.journals {
@@ -93,9 +93,9 @@ fn written(
         join(&mut shapes, journal.shapes.clone());
         time += journal.time();
     }
-    for block in parts.rest {
+    for block in parts.unjournaled {
         tally.append(block.tally.clone());
-        join(&mut shapes, block.tables.iter().map(Shape::of).collect());
+        join(&mut shapes, block.tables.iter().map(TableShape::of).collect());
     }
     shapes.retain(|shape| !shape.header.columns.is_empty());
 
@@ -103,12 +103,12 @@ fn written(
         Thinning::new(study, &shapes.iter().map(|shape| (shape.header.name.as_str(), shape.rows)).collect::<Vec<_>>());
     let is_whole = thinning.keeps_all();
     let (mut begun, mut names): (Vec<String>, Vec<String>) = Default::default();
-    let mut sinks: Vec<(&str, Box<dyn Rows>)> = Vec::new();
+    let mut sinks: Vec<(&str, Box<dyn TableWriter>)> = Vec::new();
     // The sinks are in the order of the outputs.
     let wanted: Vec<_> = outputs.iter().filter_map(|output| output.sink).collect();
     let blocks = || {
         let kept = parts.journals.iter().flat_map(Journal::blocks);
-        kept.chain(parts.rest.iter().cloned().map(Ok))
+        kept.chain(parts.unjournaled.iter().cloned().map(Ok))
     };
     for block in blocks() {
         for table in block?.tables.into_iter().filter(|table| !table.columns.is_empty()) {
@@ -118,7 +118,7 @@ fn written(
                 begun.push(table.name.clone());
                 for sink in &wanted {
                     let name = sink.file_name(&table.name)?;
-                    let file = BufWriter::with_capacity(1 << 20, aside.file(&name)?);
+                    let file = BufWriter::with_capacity(1 << 20, staging.file(&name)?);
                     sinks.push((&shape.header.name, (sink.begin)(&table, Box::new(file))?));
                     names.push(name);
                 }
@@ -154,7 +154,7 @@ fn written(
     Ok((dataset, is_whole, files))
 }
 
-fn join(shapes: &mut Vec<Shape>, more: Vec<Shape>) {
+fn join(shapes: &mut Vec<TableShape>, more: Vec<TableShape>) {
     if shapes.is_empty() {
         *shapes = more;
     } else {

@@ -5,7 +5,7 @@
 //! line.
 
 use crate::output::folder::{self, RECORD};
-use crate::output::result_file::{File, ReportError, file_name, write_once};
+use crate::output::result_file::{File, ReportError, file_name, write_if_changed};
 use crate::output::{FIGURES, Outputs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -32,8 +32,8 @@ pub struct Stored {
 #[derive(Debug, thiserror::Error)]
 pub enum StoredError {
     /// The folder has no record.
-    #[error("no results in {}: the folder has no record.json{}", folder.display(), beside(.inside))]
-    Nothing {
+    #[error("no results in {}: the folder has no record.json{}", folder.display(), list_folders(.inside))]
+    NoRecord {
         /// The folder.
         folder: PathBuf,
         /// Folders inside it that have results.
@@ -91,7 +91,7 @@ pub enum StoredError {
     },
 }
 
-fn beside(inside: &[PathBuf]) -> String {
+fn list_folders(inside: &[PathBuf]) -> String {
     let names: Vec<String> = inside.iter().map(|folder| folder.display().to_string()).collect();
     if names.is_empty() {
         String::new()
@@ -116,7 +116,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
             .unwrap_or_default();
         inside.sort();
         inside.truncate(MOST_INSIDE);
-        return Err(StoredError::Nothing { folder: folder.to_owned(), inside });
+        return Err(StoredError::NoRecord { folder: folder.to_owned(), inside });
     }
     let wrong = |reason: String| StoredError::Record { path: path.clone(), reason };
     let bytes = std::fs::read(&path).map_err(|cause| StoredError::Read { path: path.clone(), cause })?;
@@ -129,7 +129,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
             .ok_or_else(|| wrong(format!("this file is not the record of a run: the text `{key}` is missing")))
     };
     let version = text(&record, "version")?;
-    let newer = numbers(&version) > numbers(env!("CARGO_PKG_VERSION"));
+    let newer = version_numbers(&version) > version_numbers(env!("CARGO_PKG_VERSION"));
     let schema = record["study"]["schema"].as_i64();
     if newer || schema.is_some_and(|schema| schema > stickslip_study::schema::VERSION) {
         let own = env!("CARGO_PKG_VERSION");
@@ -176,7 +176,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
 }
 
 /// Splits a version into numbers for comparison.
-fn numbers(version: &str) -> Vec<u64> {
+fn version_numbers(version: &str) -> Vec<u64> {
     let release = version.split(['-', '+']).next().unwrap_or(version);
     release.split('.').map(|part| part.parse().unwrap_or(0)).collect()
 }
@@ -334,9 +334,9 @@ impl Stored {
             _ => self.folder.join(".."),
         };
         for file in &shared {
-            write_once(&above.join(file_name(&file.name, "result")?), &file.content)?;
+            write_if_changed(&above.join(file_name(&file.name, "result")?), &file.content)?;
         }
-        let mut written = folder::exchange(&self.folder, &files)?;
+        let mut written = folder::replace_some(&self.folder, &files)?;
         written.retain(|path| path.file_name().is_none_or(|name| name != RECORD));
         Ok(written)
     }
@@ -350,7 +350,7 @@ impl Stored {
     /// file.
     ///
     /// Returns `true` if that version still describes the stored results.
-    pub fn draw_like(&mut self, like: &Study) -> bool {
+    pub fn apply_figure_of(&mut self, like: &Study) -> bool {
         let cases = |study: &Study| study.resolved()["cases"].take();
         let same = like.kind().name == self.study.kind().name && cases(like) == cases(&self.study);
         self.study = self.study.clone().drawn_like(like);
@@ -409,7 +409,7 @@ amplitude = "2 N"
 
     fn written(kind: &str) -> (TempDir, PathBuf) {
         let out = TempDir::new().unwrap();
-        write_dataset(&ran(kind), out.path(), &Outputs::only(&["csv", "svg"]).unwrap()).unwrap();
+        write_dataset(&ran(kind), out.path(), &Outputs::select(&["csv", "svg"]).unwrap()).unwrap();
         let folder = out.path().join("rub");
         (out, folder)
     }
@@ -439,7 +439,7 @@ amplitude = "2 N"
         let before = [fs::read(folder.join("curve.csv")).unwrap(), fs::read(folder.join("record.json")).unwrap()];
         fs::write(folder.join("figure.svg"), "old").unwrap();
         let mut stored = read(&folder).unwrap();
-        let files = stored.write_figure(&Outputs::only(&["svg"]).unwrap()).unwrap();
+        let files = stored.write_figure(&Outputs::select(&["svg"]).unwrap()).unwrap();
         assert_eq!(files, [folder.join("figure.svg")]);
         let linear = fs::read_to_string(&files[0]).unwrap();
         assert!(linear.contains("</svg>"));
@@ -449,15 +449,15 @@ amplitude = "2 N"
             before
         );
         let text = format!("{STUDY}[study]\n{}\n[figure]\ny = \"log\"\n", KINDS[0]).replace("Rubbing", "Logarithmic");
-        assert!(stored.draw_like(&read_study("rub.toml", &text, &[]).unwrap()));
+        assert!(stored.apply_figure_of(&read_study("rub.toml", &text, &[]).unwrap()));
         assert_eq!(stored.dataset.figure.panels[0].y.scale, stickslip_study::dataset::Scale::Log);
-        stored.write_figure(&Outputs::only(&["svg", "png", "csv"]).unwrap()).unwrap();
+        stored.write_figure(&Outputs::select(&["svg", "png", "csv"]).unwrap()).unwrap();
         assert!(fs::read_to_string(&files[0]).unwrap().contains("Logarithmic"));
         let record: Value = serde_json::from_slice(&fs::read(folder.join("record.json")).unwrap()).unwrap();
         let listed = serde_json::json!(["curve.csv", "peaks.csv", "figure.svg", "record.json", "figure.png"]);
         assert_eq!(record["files"], listed);
-        // `draw_like` reports a changed model.
-        assert!(!stored.draw_like(&read_study("rub.toml", &text.replace("1 kg", "2 kg"), &[]).unwrap()));
+        // `apply_figure_of` reports a changed model.
+        assert!(!stored.apply_figure_of(&read_study("rub.toml", &text.replace("1 kg", "2 kg"), &[]).unwrap()));
     }
 
     #[test]

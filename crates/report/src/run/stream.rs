@@ -3,10 +3,10 @@
 //!
 //! A run of `NAME` keeps its [`Journal`] in `out/NAME.running/`.
 //! [`assemble`](crate::run::assemble::assemble) makes the results from it. The journal of a shard
-//! stays in `out/NAME.shard-3-of-16/` until all shards are [`merged`].
+//! stays in `out/NAME.shard-3-of-16/` until [`read_parts`] reads all shards for the merge.
 
 use crate::output::result_file::{ReportError, file_name};
-use crate::run::journal::{FILE, Head, Journal, JournalError};
+use crate::run::journal::{FILE, Journal, JournalError, RunHeader};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -18,22 +18,24 @@ use stickslip_study::run::{Checked, Context};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     number: usize,
-    of: usize,
+    total: usize,
 }
 
 /// Maximum number of shards of a study.
-const MOST_SHARDS: usize = 1_000_000;
+const MAX_SHARDS: usize = 1_000_000;
 
 impl FromStr for Shard {
     type Err = String;
 
     /// Parses a shard such as `3/16`.
     fn from_str(text: &str) -> Result<Shard, String> {
-        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+        let parts = text.split_once('/').and_then(|(number, total)| Some((number.parse().ok()?, total.parse().ok()?)));
         match parts {
-            Some((number, of)) if (1..=of).contains(&number) && of <= MOST_SHARDS => Ok(Shard { number, of }),
+            Some((number, total)) if (1..=total).contains(&number) && total <= MAX_SHARDS => {
+                Ok(Shard { number, total })
+            }
             _ => Err(format!(
-                "expected a shard such as 3/16 (number/total, at most {MOST_SHARDS} shards), found `{text}`"
+                "expected a shard such as 3/16 (number/total, at most {MAX_SHARDS} shards), found `{text}`"
             )),
         }
     }
@@ -41,7 +43,7 @@ impl FromStr for Shard {
 
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
+        write!(f, "{}/{}", self.number, self.total)
     }
 }
 
@@ -58,28 +60,28 @@ impl Shard {
     /// assert!("0/3".parse::<Shard>().is_err() && "4/3".parse::<Shard>().is_err());
     /// ```
     pub fn units(self, all: usize) -> Range<usize> {
-        let end = |number: usize| (number as u128 * all as u128 / self.of as u128) as usize;
+        let end = |number: usize| (number as u128 * all as u128 / self.total as u128) as usize;
         end(self.number - 1)..end(self.number)
     }
 
     fn folder(self, name: &str) -> String {
-        format!("{name}.shard-{}-of-{}", self.number, self.of)
+        format!("{name}.shard-{}-of-{}", self.number, self.total)
     }
 }
 
 /// Unit at which a run starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Start {
+pub enum StartMode {
     /// Starts at the first unit, but does not discard a long unfinished run.
     First,
     /// Starts at the first unit and discards any earlier journal.
-    Anew,
+    Restart,
     /// Resumes an unfinished run. Starts at the first unit if there is none.
     Resume,
 }
 
 /// An unfinished run of at least this many seconds is discarded only on request.
-const WORTH: f64 = 60.0;
+const LONG_RUN_SECONDS: f64 = 60.0;
 
 /// Reason why a run cannot start, or why it ends.
 #[derive(Debug, thiserror::Error)]
@@ -96,7 +98,7 @@ pub enum StreamError {
         folder.display(),
         if *long { " and with --restart" } else { "" }
     )]
-    Other {
+    DifferentRun {
         /// Folder of the journal.
         folder: PathBuf,
         /// Description of the difference.
@@ -106,7 +108,7 @@ pub enum StreamError {
     },
     /// The folder holds a long unfinished run.
     #[error(
-        "{} contains {units} of {of} units of an earlier run ({minutes:.0} minutes of work): continue with \
+        "{} contains {units} of {total} units of an earlier run ({minutes:.0} minutes of work): continue with \
          --resume, or discard it with --restart",
         folder.display()
     )]
@@ -116,7 +118,7 @@ pub enum StreamError {
         /// Number of units in the journal.
         units: usize,
         /// Number of units of the run.
-        of: usize,
+        total: usize,
         /// Computing time of the units in the journal, in minutes.
         minutes: f64,
     },
@@ -140,42 +142,42 @@ pub fn begin(
     checked: &Checked,
     out: &Path,
     shard: Option<Shard>,
-    start: Start,
+    start: StartMode,
     threads: usize,
 ) -> Result<Journal, StreamError> {
     let folder = folder(out, checked.study().name(), shard)?;
     let units = checked.units();
-    let head = Head::new(checked, shard.map_or(0..units, |shard| shard.units(units)), threads);
-    if start == Start::Anew || !folder.join(FILE).exists() {
+    let head = RunHeader::new(checked, shard.map_or(0..units, |shard| shard.units(units)), threads);
+    if start == StartMode::Restart || !folder.join(FILE).exists() {
         return Ok(Journal::create(&folder, head)?);
     }
     let journal = match (Journal::open(&folder), start) {
         (Ok(journal), _) => journal,
-        (Err(JournalError::Nothing { .. }), _) | (Err(JournalError::Not { .. }), Start::First) => {
+        (Err(JournalError::Empty { .. }), _) | (Err(JournalError::Invalid { .. }), StartMode::First) => {
             return Ok(Journal::create(&folder, head)?);
         }
         (Err(error), _) => return Err(error.into()),
     };
-    let long = journal.time() >= WORTH;
-    if start == Start::First {
+    let long = journal.time() >= LONG_RUN_SECONDS;
+    if start == StartMode::First {
         if long {
-            let (kept, range) = (journal.units(), &journal.head().range);
-            let (units, of, minutes) = (kept.len(), range.len(), journal.time() / 60.0);
-            return Err(StreamError::Unfinished { folder, units, of, minutes });
+            let (done, range) = (journal.units(), &journal.head().range);
+            let (units, total, minutes) = (done.len(), range.len(), journal.time() / 60.0);
+            return Err(StreamError::Unfinished { folder, units, total, minutes });
         }
         drop(journal);
         return Ok(Journal::create(&folder, head)?);
     }
     match head.difference(journal.head()) {
         None => Ok(journal),
-        Some(difference) => Err(StreamError::Other { folder, difference, long }),
+        Some(difference) => Err(StreamError::DifferentRun { folder, difference, long }),
     }
 }
 
 /// Computes the missing units of a journal.
 ///
 /// If the run is stopped, the result holds the blocks from the first unfinished unit on. The
-/// function calls `kept` whenever further units are safely on disk.
+/// function calls `on_sync` whenever further units are safely on disk.
 ///
 /// # Errors
 /// [`StreamError`] if the study cannot be computed or the file system fails. Earlier units
@@ -184,7 +186,7 @@ pub fn compute(
     checked: &Checked,
     journal: &mut Journal,
     context: &Context,
-    kept: &dyn Fn(&Journal),
+    on_sync: &dyn Fn(&Journal),
 ) -> Result<Vec<Block>, StreamError> {
     let mut rest: Option<Block> = None;
     let missing = journal.units().end..journal.head().range.end;
@@ -192,20 +194,20 @@ pub fn compute(
         match &mut rest {
             Some(rest) => rest.append(block),
             None if !block.tally.is_whole() => rest = Some(block),
-            None if journal.add(block)? => kept(journal),
+            None if journal.add(block)? => on_sync(journal),
             None => {}
         }
         Ok::<(), JournalError>(())
     });
     match computed {
         Err(JournalError::Study(error)) => {
-            journal.keep()?;
+            journal.sync()?;
             return Err(JournalError::Study(error).into());
         }
         other => other?,
     }
-    journal.keep()?;
-    kept(journal);
+    journal.sync()?;
+    on_sync(journal);
     Ok(rest.into_iter().collect())
 }
 
@@ -217,10 +219,10 @@ pub enum MergeError {
     Journal(#[from] JournalError),
     /// The folder contains no shard.
     #[error("no part of a study in {}: give the folders that `stickslip run --shard` wrote", .0.display())]
-    Nothing(PathBuf),
+    NoParts(PathBuf),
     /// A shard belongs to a different run.
     #[error("{} does not belong to {}: {difference}", folder.display(), first.display())]
-    Other {
+    DifferentRun {
         /// Folder of the shard.
         folder: PathBuf,
         /// Folder of the shard it is compared with.
@@ -229,14 +231,14 @@ pub enum MergeError {
         difference: String,
     },
     /// A shard is unfinished.
-    #[error("{} is unfinished ({units} of its {of} units): run it again with --resume", folder.display())]
+    #[error("{} is unfinished ({units} of its {total} units): run it again with --resume", folder.display())]
     Unfinished {
         /// Folder of the shard.
         folder: PathBuf,
         /// Number of units in the journal.
         units: usize,
         /// Number of units of the shard.
-        of: usize,
+        total: usize,
     },
     /// Two shards contain the same unit.
     #[error("{} and {} both contain unit {unit}: give each part once", a.display(), b.display())]
@@ -269,26 +271,26 @@ pub enum MergeError {
 ///
 /// # Errors
 /// [`MergeError`] if the shards are not the complete parts of one run.
-pub fn merged(folders: &[PathBuf]) -> Result<Vec<Journal>, MergeError> {
+pub fn read_parts(folders: &[PathBuf]) -> Result<Vec<Journal>, MergeError> {
     let mut parts = Vec::new();
     for folder in folders {
         let inside = inside(folder);
         if inside.is_empty() {
-            return Err(MergeError::Nothing(folder.clone()));
+            return Err(MergeError::NoParts(folder.clone()));
         }
         for folder in inside {
             parts.push(Journal::read(&folder)?);
         }
     }
-    let Some(first) = parts.first() else { return Err(MergeError::Nothing(PathBuf::new())) };
+    let Some(first) = parts.first() else { return Err(MergeError::NoParts(PathBuf::new())) };
     let named = |journal: &Journal| journal.folder().to_owned();
     for part in &parts {
         if let Some(difference) = first.head().difference(part.head()) {
-            return Err(MergeError::Other { folder: named(part), first: named(first), difference });
+            return Err(MergeError::DifferentRun { folder: named(part), first: named(first), difference });
         }
         if !part.is_complete() {
-            let (units, of) = (part.units().len(), part.head().range.len());
-            return Err(MergeError::Unfinished { folder: named(part), units, of });
+            let (units, total) = (part.units().len(), part.head().range.len());
+            return Err(MergeError::Unfinished { folder: named(part), units, total });
         }
     }
     let units = first.head().units;

@@ -24,19 +24,19 @@ pub struct Terminal {
 /// Longer tables are not shown; a table with main results is cut to this number of rows.
 const ROWS: usize = 20;
 /// Names of the tables with main results, in addition to all names that end in `_summary`.
-const MAIN: [&str; 6] = ["summary", "peaks", "optimum", "turns", "orbits", "differences"];
+const MAIN_TABLES: [&str; 6] = ["summary", "peaks", "optimum", "turns", "orbits", "differences"];
 /// Maximum width of a table in characters.
 const WIDTH: usize = 120;
 /// Minimum line width in characters.
 const NARROWEST: usize = 40;
 /// Columns that a wide table loses first. `record.json` and the table's file keep these error
 /// measures.
-const EVIDENCE: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
+const ERROR_COLUMNS: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
 /// Maximum number of printed notes. Only the number of further notes is printed.
 const NOTES: usize = 8;
 /// Headings and texts longer than this lose their middle in a wide table. All names that
 /// Stickslip defines are shorter.
-const LONG: usize = 28;
+const MAX_NAME_LENGTH: usize = 28;
 /// Maximum number of printed failures. Only the number of further failures is printed.
 const FAILURES: usize = 5;
 
@@ -59,10 +59,10 @@ impl Terminal {
         }
         let width = self.width.map_or(WIDTH, |width| width.clamp(NARROWEST, WIDTH));
         for table in &dataset.tables {
-            let main = MAIN.contains(&table.name.as_str()) || table.name.ends_with("_summary");
+            let main = MAIN_TABLES.contains(&table.name.as_str()) || table.name.ends_with("_summary");
             if (1..=ROWS).contains(&table.rows()) || main && table.rows() > 0 {
                 let sorted = worst_first(table).filter(|_| table.name == "peaks");
-                let written = in_written_units(sorted.as_ref().unwrap_or(table), &dataset.record.study["units"]);
+                let written = in_study_units(sorted.as_ref().unwrap_or(table), &dataset.record.study["units"]);
                 let _ = write!(out, "\n{}\n{}", clean(&table.name), shown((&table.name, &written), width));
             }
         }
@@ -111,13 +111,13 @@ impl Terminal {
                 plural(more)
             );
         }
-        out.push_str(&places(files));
+        out.push_str(&file_locations(files));
         out
     }
 
     /// Returns the location of files: each folder once, then the file names.
     pub fn files(self, files: &[PathBuf]) -> String {
-        places(files)
+        file_locations(files)
     }
 
     /// Wraps a text between words to the line width. Lines after the first start with `indent`.
@@ -149,7 +149,7 @@ fn plural(count: usize) -> &'static str {
 }
 
 /// Returns the location of files: each folder once, then the file names.
-fn places(files: &[PathBuf]) -> String {
+fn file_locations(files: &[PathBuf]) -> String {
     let mut folders: Vec<(&Path, Vec<String>)> = Vec::new();
     for file in files {
         let folder = file.parent().unwrap_or(Path::new(""));
@@ -210,7 +210,7 @@ fn unit_of(name: &str, largest: f64) -> (&str, &'static str, i32, &'static str) 
 
 /// Converts columns of a table to the units that the study uses. `written` maps columns to
 /// units.
-fn in_written_units<'t>(table: &'t Table, written: &'t Json) -> Vec<Written<'t>> {
+fn in_study_units<'t>(table: &'t Table, written: &'t Json) -> Vec<ConvertedColumn<'t>> {
     let one = |column: &'t Column| {
         let unit = written[&column.name].as_str();
         let converted = unit.and_then(|unit| {
@@ -219,18 +219,18 @@ fn in_written_units<'t>(table: &'t Table, written: &'t Json) -> Vec<Written<'t>>
             let values = column.as_numbers()?.iter().map(|value| rounded(value * factor)).collect();
             Some((Values::Number(values), unit))
         });
-        Written { column, converted }
+        ConvertedColumn { column, converted }
     };
     table.columns.iter().map(one).collect()
 }
 
 /// A column, with converted values if the study uses another unit.
-struct Written<'t> {
+struct ConvertedColumn<'t> {
     column: &'t Column,
     converted: Option<(Values, &'t str)>,
 }
 
-impl Written<'_> {
+impl ConvertedColumn<'_> {
     fn values(&self) -> &Values {
         self.converted.as_ref().map_or(&self.column.values, |(values, _)| values)
     }
@@ -301,7 +301,7 @@ fn engineering(values: &[f64], significant: i32) -> Vec<String> {
 }
 
 /// A formatted column: heading and cells with a common width.
-struct Shown<'a> {
+struct FormattedColumn<'a> {
     name: &'a str,
     heading: String,
     cells: Vec<String>,
@@ -313,10 +313,10 @@ struct Shown<'a> {
 /// Formats the first rows of a table with aligned columns, at most `limit` characters wide.
 ///
 /// A last line counts the omitted rows and columns.
-fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
+fn shown((name, table): (&str, &[ConvertedColumn<'_>]), limit: usize) -> String {
     let all_rows = table.first().map_or(0, |one| one.values().len());
     let rows = all_rows.min(ROWS);
-    let mut columns: Vec<Shown<'_>> = table
+    let mut columns: Vec<FormattedColumn<'_>> = table
         .iter()
         .map(|one| {
             let (c, unit) = (one.column, one.converted.as_ref().map(|(_, unit)| *unit));
@@ -324,23 +324,23 @@ fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
             let heading = clean(&heading);
             let width = cells.iter().chain([&heading]).map(|text| text.chars().count()).max().unwrap_or(0);
             let right = matches!(c.values, Values::Number(_) | Values::Integer(_));
-            Shown { name: &c.name, heading, cells, right, width }
+            FormattedColumn { name: &c.name, heading, cells, right, width }
         })
         .collect();
     let all = columns.len();
     // A line starts with two spaces, and two spaces separate columns.
-    let too_wide = |columns: &[Shown<'_>]| columns.iter().map(|c| c.width + 2).sum::<usize>() > limit;
+    let too_wide = |columns: &[FormattedColumn<'_>]| columns.iter().map(|c| c.width + 2).sum::<usize>() > limit;
     if too_wide(&columns) {
         shorten(&mut columns);
     }
     while columns.len() > 1 && too_wide(&columns) {
-        let evidence = EVIDENCE.iter().find_map(|name| columns.iter().position(|c| c.name == *name));
+        let evidence = ERROR_COLUMNS.iter().find_map(|name| columns.iter().position(|c| c.name == *name));
         columns.remove(evidence.unwrap_or(columns.len() - 1));
     }
     let mut out = String::new();
     for row in 0..=rows {
         let mut line = String::from(" ");
-        for Shown { heading, cells, right, width, .. } in &columns {
+        for FormattedColumn { heading, cells, right, width, .. } in &columns {
             let empty = String::new();
             let cell = if row == 0 { heading } else { cells.get(row - 1).unwrap_or(&empty) };
             let _ = if *right { write!(line, " {cell:>width$} ") } else { write!(line, " {cell:<width$} ") };
@@ -357,26 +357,28 @@ fn shown((name, table): (&str, &[Written<'_>]), limit: usize) -> String {
 }
 
 /// Shortens long headings and cells, unless they would become equal.
-fn shorten(columns: &mut [Shown<'_>]) {
-    let headings = cut(columns.iter().map(|column| column.heading.as_str()).collect());
+fn shorten(columns: &mut [FormattedColumn<'_>]) {
+    let headings = abbreviated(columns.iter().map(|column| column.heading.as_str()).collect());
     for (column, heading) in columns.iter_mut().zip(headings) {
         column.heading = heading;
         if !column.right {
-            column.cells = cut(column.cells.iter().map(String::as_str).collect());
+            column.cells = abbreviated(column.cells.iter().map(String::as_str).collect());
         }
         let texts = column.cells.iter().chain([&column.heading]);
         column.width = texts.map(|text| text.chars().count()).max().unwrap_or(0);
     }
 }
 
-/// Removes the middle of texts longer than [`LONG`].
+/// Removes the middle of texts longer than [`MAX_NAME_LENGTH`].
 ///
 /// Names differ at their ends, and units are there. All texts stay unchanged if two would
 /// become equal.
-fn cut(texts: Vec<&str>) -> Vec<String> {
+fn abbreviated(texts: Vec<&str>) -> Vec<String> {
     let short = |text: &str| {
         let all: Vec<char> = text.chars().collect();
-        let (Some(over), half) = (all.len().checked_sub(LONG + 1), LONG / 2) else { return text.to_owned() };
+        let (Some(over), half) = (all.len().checked_sub(MAX_NAME_LENGTH + 1), MAX_NAME_LENGTH / 2) else {
+            return text.to_owned();
+        };
         all[..half - 1].iter().chain(&['…']).chain(&all[half + over + 1..]).collect()
     };
     let all: Vec<String> = texts.iter().map(|text| short(text)).collect();
@@ -447,11 +449,11 @@ results/fig02/: loops_summary.csv, figure.svg
         }
         // Texts that would become equal stay unchanged.
         let texts = [format!("{0}1{0}", "x".repeat(20)), format!("{0}2{0}", "x".repeat(20))];
-        assert_eq!(cut(texts.iter().map(String::as_str).collect()), texts);
+        assert_eq!(abbreviated(texts.iter().map(String::as_str).collect()), texts);
         let long = "abcdefghijklmnopqrstuvwxyz0123456789 (N/m)";
-        let [short] = &cut(vec![long])[..] else { panic!() };
-        assert_eq!((short.chars().count(), short.ends_with("456789 (N/m)")), (LONG, true), "{short}");
-        assert_eq!(cut(vec![&long[..LONG]]), [&long[..LONG]]);
+        let [short] = &abbreviated(vec![long])[..] else { panic!() };
+        assert_eq!((short.chars().count(), short.ends_with("456789 (N/m)")), (MAX_NAME_LENGTH, true), "{short}");
+        assert_eq!(abbreviated(vec![&long[..MAX_NAME_LENGTH]]), [&long[..MAX_NAME_LENGTH]]);
     }
 
     #[test]
@@ -479,7 +481,7 @@ results/fig02/: loops_summary.csv, figure.svg
             values: Values::Number((0..rows).map(|i| unit * (1.0 + i as f64)).collect()),
         };
         let mut columns = vec![column("frequency_Hz", 1.0), column("amplitude_m", 1e-3)];
-        columns.extend(EVIDENCE.map(|name| column(name, 1e-9)));
+        columns.extend(ERROR_COLUMNS.map(|name| column(name, 1e-9)));
         columns.extend((0..6).map(|i| column(&format!("a_rather_long_name_{i}_N"), 1.0)));
         let table = Table { name: name.into(), columns };
         Dataset { tables: vec![table], ..samples::response() }

@@ -4,10 +4,10 @@ use stickslip_study::dataset::{Column, Table, Values};
 
 /// Relative difference up to which the peaks of two sectors are equal: the accuracy of peak
 /// refinement.
-const ALIKE: f64 = 1e-4;
+const EQUAL_PEAKS: f64 = 1e-4;
 
 /// A peak of a case.
-struct Peak {
+struct PeakRow {
     row: usize,
     /// Place without the number of its sector.
     place: String,
@@ -25,7 +25,7 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
         (table.texts("mass")?, table.numbers("frequency_Hz")?, table.numbers("amplitude_m")?);
     let varied: Vec<&[f64]> = table.columns[..at].iter().filter_map(Column::as_numbers).collect();
     let same_case = |a: usize, b: usize| varied.iter().all(|column| column[a].to_bits() == column[b].to_bits());
-    let mut shown: Vec<Peak> = Vec::new();
+    let mut shown: Vec<PeakRow> = Vec::new();
     let rows: Vec<usize> = (0..table.rows()).collect();
     for case in rows.chunk_by(|a, b| same_case(*a, *b)) {
         let mut order = case.to_vec();
@@ -33,9 +33,9 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
         let first = shown.len();
         for row in order {
             let (frequency, amplitude) = (frequency[row], amplitude[row]);
-            let near = |a: f64, b: f64| (a - b).abs() <= ALIKE * a.abs();
-            let place = of_sector(&names[row]);
-            let alike = |peak: &&mut Peak| {
+            let near = |a: f64, b: f64| (a - b).abs() <= EQUAL_PEAKS * a.abs();
+            let place = without_sector_number(&names[row]);
+            let alike = |peak: &&mut PeakRow| {
                 place.as_ref() == Some(&peak.place)
                     && near(peak.frequency, frequency)
                     && near(peak.amplitude, amplitude)
@@ -44,12 +44,12 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
                 Some(peak) => peak.sectors += 1,
                 None => {
                     let place = place.unwrap_or_else(|| names[row].clone());
-                    shown.push(Peak { row, place, sectors: 1, frequency, amplitude });
+                    shown.push(PeakRow { row, place, sectors: 1, frequency, amplitude });
                 }
             }
         }
     }
-    let word = |peak: &Peak| match peak.sectors {
+    let word = |peak: &PeakRow| match peak.sectors {
         1 => names[peak.row].clone(),
         sectors => format!("{}, {sectors} sectors", peak.place),
     };
@@ -67,7 +67,7 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
 }
 
 /// Returns the name of a place without its sector number: `blade.x` for `blade_3.x`.
-fn of_sector(name: &str) -> Option<String> {
+fn without_sector_number(name: &str) -> Option<String> {
     let (node, direction) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
     let (place, number) = node.rsplit_once('_')?;
     number.parse::<usize>().ok()?;

@@ -1,7 +1,7 @@
 //! Layout of the interactive figure in plotly's format: panels, axes, titles and colour bar.
 
-use super::palette::{FINE_GRID, GRID, GROUND, Ink, LINE, TEXT, ZERO, axis_name, plain, power};
-use crate::figure::axis::{self, Range};
+use super::palette::{FINE_GRID, GRID, GROUND, LINE, Palette, TEXT, ZERO, axis_name, plain, power};
+use crate::figure::axis::{self, AxisRange};
 use crate::figure::colour::Colour;
 use crate::figure::font;
 use crate::figure::panels::{self, Axes};
@@ -28,11 +28,11 @@ const PAGE_MARGINS: f64 = 150.0;
 /// Maximum line length of a panel title on a narrow page, which can have a width of 390.
 const NARROW_LINE: f64 = 250.0;
 /// Height of the colour bar below the panels of a narrow page.
-const BAR: f64 = 90.0;
+const COLOUR_BAR_HEIGHT: f64 = 90.0;
 
 /// Returns the title of an axis in lines. A range that differs from that of similar panels is
 /// stated.
-fn axis_title(shown: &Axis, range: Range, own: bool, limit: f64) -> Vec<String> {
+fn axis_title(shown: &Axis, range: AxisRange, own: bool, limit: f64) -> Vec<String> {
     let own = if own { ", own range" } else { "" };
     let text = format!("{}{own}", axis::axis_title(shown, power(range)));
     font::wrap(&text, LABEL, font::Weight::Regular, limit)
@@ -47,15 +47,15 @@ const NAMED: f64 = 6.0;
 
 /// Page width that a layout is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Page {
+pub(super) enum PageWidth {
     Wide,
     /// Panels are in one column.
     Narrow,
 }
 
-pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
+pub(super) fn layout(figure: &Figure, page: PageWidth, palette: &mut Palette) -> Value {
     let count = figure.panels.len().max(1);
-    let narrow = page == Page::Narrow;
+    let narrow = page == PageWidth::Narrow;
     let columns = if narrow { 1 } else { panels::grid(figure).0 };
     let rows = count.div_ceil(columns);
     let plot_height = match (columns, rows) {
@@ -66,26 +66,26 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
     };
     let axes = panels::axes(figure);
     let widest = |(panel, axes): (&Panel, &Axes)| {
-        let ticks = axis::ticks_of(&panel.y, axes.y, NAMED);
+        let ticks = axis::axis_ticks(&panel.y, axes.y, NAMED);
         ticks.labels.iter().map(|l| font::width(l, TICK, font::Weight::Regular)).fold(0.0, f64::max)
     };
     let most = |lines: &[Vec<String>]| lines.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64 - 1.0;
     let least = NARROW[columns.clamp(1, 3) - 1] - PAGE_MARGINS;
     let y_titles: Vec<Vec<String>> =
-        (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.y, a.y, a.own_y, plot_height)).collect();
+        (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.y, a.y, a.y_differs, plot_height)).collect();
     let beside =
         figure.panels.iter().zip(&axes).map(widest).fold(0.0, f64::max) + 60.0 + LEADING * LABEL * most(&y_titles);
     let column_gap = if columns == 1 { 0.0 } else { COLUMN_GAP.max(beside) / least };
     let plot_width = ((1.0 - column_gap * (columns as f64 - 1.0)) / columns as f64).max(0.1);
     let limit = if narrow { NARROW_LINE } else { least * plot_width };
     let x_titles: Vec<Vec<String>> =
-        (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.x, a.x, a.own_x, limit)).collect();
+        (figure.panels.iter().zip(&axes)).map(|(p, a)| axis_title(&p.x, a.x, a.x_differs, limit)).collect();
     let titles: Vec<Vec<String>> =
         figure.panels.iter().map(|p| font::wrap(&p.title, TITLE, font::Weight::Bold, limit)).collect();
     // Titles with several lines increase the distance between rows.
     let titled = if titles.iter().all(Vec::is_empty) { 0.0 } else { LEADING * TITLE * (1.0 + most(&titles)) };
     let below = LEADING * LABEL * most(&x_titles);
-    let bar = if narrow && ink.shades.bar.is_some() { BAR } else { 0.0 };
+    let bar = if narrow && palette.scheme.bar.is_some() { COLOUR_BAR_HEIGHT } else { 0.0 };
     let (top, bottom) = (TOOLBAR + titled, BOTTOM + below + bar);
     let row_gap = ROW_GAP - LEADING * TITLE + titled + below;
     let inside = rows as f64 * plot_height + (rows as f64 - 1.0) * row_gap;
@@ -110,8 +110,10 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         let top = (1.0 - row * (plot_height + row_gap) / inside).clamp(0.0, 1.0);
         let bottom = (top - plot_height / inside).max(0.0);
         let panels = &figure.panels;
-        let x_partner = (0..i).find(|&j| !panel.picture && panels::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
-        let y_partner = (0..i).find(|&j| !panel.picture && panels::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
+        let x_partner =
+            (0..i).find(|&j| !panel.picture && panels::same_quantity(&panels[j].x, &panel.x) && axes[j].x == own.x);
+        let y_partner =
+            (0..i).find(|&j| !panel.picture && panels::same_quantity(&panels[j].y, &panel.y) && axes[j].y == own.y);
         let mut x =
             axis(own.x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)), [limit, ROOM[0]]);
         x["title"]["text"] = json!(broken(&x_titles[i]));
@@ -122,13 +124,13 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
             axis(own.y, [bottom, top], axis_name("x", i), y_partner.map(|j| axis_name("y", j)), [plot_height, ROOM[1]]);
         y["title"]["text"] = json!(broken(&y_titles[i]));
         for (shown, range, made) in [(&panel.x, own.x, &mut x), (&panel.y, own.y, &mut y)] {
-            let ticks = axis::ticks_of(shown, range, NAMED);
-            if shown.whole && ticks.at.windows(2).all(|pair| pair[1] - pair[0] <= 1.0) {
+            let ticks = axis::axis_ticks(shown, range, NAMED);
+            if shown.whole && ticks.positions.windows(2).all(|pair| pair[1] - pair[0] <= 1.0) {
                 (made["tick0"], made["dtick"]) = (json!(0), json!(1));
             }
             if !shown.names.is_empty() {
                 made["tickmode"] = json!("array");
-                made["tickvals"] = json!(ticks.at);
+                made["tickvals"] = json!(ticks.positions);
                 made["ticktext"] = json!(ticks.labels.iter().map(|name| plain(name)).collect::<Vec<_>>());
             }
         }
@@ -156,25 +158,25 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         }
     }
     layout["annotations"] = Value::from(notes);
-    if let Some((shown, range)) = ink.shades.bar.clone() {
-        layout["coloraxis"] = colour_axis(&shown, range, narrow, -(BOTTOM + below) / inside, ink);
+    if let Some((shown, range)) = palette.scheme.bar.clone() {
+        layout["coloraxis"] = colour_axis(&shown, range, narrow, -(BOTTOM + below) / inside, palette);
     }
     layout
 }
 
 /// Returns the colour bar: vertical at the right, or horizontal below the panels of a narrow
 /// page.
-fn colour_axis(shown: &Axis, range: Range, narrow: bool, below: f64, ink: &mut Ink) -> Value {
+fn colour_axis(shown: &Axis, range: AxisRange, narrow: bool, below: f64, palette: &mut Palette) -> Value {
     const STEPS: u32 = 16;
     let scale: Vec<Value> = (0..=STEPS)
         .map(|i| f64::from(i) / f64::from(STEPS))
-        .map(|part| json!([part, ink.use_of(&Colour::sequential(part))]))
+        .map(|part| json!([part, palette.register(&Colour::sequential(part))]))
         .collect();
-    let ticks = axis::ticks_of(shown, range, if narrow { 5.0 } else { 7.0 });
+    let ticks = axis::axis_ticks(shown, range, if narrow { 5.0 } else { 7.0 });
     let title = plain(&axis::axis_title(shown, ticks.power));
     let mut bar = json!({
         "thickness": 16, "outlinecolor": LINE, "outlinewidth": 1, "ticks": "outside", "tickcolor": LINE,
-        "tickmode": "array", "tickvals": ticks.at.iter().map(|v| range.measure(*v)).collect::<Vec<_>>(),
+        "tickmode": "array", "tickvals": ticks.positions.iter().map(|v| range.to_linear(*v)).collect::<Vec<_>>(),
         "ticktext": ticks.labels, "tickfont": { "size": TICK }, "title": { "text": title, "side": "right", "font": { "size": LABEL } },
     });
     if narrow {
@@ -185,7 +187,7 @@ fn colour_axis(shown: &Axis, range: Range, narrow: bool, below: f64, ink: &mut I
     } else {
         bar["x"] = json!(1.02);
     }
-    json!({ "cmin": range.measure(range.from), "cmax": range.measure(range.to), "colorscale": scale, "colorbar": bar })
+    json!({ "cmin": range.to_linear(range.from), "cmax": range.to_linear(range.to), "colorscale": scale, "colorbar": bar })
 }
 
 /// Smallest distance between labels at 1, 2 and 5 times a power of ten, in decades.
@@ -197,7 +199,13 @@ const ROOM: [f64; 2] = [42.0, 18.0];
 /// range.
 ///
 /// `length` and `room` (the space for a label) are in px.
-fn axis(range: Range, domain: [f64; 2], anchor: String, partner: Option<String>, [length, room]: [f64; 2]) -> Value {
+fn axis(
+    range: AxisRange,
+    domain: [f64; 2],
+    anchor: String,
+    partner: Option<String>,
+    [length, room]: [f64; 2],
+) -> Value {
     let power = power(range);
     let log = range.scale == Scale::Log;
     let end = |v: f64| if log { axis::log10(v) } else { axis::scaled(v, power) };

@@ -12,11 +12,11 @@ mod layout;
 mod palette;
 mod traces;
 
-use crate::figure::panels::{self, AREA, Entry, PALE};
+use crate::figure::panels::{self, AREA, LegendEntry, PALE};
 use crate::figure::svg::escape;
 use crate::output::result_file::{File, Output, ReportError};
-use layout::{NARROW, Page, layout};
-use palette::{Ink, plain};
+use layout::{NARROW, PageWidth, layout};
+use palette::{Palette, plain};
 use serde_json::json;
 use std::fmt::Write;
 use std::sync::OnceLock;
@@ -29,7 +29,7 @@ pub const OUTPUT: Output = Output {
     summary: "figure.html, interactive; all figures share one script in the folder above",
     make: files,
     sink: None,
-    usual: true,
+    is_default: true,
 };
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
@@ -157,13 +157,13 @@ pub fn script_name() -> String {
 /// Returns the figure for a page: interactive on screen, static in print or without the script.
 pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
     let (columns, _) = panels::grid(figure);
-    let mut ink = Ink::new(figure);
-    let data = traces(figure, &mut ink);
-    let wide = layout(figure, Page::Wide, &mut ink);
-    let narrow = layout(figure, Page::Narrow, &mut ink);
+    let mut palette = Palette::new(figure);
+    let data = traces(figure, &mut palette);
+    let wide = layout(figure, PageWidth::Wide, &mut palette);
+    let narrow = layout(figure, PageWidth::Narrow, &mut palette);
     let height = wide["height"].as_f64().unwrap_or(0.0);
     let data = json!({
-        "data": data, "wide": wide, "narrow": narrow, "dark": ink.dark, "title": plain(&figure.title),
+        "data": data, "wide": wide, "narrow": narrow, "dark": palette.dark, "title": plain(&figure.title),
         "break": NARROW[columns.clamp(1, 3) - 1],
     });
     // A `<` in a label could close the script element.
@@ -201,7 +201,7 @@ fn legend(figure: &Figure, id: &str) -> String {
 }
 
 /// Returns the sample of a legend entry as a small drawing.
-fn sample(entry: &Entry) -> String {
+fn sample(entry: &LegendEntry) -> String {
     let mut out = "<svg width=\"30\" height=\"14\" aria-hidden=\"true\">".to_owned();
     let opacity = if entry.pale { PALE } else { 1.0 };
     let area = |x: u32, width: u32, opacity: f64| {
@@ -247,8 +247,12 @@ pub(crate) mod tests {
 
     /// Returns traces, wide layout and narrow layout, as the script receives them.
     fn made(figure: &Figure) -> (Vec<Value>, Value, Value) {
-        let mut ink = Ink::new(figure);
-        (traces(figure, &mut ink), layout(figure, Page::Wide, &mut ink), layout(figure, Page::Narrow, &mut ink))
+        let mut palette = Palette::new(figure);
+        (
+            traces(figure, &mut palette),
+            layout(figure, PageWidth::Wide, &mut palette),
+            layout(figure, PageWidth::Narrow, &mut palette),
+        )
     }
 
     /// Returns the page without its scripts; nothing in this part may load a resource.
@@ -329,13 +333,13 @@ pub(crate) mod tests {
             }
         }
         for dataset in samples::all() {
-            let mut ink = Ink::new(&dataset.figure);
+            let mut palette = Palette::new(&dataset.figure);
             let mut found = BTreeSet::new();
-            traces(&dataset.figure, &mut ink).iter().for_each(|t| colours(t, &mut found));
-            colours(&layout(&dataset.figure, Page::Wide, &mut ink), &mut found);
+            traces(&dataset.figure, &mut palette).iter().for_each(|t| colours(t, &mut found));
+            colours(&layout(&dataset.figure, PageWidth::Wide, &mut palette), &mut found);
             assert!(found.len() > 5);
             for colour in found {
-                assert!(ink.dark.contains_key(&colour), "{}: {colour}", dataset.name);
+                assert!(palette.dark.contains_key(&colour), "{}: {colour}", dataset.name);
             }
         }
     }

@@ -1,9 +1,9 @@
 //! Helpers shared by traces and layout: colours for light and dark pages, axis names, literal
 //! text.
 
-use crate::figure::axis::{self, Range};
+use crate::figure::axis::{self, AxisRange};
 use crate::figure::colour::Colour;
-use crate::figure::panels::{AREA, Shades};
+use crate::figure::panels::{AREA, ColourScheme};
 use crate::figure::svg::escape;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::Figure;
@@ -26,19 +26,19 @@ const DARK: [[&str; 2]; 6] = [
 ];
 
 /// Colours of a figure: shades on white, and the map to their dark counterparts.
-pub(super) struct Ink {
-    pub(super) shades: Shades,
+pub(super) struct Palette {
+    pub(super) scheme: ColourScheme,
     pub(super) dark: BTreeMap<String, String>,
 }
 
-impl Ink {
-    pub(super) fn new(figure: &Figure) -> Ink {
+impl Palette {
+    pub(super) fn new(figure: &Figure) -> Palette {
         let dark = DARK.iter().map(|[light, dark]| ((*light).to_owned(), (*dark).to_owned())).collect();
-        Ink { shades: Shades::of(figure), dark }
+        Palette { scheme: ColourScheme::of(figure), dark }
     }
 
     /// Returns the colour for the script and records its dark counterpart.
-    pub(super) fn use_of(&mut self, colour: &Colour) -> String {
+    pub(super) fn register(&mut self, colour: &Colour) -> String {
         self.dark.insert(colour.light.clone(), colour.dark.clone());
         colour.light.clone()
     }
@@ -62,6 +62,6 @@ pub(super) fn plain(text: &str) -> String {
 }
 
 /// Returns the power of ten factored out of an axis, as in the static figure.
-pub(super) fn power(range: Range) -> i32 {
+pub(super) fn power(range: AxisRange) -> i32 {
     axis::ticks(range, 6.0).power
 }

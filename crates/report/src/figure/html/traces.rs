@@ -1,42 +1,43 @@
 //! The curves of the interactive figure as plotly traces.
 
-use super::palette::{GROUND, Ink, axis_name, plain, power};
-use crate::figure::axis::{self, Range};
+use super::palette::{GROUND, Palette, axis_name, plain, power};
+use crate::figure::axis::{self, AxisRange};
 use crate::figure::colour::Colour;
-use crate::figure::panels::{self, Axes, Entry, PALE};
+use crate::figure::panels::{self, Axes, LegendEntry, PALE};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Style};
 
-pub(super) fn traces(figure: &Figure, ink: &mut Ink) -> Vec<Value> {
+pub(super) fn traces(figure: &Figure, palette: &mut Palette) -> Vec<Value> {
     let (entries, _) = panels::legend(figure);
     // In an image, a label with several colours has a grey legend entry from a trace without
     // points.
-    let several: Vec<&Entry> = entries.iter().filter(|entry| entry.colour == Colour::many()).collect();
-    let mut traces: Vec<Value> = several.iter().map(|entry| legend_trace(entry, ink)).collect();
+    let several: Vec<&LegendEntry> = entries.iter().filter(|entry| entry.colour == Colour::several()).collect();
+    let mut traces: Vec<Value> = several.iter().map(|entry| legend_trace(entry, palette)).collect();
     let mut seen: BTreeSet<&str> = several.iter().map(|entry| entry.label.as_str()).collect();
     let listed: BTreeSet<&str> = entries.iter().map(|entry| entry.label.as_str()).collect();
     for (index, (panel, axes)) in figure.panels.iter().zip(panels::axes(figure)).enumerate() {
         let said = figure.panels.len() == 1;
-        let drawn = Drawn { index, panel, axes, alone: said, x: Form::of(axes.x), y: Form::of(axes.y) };
-        for series in panels::layers(panel) {
+        let drawn =
+            PanelTraces { index, panel, axes, alone: said, x: NumberFormat::of(axes.x), y: NumberFormat::of(axes.y) };
+        for series in panels::drawing_order(panel) {
             let label = series.label.as_str();
             let named = listed.contains(label) && panels::drawn(panel, series).next().is_some() && seen.insert(label);
-            traces.extend(drawn.traces(series, named, ink));
+            traces.extend(drawn.traces(series, named, palette));
         }
     }
-    traces.extend(ink.shades.bar.as_ref().map(|(_, range)| bar_trace(*range)));
+    traces.extend(palette.scheme.bar.as_ref().map(|(_, range)| bar_trace(*range)));
     traces
 }
 
 /// Returns a trace without points for the legend of an image.
-fn legend_trace(entry: &Entry, ink: &mut Ink) -> Value {
+fn legend_trace(entry: &LegendEntry, palette: &mut Palette) -> Value {
     let mode = match (entry.line, entry.marks) {
         (None, _) => "markers",
         (_, true) => "lines+markers",
         (_, false) => "lines",
     };
-    let colour = ink.use_of(&entry.colour);
+    let colour = palette.register(&entry.colour);
     json!({
         "type": "scatter", "x": [null], "y": [null], "mode": mode, "legendrank": 2000,
         "name": plain(&entry.label), "legendgroup": entry.label, "showlegend": true,
@@ -46,8 +47,8 @@ fn legend_trace(entry: &Entry, ink: &mut Ink) -> Value {
 }
 
 /// Returns a trace without points that carries the colour bar.
-fn bar_trace(range: Range) -> Value {
-    let value = range.measure(range.from);
+fn bar_trace(range: AxisRange) -> Value {
+    let value = range.to_linear(range.from);
     json!({
         "type": "scatter", "x": [null], "y": [null], "mode": "markers", "showlegend": false, "hoverinfo": "skip",
         "marker": { "color": [value], "coloraxis": "coloraxis" },
@@ -61,22 +62,22 @@ const MANY_POINTS: usize = 5000;
 const OVERLAP: f64 = 0.03;
 
 /// A panel whose curves are drawn.
-struct Drawn<'f> {
+struct PanelTraces<'f> {
     index: usize,
     panel: &'f Panel,
     axes: Axes,
     /// `true` if the figure has no other panel.
     alone: bool,
-    x: Form,
-    y: Form,
+    x: NumberFormat,
+    y: NumberFormat,
 }
 
-impl Drawn<'_> {
+impl PanelTraces<'_> {
     /// Returns the trace of a series, after a trace with the isolated points of a line.
-    fn traces(&self, series: &Series, named: bool, ink: &mut Ink) -> Vec<Value> {
-        let mut trace = self.trace(series, named, ink);
-        let shade = ink.shades.colour(series);
-        let colour = ink.use_of(&shade);
+    fn traces(&self, series: &Series, named: bool, palette: &mut Palette) -> Vec<Value> {
+        let mut trace = self.trace(series, named, palette);
+        let shade = palette.scheme.colour(series);
+        let colour = palette.register(&shade);
         let crowd = panels::crowded(self.panel);
         match series.style {
             Style::Marks => {
@@ -88,7 +89,7 @@ impl Drawn<'_> {
                 };
             }
             Style::Missing => {
-                let y = self.axes.y.at(panels::row_of_crosses(series));
+                let y = self.axes.y.value_at(panels::row_of_crosses(series));
                 trace["y"] = json!(self.y.numbers(series.x.iter().map(|_| y)));
                 trace["mode"] = json!("markers");
                 trace["marker"] = json!({ "symbol": "x-thin", "size": 6, "line": { "color": colour, "width": 1.5 } });
@@ -96,13 +97,13 @@ impl Drawn<'_> {
                 trace["hovertemplate"] = json!(format!("{x}<br>no orbit<extra></extra>"));
             }
             Style::Band => {
-                trace["fillcolor"] = json!(ink.area(&shade));
+                trace["fillcolor"] = json!(palette.area(&shade));
                 self.band(series, &mut trace, &colour);
             }
             Style::Bars => self.bars(series, &mut trace, &colour),
-            Style::Stripe => return self.stripe(series, ink).into_iter().collect(),
+            Style::Stripe => return self.stripe(series, palette).into_iter().collect(),
             Style::Solid | Style::Dashed | Style::Dotted => {
-                let dots = self.lonely_points(series, &trace, &colour);
+                let dots = self.isolated_points(series, &trace, &colour);
                 let thin = matches!(series.emphasis, Emphasis::Pale | Emphasis::OwnReference);
                 let width = if thin || crowd { 1.0 } else { 2.0 };
                 let dash = dash(panels::line_style(series));
@@ -115,11 +116,11 @@ impl Drawn<'_> {
     }
 
     /// Returns the part common to all styles: points, names and hover text.
-    fn trace(&self, series: &Series, named: bool, ink: &Ink) -> Value {
+    fn trace(&self, series: &Series, named: bool, palette: &Palette) -> Value {
         let panel = self.panel;
         let said = panel.title.is_empty() || panel.title == series.label;
         let place = if self.alone || said { String::new() } else { format!("<br>{}", plain(&panel.title)) };
-        let value = ink.shades.value(series).filter(|text| !series.label.contains(text.as_str()));
+        let value = palette.scheme.value(series).filter(|text| !series.label.contains(text.as_str()));
         let value = value.map_or(String::new(), |text| format!("<br>{}", plain(&text)));
         let (x, y) = (hover("x", &panel.x, self.x.power), hover("y", &panel.y, self.y.power));
         let mut trace = json!({
@@ -164,10 +165,10 @@ impl Drawn<'_> {
     }
 
     /// Returns a stripe as a heat map with one row.
-    fn stripe(&self, series: &Series, ink: &Ink) -> Option<Value> {
-        let ((shown, range), y) = (ink.shades.bar.as_ref()?, series.y.first()?);
+    fn stripe(&self, series: &Series, palette: &Palette) -> Option<Value> {
+        let ((shown, range), y) = (palette.scheme.bar.as_ref()?, series.y.first()?);
         let count = series.x.len().min(series.shades.len());
-        let shades = Form::of(*range);
+        let shades = NumberFormat::of(*range);
         let name = self.panel.y.names.get(*y as usize).cloned().unwrap_or_default();
         let value = format!("{} = %{{z:.4~g}} {}", plain(&shown.quantity), plain(&axis::unit(shown, 0)));
         Some(json!({
@@ -179,8 +180,8 @@ impl Drawn<'_> {
     }
 
     /// Returns a trace of the points that a line does not show.
-    fn lonely_points(&self, series: &Series, trace: &Value, colour: &str) -> Option<Value> {
-        let points = lonely(self.panel, series);
+    fn isolated_points(&self, series: &Series, trace: &Value, colour: &str) -> Option<Value> {
+        let points = isolated(self.panel, series);
         if points.is_empty() {
             return None;
         }
@@ -197,7 +198,7 @@ impl Drawn<'_> {
 /// Returns the outlines of the pieces of a band.
 ///
 /// An outline follows the upper edge, returns along the lower edge, and ends with a gap.
-fn outline(panel: &Panel, series: &Series, range: Range) -> (Vec<f64>, Vec<f64>) {
+fn outline(panel: &Panel, series: &Series, range: AxisRange) -> (Vec<f64>, Vec<f64>) {
     let points: Vec<(usize, (f64, f64))> = panels::points(panel, series).enumerate().collect();
     let (mut x, mut y) = (Vec::new(), Vec::new());
     for piece in points.split(|(_, p)| !panels::drawable(*p)).filter(|piece| !piece.is_empty()) {
@@ -220,7 +221,7 @@ fn dash(style: Style) -> &'static str {
 }
 
 /// Returns the points between two gaps, which a line does not show.
-fn lonely(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
+fn isolated(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = panels::points(panel, series).collect();
     points
         .split(|p| !panels::drawable(*p))
@@ -229,7 +230,7 @@ fn lonely(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
 }
 
 /// Number format of an axis.
-struct Form {
+struct NumberFormat {
     /// Power of ten factored out, as in the static figure.
     power: i32,
     /// Digits after the decimal point. On a logarithmic axis: digits after the leading one.
@@ -242,15 +243,15 @@ struct Form {
 /// A reader can zoom in by 10,000 before a point moves by a thousandth of the picture.
 const DIGITS: i32 = 8;
 
-impl Form {
-    fn of(range: Range) -> Form {
+impl NumberFormat {
+    fn of(range: AxisRange) -> NumberFormat {
         let power = power(range);
         let first = axis::log10(axis::scaled(range.to - range.from, power)).floor() as i32;
         let digits = match range.scale {
             Scale::Linear => (DIGITS - 1 - first).clamp(0, 300),
             Scale::Log => DIGITS - 1,
         };
-        Form { power, digits: digits as usize, scale: range.scale }
+        NumberFormat { power, digits: digits as usize, scale: range.scale }
     }
 
     /// Formats numbers for the page. Non-finite values become null, which interrupts a curve.
@@ -279,15 +280,15 @@ mod tests {
 
     #[test]
     fn gaps_are_null_and_numbers_have_the_digits_of_their_axis() {
-        let form = Form::of(Range { from: 0.0, to: 2.0, scale: Scale::Linear });
+        let form = NumberFormat::of(AxisRange { from: 0.0, to: 2.0, scale: Scale::Linear });
         assert_eq!(
             json!(form.numbers([1.0, f64::NAN, f64::INFINITY, 0.1 + 0.2].into_iter())),
             json!([1, null, null, 0.3])
         );
-        let log = Form::of(Range { from: 1e-9, to: 1e3, scale: Scale::Log });
+        let log = NumberFormat::of(AxisRange { from: 1e-9, to: 1e3, scale: Scale::Log });
         assert_eq!(json!(log.numbers([1.234_567_891e-9, 100.0].into_iter())), json!([1.2345679e-9, 100]));
         // An offset does not reduce the visible digits.
-        let offset = Form::of(Range { from: 1e6, to: 1e6 + 1e-3, scale: Scale::Linear });
+        let offset = NumberFormat::of(AxisRange { from: 1e6, to: 1e6 + 1e-3, scale: Scale::Linear });
         let values: Vec<f64> = offset.numbers([1e6 + 3e-7].into_iter()).iter().filter_map(Value::as_f64).collect();
         assert!((values[0] - (1e6 + 3e-7)).abs() < 2e-10);
     }

@@ -1,11 +1,11 @@
 //! Layout of a figure: positions of all parts. Every text is measured before it is placed.
 
-use super::style::{BAR, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
-use crate::figure::axis::{self, Range, Ticks};
-use crate::figure::clip::{Point, Window};
+use super::style::{COLOUR_BAR_WIDTH, GAP, LABEL, LEADING, MARGIN, PANEL_TITLE, TICK, TICK_LENGTH, TITLE};
+use crate::figure::axis::{self, AxisRange, Ticks};
+use crate::figure::clip::{ClipRect, Point};
 use crate::figure::colour::Colour;
 use crate::figure::font::{self, Weight};
-use crate::figure::panels::{self, Axes, Entry, Shades};
+use crate::figure::panels::{self, Axes, ColourScheme, LegendEntry};
 use stickslip_study::dataset::{Axis, Figure, Panel};
 
 /// Positions of all parts of a figure.
@@ -13,15 +13,15 @@ pub(super) struct Layout {
     pub(super) width: f64,
     pub(super) height: f64,
     pub(super) title: Vec<String>,
-    pub(super) legend: Vec<Placed>,
+    pub(super) legend: Vec<PlacedEntry>,
     pub(super) panels: Vec<PlotArea>,
-    pub(super) shades: Shades,
+    pub(super) scheme: ColourScheme,
     pub(super) bar: Option<Bar>,
 }
 
 /// A legend entry and the left end of its first line.
-pub(super) struct Placed {
-    pub(super) entry: Entry,
+pub(super) struct PlacedEntry {
+    pub(super) entry: LegendEntry,
     pub(super) lines: Vec<String>,
     pub(super) x: f64,
     pub(super) y: f64,
@@ -32,7 +32,7 @@ pub(super) struct Bar {
     pub(super) left: f64,
     pub(super) top: f64,
     pub(super) height: f64,
-    pub(super) range: Range,
+    pub(super) range: AxisRange,
     pub(super) ticks: Ticks,
     pub(super) title: Vec<String>,
     /// Distance from the bar to the near edge of its title.
@@ -45,10 +45,10 @@ pub(super) struct PlotArea {
     pub(super) top: f64,
     pub(super) width: f64,
     pub(super) height: f64,
-    pub(super) x: Range,
-    pub(super) y: Range,
-    pub(super) own_x: bool,
-    pub(super) own_y: bool,
+    pub(super) x: AxisRange,
+    pub(super) y: AxisRange,
+    pub(super) x_differs: bool,
+    pub(super) y_differs: bool,
     pub(super) x_ticks: Ticks,
     pub(super) y_ticks: Ticks,
     pub(super) title: Vec<String>,
@@ -74,15 +74,15 @@ impl Layout {
             .collect();
         // Adjacent panels with the same axis share one title at the outer edge.
         for i in 0..panels.len() {
-            if i + columns < panels.len() && !panels[i].own_x && panels[i].x_title == panels[i + columns].x_title {
+            if i + columns < panels.len() && !panels[i].x_differs && panels[i].x_title == panels[i + columns].x_title {
                 panels[i].x_title.clear();
             }
         }
         for i in (0..panels.len()).rev() {
             // Panels with a different x quantity keep their y titles, because a reader expects
             // them there.
-            let same = i > 0 && panels::alike(&figure.panels[i].x, &figure.panels[i - 1].x);
-            if same && i % columns > 0 && !panels[i].own_y && panels[i].y_title == panels[i - 1].y_title {
+            let same = i > 0 && panels::same_quantity(&figure.panels[i].x, &figure.panels[i - 1].x);
+            if same && i % columns > 0 && !panels[i].y_differs && panels[i].y_title == panels[i - 1].y_title {
                 panels[i].y_title.clear();
             }
         }
@@ -97,9 +97,9 @@ impl Layout {
             let overhang = members.iter().map(|&i| panels[i].overhang()).fold(0.0, f64::max);
             right += left + plot_width + if column + 1 < columns { overhang.max(GAP) } else { overhang };
         }
-        let shades = Shades::of(figure);
+        let scheme = ColourScheme::of(figure);
         let full_height = rows as f64 * plot_height;
-        let mut bar = shades.bar.as_ref().map(|(axis, range)| Bar::new(axis, *range, right + GAP, full_height));
+        let mut bar = scheme.bar.as_ref().map(|(axis, range)| Bar::new(axis, *range, right + GAP, full_height));
         let width = bar.as_ref().map_or(right, Bar::right) + MARGIN;
 
         let title = font::wrap(&figure.title, TITLE, Weight::Bold, width - 2.0 * MARGIN);
@@ -120,7 +120,7 @@ impl Layout {
             bar.top = first.top;
             bar.height = last.top + plot_height - first.top;
         }
-        Layout { width, height: y + MARGIN, title, legend, panels, shades, bar }
+        Layout { width, height: y + MARGIN, title, legend, panels, scheme, bar }
     }
 }
 
@@ -136,9 +136,9 @@ fn title(axis: &Axis, ticks: &Ticks, own: bool, limit: f64) -> Vec<String> {
 }
 
 impl Bar {
-    pub(super) fn new(axis: &Axis, range: Range, left: f64, height: f64) -> Bar {
-        let ticks = axis::ticks_of(axis, range, height / 46.0);
-        let title_offset = BAR + TICK_LENGTH + 5.0 + widest(&ticks) + 9.0;
+    pub(super) fn new(axis: &Axis, range: AxisRange, left: f64, height: f64) -> Bar {
+        let ticks = axis::axis_ticks(axis, range, height / 46.0);
+        let title_offset = COLOUR_BAR_WIDTH + TICK_LENGTH + 5.0 + widest(&ticks) + 9.0;
         let title = title(axis, &ticks, false, height);
         Bar { left, top: 0.0, height, range, ticks, title, title_offset }
     }
@@ -153,13 +153,13 @@ impl PlotArea {
         if panel.picture {
             return PlotArea::of_picture(panel, axes, width, height);
         }
-        let Axes { x, y, own_x, own_y } = *axes;
-        let y_ticks = axis::ticks_of(&panel.y, y, height / 46.0);
+        let Axes { x, y, x_differs, y_differs } = *axes;
+        let y_ticks = axis::axis_ticks(&panel.y, y, height / 46.0);
         // Uses as many ticks as the widths of their labels allow.
         let fits =
             |ticks: &Ticks| (widest(ticks) + 16.0) * ticks.labels.len() as f64 <= width && apart(ticks, x, width);
-        let x_ticks = (3..=8).rev().map(|n| axis::ticks_of(&panel.x, x, f64::from(n))).find(fits);
-        let x_ticks = x_ticks.unwrap_or_else(|| axis::ticks_of(&panel.x, x, 2.0));
+        let x_ticks = (3..=8).rev().map(|n| axis::axis_ticks(&panel.x, x, f64::from(n))).find(fits);
+        let x_ticks = x_ticks.unwrap_or_else(|| axis::axis_ticks(&panel.x, x, 2.0));
         let y_title_offset = TICK_LENGTH + 5.0 + widest(&y_ticks) + 9.0;
         PlotArea {
             left: 0.0,
@@ -167,12 +167,12 @@ impl PlotArea {
             width,
             height,
             title: font::wrap(&panel.title, PANEL_TITLE, Weight::Bold, width),
-            x_title: title(&panel.x, &x_ticks, own_x, width),
-            y_title: title(&panel.y, &y_ticks, own_y, height),
+            x_title: title(&panel.x, &x_ticks, x_differs, width),
+            y_title: title(&panel.y, &y_ticks, y_differs, height),
             x,
             y,
-            own_x,
-            own_y,
+            x_differs,
+            y_differs,
             x_ticks,
             y_ticks,
             y_title_offset,
@@ -181,7 +181,7 @@ impl PlotArea {
 
     /// Lays out a picture: equal scales on both axes, without ticks and titles.
     fn of_picture(panel: &Panel, axes: &Axes, width: f64, height: f64) -> PlotArea {
-        let (x, y) = panels::level(axes.x, axes.y, width / height);
+        let (x, y) = panels::equal_scale(axes.x, axes.y, width / height);
         PlotArea {
             left: 0.0,
             top: 0.0,
@@ -192,8 +192,8 @@ impl PlotArea {
             y_title: Vec::new(),
             x,
             y,
-            own_x: true,
-            own_y: true,
+            x_differs: true,
+            y_differs: true,
             x_ticks: Ticks::default(),
             y_ticks: Ticks::default(),
             y_title_offset: 0.0,
@@ -213,7 +213,7 @@ impl PlotArea {
 
     /// Returns the length by which the last x label extends beyond the plot area.
     pub(super) fn overhang(&self) -> f64 {
-        let (Some(at), Some(label)) = (self.x_ticks.at.last(), self.x_ticks.labels.last()) else { return 0.0 };
+        let (Some(at), Some(label)) = (self.x_ticks.positions.last(), self.x_ticks.labels.last()) else { return 0.0 };
         (self.map((*at, self.y.from)).0 - self.left + 0.5 * font::width(label, TICK, Weight::Regular) - self.width)
             .max(0.0)
     }
@@ -221,22 +221,22 @@ impl PlotArea {
     /// Returns the page position of a point. Distant points are moved closer, without visible
     /// effect on lines.
     pub(super) fn map(&self, (x, y): Point) -> Point {
-        let part = |v: f64, r: Range| r.part(v).clamp(-FAR, FAR);
+        let part = |v: f64, r: AxisRange| r.fraction(v).clamp(-MAX_DISTANCE, MAX_DISTANCE);
         (self.left + self.width * part(x, self.x), self.top + self.height * (1.0 - part(y, self.y)))
     }
 
-    pub(super) fn window(&self) -> Window {
-        Window { left: self.left, top: self.top, right: self.left + self.width, bottom: self.top + self.height }
+    pub(super) fn clip_rect(&self) -> ClipRect {
+        ClipRect { left: self.left, top: self.top, right: self.left + self.width, bottom: self.top + self.height }
     }
 }
 
 /// Maximum distance of a point from the plot area, in axis lengths.
-const FAR: f64 = 1e6;
+const MAX_DISTANCE: f64 = 1e6;
 
 /// Returns `true` if labels at unequal distances do not touch each other.
-fn apart(ticks: &Ticks, range: Range, width: f64) -> bool {
-    let edges: Vec<(f64, f64)> = (ticks.at.iter().zip(&ticks.labels))
-        .map(|(at, label)| (width * range.part(*at), 0.5 * font::width(label, TICK, Weight::Regular)))
+fn apart(ticks: &Ticks, range: AxisRange, width: f64) -> bool {
+    let edges: Vec<(f64, f64)> = (ticks.positions.iter().zip(&ticks.labels))
+        .map(|(at, label)| (width * range.fraction(*at), 0.5 * font::width(label, TICK, Weight::Regular)))
         .collect();
     edges.windows(2).all(|w| w[1].0 - w[1].1 - (w[0].0 + w[0].1) >= 8.0)
 }
@@ -245,22 +245,22 @@ fn apart(ticks: &Ticks, range: Range, width: f64) -> bool {
 pub(super) const SAMPLE: (f64, f64, f64) = (30.0, 7.0, 24.0);
 
 /// Places legend entries in centred rows below `top`. Returns them and the lower edge.
-fn place_legend((entries, more): (Vec<Entry>, usize), width: f64, top: f64) -> (Vec<Placed>, f64) {
+fn place_legend((entries, more): (Vec<LegendEntry>, usize), width: f64, top: f64) -> (Vec<PlacedEntry>, f64) {
     let limit = width - 2.0 * MARGIN;
     let before = SAMPLE.0 + SAMPLE.1;
     struct Item {
         length: f64,
         lines: Vec<String>,
-        entry: Entry,
+        entry: LegendEntry,
     }
-    let broken = |entry: Entry| {
+    let broken = |entry: LegendEntry| {
         let lines = font::wrap(&entry.label, LABEL, Weight::Regular, limit - before);
         let text = lines.iter().map(|l| font::width(l, LABEL, Weight::Regular)).fold(0.0, f64::max);
         Item { length: before + text, lines, entry }
     };
-    let rest = (more > 0).then(|| Entry {
+    let rest = (more > 0).then(|| LegendEntry {
         label: format!("… and {more} more"),
-        colour: Colour::many(),
+        colour: Colour::several(),
         line: None,
         marks: false,
         area: None,
@@ -283,7 +283,7 @@ fn place_legend((entries, more): (Vec<Entry>, usize), width: f64, top: f64) -> (
         let mut x = ((width - used) / 2.0).max(MARGIN);
         let lines = row.iter().map(|item| item.lines.len()).max().unwrap_or(1).max(1);
         for Item { length, lines, entry } in row {
-            placed.push(Placed { entry, lines, x, y: y + LABEL });
+            placed.push(PlacedEntry { entry, lines, x, y: y + LABEL });
             x += length + SAMPLE.2;
         }
         y += LABEL * (1.5 + LEADING * (lines - 1) as f64);

@@ -18,19 +18,19 @@ pub(crate) use document::escape;
 use crate::figure::clip::{self, Point};
 use crate::figure::colour::Colour;
 use crate::figure::font::Weight;
-use crate::figure::panels::{self, AREA, PALE, Shades};
+use crate::figure::panels::{self, AREA, ColourScheme, PALE};
 use crate::output::result_file::{File, Output, ReportError};
 use document::{Pen, Svg, Text};
-use layout::{Bar, Layout, Placed, PlotArea, SAMPLE};
+use layout::{Bar, Layout, PlacedEntry, PlotArea, SAMPLE};
 use stickslip_study::dataset::{Dataset, Emphasis, Figure, Panel, Series, Style};
 use style::{
-    AXIS, BAR, BAR_STEPS, FINE_GRID, GRID, LABEL, LEADING, LINE, MARGIN, MARK, MINOR_LENGTH, PANEL_TITLE, SMALL_MARK,
-    THIN, TICK, TICK_LENGTH, TITLE,
+    AXIS, BAR_STEPS, COLOUR_BAR_WIDTH, FINE_GRID, GRID, LABEL, LEADING, LINE, MARGIN, MARK, MINOR_LENGTH, PANEL_TITLE,
+    SMALL_MARK, THIN, TICK, TICK_LENGTH, TITLE,
 };
 
 /// The output `svg`.
 pub const OUTPUT: Output =
-    Output { name: "svg", summary: "figure.svg, for papers and slides", make: files, sink: None, usual: true };
+    Output { name: "svg", summary: "figure.svg, for papers and slides", make: files, sink: None, is_default: true };
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(vec![File::new("figure.svg", to_svg(&dataset.figure))])
@@ -48,7 +48,7 @@ pub fn to_svg(figure: &Figure) -> String {
         draw_entry(&mut svg, placed);
     }
     for (panel, plot) in figure.panels.iter().zip(&layout.panels) {
-        draw_panel(&mut svg, panel, plot, &layout.shades);
+        draw_panel(&mut svg, panel, plot, &layout.scheme);
     }
     if let Some(bar) = &layout.bar {
         draw_bar(&mut svg, bar);
@@ -65,7 +65,7 @@ fn dashes(style: Style) -> Option<&'static str> {
     }
 }
 
-fn draw_entry(svg: &mut Svg, Placed { entry, lines, x, y }: &Placed) {
+fn draw_entry(svg: &mut Svg, PlacedEntry { entry, lines, x, y }: &PlacedEntry) {
     let colour = &entry.colour.light;
     let opacity = if entry.pale { PALE } else { 1.0 };
     match entry.area {
@@ -97,17 +97,21 @@ fn draw_bar(svg: &mut Svg, bar: &Bar) {
     for i in 0..BAR_STEPS {
         let part = |i: usize| i as f64 / BAR_STEPS as f64;
         let colour = Colour::sequential((i as f64 + 0.5) / BAR_STEPS as f64).light;
-        svg.area(&box_around(bar.left, bar.top, BAR, bar.height * (1.0 - part(i))), &colour, 1.0);
+        svg.area(&box_around(bar.left, bar.top, COLOUR_BAR_WIDTH, bar.height * (1.0 - part(i))), &colour, 1.0);
     }
-    svg.frame(bar.left, bar.top, BAR, bar.height);
-    let at = |value: f64| bar.top + bar.height * (1.0 - bar.range.part(value));
+    svg.frame(bar.left, bar.top, COLOUR_BAR_WIDTH, bar.height);
+    let at = |value: f64| bar.top + bar.height * (1.0 - bar.range.fraction(value));
     for minor in &bar.ticks.minor {
-        svg.line((bar.left + BAR, at(*minor)), (bar.left + BAR + MINOR_LENGTH, at(*minor)), AXIS);
+        svg.line(
+            (bar.left + COLOUR_BAR_WIDTH, at(*minor)),
+            (bar.left + COLOUR_BAR_WIDTH + MINOR_LENGTH, at(*minor)),
+            AXIS,
+        );
     }
-    for (value, label) in bar.ticks.at.iter().zip(&bar.ticks.labels) {
+    for (value, label) in bar.ticks.positions.iter().zip(&bar.ticks.labels) {
         let y = at(*value);
-        svg.line((bar.left + BAR, y), (bar.left + BAR + TICK_LENGTH, y), AXIS);
-        let beside = Text::at(bar.left + BAR + TICK_LENGTH + 5.0, y + 0.36 * TICK);
+        svg.line((bar.left + COLOUR_BAR_WIDTH, y), (bar.left + COLOUR_BAR_WIDTH + TICK_LENGTH, y), AXIS);
+        let beside = Text::at(bar.left + COLOUR_BAR_WIDTH + TICK_LENGTH + 5.0, y + 0.36 * TICK);
         svg.text(label, Text { size: TICK, anchor: "start", ..beside });
     }
     for (i, line) in bar.title.iter().enumerate() {
@@ -117,7 +121,7 @@ fn draw_bar(svg: &mut Svg, bar: &Bar) {
     svg.close();
 }
 
-fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
+fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourScheme) {
     let (right, bottom, middle) = (plot.left + plot.width, plot.top + plot.height, plot.left + plot.width / 2.0);
     svg.open(&panel.title);
     for (i, line) in plot.title.iter().enumerate() {
@@ -126,12 +130,12 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
     }
     let x_of = |x: &f64| plot.map((*x, plot.y.from)).0;
     let y_of = |y: &f64| plot.map((plot.x.from, *y)).1;
-    for (values, colour) in [(&plot.x_ticks.minor, FINE_GRID), (&plot.x_ticks.at, GRID)] {
+    for (values, colour) in [(&plot.x_ticks.minor, FINE_GRID), (&plot.x_ticks.positions, GRID)] {
         for x in values.iter().map(x_of) {
             svg.line((x, plot.top), (x, bottom), colour);
         }
     }
-    for (values, colour) in [(&plot.y_ticks.minor, FINE_GRID), (&plot.y_ticks.at, GRID)] {
+    for (values, colour) in [(&plot.y_ticks.minor, FINE_GRID), (&plot.y_ticks.positions, GRID)] {
         for y in values.iter().map(y_of) {
             svg.line((plot.left, y), (right, y), colour);
         }
@@ -155,14 +159,14 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
     for x in plot.x_ticks.minor.iter().map(x_of) {
         svg.line((x, bottom), (x, bottom + MINOR_LENGTH), AXIS);
     }
-    for (x, label) in plot.x_ticks.at.iter().map(x_of).zip(&plot.x_ticks.labels) {
+    for (x, label) in plot.x_ticks.positions.iter().map(x_of).zip(&plot.x_ticks.labels) {
         svg.line((x, bottom), (x, bottom + TICK_LENGTH), AXIS);
         svg.text(label, Text { size: TICK, ..Text::at(x, bottom + TICK_LENGTH + 3.0 + TICK * 0.95) });
     }
     for y in plot.y_ticks.minor.iter().map(y_of) {
         svg.line((plot.left - MINOR_LENGTH, y), (plot.left, y), AXIS);
     }
-    for (y, label) in plot.y_ticks.at.iter().map(y_of).zip(&plot.y_ticks.labels) {
+    for (y, label) in plot.y_ticks.positions.iter().map(y_of).zip(&plot.y_ticks.labels) {
         svg.line((plot.left - TICK_LENGTH, y), (plot.left, y), AXIS);
         let at = Text::at(plot.left - TICK_LENGTH - 5.0, y + 0.36 * TICK);
         svg.text(label, Text { size: TICK, anchor: "end", ..at });
@@ -180,23 +184,23 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, shades: &Shades) {
     }
     let crowd = panels::crowded(panel);
     let bars: Vec<&Series> = panel.series.iter().filter(|s| s.style == Style::Bars).collect();
-    for series in panels::layers(panel) {
-        let colour = &shades.colour(series).light;
+    for series in panels::drawing_order(panel) {
+        let colour = &scheme.colour(series).light;
         match series.style {
             Style::Marks => {
                 let size = if crowd { SMALL_MARK } else { MARK };
                 let at = panels::drawn(panel, series).map(|p| plot.map(p));
-                for point in at.filter(|p| plot.window().contains(*p)) {
+                for point in at.filter(|p| plot.clip_rect().contains(*p)) {
                     svg.mark(point, colour, size);
                 }
             }
             Style::Missing => {
                 let y = plot.top + plot.height * (1.0 - panels::row_of_crosses(series));
-                for point in series.x.iter().map(|x| (x_of(x), y)).filter(|p| plot.window().contains(*p)) {
+                for point in series.x.iter().map(|x| (x_of(x), y)).filter(|p| plot.clip_rect().contains(*p)) {
                     svg.cross(point, colour);
                 }
             }
-            Style::Stripe => draw_stripe(svg, series, plot, shades),
+            Style::Stripe => draw_stripe(svg, series, plot, scheme),
             Style::Band => draw_band(svg, panel, series, plot, colour),
             Style::Bars => {
                 let slot = panels::bar_slot(panel, plot.x);
@@ -225,11 +229,11 @@ fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen
         let piece: Vec<Point> = piece.iter().map(|p| plot.map(*p)).collect();
         match piece.as_slice() {
             [] => {}
-            [point] if plot.window().contains(*point) => svg.dot(*point, pen.colour),
+            [point] if plot.clip_rect().contains(*point) => svg.dot(*point, pen.colour),
             [_] => {}
             line => {
-                for part in plot.window().line(line) {
-                    svg.polyline(&clip::visible(part), pen);
+                for part in plot.clip_rect().line(line) {
+                    svg.polyline(&clip::simplified(part), pen);
                 }
             }
         }
@@ -247,20 +251,20 @@ fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, col
         })
         .collect();
     for piece in points.split(|((x, y), _)| !(x.is_finite() && y.is_finite())) {
-        let upper = clip::visible(piece.iter().map(|(p, _)| *p).collect());
-        let lower = clip::visible(piece.iter().map(|((x, _), base)| (*x, *base)).collect());
+        let upper = clip::simplified(piece.iter().map(|(p, _)| *p).collect());
+        let lower = clip::simplified(piece.iter().map(|((x, _), base)| (*x, *base)).collect());
         let outline: Vec<Point> = upper.into_iter().chain(lower.into_iter().rev()).collect();
-        svg.area(&plot.window().polygon(&outline), colour, AREA);
+        svg.area(&plot.clip_rect().polygon(&outline), colour, AREA);
     }
 }
 
 /// Draws the cells of a stripe, as high as the distance between stripes.
-fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, shades: &Shades) {
+fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, scheme: &ColourScheme) {
     let Some(y) = series.y.first() else { return };
-    for ((from, to, _), colour) in panels::cells(series, plot.x, shades) {
-        let ((left, top), (right, bottom)) = (plot.map((from, y + 0.5)), plot.map((to, y - 0.5)));
+    for cell in panels::cells(series, plot.x, scheme) {
+        let ((left, top), (right, bottom)) = (plot.map((cell.from, y + 0.5)), plot.map((cell.to, y - 0.5)));
         let corners = box_around(left, top, right - left, bottom - top);
-        svg.tile(&plot.window().polygon(&corners), &colour.light);
+        svg.tile(&plot.clip_rect().polygon(&corners), &cell.colour.light);
     }
 }
 
@@ -277,7 +281,7 @@ fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, slo
         let (x, y) = plot.map(point);
         let base = panels::base(panel, series, i).map_or(plot.top + plot.height, |base| plot.map((point.0, base)).1);
         let corners = box_around(x + slot.shift * scale, y, slot.width * scale, base - y);
-        svg.area(&plot.window().polygon(&corners), colour, opacity);
+        svg.area(&plot.clip_rect().polygon(&corners), colour, opacity);
     }
 }
 
@@ -354,7 +358,7 @@ mod tests {
         let mut figure = samples::envelope().figure;
         figure.panels.truncate(1);
         let layout = Layout::new(&figure);
-        let window = layout.panels[0].window();
+        let window = layout.panels[0].clip_rect();
         let svg = to_svg(&figure);
         let document = roxmltree::Document::parse(&svg).unwrap();
         let mut points = 0;

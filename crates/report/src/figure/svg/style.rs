@@ -19,7 +19,7 @@ pub(super) const MARK: f64 = 3.8;
 pub(super) const SMALL_MARK: f64 = 2.0;
 pub(super) const CROSS: f64 = 2.8;
 /// Width of the colour bar, and number of its steps, which look continuous.
-pub(super) const BAR: f64 = 16.0;
+pub(super) const COLOUR_BAR_WIDTH: f64 = 16.0;
 pub(super) const BAR_STEPS: usize = 96;
 pub(super) const TEXT: &str = "#1a1a1a";
 pub(super) const AXIS: &str = "#444444";

@@ -3,7 +3,7 @@
 use std::io::Read;
 
 /// Limit of the length of a frame; a larger length is invalid.
-pub(super) const LONGEST: u32 = 1 << 31;
+pub(super) const MAX_LENGTH: u32 = 1 << 31;
 /// Number of bytes before the payload of a frame.
 pub(super) const PREFIX: u64 = 8;
 
@@ -25,7 +25,7 @@ pub(super) fn frame(reader: &mut impl Read, left: u64) -> std::io::Result<Option
     reader.read_exact(&mut length)?;
     reader.read_exact(&mut sum)?;
     let length = u32::from_le_bytes(length);
-    if length >= LONGEST || PREFIX + u64::from(length) > left {
+    if length >= MAX_LENGTH || PREFIX + u64::from(length) > left {
         return Ok(None);
     }
     let mut payload = vec![0; length as usize];

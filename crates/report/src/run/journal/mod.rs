@@ -4,20 +4,20 @@
 //! ```text
 //! STICKJ01                                            eight bytes
 //! length u32 | check u32 | payload                    a frame, little endian; the check is CRC-32 of length and payload
-//!   payload: 0, JSON of the head                      what the run is of: the first frame
-//!   payload: 1, units, time, JSON of the tally, tables   a block, after that of the units before
-//!   payload: 2                                        all units are here: the last frame
+//!   payload: 0, JSON of the header                    description of the run: the first frame
+//!   payload: 1, units, time, JSON of the tally, tables   a block, in the order of the units
+//!   payload: 2                                        end of a complete run: the last frame
 //! ```
 //!
 //! A frame is valid if it is complete and its checksum matches. A resumed run cuts off the
-//! bytes after the last valid frame, which the abort left incomplete. A block counts as kept
+//! bytes after the last valid frame, which the abort left incomplete. A block is safe
 //! when the file system confirms that it is on disk and the file is still at its path.
 
 mod encoding;
 mod frame;
 
-use crate::output::json::Shape;
-use frame::{LONGEST, PREFIX, check, frame};
+use crate::output::json::TableShape;
+use frame::{MAX_LENGTH, PREFIX, check, frame};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -34,10 +34,10 @@ use stickslip_study::run::Checked;
 pub(crate) const FILE: &str = "journal";
 const MAGIC: &[u8; 8] = b"STICKJ01";
 /// Maximum number of cells in a block: one megabyte.
-const CELLS: usize = 131_072;
+const MAX_BLOCK_CELLS: usize = 131_072;
 /// Interval after which a block is synchronized to disk regardless of its size. An abort loses
 /// at most the results of this interval.
-const EVERY: Duration = Duration::from_secs(1);
+const SYNC_INTERVAL: Duration = Duration::from_secs(1);
 /// Tags of payloads.
 const HEAD: u8 = 0;
 const BLOCK: u8 = 1;
@@ -45,7 +45,7 @@ const END: u8 = 2;
 
 /// Description of the run that a journal belongs to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Head {
+pub struct RunHeader {
     /// The part of the results that is known before the computation.
     pub outline: Dataset,
     /// Number of units of the whole study.
@@ -54,16 +54,16 @@ pub struct Head {
     pub range: Range<usize>,
 }
 
-impl Head {
+impl RunHeader {
     /// Describes a run of these units.
-    pub fn new(checked: &Checked, range: Range<usize>, threads: usize) -> Head {
-        Head { outline: checked.outline(threads), units: checked.units(), range }
+    pub fn new(checked: &Checked, range: Range<usize>, threads: usize) -> RunHeader {
+        RunHeader { outline: checked.outline(threads), units: checked.units(), range }
     }
 
     /// Returns a description of the difference between the runs of two journals.
     ///
     /// Returns `None` if both belong to the same results.
-    pub fn difference(&self, other: &Head) -> Option<String> {
+    pub fn difference(&self, other: &RunHeader) -> Option<String> {
         let (ours, theirs) = (&self.outline.record, &other.outline.record);
         let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs}, not {ours}"));
         if ours.version != theirs.version {
@@ -115,7 +115,7 @@ impl Head {
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
     /// The file system returned an error while writing.
-    #[error("cannot write {}: {cause}; {}", path.display(), kept(*units))]
+    #[error("cannot write {}: {cause}; {}", path.display(), storage_status(*units))]
     Write {
         /// Path of the journal.
         path: PathBuf,
@@ -128,7 +128,7 @@ pub enum JournalError {
     /// Another program removed or replaced the file.
     #[error("{} was removed or replaced during the run: its results are lost, and the run stops. Run the study \
              again", path.display())]
-    Vanished {
+    Removed {
         /// Path of the journal.
         path: PathBuf,
     },
@@ -143,7 +143,7 @@ pub enum JournalError {
     },
     /// The file is not a valid journal.
     #[error("{}: {reason}", path.display())]
-    Not {
+    Invalid {
         /// Path of the file.
         path: PathBuf,
         /// Description of the error.
@@ -151,7 +151,7 @@ pub enum JournalError {
     },
     /// The program was aborted before the journal contained any data.
     #[error("{}: the journal is empty; start the run again without --resume", path.display())]
-    Nothing {
+    Empty {
         /// Path of the journal.
         path: PathBuf,
     },
@@ -166,7 +166,7 @@ pub enum JournalError {
     Study(#[from] StudyError),
 }
 
-fn kept(units: usize) -> String {
+fn storage_status(units: usize) -> String {
     match units {
         0 => "no results are stored yet".to_owned(),
         _ => "the earlier results are stored: resume the run with --resume".to_owned(),
@@ -178,7 +178,7 @@ fn kept(units: usize) -> String {
 pub struct Journal {
     path: PathBuf,
     file: File,
-    head: Head,
+    head: RunHeader,
     /// Units whose blocks are in the file.
     units: Range<usize>,
     /// Offset and payload length of each block.
@@ -186,15 +186,15 @@ pub struct Journal {
     /// Offset of the end of the last frame.
     end: u64,
     pub(crate) tally: Tally,
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<TableShape>,
     /// Wall time up to the last block in s.
     time: f64,
     /// Wall time of earlier runs in s, and start of this run.
-    before: f64,
+    earlier_time: f64,
     begun: Instant,
-    waiting: Option<Block>,
+    pending: Option<Block>,
     /// First unit that is not confirmed on disk.
-    kept: usize,
+    synced_end: usize,
     synced: Instant,
     sealed: bool,
 }
@@ -205,7 +205,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError`] if the file system fails or another run writes there.
-    pub fn create(folder: &Path, head: Head) -> Result<Journal, JournalError> {
+    pub fn create(folder: &Path, head: RunHeader) -> Result<Journal, JournalError> {
         let path = folder.join(FILE);
         let failed = |cause| JournalError::Write { path: path.clone(), cause, units: 0 };
         std::fs::create_dir_all(folder).map_err(failed)?;
@@ -224,7 +224,7 @@ impl Journal {
         Ok(journal)
     }
 
-    fn empty(path: PathBuf, file: File, head: Head) -> Journal {
+    fn empty(path: PathBuf, file: File, head: RunHeader) -> Journal {
         let from = head.range.start;
         Journal {
             path,
@@ -236,10 +236,10 @@ impl Journal {
             tally: Tally::default(),
             shapes: Vec::new(),
             time: 0.0,
-            before: 0.0,
+            earlier_time: 0.0,
             begun: Instant::now(),
-            waiting: None,
-            kept: from,
+            pending: None,
+            synced_end: from,
             synced: Instant::now(),
             sealed: false,
         }
@@ -254,7 +254,7 @@ impl Journal {
         let failed = |cause| JournalError::Write { path: path.clone(), cause, units: 0 };
         let file = OpenOptions::new().read(true).write(true).open(&path).map_err(failed)?;
         lock(&file, folder)?;
-        let mut journal = Journal::scanned(path.clone(), file)?;
+        let mut journal = Journal::scan(path.clone(), file)?;
         journal.file.set_len(journal.end).map_err(failed)?;
         journal.file.seek(SeekFrom::Start(journal.end)).map_err(failed)?;
         Ok(journal)
@@ -267,18 +267,18 @@ impl Journal {
     pub fn read(folder: &Path) -> Result<Journal, JournalError> {
         let path = folder.join(FILE);
         let file = File::open(&path).map_err(|cause| JournalError::Read { path: path.clone(), cause })?;
-        Journal::scanned(path, file)
+        Journal::scan(path, file)
     }
 
-    fn scanned(path: PathBuf, file: File) -> Result<Journal, JournalError> {
+    fn scan(path: PathBuf, file: File) -> Result<Journal, JournalError> {
         let reading = |cause| JournalError::Read { path: path.clone(), cause };
-        let not = |reason: &str| JournalError::Not { path: path.clone(), reason: reason.to_owned() };
+        let not = |reason: &str| JournalError::Invalid { path: path.clone(), reason: reason.to_owned() };
         let mut reader = BufReader::with_capacity(1 << 20, file.try_clone().map_err(reading)?);
         let all = file.metadata().map_err(reading)?.len();
         let mut magic = [0; MAGIC.len()];
         match reader.read_exact(&mut magic) {
             Ok(()) if magic == *MAGIC => {}
-            Err(cause) if cause.kind() == ErrorKind::UnexpectedEof => return Err(JournalError::Nothing { path }),
+            Err(cause) if cause.kind() == ErrorKind::UnexpectedEof => return Err(JournalError::Empty { path }),
             Err(cause) => return Err(reading(cause)),
             _ => return Err(not("this file is not a journal of a run by this version")),
         }
@@ -289,7 +289,7 @@ impl Journal {
             Ok(payload)
         };
         let Some(head) = next(&mut at)?.filter(|payload| payload.first() == Some(&HEAD)) else {
-            return Err(JournalError::Nothing { path });
+            return Err(JournalError::Empty { path });
         };
         let head = serde_json::from_slice(&head[1..]);
         let head =
@@ -306,20 +306,20 @@ impl Journal {
                         break;
                     }
                     journal.frames.push((journal.end, payload.len() as u32));
-                    journal.joined(block);
-                    (journal.time, journal.before) = (time, time);
+                    journal.append_summary(block);
+                    (journal.time, journal.earlier_time) = (time, time);
                 }
                 Some(&END) => journal.sealed = true,
                 _ => break,
             }
             journal.end = at;
         }
-        journal.kept = journal.units.end;
+        journal.synced_end = journal.units.end;
         Ok(journal)
     }
 
     /// Returns the description of the run.
-    pub fn head(&self) -> &Head {
+    pub fn head(&self) -> &RunHeader {
         &self.head
     }
 
@@ -329,8 +329,8 @@ impl Journal {
     }
 
     /// Returns the first unit that is not confirmed on disk.
-    pub fn kept(&self) -> usize {
-        self.kept
+    pub fn synced_end(&self) -> usize {
+        self.synced_end
     }
 
     /// Returns the numbers of points by status, and the notes and failures, of the units in the
@@ -361,37 +361,37 @@ impl Journal {
     /// # Errors
     /// [`JournalError`] if the file system fails or the file was removed.
     pub fn add(&mut self, block: Block) -> Result<bool, JournalError> {
-        match &mut self.waiting {
-            Some(waiting) => waiting.append(block),
-            None => self.waiting = Some(block),
+        match &mut self.pending {
+            Some(pending) => pending.append(block),
+            None => self.pending = Some(block),
         }
-        let late = self.synced.elapsed() >= EVERY;
-        let large = self.waiting.as_ref().is_some_and(|waiting| waiting.cells() >= CELLS);
+        let late = self.synced.elapsed() >= SYNC_INTERVAL;
+        let large = self.pending.as_ref().is_some_and(|pending| pending.cells() >= MAX_BLOCK_CELLS);
         if late {
-            self.keep()?;
+            self.sync()?;
         } else if large {
-            self.put()?;
+            self.write_block()?;
         }
         Ok(late)
     }
 
-    /// Writes the waiting block.
-    fn put(&mut self) -> Result<(), JournalError> {
-        let Some(block) = self.waiting.take() else { return Ok(()) };
-        self.time = self.before + self.begun.elapsed().as_secs_f64();
+    /// Writes the pending block.
+    fn write_block(&mut self) -> Result<(), JournalError> {
+        let Some(block) = self.pending.take() else { return Ok(()) };
+        self.time = self.earlier_time + self.begun.elapsed().as_secs_f64();
         let mut payload = vec![BLOCK];
         encoding::write(&block, self.time, &mut payload);
         let at = self.end;
         self.frame(&payload)?;
         self.frames.push((at, payload.len() as u32));
-        self.joined(block);
+        self.append_summary(block);
         Ok(())
     }
 
-    fn joined(&mut self, block: Block) {
+    fn append_summary(&mut self, block: Block) {
         self.units.end = block.units.end;
         self.tally.append(block.tally);
-        let shapes = block.tables.iter().map(Shape::of);
+        let shapes = block.tables.iter().map(TableShape::of);
         if self.shapes.is_empty() {
             self.shapes = shapes.collect();
         } else {
@@ -399,15 +399,15 @@ impl Journal {
         }
     }
 
-    /// Writes the waiting block and synchronizes the file to disk.
+    /// Writes the pending block and synchronizes the file to disk.
     ///
     /// # Errors
     /// [`JournalError`] if the file system fails or the file was removed.
-    pub fn keep(&mut self) -> Result<(), JournalError> {
-        self.put()?;
+    pub fn sync(&mut self) -> Result<(), JournalError> {
+        self.write_block()?;
         self.file.sync_data().map_err(|cause| self.failed(cause))?;
         self.is_there()?;
-        self.kept = self.units.end;
+        self.synced_end = self.units.end;
         self.synced = Instant::now();
         Ok(())
     }
@@ -417,12 +417,12 @@ impl Journal {
     /// # Errors
     /// [`JournalError`] if the file system fails or the file was removed.
     pub fn seal(&mut self) -> Result<(), JournalError> {
-        self.put()?;
+        self.write_block()?;
         if !self.sealed {
             self.frame(&[END])?;
             self.sealed = true;
         }
-        self.keep()
+        self.sync()
     }
 
     /// Returns an error if the file at the path is no longer this one: a removed file accepts
@@ -432,18 +432,18 @@ impl Journal {
             let (here, there) = (self.file.metadata()?, std::fs::metadata(&self.path)?);
             Ok(is_same(&here, &there) && there.len() == self.end)
         };
-        if same().unwrap_or(false) { Ok(()) } else { Err(JournalError::Vanished { path: self.path.clone() }) }
+        if same().unwrap_or(false) { Ok(()) } else { Err(JournalError::Removed { path: self.path.clone() }) }
     }
 
     fn failed(&self, cause: std::io::Error) -> JournalError {
-        JournalError::Write { path: self.path.clone(), cause, units: self.kept - self.head.range.start }
+        JournalError::Write { path: self.path.clone(), cause, units: self.synced_end - self.head.range.start }
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), JournalError> {
         if let Err(cause) = self.file.write_all(bytes) {
             // The earlier blocks are complete, and a resumed run finds them.
             if self.file.sync_data().is_ok() {
-                self.kept = self.units.end;
+                self.synced_end = self.units.end;
             }
             return Err(self.failed(cause));
         }
@@ -452,7 +452,7 @@ impl Journal {
     }
 
     fn frame(&mut self, payload: &[u8]) -> Result<(), JournalError> {
-        let length = u32::try_from(payload.len()).ok().filter(|length| *length < LONGEST);
+        let length = u32::try_from(payload.len()).ok().filter(|length| *length < MAX_LENGTH);
         let length = length.ok_or_else(|| self.failed(ErrorKind::FileTooLarge.into()))?;
         let mut bytes = Vec::with_capacity(PREFIX as usize + payload.len());
         bytes.extend(length.to_le_bytes());
@@ -461,11 +461,11 @@ impl Journal {
         self.write(&bytes)
     }
 
-    /// Reads the blocks from the file in order. No block may be waiting.
+    /// Reads the blocks from the file in order. No block may be pending.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = Result<Block, JournalError>> + '_ {
         self.frames.iter().map(|(at, length)| {
             let reading = |cause| JournalError::Read { path: self.path.clone(), cause };
-            let not = || JournalError::Not {
+            let not = || JournalError::Invalid {
                 path: self.path.clone(),
                 reason: "the file was changed while it was read; run the command again".to_owned(),
             };
@@ -535,14 +535,14 @@ mod tests {
     fn a_torn_journal_gives_its_whole_blocks() {
         let (out, checked) = (tempfile::tempdir().unwrap(), couple());
         let all = units(&checked);
-        let mut journal = Journal::create(out.path(), Head::new(&checked, 0..all.len(), 1)).unwrap();
+        let mut journal = Journal::create(out.path(), RunHeader::new(&checked, 0..all.len(), 1)).unwrap();
         let mut ends = vec![journal.end];
         for block in &all {
             journal.add(block.clone()).unwrap();
-            journal.keep().unwrap();
+            journal.sync().unwrap();
             ends.push(journal.end);
         }
-        assert!(journal.is_complete() && journal.kept() == all.len());
+        assert!(journal.is_complete() && journal.synced_end() == all.len());
         drop(journal);
         let bytes = std::fs::read(out.path().join(FILE)).unwrap();
         let cuts = (0..bytes.len()).step_by(997).chain(ends.iter().flat_map(|end| [*end as usize - 1, *end as usize]));
@@ -551,7 +551,7 @@ mod tests {
             std::fs::write(folder.path().join(FILE), &bytes[..cut]).unwrap();
             let whole = ends.iter().filter(|end| **end as usize <= cut).count();
             if whole == 0 {
-                assert!(matches!(Journal::open(folder.path()), Err(JournalError::Nothing { .. })), "{cut}");
+                assert!(matches!(Journal::open(folder.path()), Err(JournalError::Empty { .. })), "{cut}");
                 continue;
             }
             let mut journal = Journal::open(folder.path()).unwrap();
@@ -559,7 +559,7 @@ mod tests {
             for block in &all[whole - 1..] {
                 journal.add(block.clone()).unwrap();
             }
-            journal.keep().unwrap();
+            journal.sync().unwrap();
             same(&journal, &all, cut);
             assert_eq!(journal.tally, joined(all.clone()).tally, "{cut}");
         }
@@ -570,13 +570,13 @@ mod tests {
     fn a_changed_byte_ends_the_journal_there() {
         let (out, checked) = (tempfile::tempdir().unwrap(), couple());
         let all = units(&checked);
-        let mut journal = Journal::create(out.path(), Head::new(&checked, 0..all.len(), 1)).unwrap();
+        let mut journal = Journal::create(out.path(), RunHeader::new(&checked, 0..all.len(), 1)).unwrap();
         let head = journal.end as usize;
         for block in &all {
             journal.add(block.clone()).unwrap();
-            journal.put().unwrap();
+            journal.write_block().unwrap();
         }
-        journal.keep().unwrap();
+        journal.sync().unwrap();
         drop(journal);
         let bytes = std::fs::read(out.path().join(FILE)).unwrap();
         for at in (head..bytes.len()).step_by(503) {
@@ -595,21 +595,21 @@ mod tests {
     #[test]
     fn a_journal_has_one_writer_and_notices_when_it_is_taken_away() {
         let (out, checked) = (tempfile::tempdir().unwrap(), couple());
-        let head = Head::new(&checked, 0..checked.units(), 1);
+        let head = RunHeader::new(&checked, 0..checked.units(), 1);
         let folder = out.path().join("run");
         let mut journal = Journal::create(&folder, head.clone()).unwrap();
         assert!(matches!(Journal::open(&folder), Err(JournalError::Busy { .. })));
         assert!(matches!(Journal::create(&folder, head.clone()), Err(JournalError::Busy { .. })));
         let all = units(&checked);
         journal.add(all[0].clone()).unwrap();
-        journal.keep().unwrap();
+        journal.sync().unwrap();
         std::fs::remove_dir_all(&folder).unwrap();
         journal.add(all[1].clone()).unwrap();
-        assert!(matches!(journal.keep(), Err(JournalError::Vanished { .. })));
+        assert!(matches!(journal.sync(), Err(JournalError::Removed { .. })));
         // The journal of another run in its place is not mistaken for this one.
         let other = Journal::create(&folder, head).unwrap();
         drop(other);
-        assert!(matches!(journal.keep(), Err(JournalError::Vanished { .. })));
+        assert!(matches!(journal.sync(), Err(JournalError::Removed { .. })));
     }
 
     #[test]
@@ -618,7 +618,7 @@ mod tests {
         let head = |name: &str, text: &str, set: &[(&str, &str)], method: &str| {
             let set: Vec<(String, String)> = set.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
             let study = read_study(name, text, &set).unwrap().with_method(method).unwrap();
-            Head::new(&check(&study).unwrap(), 0..1, 1)
+            RunHeader::new(&check(&study).unwrap(), 0..1, 1)
         };
         let own = head("couple.toml", text, &[], "auto");
         assert_eq!(own.difference(&own.clone()), None);
@@ -652,7 +652,7 @@ mod tests {
         let head = |stiffness: f64| {
             std::fs::write(file("k.mtx"), matrix(stiffness)).unwrap();
             let study = stickslip_study::read_file(&file("blade.toml"), &[]).unwrap();
-            Head::new(&check(&study).unwrap(), 0..1, 1)
+            RunHeader::new(&check(&study).unwrap(), 0..1, 1)
         };
         let own = head(8e4);
         assert_eq!(own.difference(&head(8e4)), None);
