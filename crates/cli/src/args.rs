@@ -162,7 +162,7 @@ pub enum Command {
     /// List laws, methods, templates, study kinds or outputs
     List {
         /// Table to list; default: all
-        what: Option<What>,
+        what: Option<ListTopic>,
     },
     /// Print the JSON Schema of study files for editors
     Schema,
@@ -200,7 +200,7 @@ pub enum Progress {
 
 /// Tables that `list` can print.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum What {
+pub enum ListTopic {
     /// Friction laws
     Laws,
     /// Methods

@@ -33,19 +33,19 @@ pub fn show(file: &Path) -> Result<(), String> {
     let said = |reason: String| format!("cannot open {}: {reason}; open it manually", file.display());
     let mut child = command.spawn().map_err(|error| said(format!("{program}: {error}")))?;
     // A program that fails ends soon. A successful one may run as long as the browser.
-    let until = std::time::Instant::now() + PATIENCE;
+    let until = std::time::Instant::now() + FAILURE_TIMEOUT;
     while std::time::Instant::now() < until {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
             Ok(Some(status)) => return Err(said(format!("{program} ended with {status}"))),
-            _ => std::thread::sleep(PATIENCE / 20),
+            _ => std::thread::sleep(FAILURE_TIMEOUT / 20),
         }
     }
     Ok(())
 }
 
 /// Time to wait for a failure of the program.
-const PATIENCE: std::time::Duration = std::time::Duration::from_secs(1);
+const FAILURE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(1);
 
 #[cfg(test)]
 mod tests {

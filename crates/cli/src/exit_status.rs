@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 /// Result of a command, which determines the exit status.
 #[derive(Debug)]
-pub enum Ending {
+pub enum Exit {
     /// All points converged.
     Done,
     /// Results were written, but some points failed.
@@ -16,22 +16,22 @@ pub enum Ending {
     Failed(String),
 }
 
-impl Ending {
+impl Exit {
     /// Returns the exit status.
     pub fn code(&self) -> ExitCode {
         match self {
-            Ending::Done => ExitCode::SUCCESS,
-            Ending::Failed(_) => ExitCode::from(1),
-            Ending::WrongInput => ExitCode::from(2),
-            Ending::SomeFailed => ExitCode::from(3),
+            Exit::Done => ExitCode::SUCCESS,
+            Exit::Failed(_) => ExitCode::from(1),
+            Exit::WrongInput => ExitCode::from(2),
+            Exit::SomeFailed => ExitCode::from(3),
         }
     }
 }
 
 /// Prints on standard output. A closed pipe (`| head`) is not an error.
-pub fn print(text: &str) -> Ending {
+pub fn print(text: &str) -> Exit {
     match std::io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Ending::Failed(error.to_string()),
-        _ => Ending::Done,
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Exit::Failed(error.to_string()),
+        _ => Exit::Done,
     }
 }

@@ -1,7 +1,7 @@
 //! `stickslip inspect`: describes matrix files, and checks whether they can belong to a
 //! structure.
 
-use crate::exit_status::{Ending, print};
+use crate::exit_status::{Exit, print};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write};
@@ -19,10 +19,10 @@ const LOWEST: usize = 6;
 
 /// Usual masses of parts that vibrate with dry friction, in kg: a blade or a bracket, clamped
 /// or free.
-const USUAL: RangeInclusive<f64> = 0.01..=100.0;
+const USUAL_MASSES: RangeInclusive<f64> = 0.01..=100.0;
 
 /// A matrix and its displayed name.
-struct Named {
+struct NamedMatrix {
     name: String,
     role: Option<Role>,
     matrix: Matrix,
@@ -47,7 +47,7 @@ const SHORT: usize = 4;
 impl Role {
     /// Returns the role that the name of a matrix states, or that of its file if the matrix has
     /// no name.
-    fn of(file: &Path, name: Option<&str>) -> Option<Role> {
+    fn from_name(file: &Path, name: Option<&str>) -> Option<Role> {
         let text = |part: Option<&std::ffi::OsStr>| part.map(|part| part.to_string_lossy().to_lowercase());
         let (short, all) = match name {
             Some(name) => (name.to_lowercase(), name.to_lowercase()),
@@ -63,13 +63,13 @@ impl Role {
 
 /// Describes every matrix in the files, and prints the lowest frequencies of stiffness and
 /// mass.
-pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
+pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
     let (mut text, mut wrong) = (String::new(), false);
-    let mut square: Vec<Named> = Vec::new();
+    let mut square: Vec<NamedMatrix> = Vec::new();
     let mut rows = Vec::new();
     let mut beside = None;
     for file in files {
-        match one(file, format, &mut text) {
+        match inspect_file(file, format, &mut text) {
             Ok((matrices, whole)) => {
                 square.extend(matrices);
                 wrong |= !whole;
@@ -108,10 +108,11 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
         }
     }
     if square.len() > 1 {
-        match chosen(&square) {
+        match choose(&square) {
             Ok((stiffness, mass, why)) => {
                 let _ = writeln!(text, "{} as stiffness, {} as mass, {why}", stiffness.name, mass.name);
-                let of_damping: Vec<&Named> = square.iter().filter(|named| named.role == Some(Role::Damping)).collect();
+                let of_damping: Vec<&NamedMatrix> =
+                    square.iter().filter(|named| named.role == Some(Role::Damping)).collect();
                 let damping = Some(&of_damping[..]).filter(|all| all.len() == 1).map(|all| all[0]);
                 text += &match Pair::new(stiffness, mass, damping, beside.as_deref()) {
                     Ok(pair) => pair.to_string(),
@@ -122,15 +123,15 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
         }
     }
     match (wrong, print(&text)) {
-        (true, _) => Ending::WrongInput,
-        (false, ending) => ending,
+        (true, _) => Exit::WrongInput,
+        (false, exit) => exit,
     }
 }
 
 /// Describes the matrices of one file in `text`.
 ///
 /// Returns the square matrices, and `true` if no matrix is damaged.
-fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Named>, bool), Error> {
+fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<NamedMatrix>, bool), Error> {
     let variables = formats::list(file, format)?;
     let several = variables.len() > 1;
     if variables.is_empty() {
@@ -164,12 +165,12 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
                 let beside = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
                 let _ = writeln!(text, "  {}{beside}", definite(&sparse));
             }
-            let role = Role::of(file, name);
+            let role = Role::from_name(file, name);
             let name = match name {
                 Some(name) => format!("{}, {name}", file.display()),
                 None => file.display().to_string(),
             };
-            found.push(Named { name, role, matrix });
+            found.push(NamedMatrix { name, role, matrix });
         }
     }
     text.push('\n');
@@ -198,7 +199,7 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
 ///
 /// The criterion is their names. If the names of two matrices do not state their roles, the matrix
 /// with the larger entries is the stiffness.
-fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
+fn choose(square: &[NamedMatrix]) -> Result<(&NamedMatrix, &NamedMatrix, &'static str), String> {
     let of = |role: Role| square.iter().filter(|named| named.role == Some(role)).collect::<Vec<_>>();
     let (stiffness, mass, why) = match (&of(Role::Stiffness)[..], &of(Role::Mass)[..], square) {
         ([stiffness], [mass], _) => (*stiffness, *mass, "according to their names"),
@@ -237,9 +238,9 @@ impl Pair {
     ///
     /// The error states why they do not form a pair.
     fn new(
-        stiffness: &Named,
-        mass: &Named,
-        damping: Option<&Named>,
+        stiffness: &NamedMatrix,
+        mass: &NamedMatrix,
+        damping: Option<&NamedMatrix>,
         beside: Option<&[String]>,
     ) -> Result<Pair, String> {
         let of_mass = match mass.matrix.names() {
@@ -305,10 +306,10 @@ impl fmt::Display for Pair {
         writeln!(f, "  mass of the free rows, in the units of the file: {}", each.join(", "))?;
         for set in unit_sets::TABLE {
             let kilograms = set.mass * first;
-            let usual = if USUAL.contains(&kilograms) { ", plausible for a blade" } else { "" };
+            let usual = if USUAL_MASSES.contains(&kilograms) { ", plausible for a blade" } else { "" };
             writeln!(f, "    {kilograms:.4e} kg if units = \"{}\"{usual}", set.name)?;
         }
-        let (from, to) = (USUAL.start(), USUAL.end());
+        let (from, to) = (USUAL_MASSES.start(), USUAL_MASSES.end());
         writeln!(
             f,
             "  the files do not state their units: choose the units that give the correct mass; blades have \

@@ -1,6 +1,6 @@
 //! `stickslip merge`: merges the parts of a study.
 
-use crate::exit_status::Ending;
+use crate::exit_status::Exit;
 use crate::run;
 use std::path::{Path, PathBuf};
 use stickslip_report::assemble::{Parts, assemble};
@@ -8,16 +8,16 @@ use stickslip_report::stored::study_of;
 use stickslip_report::{check_writable, stream};
 
 /// Merges the parts into `out/NAME/`.
-pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String]), open: bool) -> Ending {
+pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String]), open: bool) -> Exit {
     let outputs = match run::outputs(only, also) {
         Ok(outputs) => outputs,
-        Err(ending) => return ending,
+        Err(exit) => return exit,
     };
     let wrong = |message: String| {
         crate::messages::error(&message);
-        Ending::WrongInput
+        Exit::WrongInput
     };
-    let journals = match stream::merged(folders) {
+    let journals = match stream::read_parts(folders) {
         Ok(journals) => journals,
         Err(error) => return wrong(error.to_string()),
     };
@@ -33,12 +33,12 @@ pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String
     };
     let folder = out.join(&outline.name);
     if let Err(error) = check_writable(&folder) {
-        return Ending::Failed(error.to_string());
+        return Exit::Failed(error.to_string());
     }
     let aside = out.join(format!("{}.merging.{}", outline.name, std::process::id()));
-    let parts = Parts { outline: &outline, journals: &journals, rest: &[] };
+    let parts = Parts { outline: &outline, journals: &journals, unjournaled: &[] };
     match assemble(&parts, &study, &outputs, out, &aside) {
-        Err(error) => Ending::Failed(error.to_string()),
-        Ok(assembled) => run::told(&assembled, &[], (false, open)),
+        Err(error) => Exit::Failed(error.to_string()),
+        Ok(assembled) => run::report(&assembled, &[], (false, open)),
     }
 }

@@ -26,7 +26,7 @@ pub fn is_for_programs() -> bool {
 }
 
 /// Prints a message. A closed pipe is not an error.
-pub fn line(text: &str) {
+pub fn message(text: &str) {
     if is_for_programs() {
         return event("message", json!({ "text": text.trim() }));
     }
