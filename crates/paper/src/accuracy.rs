@@ -1,14 +1,14 @@
 //! Data that the paper does not state, and the accuracy of the report's numbers.
 
-use crate::additional_cases::Further;
-use crate::finding::Part;
+use crate::additional_cases::AdditionalCases;
+use crate::finding::ReportPart;
 use crate::studies::Results;
 use crate::text::{list, words};
 use stickslip_report::{PageTable, Section};
 use stickslip_study::results::worst_evidence;
 
 /// Lists inferred values and misprints.
-pub fn open(further: &Further) -> Part {
+pub fn inferred_values(additional: &AdditionalCases) -> ReportPart {
     let rows = [
         [
             "k = 105103 N/m",
@@ -60,10 +60,10 @@ pub fn open(further: &Further) -> Part {
          report uses instead."
             .to_owned(),
     ];
-    if let Some(couple) = &further.couple {
+    if let Some(couple) = &additional.couple {
         paragraphs.push(format!(
             "The inferred b carries over to all amplitudes: near its peak a1 follows (F0 \u{2212} 4 Ft/\u{3c0})/(b \u{3c9}). With it the peaks at Ft = 2 and 4 N are {} cm.",
-            list([100.0 * couple.at(2.0), 100.0 * couple.at(4.0)], 3)
+            list([100.0 * couple.peak_at(2.0), 100.0 * couple.peak_at(4.0)], 3)
         ));
     }
     let section = Section {
@@ -76,11 +76,11 @@ pub fn open(further: &Further) -> Part {
         }],
         ..Section::default()
     };
-    Part { section, findings: Vec::new() }
+    ReportPart { section, findings: Vec::new() }
 }
 
 /// Lists the error measures of every dataset.
-pub fn record(results: &Results) -> Part {
+pub fn error_measures(results: &Results) -> ReportPart {
     let rows = results.all().map(|dataset| {
         let points: u64 = dataset.record.points.values().sum();
         let evidence = worst_evidence(dataset);
@@ -108,7 +108,7 @@ pub fn record(results: &Results) -> Part {
         }],
         ..Section::default()
     };
-    Part { section, findings: Vec::new() }
+    ReportPart { section, findings: Vec::new() }
 }
 
 /// Formats an error measure, if it exists.

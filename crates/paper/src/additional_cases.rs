@@ -7,7 +7,7 @@ use stickslip_study::run::{Context, run};
 
 /// Additional cases; empty if the run was interrupted.
 #[derive(Debug, Default)]
-pub struct Further {
+pub struct AdditionalCases {
     /// Contact stiffness (N/m) and the curves of Fig. 6 with it.
     pub stiffness: Vec<(f64, Vec<Curve>)>,
     /// Peaks over the slip limit, non-symmetric element.
@@ -26,9 +26,9 @@ const STIFFNESSES: [(f64, &str); 4] = [(5e3, "5000 N/m"), (1e4, "10000 N/m"), (2
 const OMEGAS: [(f64, &str); 4] =
     [(0.5, "0.5 rad/s"), (1.0, "1 rad/s"), (2.0, "2 rad/s"), (std::f64::consts::TAU, "6.283185307179586 rad/s")];
 
-impl Further {
+impl AdditionalCases {
     /// Computes the cases. `points` replaces the number of points of response curves.
-    pub fn new(context: &Context, points: Option<usize>) -> Further {
+    pub fn new(context: &Context, points: Option<usize>) -> AdditionalCases {
         // An interrupted or failed case leaves only its claim without a measurement.
         let with = |name: &str, key: &str, value: &str| {
             let study = read(name, points, &[(key, value)]).ok()?;
@@ -37,7 +37,7 @@ impl Further {
         };
         let stopped = || context.stopped();
         if stopped() {
-            return Further::default();
+            return AdditionalCases::default();
         }
         let stiffness = STIFFNESSES
             .iter()
@@ -59,13 +59,13 @@ impl Further {
             .filter_map(|(w, text)| Some((*w, all(["fig03a", "fig03b"], text)?, all(["fig04a", "fig04b"], text)?)))
             .collect();
         let optimum = |name: &str| Optimum::new(&read(name, points, &[]).ok()?, context);
-        let further = Further {
+        let additional = AdditionalCases {
             stiffness,
             omega,
             couple: optimum("fig06_optimum"),
             light: optimum("fig07_optimum"),
             symmetric: optimum("fig10_optimum"),
         };
-        if stopped() { Further::default() } else { further }
+        if stopped() { AdditionalCases::default() } else { additional }
     }
 }

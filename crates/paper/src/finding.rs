@@ -18,7 +18,7 @@ pub fn finding(name: &'static str, text: &str, measured: String, verdict: Verdic
 
 /// A section of the report, with its claims still separate.
 #[derive(Debug, Clone, Default)]
-pub struct Part {
+pub struct ReportPart {
     /// The section.
     pub section: Section,
     /// Claims of the section.

@@ -18,8 +18,8 @@ mod studies;
 mod text;
 mod verdict;
 
-use additional_cases::Further;
-use finding::{Finding, Part};
+use additional_cases::AdditionalCases;
+use finding::{Finding, ReportPart};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_report::{Outputs, Page, ReportError, Section, Verdict, write_dataset};
@@ -50,7 +50,7 @@ pub enum PaperError {
 }
 
 /// Amount of computation, which tests reduce.
-struct Extent {
+struct Effort {
     points: Option<usize>,
     outputs: Outputs,
 }
@@ -73,18 +73,18 @@ struct Extent {
 /// # Ok::<(), stickslip_paper::PaperError>(())
 /// ```
 pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, PaperError> {
-    produce(out, context, say, &Extent { points: None, outputs: Outputs::usual() })
+    produce(out, context, say, &Effort { points: None, outputs: Outputs::defaults() })
 }
 
-fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, PaperError> {
+fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), effort: &Effort) -> Result<Outcome, PaperError> {
     let mut results = Results::default();
     for (name, _) in FILES {
         if context.stopped() {
             break;
         }
-        let study = read(name, extent.points, &[])?;
+        let study = read(name, effort.points, &[])?;
         let dataset = run(&study, context)?;
-        write_dataset(&dataset, out, &extent.outputs)?;
+        write_dataset(&dataset, out, &effort.outputs)?;
         let points: u64 = dataset.record.points.values().sum();
         let failed = dataset.failures.len();
         let failed = if failed > 0 { format!(", {failed} failed") } else { String::new() };
@@ -92,20 +92,20 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
         results.insert(study, dataset);
     }
     say("Additional cases for the claims: other slip limits, contact stiffnesses, frequencies");
-    let further = Further::new(context, extent.points);
-    let parts: Vec<Part> = [
+    let additional = AdditionalCases::new(context, effort.points);
+    let parts: Vec<ReportPart> = [
         loops::exact(&results),
-        loops::approximate(&results, &further),
+        loops::approximate(&results, &additional),
         loops::coulomb(&results),
-        responses::figure6(&results, &further),
-        responses::figure7(&results, &further),
-        responses::dependence(&results, &further),
+        responses::figure6(&results, &additional),
+        responses::figure7(&results, &additional),
+        responses::dependence(&results, &additional),
         responses::figure8(&results),
         responses::figure10(&results),
-        responses::optimum(&further),
+        responses::optimum(&additional),
         responses::laws(&results),
-        Some(accuracy::open(&further)),
-        Some(accuracy::record(&results)),
+        Some(accuracy::inferred_values(&additional)),
+        Some(accuracy::error_measures(&results)),
     ]
     .into_iter()
     .flatten()
@@ -119,7 +119,7 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     Ok(Outcome { summary, failed: results.failed(), report })
 }
 
-fn page(parts: Vec<Part>) -> Page {
+fn page(parts: Vec<ReportPart>) -> Page {
     Page {
         title: "Blade couple with dry friction connection: figures and claims".to_owned(),
         introduction: vec![
@@ -147,7 +147,7 @@ fn page(parts: Vec<Part>) -> Page {
 }
 
 /// Returns the claims as text for the terminal.
-fn summary(report: &Path, parts: &[Part], results: &Results) -> String {
+fn summary(report: &Path, parts: &[ReportPart], results: &Results) -> String {
     let mut text = String::new();
     for part in parts.iter().filter(|part| !part.findings.is_empty()) {
         let _ = writeln!(text, "{}", part.section.heading);
@@ -180,8 +180,8 @@ mod tests {
     fn reduced(stop: bool) -> (tempfile::TempDir, Outcome) {
         let out = tempfile::tempdir().unwrap();
         let context = Context { stop: Arc::new(AtomicBool::new(stop)), ..Context::unwatched(1) };
-        let extent = Extent { points: Some(25), outputs: Outputs::only(&["csv", "json", "svg"]).unwrap() };
-        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        let effort = Effort { points: Some(25), outputs: Outputs::select(&["csv", "json", "svg"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &effort).unwrap();
         (out, outcome)
     }
 
@@ -222,8 +222,8 @@ mod tests {
         let whole = out.path().join("report.html");
         std::fs::write(&whole, "whole").unwrap();
         let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
-        let extent = Extent { points: Some(25), outputs: Outputs::only(&["json"]).unwrap() };
-        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        let effort = Effort { points: Some(25), outputs: Outputs::select(&["json"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &effort).unwrap();
         assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");
         assert!(outcome.report.ends_with("report.interrupted.html") && outcome.report.is_file());
         assert!(outcome.summary.contains("report.interrupted.html"), "{}", outcome.summary);

@@ -1,7 +1,7 @@
 //! Figs. 2-4: the loops of the friction elements, and the paper's claims about them.
 
-use crate::additional_cases::Further;
-use crate::finding::{Finding, Part, finding};
+use crate::additional_cases::AdditionalCases;
+use crate::finding::{Finding, ReportPart, finding};
 use crate::measure::{Loop, largest};
 use crate::studies::Results;
 use crate::text::{join, list, percent, words};
@@ -27,7 +27,7 @@ fn merged(results: &Results, title: &str, figures: &[(&str, &str)]) -> Option<Fi
 }
 
 /// Fig. 2.
-pub fn exact(results: &Results) -> Option<Part> {
+pub fn exact(results: &Results) -> Option<ReportPart> {
     let loops = results.loops(&["fig02"])?;
     let corners: Vec<usize> = loops.iter().map(Loop::break_points).collect();
     // A rhomboid has four sides with two alternating slopes.
@@ -73,11 +73,11 @@ pub fn exact(results: &Results) -> Option<Part> {
         figure: Some(Figure { title: String::new(), ..results.get("fig02")?.figure.clone() }),
         ..Section::default()
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 /// Figs. 3 and 4 with the paper's law.
-pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
+pub fn approximate(results: &Results, additional: &AdditionalCases) -> Option<ReportPart> {
     let elements = Elements::of(results)?;
     let mut findings = elements.findings();
     findings.extend(computing_time(results));
@@ -94,10 +94,10 @@ pub fn approximate(results: &Results, further: &Further) -> Option<Part> {
             "",
             &[("fig03a", "Fig. 3a"), ("fig03b", "Fig. 3b"), ("fig04a", "Fig. 4a"), ("fig04b", "Fig. 4b")],
         ),
-        tables: vec![elements.areas(), frequencies(further)],
+        tables: vec![elements.areas(), frequencies(additional)],
         ..Section::default()
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 /// Loops of the four kinds of element, in the same order.
@@ -114,7 +114,7 @@ fn excess(a: &[Loop], b: &[Loop]) -> Vec<f64> {
 }
 
 /// Returns the largest force difference between loops of the same motion, in slip limits.
-fn apart(a: &[Loop], b: &[Loop]) -> Vec<f64> {
+fn force_differences(a: &[Loop], b: &[Loop]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a.difference(b) / LIMIT).collect()
 }
 
@@ -179,7 +179,7 @@ impl Elements {
     }
 
     fn little_mass(&self) -> Finding {
-        let (area, form) = (excess(&self.massive, &self.arctan), apart(&self.massive, &self.arctan));
+        let (area, form) = (excess(&self.massive, &self.arctan), force_differences(&self.massive, &self.arctan));
         finding(
             "the mass changes the force only slightly",
             "With the small mass \u{201c}the excitation force is slightly different\u{201d} from that of the weightless element. (Sec. 2)",
@@ -238,11 +238,11 @@ fn computing_time(results: &Results) -> Option<Finding> {
     ))
 }
 
-fn frequencies(further: &Further) -> PageTable {
+fn frequencies(additional: &AdditionalCases) -> PageTable {
     let row = |(omega, arctan, massive): &(f64, Vec<Loop>, Vec<Loop>)| {
         vec![
             format!("{omega:.4}"),
-            list([100.0 * largest(apart(massive, arctan))], 1),
+            list([100.0 * largest(force_differences(massive, arctan))], 1),
             list([100.0 * largest(excess(massive, arctan).iter().map(|v| v.abs()))], 1),
             list([largest(massive.iter().map(Loop::highest)) / LIMIT], 2),
         ]
@@ -250,12 +250,12 @@ fn frequencies(further: &Further) -> PageTable {
     PageTable {
         caption: "Why \u{3c9} = 1 rad/s: over the six loops, how much Fig. 4 differs from Fig. 3".to_owned(),
         header: words(&["\u{3c9} (rad/s)", "force, % of Ft", "area, %", "highest force in Fig. 4, Ft"]),
-        rows: further.omega.iter().map(row).collect(),
+        rows: additional.omega.iter().map(row).collect(),
     }
 }
 
 /// Fig. 4 with the law of its caption.
-pub fn coulomb(results: &Results) -> Option<Part> {
+pub fn coulomb(results: &Results) -> Option<ReportPart> {
     let loops = results.loops(&["fig04a_coulomb", "fig04b_coulomb"])?;
     let arctan = results.loops(&["fig04a", "fig04b"])?;
     let overshoot = |loops: &[Loop]| largest(loops.iter().map(Loop::highest)) / LIMIT - 1.0;
@@ -285,5 +285,5 @@ pub fn coulomb(results: &Results) -> Option<Part> {
         figure: merged(results, "", &[("fig04a_coulomb", "Coulomb"), ("fig04b_coulomb", "Coulomb")]),
         ..Section::default()
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }

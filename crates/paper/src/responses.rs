@@ -1,7 +1,7 @@
 //! Figs. 6-8 and 10: the response of the blade couple, and the paper's claims about it.
 
-use crate::additional_cases::Further;
-use crate::finding::{Finding, Part, finding};
+use crate::additional_cases::AdditionalCases;
+use crate::finding::{Finding, ReportPart, finding};
 use crate::measure::{Curve, largest};
 use crate::optimum::{self, Optimum};
 use crate::studies::Results;
@@ -99,7 +99,7 @@ fn falling(curves: &[Curve], optimum: Option<&Optimum>) -> (String, Verdict) {
 }
 
 /// Fig. 6.
-pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
+pub fn figure6(results: &Results, additional: &AdditionalCases) -> Option<ReportPart> {
     let curves = results.curves("fig06")?;
     let (a2, a3) = (heights(&curves, CONTACT), heights(&curves, BLADE3));
     let (f1, f3) = (frequencies(&curves, BLADE1), frequencies(&curves, BLADE3));
@@ -140,7 +140,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
             in_all(&f3.iter().map(|f| (f - second).abs() <= PRINTED).collect::<Vec<_>>()),
         ),
     ];
-    let (measured, verdict) = falling(&curves, further.couple.as_ref());
+    let (measured, verdict) = falling(&curves, additional.couple.as_ref());
     findings.push(finding(
         "a1 falls with Ft",
         "\u{201c}The increasing value of the dry friction slipping force Ft0 causes a decrease of amplitudes a1 of the excited blades.\u{201d} \
@@ -158,7 +158,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
     findings.push(close_at_the_highest(&curves, "at 8 N all amplitudes are close",
         "\u{201c}For the highest friction force Ft0 = 8 N they overlap with the peak of curve a1 and the investigated system vibrates approximately \
          with very similar amplitudes in the entire frequency resonance range.\u{201d} (Sec. 4)")?);
-    findings.extend(stiffness_claims(&curves, &further.stiffness));
+    findings.extend(stiffness_claims(&curves, &additional.stiffness));
     let section = Section {
         tables: vec![peaks("Refined peaks", &curves, &MASSES)],
         ..section(
@@ -169,7 +169,7 @@ pub fn figure6(results: &Results, further: &Further) -> Option<Part> {
              half of peak to peak; peaks are maximised over frequency.",
         )?
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Option<Finding> {
@@ -196,7 +196,7 @@ fn close_at_the_highest(curves: &[Curve], name: &'static str, text: &str) -> Opt
 }
 
 /// Checks the claims about `kt`.
-fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<Finding> {
+fn stiffness_claims(curves: &[Curve], additional: &[(f64, Vec<Curve>)]) -> Vec<Finding> {
     // Largest difference between a2 and a3 relative to the peak of a3, at each slip limit.
     let apart = |curve: &Curve| {
         let pairs = curve.amplitude[CONTACT].iter().zip(&curve.amplitude[BLADE3]);
@@ -204,15 +204,15 @@ fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<Find
     };
     let ratio = |curve: &Curve| curve.peak[CONTACT].amplitude / curve.peak[BLADE3].amplitude - 1.0;
     let mut findings = Vec::new();
-    if further.len() > 1 {
-        let worst: Vec<f64> = further.iter().map(|(_, curves)| largest(curves.iter().map(ratio))).collect();
+    if additional.len() > 1 {
+        let worst: Vec<f64> = additional.iter().map(|(_, curves)| largest(curves.iter().map(ratio))).collect();
         findings.push(finding(
             "kt influences the difference of a2 and a3",
             "\u{201c}The stiffness kt influences the difference between response curves a2 of the small middle body and a3 of the non-excited body.\u{201d} \
              (Sec. 4)",
             format!(
                 "kt = {} N/m: the peak of a2 is higher than that of a3 by up to {}.",
-                list(further.iter().map(|f| f.0), 0),
+                list(additional.iter().map(|f| f.0), 0),
                 worst.iter().map(|v| percent(*v)).collect::<Vec<_>>().join(", ")
             ),
             monotone(&worst, -1.0),
@@ -240,14 +240,14 @@ fn stiffness_claims(curves: &[Curve], further: &[(f64, Vec<Curve>)]) -> Vec<Find
 }
 
 /// Fig. 7.
-pub fn figure7(results: &Results, further: &Further) -> Option<Part> {
+pub fn figure7(results: &Results, additional: &AdditionalCases) -> Option<ReportPart> {
     let curves = results.curves("fig07")?;
     let heavy = results.curves("fig06")?;
     let at = limits(&curves);
     let (here, before) = (shifts(&curves, BLADE1, BLADE3), shifts(&heavy, BLADE1, BLADE3));
     let apart = here.iter().map(|shift| *shift > 0.0).collect::<Vec<_>>();
     let nearer = here.iter().zip(&before).map(|(a, b)| a.abs() < b.abs()).collect::<Vec<_>>();
-    let (measured, verdict) = falling(&curves, further.light.as_ref());
+    let (measured, verdict) = falling(&curves, additional.light.as_ref());
     let (a2, a3) = (heights(&curves, CONTACT), heights(&curves, BLADE3));
     let top = largest(curves.iter().chain(&heavy).map(Curve::highest));
     let findings = vec![
@@ -311,16 +311,16 @@ pub fn figure7(results: &Results, further: &Further) -> Option<Part> {
             "As Fig. 6, with half the mass of the deformed parts.",
         )?
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 /// The conclusion about all parameters.
-pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
+pub fn dependence(results: &Results, additional: &AdditionalCases) -> Option<ReportPart> {
     let (heavy, light) = (results.curves("fig06")?, results.curves("fig07")?);
     let model = results.model("fig06")?;
     // Half-power width of a blade's resonance in Hz.
     let width = model.springs.first()?.damping / (TAU * mass_of(&model, "blade1")?);
-    let double = further.stiffness.iter().find(|(kt, _)| *kt == 2e4).map(|(_, curves)| curves)?;
+    let double = additional.stiffness.iter().find(|(kt, _)| *kt == 2e4).map(|(_, curves)| curves)?;
     let changes = [("Ft doubled", heavy.get(1)?), ("kt doubled", double.first()?), ("m1 halved", light.first()?)];
     let base = heavy.first()?;
     let mut strong = Vec::new();
@@ -361,32 +361,33 @@ pub fn dependence(results: &Results, further: &Further) -> Option<Part> {
         }],
         ..Section::default()
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 /// Returns the largest difference between one figure and ten times another with a tenth of the
 /// forces.
-fn image(results: &Results, large: &str, small: &str) -> Option<f64> {
+fn scaled_difference(results: &Results, large: &str, small: &str) -> Option<f64> {
     let (large, small) = (results.curves(large)?, results.curves(small)?);
     (large.len() == small.len()).then(|| largest(large.iter().zip(&small).map(|(a, b)| a.difference(b, 10.0))))
 }
 
 /// Relative difference below which two curves are similar: smooth orbits have an error of about
 /// 1e-7.
-const IMAGE: f64 = 1e-6;
+const SIMILARITY_TOLERANCE: f64 = 1e-6;
 
 /// Fig. 8.
-pub fn figure8(results: &Results) -> Option<Part> {
-    let exact = image(results, "fig06", "fig08")?;
+pub fn figure8(results: &Results) -> Option<ReportPart> {
+    let exact = scaled_difference(results, "fig06", "fig08")?;
     let mut findings = vec![finding(
         "ten times smaller forces give the same picture",
         "\u{201c}For ten times lower forces \u{2026} the amplitudes reduce as well, but the character of the responses remain similar.\u{201d} (Sec. 4)",
         format!("Ten times Fig. 8 and Fig. 6 differ by {exact:.1e} of the highest peak (exact Coulomb friction)."),
         small(exact, SIMILAR, APPROXIMATE),
     )];
-    if let (Some(kept), Some(scaled)) =
-        (image(results, "fig06_arctan", "fig08_arctan"), image(results, "fig06_arctan", "fig08_arctan_similar"))
-    {
+    if let (Some(kept), Some(scaled)) = (
+        scaled_difference(results, "fig06_arctan", "fig08_arctan"),
+        scaled_difference(results, "fig06_arctan", "fig08_arctan_similar"),
+    ) {
         findings.push(finding(
             "the ratio F0/Ft is the condition of similarity",
             "\u{201c}\u{2026} valid also for vibration with small amplitudes, of course when the conditions of physical similarity such as the ratio \
@@ -396,7 +397,7 @@ pub fn figure8(results: &Results) -> Option<Part> {
                  relative to the highest peak of its panel: {kept:.1e} with α = 25 s/mm, {scaled:.1e} with α = \
                  250 s/mm."
             ),
-            small(kept, IMAGE, SIMILAR),
+            small(kept, SIMILARITY_TOLERANCE, SIMILAR),
         ));
     }
     let section = section(
@@ -405,14 +406,14 @@ pub fn figure8(results: &Results) -> Option<Part> {
         "Fig. 8: a tenth of the forces",
         "F0 = 1 N and Ft = 0.2 to 0.8 N instead of 10 N and 2 to 8 N.",
     )?;
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 /// Tolerance in Hz for equal peak frequencies: about 1/20 of the half-power width (0.17 Hz).
 const SAME_FREQUENCY: f64 = 0.01;
 
 /// Fig. 10.
-pub fn figure10(results: &Results) -> Option<Part> {
+pub fn figure10(results: &Results) -> Option<ReportPart> {
     let symmetric = results.curves("fig10")?;
     let couple = results.curves("fig06")?;
     let at = limits(&symmetric);
@@ -486,12 +487,13 @@ pub fn figure10(results: &Results) -> Option<Part> {
             "A spring and a small mass m1/2 on each side, friction between the small masses (Fig. 9). Dashed: the small masses.",
         )?
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
 
 /// The peak over the slip limit; the paper's four values are samples of this curve.
-pub fn optimum(further: &Further) -> Option<Part> {
-    let (couple, light, symmetric) = (further.couple.as_ref()?, further.light.as_ref()?, further.symmetric.as_ref()?);
+pub fn optimum(additional: &AdditionalCases) -> Option<ReportPart> {
+    let (couple, light, symmetric) =
+        (additional.couple.as_ref()?, additional.light.as_ref()?, additional.symmetric.as_ref()?);
     let rows = (0..couple.limits.len())
         .map(|i| {
             let mut row = vec![format!("{}", couple.limits[i])];
@@ -526,11 +528,11 @@ pub fn optimum(further: &Further) -> Option<Part> {
         }],
         ..Section::default()
     };
-    Some(Part { section, findings: Vec::new() })
+    Some(ReportPart { section, findings: Vec::new() })
 }
 
 /// The arctangent law compared with the exact law.
-pub fn laws(results: &Results) -> Option<Part> {
+pub fn laws(results: &Results) -> Option<ReportPart> {
     let mut rows = Vec::new();
     let mut worst = Vec::new();
     for (figure, exact, arctan) in [
@@ -608,5 +610,5 @@ pub fn laws(results: &Results) -> Option<Part> {
         }],
         ..Section::default()
     };
-    Some(Part { section, findings })
+    Some(ReportPart { section, findings })
 }
