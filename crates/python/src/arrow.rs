@@ -51,7 +51,7 @@ struct ArrowArrayStream {
     private_data: *mut c_void,
 }
 
-// SAFETY: its private data is a `Stream`, which any thread may drop
+// SAFETY: its private data is a `StreamData`, which any thread may drop
 unsafe impl Send for ArrowArrayStream {}
 
 impl Drop for ArrowArrayStream {
@@ -70,7 +70,7 @@ const NULLABLE: i64 = 2;
 const STREAM: &std::ffi::CStr = c"arrow_array_stream";
 
 /// Private data of a stream, which delivers one table once.
-struct Stream {
+struct StreamData {
     dataset: Arc<Dataset>,
     table: usize,
     given: bool,
@@ -78,7 +78,7 @@ struct Stream {
 
 /// Returns a capsule with the stream of a table.
 pub fn stream<'py>(py: Python<'py>, dataset: Arc<Dataset>, table: usize) -> PyResult<Bound<'py, PyCapsule>> {
-    let private = Box::new(Stream { dataset, table, given: false });
+    let private = Box::new(StreamData { dataset, table, given: false });
     let stream = ArrowArrayStream {
         get_schema: Some(get_schema),
         get_next: Some(get_next),
@@ -92,7 +92,7 @@ pub fn stream<'py>(py: Python<'py>, dataset: Arc<Dataset>, table: usize) -> PyRe
 unsafe extern "C" fn get_schema(stream: *mut ArrowArrayStream, out: *mut ArrowSchema) -> c_int {
     // SAFETY: the consumer passes a live stream of this module and memory for a schema
     unsafe {
-        let stream = &*(*stream).private_data.cast::<Stream>();
+        let stream = &*(*stream).private_data.cast::<StreamData>();
         let columns = &stream.dataset.tables[stream.table].columns;
         let fields = columns.iter().map(|column| schema(format_of(&column.values), &column.name, NULLABLE, Vec::new()));
         out.write(schema("+s", "", 0, fields.collect()));
@@ -103,7 +103,7 @@ unsafe extern "C" fn get_schema(stream: *mut ArrowArrayStream, out: *mut ArrowSc
 unsafe extern "C" fn get_next(stream: *mut ArrowArrayStream, out: *mut ArrowArray) -> c_int {
     // SAFETY: the consumer passes a live stream of this module and memory for an array
     unsafe {
-        let stream = &mut *(*stream).private_data.cast::<Stream>();
+        let stream = &mut *(*stream).private_data.cast::<StreamData>();
         if stream.given {
             out.write(end());
             return 0;
@@ -114,7 +114,7 @@ unsafe extern "C" fn get_next(stream: *mut ArrowArrayStream, out: *mut ArrowArra
         out.write(array(
             table.rows(),
             0,
-            Kept { children: children.collect(), ..Kept::of(&stream.dataset) },
+            ArrayData { children: children.collect(), ..ArrayData::of(&stream.dataset) },
             &[ptr::null()],
         ));
     }
@@ -128,7 +128,7 @@ unsafe extern "C" fn get_last_error(_: *mut ArrowArrayStream) -> *const c_char {
 unsafe extern "C" fn release_stream(stream: *mut ArrowArrayStream) {
     // SAFETY: the owner calls this once; the private data came from a box
     unsafe {
-        drop(Box::from_raw((*stream).private_data.cast::<Stream>()));
+        drop(Box::from_raw((*stream).private_data.cast::<StreamData>()));
         (*stream).release = None;
     }
 }
@@ -144,7 +144,7 @@ fn format_of(values: &Values) -> &'static str {
 }
 
 /// Private data of a schema.
-struct Named {
+struct SchemaData {
     _texts: [CString; 2],
     children: Vec<*mut ArrowSchema>,
 }
@@ -155,25 +155,25 @@ fn schema(format: &str, name: &str, flags: i64, children: Vec<ArrowSchema>) -> A
     let texts = [text(format), text(name)];
     let [format, name] = [texts[0].as_ptr(), texts[1].as_ptr()];
     let children: Vec<*mut ArrowSchema> = children.into_iter().map(|child| Box::into_raw(Box::new(child))).collect();
-    let mut named = Box::new(Named { _texts: texts, children });
+    let mut data = Box::new(SchemaData { _texts: texts, children });
     ArrowSchema {
         format,
         name,
         metadata: ptr::null(),
         flags,
-        n_children: named.children.len() as i64,
-        children: named.children.as_mut_ptr(),
+        n_children: data.children.len() as i64,
+        children: data.children.as_mut_ptr(),
         dictionary: ptr::null_mut(),
         release: Some(release_schema),
-        private_data: Box::into_raw(named).cast(),
+        private_data: Box::into_raw(data).cast(),
     }
 }
 
 unsafe extern "C" fn release_schema(schema: *mut ArrowSchema) {
     // SAFETY: the owner calls this once; children that were moved out have no `release`
     unsafe {
-        let named = Box::from_raw((*schema).private_data.cast::<Named>());
-        for &child in &named.children {
+        let data = Box::from_raw((*schema).private_data.cast::<SchemaData>());
+        for &child in &data.children {
             if let Some(release) = (*child).release {
                 release(child);
             }
@@ -184,7 +184,7 @@ unsafe extern "C" fn release_schema(schema: *mut ArrowSchema) {
 }
 
 /// Private data of an array.
-struct Kept {
+struct ArrayData {
     /// Keeps the numbers and counts alive.
     _dataset: Arc<Dataset>,
     bits: Vec<Vec<u8>>,
@@ -195,9 +195,9 @@ struct Kept {
     addresses: Vec<*mut ArrowArray>,
 }
 
-impl Kept {
-    fn of(dataset: &Arc<Dataset>) -> Kept {
-        Kept {
+impl ArrayData {
+    fn of(dataset: &Arc<Dataset>) -> ArrayData {
+        ArrayData {
             _dataset: dataset.clone(),
             bits: Vec::new(),
             offsets: Vec::new(),
@@ -218,7 +218,7 @@ fn bits(values: impl ExactSizeIterator<Item = bool>) -> Vec<u8> {
 
 /// Returns the array of a column.
 fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
-    let mut kept = Kept::of(dataset);
+    let mut data = ArrayData::of(dataset);
     let rows = column.values.len();
     let mut nulls = 0;
     // The first buffer is the validity bitmap.
@@ -227,50 +227,50 @@ fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
         Values::Number(values) => {
             nulls = values.iter().filter(|value| value.is_nan()).count();
             if nulls > 0 {
-                kept.bits.push(bits(values.iter().map(|value| !value.is_nan())));
-                buffers[0] = kept.bits[0].as_ptr().cast();
+                data.bits.push(bits(values.iter().map(|value| !value.is_nan())));
+                buffers[0] = data.bits[0].as_ptr().cast();
             }
             buffers.push(values.as_ptr().cast());
         }
         Values::Integer(values) => buffers.push(values.as_ptr().cast()),
         Values::Text(values) => {
-            kept.offsets = std::iter::once(0)
+            data.offsets = std::iter::once(0)
                 .chain(values.iter().scan(0, |end, text| {
                     *end += text.len() as i64;
                     Some(*end)
                 }))
                 .collect();
-            kept.text = values.iter().flat_map(|text| text.bytes()).collect();
-            buffers.extend([kept.offsets.as_ptr().cast(), kept.text.as_ptr().cast::<c_void>()]);
+            data.text = values.iter().flat_map(|text| text.bytes()).collect();
+            buffers.extend([data.offsets.as_ptr().cast(), data.text.as_ptr().cast::<c_void>()]);
         }
         Values::Flag(values) => {
             nulls = values.iter().filter(|value| value.is_none()).count();
-            kept.bits.push(bits(values.iter().map(Option::is_some)));
-            kept.bits.push(bits(values.iter().map(|value| *value == Some(true))));
-            buffers[0] = kept.bits[0].as_ptr().cast();
-            buffers.push(kept.bits[1].as_ptr().cast());
+            data.bits.push(bits(values.iter().map(Option::is_some)));
+            data.bits.push(bits(values.iter().map(|value| *value == Some(true))));
+            buffers[0] = data.bits[0].as_ptr().cast();
+            buffers.push(data.bits[1].as_ptr().cast());
         }
     }
-    array(rows, nulls, kept, &buffers)
+    array(rows, nulls, data, &buffers)
 }
 
-fn array(rows: usize, nulls: usize, kept: Kept, buffers: &[*const c_void]) -> ArrowArray {
-    let mut kept = Box::new(kept);
-    kept.buffers = buffers.to_vec();
+fn array(rows: usize, nulls: usize, data: ArrayData, buffers: &[*const c_void]) -> ArrowArray {
+    let mut data = Box::new(data);
+    data.buffers = buffers.to_vec();
     // Each child has a separate allocation, because a consumer may move one out.
-    kept.addresses =
-        std::mem::take(&mut kept.children).into_iter().map(|child| Box::into_raw(Box::new(child))).collect();
+    data.addresses =
+        std::mem::take(&mut data.children).into_iter().map(|child| Box::into_raw(Box::new(child))).collect();
     ArrowArray {
         length: rows as i64,
         null_count: nulls as i64,
         offset: 0,
-        n_buffers: kept.buffers.len() as i64,
-        n_children: kept.addresses.len() as i64,
-        buffers: kept.buffers.as_mut_ptr(),
-        children: kept.addresses.as_mut_ptr(),
+        n_buffers: data.buffers.len() as i64,
+        n_children: data.addresses.len() as i64,
+        buffers: data.buffers.as_mut_ptr(),
+        children: data.addresses.as_mut_ptr(),
         dictionary: ptr::null_mut(),
         release: Some(release_array),
-        private_data: Box::into_raw(kept).cast(),
+        private_data: Box::into_raw(data).cast(),
     }
 }
 
@@ -293,8 +293,8 @@ fn end() -> ArrowArray {
 unsafe extern "C" fn release_array(array: *mut ArrowArray) {
     // SAFETY: the owner calls this once; children that were moved out have no `release`
     unsafe {
-        let kept = Box::from_raw((*array).private_data.cast::<Kept>());
-        for &child in &kept.addresses {
+        let data = Box::from_raw((*array).private_data.cast::<ArrayData>());
+        for &child in &data.addresses {
             if let Some(release) = (*child).release {
                 release(child);
             }

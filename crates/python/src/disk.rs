@@ -125,6 +125,6 @@ pub fn ring(
 }
 
 /// Marks the sectors of a changed ring as possibly unequal.
-pub fn of_any_sectors(model: &mut Model) {
+pub fn mark_sectors_unequal(model: &mut Model) {
     model.ring = model.ring.map(|ring| Ring { equal: false, order: None, ..ring });
 }

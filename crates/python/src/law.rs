@@ -1,6 +1,6 @@
 //! Laws by name, with quantities as keyword arguments.
 
-use crate::python_law::{self, Size, Written};
+use crate::python_law::{self, Magnitude, PythonLaw};
 use crate::{error, quantity};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -18,11 +18,11 @@ use stickslip::law::{self, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw};
 pub struct PyLaw {
     pub law: SharedLaw,
     /// The Python implementation, if the law is written in Python.
-    pub written: Option<Arc<Written>>,
+    pub written: Option<Arc<PythonLaw>>,
 }
 
 /// A function and its arguments, from which a pickle recreates an object.
-type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+type PickleParts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 impl PyLaw {
     /// Wraps the law of a joint.
@@ -112,7 +112,7 @@ impl PyLaw {
         slf
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<PickleParts<'py>> {
         let (py, this) = (slf.py(), slf.get());
         if let Some(written) = &this.written {
             return written.kernel.bind(py).call_method1("pickled", (slf,))?.extract();
@@ -192,7 +192,7 @@ fn row(py: Python<'_>, name: &str) -> PyResult<&'static LawInfo> {
 /// <stickslip.Law jenkins, stiffness=10000, limit=2>
 #[pyfunction]
 #[pyo3(name = "law", signature = (name, /, **parameters))]
-pub fn named(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<PyLaw> {
+pub fn law_by_name(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<PyLaw> {
     let row = row(py, name)?;
     let mut given: BTreeMap<String, Bound<'_, PyAny>> = BTreeMap::new();
     for (key, value) in parameters.into_iter().flatten() {
@@ -218,7 +218,7 @@ pub fn named(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>)
         };
         let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
         let what = format!("`{}` of law `{name}`", parameter.key);
-        values.insert(parameter.key, quantity::si(value, dimension, &what)?);
+        values.insert(parameter.key, quantity::to_si(value, dimension, &what)?);
     }
     let law = row.build(&values).map_err(|cause| error::model(py, cause))?;
     Ok(PyLaw { law, written: None })
@@ -245,11 +245,16 @@ pub fn laws(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
 }
 
 /// Parses a size of a law written in Python: a number, or the name of a parameter.
-fn size(given: &Bound<'_, PyAny>, what: &str, law: &str, parameters: &[(String, Dimension)]) -> PyResult<Size> {
+fn magnitude(
+    given: &Bound<'_, PyAny>,
+    what: &str,
+    law: &str,
+    parameters: &[(String, Dimension)],
+) -> PyResult<Magnitude> {
     let py = given.py();
     if let Ok(name) = given.cast::<PyString>() {
         let at = parameters.iter().position(|(parameter, _)| *name == parameter.as_str());
-        return at.map(Size::Parameter).ok_or_else(|| {
+        return at.map(Magnitude::Parameter).ok_or_else(|| {
             error::model(
                 py,
                 format!(
@@ -260,7 +265,7 @@ fn size(given: &Bound<'_, PyAny>, what: &str, law: &str, parameters: &[(String, 
         });
     }
     match quantity::number(given)? {
-        Some(number) if number > 0.0 && (number.is_finite() || what == "scale") => Ok(Size::Number(number)),
+        Some(number) if number > 0.0 && (number.is_finite() || what == "scale") => Ok(Magnitude::Number(number)),
         _ => Err(error::model(py, format!("`{what}` of law `{law}` must be more than zero, found {given}"))),
     }
 }
@@ -297,11 +302,11 @@ pub fn _rate_law(
         keys.push((key, dimension));
         values.push(value);
     }
-    let mut law = Written::new(name, kernel, &keys);
+    let mut law = PythonLaw::new(name, kernel, &keys);
     (law.directions, law.states, law.odd, law.passive) = (directions, states, odd, passive);
-    law.state_scale = size(state_scale, "state_scale", name, &keys)?;
-    law.scale = size(scale, "scale", name, &keys)?;
-    let written = law.shared();
+    law.state_scale = magnitude(state_scale, "state_scale", name, &keys)?;
+    law.scale = magnitude(scale, "scale", name, &keys)?;
+    let written = law.register();
     let law = written.law(values);
     law.consistent().map_err(|message| error::model(py, format!("law `{name}`: {message}")))?;
     Ok(PyLaw { law, written: Some(written) })

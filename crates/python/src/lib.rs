@@ -33,7 +33,7 @@ mod _core {
     #[pymodule_export]
     use crate::law::{_law, _rate_law};
     #[pymodule_export]
-    use crate::law::{PyLaw, laws, named};
+    use crate::law::{PyLaw, law_by_name, laws};
     #[pymodule_export]
     use crate::lock::{_lock, Lock};
     #[pymodule_export]

@@ -1,7 +1,7 @@
 //! Many orbits of a model in one call: at many frequencies, or for many values of parameters.
 
 use crate::orbit_table::Row;
-use crate::parameters::{self, Along};
+use crate::parameters::{self, VariedParameters};
 use crate::{disk, error};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -13,67 +13,67 @@ use stickslip::orbit::Orbit;
 use stickslip_study::run::Context;
 
 /// System and method of a request.
-pub struct Asked {
+pub struct OrbitRequest {
     pub system: Arc<System>,
     pub method: Box<dyn Method>,
 }
 
 /// Describes an error in a model, with the name of its element and key.
-pub fn said(cause: &ModelError, model: &Model) -> String {
+pub fn describe(cause: &ModelError, model: &Model) -> String {
     format!("{}, `{}`: {}", cause.element.named(model), cause.key, cause.message)
 }
 
 /// Reason why a point cannot be computed.
-pub enum Refusal {
+pub enum PointError {
     Model(String),
     Method(String),
 }
 
-impl Refusal {
+impl PointError {
     pub fn raised(self, py: Python<'_>) -> PyErr {
         match self {
-            Refusal::Model(message) => error::model(py, message),
-            Refusal::Method(message) => error::method(py, message),
+            PointError::Model(message) => error::model(py, message),
+            PointError::Method(message) => error::method(py, message),
         }
     }
 }
 
 /// Computes orbits of one model at all frequencies, each from the adjacent solution.
-pub fn along_frequencies(asked: &Asked, omegas: &[f64], context: &Context) -> Result<Vec<Row>, Refusal> {
+pub fn along_frequencies(request: &OrbitRequest, omegas: &[f64], context: &Context) -> Result<Vec<Row>, PointError> {
     let watch = Sweep { finished: &*context.finished, stop: &context.stop };
-    let row = |index: usize, outcome: Result<&Orbit, &OrbitError>| Row::new(&asked.system, omegas[index], outcome);
-    let rows = sweep(&*asked.method, &asked.system, omegas.len(), &|index| omegas[index], watch, &row);
+    let row = |index: usize, outcome: Result<&Orbit, &OrbitError>| Row::new(&request.system, omegas[index], outcome);
+    let rows = sweep(&*request.method, &request.system, omegas.len(), &|index| omegas[index], watch, &row);
     // If the run was stopped, the caller raises the exception that stopped it.
-    Ok(rows.map_err(|cause| Refusal::Method(cause.to_string()))?.into_iter().flatten().collect())
+    Ok(rows.map_err(|cause| PointError::Method(cause.to_string()))?.into_iter().flatten().collect())
 }
 
 /// Computes one model per point, in blocks of points per thread.
 pub fn along_parameters(
     model: &Model,
-    asked: &Asked,
+    request: &OrbitRequest,
     omegas: &[f64],
-    along: &Along,
+    varied: &VariedParameters,
     context: &Context,
-) -> Result<Vec<Row>, Refusal> {
-    let point = |index: usize| -> Result<Option<Row>, Refusal> {
+) -> Result<Vec<Row>, PointError> {
+    let point = |index: usize| -> Result<Option<Row>, PointError> {
         if context.stopped() {
             return Ok(None);
         }
         let mut model = model.clone();
         // A changed parameter may make one sector different from the others.
-        disk::of_any_sectors(&mut model);
+        disk::mark_sectors_unequal(&mut model);
         let at = |message: String| format!("point {index}: {message}");
-        for (name, values) in along {
-            parameters::put(&mut model, name, values[index]).map_err(|message| Refusal::Model(at(message)))?;
+        for (name, values) in varied {
+            parameters::set(&mut model, name, values[index]).map_err(|message| PointError::Model(at(message)))?;
         }
-        let system = model.assemble().map_err(|cause| Refusal::Model(at(said(&cause, &model))))?;
-        let solver = advised(&*asked.method, &system);
-        let mut solver = solver.map_err(|cause| Refusal::Method(at(cause.to_string())))?;
+        let system = model.assemble().map_err(|cause| PointError::Model(at(describe(&cause, &model))))?;
+        let solver = advised(&*request.method, &system);
+        let mut solver = solver.map_err(|cause| PointError::Method(at(cause.to_string())))?;
         let outcome = solver.orbit(omegas[index], None);
         (context.finished)();
         Ok(Some(Row::new(&system, omegas[index], outcome.as_ref())))
     };
-    let blocks: Result<Vec<Vec<Row>>, Refusal> = (0..omegas.len().div_ceil(BLOCK))
+    let blocks: Result<Vec<Vec<Row>>, PointError> = (0..omegas.len().div_ceil(BLOCK))
         .into_par_iter()
         .map(|block| {
             let points = block * BLOCK..((block + 1) * BLOCK).min(omegas.len());

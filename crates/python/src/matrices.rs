@@ -1,7 +1,7 @@
 //! Mass, damping and stiffness matrices from NumPy and SciPy.
 
 use crate::error;
-use crate::supervision::apart;
+use crate::supervision::run_on_new_thread;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -77,7 +77,7 @@ pub fn component(
     };
     let (mass, stiffness) = (matrix(mass, "mass")?, matrix(stiffness, "stiffness")?);
     let damping = damping.map(|damping| matrix(damping, "damping")).transpose()?;
-    let made = apart(py, move || Component::new(names, mass, damping, stiffness))?;
+    let made = run_on_new_thread(py, move || Component::new(names, mass, damping, stiffness))?;
     made.map_err(|cause| error::model(py, cause))
 }
 

@@ -1,13 +1,13 @@
 //! Models built in Python, and their results: orbits, responses, loops, modes.
 
 use crate::law::PyLaw;
-use crate::many_orbits::{Asked, along_frequencies, along_parameters, said};
+use crate::many_orbits::{OrbitRequest, along_frequencies, along_parameters, describe};
 use crate::orbit::{PyOrbit, instants};
 use crate::orbit_table::{self, Row};
 use crate::progress::{bar, close};
 use crate::result::PyResultSet;
 use crate::study::PyStudy;
-use crate::supervision::{Watch, alone, apart, watched};
+use crate::supervision::{Supervision, run_here, run_on_new_thread, run_supervised};
 use crate::{disk, error, figures, matrices, parameters, pickle, quantity};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -55,11 +55,11 @@ pub struct PyModel {
     /// belongs to the study.
     study: Option<(PyStudy, usize)>,
     /// The system and the solver of the last request.
-    ready: Mutex<Option<Ready>>,
+    cached: Mutex<Option<CachedSolver>>,
 }
 
 /// A system with its solver.
-struct Ready {
+struct CachedSolver {
     key: (String, Options),
     /// Copy of the model at the time of the request.
     model: Arc<PyModel>,
@@ -69,9 +69,9 @@ struct Ready {
 }
 
 /// Creates the solver of a system that is stored together with the solver.
-fn kept_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
+fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
     let solver = advised(method, system)?;
-    // SAFETY: the system is on the heap and does not move; `Ready` drops the solver before its
+    // SAFETY: the system is on the heap and does not move; `CachedSolver` drops the solver before its
     // own reference to the system, and never gives the solver away
     #[allow(unsafe_code)]
     Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
@@ -99,8 +99,8 @@ impl PyModel {
 
     /// Discards the solver after a change of the model. Sectors of a ring may then differ.
     fn changed(&mut self) {
-        disk::of_any_sectors(&mut self.model);
-        *self.ready.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
+        disk::mark_sectors_unequal(&mut self.model);
+        *self.cached.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     fn system(&self, py: Python<'_>) -> PyResult<System> {
@@ -109,12 +109,12 @@ impl PyModel {
                            but this model is one sector: use model.disk(24) for a disk of 24 sectors";
             return Err(error::model(py, message));
         }
-        alone(py, || self.model.assemble())?.map_err(|cause| refused(py, &cause, &self.model))
+        run_here(py, || self.model.assemble())?.map_err(|cause| model_error(py, &cause, &self.model))
     }
 
-    fn asked(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Asked> {
-        let (method, _) = built(py, name, options)?;
-        Ok(Asked { system: Arc::new(self.system(py)?), method })
+    fn request(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<OrbitRequest> {
+        let (method, _) = build_method(py, name, options)?;
+        Ok(OrbitRequest { system: Arc::new(self.system(py)?), method })
     }
 
     /// Computes the orbit at a frequency in rad/s.
@@ -129,19 +129,20 @@ impl PyModel {
         made: impl FnOnce() -> PyResult<(Box<dyn Method>, Options)>,
     ) -> PyResult<PyOrbit> {
         // A thread that waits for this lock does not hold the lock of the Python interpreter.
-        let mut ready = self.ready.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
+        let mut cached = self.cached.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         // Without options, the name identifies the stored solver.
-        let same = |ready: &Ready| plain && ready.key.0 == method && ready.key.1.is_empty();
-        if !ready.as_ref().is_some_and(same) {
+        let same = |cached: &CachedSolver| plain && cached.key.0 == method && cached.key.1.is_empty();
+        if !cached.as_ref().is_some_and(same) {
             let (made, options) = made()?;
             let key = (method.to_owned(), options);
-            if ready.as_ref().is_none_or(|ready| ready.key != key) {
+            if cached.as_ref().is_none_or(|cached| cached.key != key) {
                 let system = Arc::new(self.system(py)?);
-                let solver = alone(py, || kept_solver(&*made, &system))?.map_err(|cause| error::method(py, cause))?;
-                *ready = Some(Ready { key, model: Arc::new(self.copied()), solver, system });
+                let solver =
+                    run_here(py, || owned_solver(&*made, &system))?.map_err(|cause| error::method(py, cause))?;
+                *cached = Some(CachedSolver { key, model: Arc::new(self.copied()), solver, system });
             }
         }
-        let Some(found) = ready.as_mut() else { unreachable!("a solver was made above") };
+        let Some(found) = cached.as_mut() else { unreachable!("a solver was made above") };
         let n = 2 * found.system.dofs();
         if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
             return Err(error::model(
@@ -149,12 +150,12 @@ impl PyModel {
                 format!("`start` must contain {n} numbers (displacements and velocities), found {}", start.len()),
             ));
         }
-        let outcome = alone(py, || found.solver.orbit(omega, start.as_deref()));
+        let outcome = run_here(py, || found.solver.orbit(omega, start.as_deref()));
         let outcome = match outcome {
             Ok(outcome) => outcome,
             Err(ended) => {
                 // An interrupted solver is in an undefined state.
-                *ready = None;
+                *cached = None;
                 return Err(ended);
             }
         };
@@ -168,12 +169,16 @@ impl PyModel {
             );
             return Err(error::model(py, message));
         }
-        let recipe =
-            Recipe { model: found.model.clone(), method: found.key.0.clone(), options: found.key.1.clone(), start };
-        Ok(PyOrbit { orbit, system: found.system.clone(), recipe })
+        let input = SearchInput {
+            model: found.model.clone(),
+            method: found.key.0.clone(),
+            options: found.key.1.clone(),
+            start,
+        };
+        Ok(PyOrbit { orbit, system: found.system.clone(), input })
     }
 
-    fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, told: Told) -> PyResultSet {
+    fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, record: RunRecord) -> PyResultSet {
         PyResultSet::new(Dataset {
             name: name.to_owned(),
             title: title.to_owned(),
@@ -181,28 +186,28 @@ impl PyModel {
             kind: name.to_owned(),
             tables,
             figure: Figure { title: title.to_owned(), ..figure },
-            notes: told.notes,
-            failures: told.failures,
+            notes: record.notes,
+            failures: record.failures,
             record: Record {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 study: json!({ "kind": name, "model": self.model }),
-                methods: told.methods,
+                methods: record.methods,
                 seed: None,
-                threads: told.threads,
-                wall_time_s: told.seconds,
-                interrupted: told.points.contains_key(NOT_REACHED),
-                points: told.points,
+                threads: record.threads,
+                wall_time_s: record.seconds,
+                interrupted: record.points.contains_key(NOT_REACHED),
+                points: record.points,
             },
         })
     }
 }
 
-fn refused(py: Python<'_>, cause: &ModelError, model: &Model) -> PyErr {
-    error::model(py, said(cause, model))
+fn model_error(py: Python<'_>, cause: &ModelError, model: &Model) -> PyErr {
+    error::model(py, describe(cause, model))
 }
 
 /// Record of a computation.
-struct Told {
+struct RunRecord {
     methods: Vec<String>,
     notes: Vec<String>,
     failures: Vec<Failure>,
@@ -211,20 +216,26 @@ struct Told {
     seconds: f64,
 }
 
-impl Told {
-    fn of(rows: &[Row], at: &dyn Fn(usize) -> String, methods: Vec<String>, threads: usize, start: Instant) -> Told {
+impl RunRecord {
+    fn of(
+        rows: &[Row],
+        at: &dyn Fn(usize) -> String,
+        methods: Vec<String>,
+        threads: usize,
+        start: Instant,
+    ) -> RunRecord {
         let mut points = BTreeMap::new();
         let mut failures = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             *points.entry(row.status.to_owned()).or_default() += 1;
             failures.extend(row.failure.iter().map(|reason| Failure { at: at(index), reason: reason.clone() }));
         }
-        Told { methods, notes: Vec::new(), failures, points, threads, seconds: start.elapsed().as_secs_f64() }
+        RunRecord { methods, notes: Vec::new(), failures, points, threads, seconds: start.elapsed().as_secs_f64() }
     }
 }
 
 /// Returns the method of this name with its options.
-fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<(Box<dyn Method>, Options)> {
+fn build_method(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<(Box<dyn Method>, Options)> {
     let Some(row) = method::find(name) else {
         let names: Vec<&str> = method::TABLE.iter().map(|row| row.name).collect();
         return Err(error::method(py, format!("unknown method `{name}`; the methods are {}", names.join(", "))));
@@ -240,7 +251,7 @@ fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyRes
             };
             return Err(error::method(py, message));
         };
-        let value = quantity::si(&value, option.dimension, &format!("option `{key}`"))?;
+        let value = quantity::to_si(&value, option.dimension, &format!("option `{key}`"))?;
         if option.count && (value < 1.0 || value.fract() != 0.0 || value > f64::from(u32::MAX)) {
             return Err(error::method(py, format!("option `{key}` must be a whole number from 1, found {value}")));
         }
@@ -252,7 +263,7 @@ fn built(py: Python<'_>, name: &str, given: Option<&Bound<'_, PyDict>>) -> PyRes
 
 /// Returns the frequency of one orbit in rad/s.
 fn one_frequency(value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    quantity::si(value, Dimension::FREQUENCY, "frequency")
+    quantity::to_si(value, Dimension::FREQUENCY, "frequency")
 }
 
 #[pymethods]
@@ -307,17 +318,20 @@ impl PyModel {
         }
         let damping = match (damping_ratio, damping) {
             (None, _) => SubstructureDamping::Own,
-            (Some(ratio), None) => SubstructureDamping::Ratio(quantity::si(&ratio, Dimension::NONE, "damping_ratio")?),
+            (Some(ratio), None) => {
+                SubstructureDamping::Ratio(quantity::to_si(&ratio, Dimension::NONE, "damping_ratio")?)
+            }
             (Some(_), Some(_)) => return Err(error::model(py, "give `damping` or `damping_ratio`, not both")),
         };
         let reduction = match reduce {
             None => Reduction::None { up_to: 0.0 },
-            Some(reduce) => Reduction::up_to(quantity::si(&reduce, Dimension::FREQUENCY, "reduce")?),
+            Some(reduce) => Reduction::up_to(quantity::to_si(&reduce, Dimension::FREQUENCY, "reduce")?),
         };
         let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
         let model = made.model.clone();
-        apart(py, move || model.assemble().map(drop))?.map_err(|cause| refused(py, &cause, &made.model))?;
+        run_on_new_thread(py, move || model.assemble().map(drop))?
+            .map_err(|cause| model_error(py, &cause, &made.model))?;
         Ok(made)
     }
 
@@ -326,7 +340,7 @@ impl PyModel {
     /// With ``directions``, up to three names, it is a node with one place per direction.
     #[pyo3(signature = (name, mass, *, directions=None))]
     fn mass(&mut self, name: String, mass: &Bound<'_, PyAny>, directions: Option<Vec<String>>) -> PyResult<()> {
-        let mass = quantity::si(mass, Dimension::MASS, &format!("mass of `{name}`"))?;
+        let mass = quantity::to_si(mass, Dimension::MASS, &format!("mass of `{name}`"))?;
         self.model.masses.push(Mass { name, mass, directions: directions.unwrap_or_default() });
         self.changed();
         Ok(())
@@ -342,7 +356,7 @@ impl PyModel {
         damping: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let value = |given: Option<&Bound<'_, PyAny>>, dimension, what: &str| {
-            given.map_or(Ok(0.0), |given| quantity::si(given, dimension, &format!("{what} between `{a}` and `{b}`")))
+            given.map_or(Ok(0.0), |given| quantity::to_si(given, dimension, &format!("{what} between `{a}` and `{b}`")))
         };
         let stiffness = value(stiffness, Dimension::STIFFNESS, "stiffness")?;
         let damping = value(damping, Dimension::DAMPING, "damping")?;
@@ -378,8 +392,8 @@ impl PyModel {
         sector: Option<usize>,
     ) -> PyResult<()> {
         let around = disk::around(py, engine_order, nodal_diameter, sector)?;
-        let amplitude = quantity::si(amplitude, Dimension::FORCE, &format!("force on `{on}`"))?;
-        let phase = phase.map_or(Ok(0.0), |phase| quantity::si(phase, Dimension::ANGLE, "phase"))?;
+        let amplitude = quantity::to_si(amplitude, Dimension::FORCE, &format!("force on `{on}`"))?;
+        let phase = phase.map_or(Ok(0.0), |phase| quantity::to_si(phase, Dimension::ANGLE, "phase"))?;
         self.model.forces.push(Force { on, amplitude, phase, harmonic });
         self.around[0].resize(self.model.forces.len() - 1, None);
         self.around[0].push(around);
@@ -404,8 +418,8 @@ impl PyModel {
         sector: Option<usize>,
     ) -> PyResult<()> {
         let around = disk::around(py, engine_order, nodal_diameter, sector)?;
-        let amplitude = quantity::si(amplitude, Dimension::LENGTH, &format!("motion of `{on}`"))?;
-        let phase = phase.map_or(Ok(0.0), |phase| quantity::si(phase, Dimension::ANGLE, "phase"))?;
+        let amplitude = quantity::to_si(amplitude, Dimension::LENGTH, &format!("motion of `{on}`"))?;
+        let phase = phase.map_or(Ok(0.0), |phase| quantity::to_si(phase, Dimension::ANGLE, "phase"))?;
         self.model.motions.push(Motion { on, amplitude, phase, harmonic });
         self.around[1].resize(self.model.motions.len() - 1, None);
         self.around[1].push(around);
@@ -446,7 +460,7 @@ impl PyModel {
         let forces = all(0, self.model.forces.len());
         let disk = Disk { sectors, forces, motions: all(1, self.model.motions.len()) };
         let model = disk::ring(py, &self.model, &disk, mistuning.as_ref())?
-            .map_err(|cause| refused(py, &cause, &self.model))?;
+            .map_err(|cause| model_error(py, &cause, &self.model))?;
         Ok(PyModel::from_model(model))
     }
 
@@ -456,16 +470,16 @@ impl PyModel {
     /// 1e5, "a.force": 5})``.
     fn set(&mut self, py: Python<'_>, values: &Bound<'_, PyAny>) -> PyResult<()> {
         let values = quantity::dictionary(values, "the argument of `set`")?;
-        let along = parameters::along(py, &self.model, Some(&values), &mut vec![1.0])?;
-        if let Some((name, values)) = along.iter().find(|(_, values)| values.len() > 1) {
+        let varied = parameters::parse_varied(py, &self.model, Some(&values), &mut vec![1.0])?;
+        if let Some((name, values)) = varied.iter().find(|(_, values)| values.len() > 1) {
             return Err(error::model(
                 py,
                 format!("`{name}` needs one value, found {}; use `response` to vary it", values.len()),
             ));
         }
         let mut model = self.model.clone();
-        for (name, values) in &along {
-            parameters::put(&mut model, name, values[0]).map_err(|message| error::model(py, message))?;
+        for (name, values) in &varied {
+            parameters::set(&mut model, name, values[0]).map_err(|message| error::model(py, message))?;
         }
         self.model = model;
         self.changed();
@@ -519,16 +533,17 @@ impl PyModel {
         method: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let asked = self.asked(py, method, options)?;
-        let prepared =
-            alone(py, || advised(&*asked.method, &asked.system).map(|_| asked.method.choice(&asked.system)))?;
+        let request = self.request(py, method, options)?;
+        let prepared = run_here(py, || {
+            advised(&*request.method, &request.system).map(|_| request.method.choice(&request.system))
+        })?;
         let choice = prepared.map_err(|cause| error::method(py, cause))?;
         let out = PyDict::new(py);
-        out.set_item("places", asked.system.places())?;
+        out.set_item("places", request.system.places())?;
         out.set_item("joints", self.joints())?;
         out.set_item("method", choice.to_string())?;
-        if asked.system.dofs() <= MOST_SURVEYED {
-            let survey = alone(py, || self.model.survey())?.map_err(|cause| refused(py, &cause, &self.model))?;
+        if request.system.dofs() <= MOST_SURVEYED {
+            let survey = run_here(py, || self.model.survey())?.map_err(|cause| model_error(py, &cause, &self.model))?;
             let hertz =
                 |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
             out.set_item("free_Hz", hertz(survey.free()))?;
@@ -560,7 +575,7 @@ impl PyModel {
             return Err(error::model(py, message));
         }
         let plain = options.is_none_or(|options| options.is_empty());
-        self.search(py, omega, start, (method, plain), || built(py, method, options))
+        self.search(py, omega, start, (method, plain), || build_method(py, method, options))
     }
 
     /// Computes orbits at many frequencies, or for many values of parameters.
@@ -590,16 +605,19 @@ impl PyModel {
         let start = Instant::now();
         let mut omegas = quantity::many(frequency, Some(Dimension::FREQUENCY), "frequency")?;
         let vary = vary.map(|vary| quantity::dictionary(vary, "`vary`")).transpose()?;
-        let along = parameters::along(py, &self.model, vary.as_ref(), &mut omegas)?;
-        let asked = self.asked(py, method, options)?;
+        let varied = parameters::parse_varied(py, &self.model, vary.as_ref(), &mut omegas)?;
+        let request = self.request(py, method, options)?;
         let bar = bar(py, progress, "response")?;
-        let watch =
-            Watch { threads, progress: bar.as_ref().map(|bar| bar.clone().unbind()), total: Some(omegas.len() as u64) };
-        let outcome = watched(py, &watch, |context| {
-            let rows = if along.is_empty() {
-                along_frequencies(&asked, &omegas, context)
+        let supervision = Supervision {
+            threads,
+            progress: bar.as_ref().map(|bar| bar.clone().unbind()),
+            total: Some(omegas.len() as u64),
+        };
+        let outcome = run_supervised(py, &supervision, |context| {
+            let rows = if varied.is_empty() {
+                along_frequencies(&request, &omegas, context)
             } else {
-                along_parameters(&self.model, &asked, &omegas, &along, context)
+                along_parameters(&self.model, &request, &omegas, &varied, context)
             };
             (rows, context.threads)
         });
@@ -607,17 +625,18 @@ impl PyModel {
         let (rows, threads) = outcome?;
         let rows = rows.map_err(|refusal| refusal.raised(py))?;
         let at = |index: usize| {
-            let values = along.iter().map(|(name, values)| format!("{name} = {}", values[index]));
+            let values = varied.iter().map(|(name, values)| format!("{name} = {}", values[index]));
             values.chain([format!("frequency = {:.6} Hz", hertz(omegas[index]))]).collect::<Vec<_>>().join(", ")
         };
-        let told = Told::of(&rows, &at, vec![asked.method.choice(&asked.system).to_string()], threads, start);
-        let first = along
+        let record =
+            RunRecord::of(&rows, &at, vec![request.method.choice(&request.system).to_string()], threads, start);
+        let first = varied
             .iter()
             .map(|(name, values)| Column::numbers(&name.replace(['.', '-'], "_"), values.clone()))
             .collect();
-        let table = orbit_table::table("curve", first, &asked.system, &*asked.method, &rows);
-        let figure = figures::curves(&table, &asked.system, along.first().map(|(name, _)| name.as_str()));
-        Ok(self.result("response", "Response", vec![table], figure, told))
+        let table = orbit_table::table("curve", first, &request.system, &*request.method, &rows);
+        let figure = figures::curves(&table, &request.system, varied.first().map(|(name, _)| name.as_str()));
+        Ok(self.result("response", "Response", vec![table], figure, record))
     }
 
     /// Computes the loops of all joints at an excitation frequency and returns a
@@ -639,8 +658,8 @@ impl PyModel {
         let found = self.orbit(py, frequency, method, None, options)?;
         let (tables, figure) = figures::loops(&found, points);
         let row = Row::new(&found.system, found.orbit.omega, Ok(&found.orbit));
-        let told = Told::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
-        Ok(self.result("hysteresis", "Hysteresis", tables, figure, told))
+        let record = RunRecord::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
+        Ok(self.result("hysteresis", "Hysteresis", tables, figure, record))
     }
 
     /// Computes a nonlinear mode and returns a :class:`Result` with the table ``modes``.
@@ -682,13 +701,13 @@ impl PyModel {
         let request = ModeRequest { mode: mode - 1, range: (low, high), points, harmonics, samples };
         let system = Arc::new(system);
         let moved = system.clone();
-        let outcome = apart(py, move || self::mode(&moved, request))?;
+        let outcome = run_on_new_thread(py, move || self::mode(&moved, request))?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
         let (table, figure) = figures::mode(&found, &system);
-        let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
-        told.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
-        told.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
-        Ok(self.result("modes", "Nonlinear mode", vec![table], figure, told))
+        let mut record = RunRecord::of(&[], &|_| String::new(), Vec::new(), 1, start);
+        record.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
+        record.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
+        Ok(self.result("modes", "Nonlinear mode", vec![table], figure, record))
     }
 
     fn __copy__(&self) -> PyModel {
@@ -700,7 +719,7 @@ impl PyModel {
         self.copied()
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledModel<'py>)> {
         let bytes =
             pickle::bytes(&self.model, &self.around, self.study.is_some()).map_err(|cause| error::model(py, cause))?;
         let laws = self.model.joints.iter().map(|joint| Py::new(py, PyLaw::of(joint.law.clone())));
@@ -724,7 +743,7 @@ impl PyModel {
 }
 
 /// Pickled model: its parts, the laws of its joints, and the study that owns its structure.
-type Pickled<'py> = (Bound<'py, PyBytes>, Bound<'py, PyList>, Option<(PyStudy, usize)>);
+type PickledModel<'py> = (Bound<'py, PyBytes>, Bound<'py, PyList>, Option<(PyStudy, usize)>);
 
 /// Recreates a model from its pickle.
 #[pyfunction]
@@ -745,14 +764,14 @@ pub fn _model(
 }
 
 /// Input of an orbit search, which reproduces the same bits.
-pub struct Recipe {
+pub struct SearchInput {
     pub model: Arc<PyModel>,
     pub method: String,
     pub options: Options,
     pub start: Option<Vec<f64>>,
 }
 
-impl Recipe {
+impl SearchInput {
     /// Returns the model at the time of the search.
     pub fn model(&self) -> PyModel {
         self.model.copied()

@@ -1,7 +1,7 @@
 //! Orbits in Python; their values are computed on demand.
 
-use crate::model::{PyModel, Recipe};
-use crate::supervision::alone;
+use crate::model::{PyModel, SearchInput};
+use crate::supervision::run_here;
 use crate::{error, quantity};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyKeyError;
@@ -30,7 +30,7 @@ use stickslip_study::hertz;
 pub struct PyOrbit {
     pub orbit: Orbit,
     pub system: Arc<System>,
-    pub recipe: Recipe,
+    pub input: SearchInput,
 }
 
 fn dict<'py, V: IntoPyObject<'py>>(
@@ -128,7 +128,7 @@ impl PyOrbit {
         evidence.set_item("residual", found.residual)?;
         evidence.set_item("energy_gap", found.energy_gap)?;
         evidence.set_item("truncation", found.truncation)?;
-        evidence.set_item("return_defect", alone(py, || self.orbit.return_defect())?)?;
+        evidence.set_item("return_defect", run_here(py, || self.orbit.return_defect())?)?;
         evidence.set_item("status", found.accuracy.status())?;
         evidence.set_item("found_by", found.found_by)?;
         evidence.set_item("iterations", found.iterations)?;
@@ -141,14 +141,14 @@ impl PyOrbit {
     /// ``True`` if no small disturbance grows; ``None`` if this is unknown.
     #[getter]
     fn stable(&self, py: Python<'_>) -> PyResult<Option<bool>> {
-        alone(py, || self.orbit.is_stable())
+        run_here(py, || self.orbit.is_stable())
     }
 
     /// Floquet multipliers of a period in descending order of modulus; ``None`` without a
     /// return map.
     #[getter]
     fn multipliers<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<numpy::Complex64>>>> {
-        let Some(multipliers) = alone(py, || self.orbit.multipliers())? else { return Ok(None) };
+        let Some(multipliers) = run_here(py, || self.orbit.multipliers())? else { return Ok(None) };
         let multipliers: Vec<numpy::Complex64> =
             multipliers.into_iter().map(|value| numpy::Complex64::new(value.re, value.im)).collect();
         Ok(Some(multipliers.to_pyarray(py)))
@@ -194,7 +194,7 @@ impl PyOrbit {
         };
         let n = self.orbit.places.len();
         let mut signals: [Vec<f64>; 3] = Default::default();
-        alone(py, || {
+        run_here(py, || {
             for &time in &times {
                 let sample = self.orbit.sample(time);
                 for (signal, values) in
@@ -230,7 +230,7 @@ impl PyOrbit {
         };
         let d = self.system.joints()[index].axes().len();
         let points = instants(py, points)?;
-        let (times, signals) = alone(py, || self.loop_of(index, points))?;
+        let (times, signals) = run_here(py, || self.loop_of(index, points))?;
         let out = PyDict::new(py);
         out.set_item("time_s", times.to_pyarray(py))?;
         for (name, signal) in ["displacement_m", "velocity_m_per_s", "force_N"].into_iter().zip(signals) {
@@ -251,8 +251,8 @@ impl PyOrbit {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'_>)> {
-        let Recipe { method, options, start, .. } = &self.recipe;
-        let of = (self.recipe.model(), self.orbit.omega, method.as_str(), options.clone(), start.clone());
+        let SearchInput { method, options, start, .. } = &self.input;
+        let of = (self.input.model(), self.orbit.omega, method.as_str(), options.clone(), start.clone());
         Ok((py.import("stickslip._core")?.getattr("_orbit")?, of))
     }
 

@@ -7,14 +7,14 @@ use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 
 /// Varied parameters with their values, one per point.
-pub type Along = Vec<(String, Vec<f64>)>;
+pub type VariedParameters = Vec<(String, Vec<f64>)>;
 
 /// Sets a parameter of the model to a value in SI units. [`dimension`] must know its name.
 ///
 /// # Errors
 /// The law rejects the value. Masses, springs, forces and motions are checked when the model is
 /// assembled.
-pub fn put(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
+pub fn set(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
     let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
     match key {
         "mass" => model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value),
@@ -62,13 +62,13 @@ pub fn dimension(model: &Model, name: &str) -> Option<Option<Dimension>> {
 }
 
 /// Parses `vary`. All lists, including the frequencies, get the same length.
-pub fn along(
+pub fn parse_varied(
     py: Python<'_>,
     model: &Model,
     vary: Option<&Bound<'_, PyDict>>,
     omegas: &mut Vec<f64>,
-) -> PyResult<Along> {
-    let mut along = Along::new();
+) -> PyResult<VariedParameters> {
+    let mut varied = VariedParameters::new();
     for (name, values) in vary.into_iter().flatten() {
         let name: String = name.extract()?;
         let Some(dimension) = dimension(model, &name) else {
@@ -79,13 +79,13 @@ pub fn along(
             return Err(error::model(py, message));
         };
         let values = quantity::many(&values, dimension, &format!("`{name}`"))?;
-        along.push((name, values));
+        varied.push((name, values));
     }
     if omegas.is_empty() {
         return Err(error::model(py, "`frequency` has no values"));
     }
-    let count = along.iter().map(|(_, values)| values.len()).chain([omegas.len()]).max().unwrap_or(0);
-    let lists = along.iter_mut().map(|(name, values)| (name.as_str(), values));
+    let count = varied.iter().map(|(_, values)| values.len()).chain([omegas.len()]).max().unwrap_or(0);
+    let lists = varied.iter_mut().map(|(name, values)| (name.as_str(), values));
     for (name, list) in lists.chain([("frequency", omegas)]) {
         match list.len() {
             len if len == count => {}
@@ -97,5 +97,5 @@ pub fn along(
             }
         }
     }
-    Ok(along)
+    Ok(varied)
 }

@@ -16,7 +16,7 @@ type Entries = Vec<(usize, usize, f64)>;
 type StoredBody = (String, f64, [[f64; 3]; 3], Vec<String>);
 
 #[derive(Serialize, Deserialize)]
-struct Stored {
+struct StoredModel {
     /// Name, mass, directions.
     masses: Vec<(String, f64, Vec<String>)>,
     bodies: Vec<StoredBody>,
@@ -67,7 +67,7 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
         all.iter().map(|around| around.as_ref().map(stored)).collect()
     });
     let structure = model.substructure.as_ref().filter(|_| !of_study);
-    let stored = Stored {
+    let stored = StoredModel {
         masses: model.masses.iter().map(|mass| (mass.name.clone(), mass.mass, mass.directions.clone())).collect(),
         bodies: model.bodies.iter().map(|b| (b.name.clone(), b.mass, b.inertia, b.directions.clone())).collect(),
         springs: model
@@ -87,7 +87,7 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
 
 /// Recreates a model from its parts and laws.
 pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), String> {
-    let stored: Stored =
+    let stored: StoredModel =
         rmp_serde::from_slice(bytes).map_err(|cause| format!("this is not a valid pickle of a model: {cause}"))?;
     if stored.joints.len() != laws.len() {
         return Err(format!(

@@ -19,14 +19,14 @@ use stickslip_numerics::interrupt;
 
 /// A size: a number, or the value of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Size {
+pub enum Magnitude {
     Number(f64),
     /// Index of the parameter.
     Parameter(usize),
 }
 
 /// A law written in Python, without the values of its parameters.
-pub struct Written {
+pub struct PythonLaw {
     info: &'static LawInfo,
     /// Distinguishes laws with the same name and the same parameters.
     number: u64,
@@ -35,13 +35,13 @@ pub struct Written {
     pub kernel: Py<PyAny>,
     pub directions: usize,
     pub states: usize,
-    pub state_scale: Size,
-    pub scale: Size,
+    pub state_scale: Magnitude,
+    pub scale: Magnitude,
     pub odd: bool,
     pub passive: bool,
 }
 
-impl fmt::Debug for Written {
+impl fmt::Debug for PythonLaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Written").field("name", &self.info.name).field("number", &self.number).finish_non_exhaustive()
     }
@@ -53,10 +53,10 @@ type Signature = (String, Vec<(String, Dimension)>);
 /// Table rows of laws. They are leaked, because laws require `&'static` rows.
 static ROWS: Mutex<BTreeMap<Signature, &'static LawInfo>> = Mutex::new(BTreeMap::new());
 /// Existing laws by number, from which laws with other values of parameters are built.
-static LAWS: Mutex<BTreeMap<u64, Weak<Written>>> = Mutex::new(BTreeMap::new());
+static LAWS: Mutex<BTreeMap<u64, Weak<PythonLaw>>> = Mutex::new(BTreeMap::new());
 static NUMBER: AtomicU64 = AtomicU64::new(0);
 
-fn kept(text: &str) -> &'static str {
+fn leaked(text: &str) -> &'static str {
     Box::leak(text.to_owned().into_boxed_str())
 }
 
@@ -64,10 +64,10 @@ fn row(name: &str, parameters: &[(String, Dimension)]) -> &'static LawInfo {
     let mut rows = ROWS.lock().unwrap_or_else(PoisonError::into_inner);
     rows.entry((name.to_owned(), parameters.to_vec())).or_insert_with(|| {
         let parameter = |(key, dimension): &(String, Dimension)| {
-            Parameter::new(kept(key), *dimension, Range::Any, "a parameter of a law written in Python")
+            Parameter::new(leaked(key), *dimension, Range::Any, "a parameter of a law written in Python")
         };
         Box::leak(Box::new(LawInfo {
-            name: kept(name),
+            name: leaked(name),
             summary: "a law written in Python",
             parameters: Vec::leak(parameters.iter().map(parameter).collect()),
             sample: &[],
@@ -87,7 +87,7 @@ fn build(values: &[f64]) -> SharedLaw {
 }
 
 /// Returns the Python implementation of a law, if it is written in Python.
-pub fn written(law: &SharedLaw) -> Option<Arc<Written>> {
+pub fn written(law: &SharedLaw) -> Option<Arc<PythonLaw>> {
     let number = law.values().get(law.info().parameters.len()).copied()?;
     LAWS.lock().unwrap_or_else(PoisonError::into_inner).get(&(number as u64)).and_then(Weak::upgrade)
 }
@@ -98,26 +98,26 @@ pub fn is_written(law: &SharedLaw) -> bool {
     law.values().len() > law.info().parameters.len()
 }
 
-impl Written {
+impl PythonLaw {
     /// Creates a law with one direction and no states.
     ///
     /// The caller sets other properties before [sharing](Written::shared) it.
     pub fn new(name: &str, kernel: Py<PyAny>, parameters: &[(String, Dimension)]) -> Self {
-        Written {
+        PythonLaw {
             info: row(name, parameters),
             number: NUMBER.fetch_add(1, Ordering::Relaxed),
             kernel,
             directions: 1,
             states: 0,
-            state_scale: Size::Number(1.0),
-            scale: Size::Number(f64::INFINITY),
+            state_scale: Magnitude::Number(1.0),
+            scale: Magnitude::Number(f64::INFINITY),
             odd: false,
             passive: false,
         }
     }
 
     /// Registers the law under its number.
-    pub fn shared(self) -> Arc<Self> {
+    pub fn register(self) -> Arc<Self> {
         let shared = Arc::new(self);
         LAWS.lock().unwrap_or_else(PoisonError::into_inner).insert(shared.number, Arc::downgrade(&shared));
         shared
@@ -125,11 +125,11 @@ impl Written {
 
     /// Returns the law with these values of its parameters.
     pub fn law(self: &Arc<Self>, values: Vec<f64>) -> SharedLaw {
-        Arc::new(Shown { written: self.clone(), values })
+        Arc::new(PythonLawInstance { written: self.clone(), values })
     }
 }
 
-impl Drop for Written {
+impl Drop for PythonLaw {
     fn drop(&mut self) {
         LAWS.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.number);
     }
@@ -137,16 +137,16 @@ impl Drop for Written {
 
 /// A law written in Python, with values of its parameters.
 #[derive(Debug)]
-struct Shown {
-    written: Arc<Written>,
+struct PythonLawInstance {
+    written: Arc<PythonLaw>,
     values: Vec<f64>,
 }
 
-impl Shown {
-    fn size(&self, size: Size) -> f64 {
+impl PythonLawInstance {
+    fn magnitude(&self, size: Magnitude) -> f64 {
         match size {
-            Size::Number(number) => number,
-            Size::Parameter(at) => self.values[at],
+            Magnitude::Number(number) => number,
+            Magnitude::Parameter(at) => self.values[at],
         }
     }
 
@@ -154,9 +154,9 @@ impl Shown {
     ///
     /// Returns forces, then rates, as (row, point), and slopes as (row, argument, point). A
     /// Python exception ends the computation.
-    fn ask(&self, motions: &[Relative<f64>], z: &[f64], linear: bool) -> (Vec<f64>, Vec<f64>) {
+    fn call(&self, motions: &[Relative<f64>], z: &[f64], linear: bool) -> (Vec<f64>, Vec<f64>) {
         interrupt::check();
-        match Python::attach(|py| self.answer(py, motions, z, linear)) {
+        match Python::attach(|py| self.call_python(py, motions, z, linear)) {
             Ok(answer) => answer,
             Err(error) => {
                 interrupt::throw(Box::new(error));
@@ -168,14 +168,14 @@ impl Shown {
         }
     }
 
-    fn answer(
+    fn call_python(
         &self,
         py: Python<'_>,
         motions: &[Relative<f64>],
         z: &[f64],
         linear: bool,
     ) -> PyResult<(Vec<f64>, Vec<f64>)> {
-        let Written { directions, states, .. } = *self.written;
+        let PythonLaw { directions, states, .. } = *self.written;
         let n = motions.len();
         let array = |rows: usize, value: &dyn Fn(usize, usize) -> f64| {
             let values: Vec<f64> =
@@ -206,10 +206,10 @@ impl Shown {
     }
 }
 
-impl Shown {
+impl PythonLawInstance {
     /// Computes forces, rates and their derivatives at several points.
     fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
-        let (out, slopes) = self.ask(motions, z, true);
+        let (out, slopes) = self.call(motions, z, true);
         let n = motions.len();
         for (i, point) in points.iter_mut().enumerate() {
             (0..directions).for_each(|a| point.force[a] = out[a * n + i]);
@@ -219,7 +219,7 @@ impl Shown {
     }
 }
 
-impl Law for Shown {
+impl Law for PythonLawInstance {
     fn info(&self) -> &'static LawInfo {
         self.written.info
     }
@@ -230,7 +230,7 @@ impl Law for Shown {
         self.written.directions
     }
     fn scale(&self) -> f64 {
-        self.size(self.written.scale)
+        self.magnitude(self.written.scale)
     }
     fn rate(&self) -> Option<&dyn Rate> {
         Some(self)
@@ -242,7 +242,7 @@ impl Law for Shown {
         self.written.passive
     }
     fn consistent(&self) -> Result<(), String> {
-        let sizes = [("scale", self.scale()), ("state_scale", self.size(self.written.state_scale))];
+        let sizes = [("scale", self.scale()), ("state_scale", self.magnitude(self.written.state_scale))];
         match sizes.into_iter().find(|(_, size)| size.is_nan() || *size <= 0.0) {
             Some((name, size)) => Err(format!("its `{name}` must be more than zero, found {size}")),
             None => Ok(()),
@@ -250,18 +250,18 @@ impl Law for Shown {
     }
 }
 
-impl Rate for Shown {
+impl Rate for PythonLawInstance {
     fn states(&self) -> usize {
         self.written.states
     }
     fn state_scale(&self) -> f64 {
-        self.size(self.written.state_scale)
+        self.magnitude(self.written.state_scale)
     }
     fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
         false
     }
     fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS] {
-        let (out, _) = self.ask(std::slice::from_ref(motion), z, false);
+        let (out, _) = self.call(std::slice::from_ref(motion), z, false);
         let mut force = [0.0; MOST_DIRECTIONS];
         force[..self.written.directions].copy_from_slice(&out[..self.written.directions]);
         rate.copy_from_slice(&out[self.written.directions..]);

@@ -137,8 +137,8 @@ impl PyResultSet {
     #[pyo3(signature = (folder, only=None))]
     fn save<'py>(&self, py: Python<'py>, folder: PathBuf, only: Option<Vec<String>>) -> PyResult<Bound<'py, PyList>> {
         let outputs = match only {
-            Some(only) => Outputs::only(&only).map_err(|cause| error::report(py, cause))?,
-            None => Outputs::usual(),
+            Some(only) => Outputs::select(&only).map_err(|cause| error::report(py, cause))?,
+            None => Outputs::defaults(),
         };
         let files = py.detach(|| write_dataset(&self.dataset, &folder, &outputs));
         PyList::new(py, files.map_err(|cause| error::report(py, cause))?)

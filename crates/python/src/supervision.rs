@@ -15,12 +15,12 @@ use stickslip_numerics::interrupt::{self, Interrupted, Stop};
 use stickslip_study::run::Context;
 
 /// Interval between progress reports, and between checks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Maximum number of threads in a request.
 const MOST_THREADS: usize = 1024;
 
 /// Supervision of a call.
-pub struct Watch {
+pub struct Supervision {
     /// Number of threads. The default is that of the machine or of `RAYON_NUM_THREADS`.
     pub threads: Option<usize>,
     /// Receives the number of finished points and of all points (`None` if unknown).
@@ -30,19 +30,19 @@ pub struct Watch {
 }
 
 /// Runs short `work` on this thread.
-pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+pub fn run_here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
-    let (begun, looked) = (Instant::now(), AtomicU64::new(0));
-    let kept = raised.clone();
+    let (begun, last_check) = (Instant::now(), AtomicU64::new(0));
+    let slot = raised.clone();
     let stop = Stop::asking(move || {
         let now = begun.elapsed().as_millis() as u64;
-        if now < looked.load(Ordering::Relaxed) + LOOK.as_millis() as u64 {
+        if now < last_check.load(Ordering::Relaxed) + POLL_INTERVAL.as_millis() as u64 {
             return false;
         }
-        looked.store(now, Ordering::Relaxed);
+        last_check.store(now, Ordering::Relaxed);
         let error = Python::attach(|py| py.check_signals()).err();
         let ends = error.is_some();
-        *kept.lock().unwrap_or_else(PoisonError::into_inner) = error;
+        *slot.lock().unwrap_or_else(PoisonError::into_inner) = error;
         ends
     });
     let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(|| stop.watch(work))));
@@ -50,18 +50,18 @@ pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResu
 }
 
 /// Runs long `work` on a new thread, which Ctrl-C abandons if it cannot end at once.
-pub fn apart<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+pub fn run_on_new_thread<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let stop = Stop::new();
     let (send, receive) = mpsc::channel();
-    let watched = stop.clone();
+    let stop_flag = stop.clone();
     let spawned = std::thread::Builder::new().spawn(move || {
         // The result of an abandoned thread has no receiver.
-        let _ = send.send(catch_unwind(AssertUnwindSafe(|| watched.watch(work))));
+        let _ = send.send(catch_unwind(AssertUnwindSafe(|| stop_flag.watch(work))));
     });
     spawned.map_err(|cause| error::exception(py, "StickslipError", format!("cannot create a thread: {cause}")))?;
     let receive = Mutex::new(receive);
     loop {
-        let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
+        let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL_INTERVAL));
         match next {
             Ok(outcome) => return outcome.map_err(|panic| ended(panic, None)),
             Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
@@ -87,20 +87,20 @@ static PROCESS: OnceLock<u32> = OnceLock::new();
 static POOLS: Mutex<BTreeMap<usize, Vec<rayon::ThreadPool>>> = Mutex::new(BTreeMap::new());
 
 /// Threads in use by one call.
-struct Lent {
+struct PoolLease {
     number: usize,
     pool: Option<rayon::ThreadPool>,
     /// Flag that ends their work.
     stop: Stop,
 }
 
-impl Lent {
+impl PoolLease {
     fn pool(&self) -> &rayon::ThreadPool {
         self.pool.as_ref().unwrap_or_else(|| unreachable!("a pool is given back once"))
     }
 }
 
-impl Drop for Lent {
+impl Drop for PoolLease {
     fn drop(&mut self) {
         if self.stop.is_set() {
             return; // The threads may still be working.
@@ -111,7 +111,7 @@ impl Drop for Lent {
 }
 
 /// Returns threads for one call: the requested number, or that of the machine.
-fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
+fn lease_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<PoolLease> {
     let process = std::process::id();
     if *PROCESS.get_or_init(|| process) != process {
         let message = "this process was forked after Stickslip started its threads, which a fork does not \
@@ -133,13 +133,17 @@ fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
     };
     let stop = Stop::new();
     pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
-    Ok(Lent { number, pool: Some(pool), stop })
+    Ok(PoolLease { number, pool: Some(pool), stop })
 }
 
 /// Runs `work` on the threads of a pool, reports progress, and lets Ctrl-C end the work.
-pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Context) -> T + Send) -> PyResult<T> {
-    let lent = lent(py, watch.threads)?;
-    let pool = lent.pool();
+pub fn run_supervised<T: Send>(
+    py: Python<'_>,
+    supervision: &Supervision,
+    work: impl FnOnce(&Context) -> T + Send,
+) -> PyResult<T> {
+    let lease = lease_pool(py, supervision.threads)?;
+    let pool = lease.pool();
     let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
     let counter = done.clone();
     let count = move || {
@@ -156,18 +160,19 @@ pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Contex
             let _ = send.send(outcome);
         });
         let mut wrong: Option<PyErr> = None;
-        let mut told = None;
+        let mut reported = None;
         let outcome = loop {
-            let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
+            let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL_INTERVAL));
             match next {
                 Ok(outcome) => break outcome,
                 Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
                 Err(mpsc::RecvTimeoutError::Timeout) if wrong.is_some() => {}
                 Err(mpsc::RecvTimeoutError::Timeout) => {
-                    let look = py.check_signals().and_then(|()| tell(py, watch, &done, &mut told));
-                    if let Err(error) = look {
+                    let checked =
+                        py.check_signals().and_then(|()| report_progress(py, supervision, &done, &mut reported));
+                    if let Err(error) = checked {
                         stop.store(true, Ordering::Relaxed);
-                        lent.stop.set();
+                        lease.stop.set();
                         wrong = Some(error);
                     }
                 }
@@ -178,16 +183,21 @@ pub fn watched<T: Send>(py: Python<'_>, watch: &Watch, work: impl FnOnce(&Contex
         }
         let outcome = outcome.map_err(|panic| ended(panic, None))?;
         py.check_signals()?;
-        tell(py, watch, &done, &mut told)?;
+        report_progress(py, supervision, &done, &mut reported)?;
         Ok(outcome)
     })
 }
 
-fn tell(py: Python<'_>, watch: &Watch, done: &AtomicU64, told: &mut Option<u64>) -> PyResult<()> {
+fn report_progress(
+    py: Python<'_>,
+    supervision: &Supervision,
+    done: &AtomicU64,
+    reported: &mut Option<u64>,
+) -> PyResult<()> {
     let now = done.load(Ordering::Relaxed);
-    if let Some(progress) = watch.progress.as_ref().filter(|_| *told != Some(now)) {
-        progress.call1(py, (now, watch.total))?;
-        *told = Some(now);
+    if let Some(progress) = supervision.progress.as_ref().filter(|_| *reported != Some(now)) {
+        progress.call1(py, (now, supervision.total))?;
+        *reported = Some(now);
     }
     Ok(())
 }
