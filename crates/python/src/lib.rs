@@ -1,22 +1,11 @@
 //! The Rust part `stickslip._core` of the Python package; the Python part is in
 //! `python/stickslip`.
 
-mod arrow;
-mod disk;
 mod error;
-mod figures;
 mod law;
 mod lock;
-mod many_orbits;
-mod matrices;
 mod model;
-mod numpy_view;
-mod orbit;
-mod orbit_table;
-mod parameters;
-mod pickle;
 mod progress;
-mod python_law;
 mod quantity;
 mod result;
 mod study;
@@ -37,9 +26,9 @@ mod _core {
     #[pymodule_export]
     use crate::lock::{_lock, Lock};
     #[pymodule_export]
-    use crate::model::{_model, _orbit, PyModel};
+    use crate::model::orbit::PyOrbit;
     #[pymodule_export]
-    use crate::orbit::PyOrbit;
+    use crate::model::{_model, _orbit, PyModel};
     #[pymodule_export]
     use crate::result::{_result, _table, PyResultSet, Table};
     #[pymodule_export]

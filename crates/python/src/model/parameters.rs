@@ -1,6 +1,7 @@
 //! Parameters of a model by name, for setting and varying them.
 
-use crate::{error, law, python_law, quantity};
+use crate::law::python_law;
+use crate::{error, law, quantity};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use stickslip::dimension::Dimension;

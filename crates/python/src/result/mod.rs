@@ -1,6 +1,9 @@
 //! Results of a study: tables, a figure and the record of the run.
 
-use crate::{arrow, error, numpy_view};
+mod arrow;
+mod numpy_view;
+
+use crate::error;
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};

@@ -1,15 +1,30 @@
 //! Models built in Python, and their results: orbits, responses, loops, modes.
+//!
+//! - `matrices`, `disk`: models from matrices, and disks from one sector.
+//! - `parameters`: the parameters of a model by name.
+//! - `orbit`, `many_orbits`: one orbit, and many in one call.
+//! - `orbit_table`, `figures`: tables and figures of the results.
+//! - `pickle`: the binary form of a model.
+
+mod disk;
+mod figures;
+mod many_orbits;
+mod matrices;
+pub mod orbit;
+mod orbit_table;
+mod parameters;
+mod pickle;
 
 use crate::law::PyLaw;
-use crate::many_orbits::{OrbitRequest, along_frequencies, along_parameters, describe};
-use crate::orbit::{PyOrbit, instants};
-use crate::orbit_table::{self, Row};
 use crate::progress::{bar, close};
 use crate::result::PyResultSet;
 use crate::study::PyStudy;
 use crate::supervision::{Supervision, run_here, run_on_new_thread, run_supervised};
-use crate::{disk, error, figures, matrices, parameters, pickle, quantity};
+use crate::{error, quantity};
+use many_orbits::{OrbitRequest, along_frequencies, along_parameters, describe};
 use numpy::{PyArray1, PyArrayMethods};
+use orbit::{PyOrbit, instants};
+use orbit_table::Row;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict, PyList};

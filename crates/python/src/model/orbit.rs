@@ -1,6 +1,6 @@
 //! Orbits in Python; their values are computed on demand.
 
-use crate::model::{PyModel, SearchInput};
+use super::{PyModel, SearchInput};
 use crate::supervision::run_here;
 use crate::{error, quantity};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};

@@ -1,5 +1,6 @@
 //! Binary form of a model for pickles, without the laws of its joints, which are separate.
 
+use super::matrices::Entries;
 use serde::{Deserialize, Serialize};
 use stickslip::law::SharedLaw;
 use stickslip::model::{
@@ -10,7 +11,6 @@ use stickslip_numerics::sparse::Matrix;
 
 /// Distribution of forces and of imposed motions around a disk.
 type Arounds = [Vec<Option<Around>>; 2];
-type Entries = Vec<(usize, usize, f64)>;
 
 /// Name, mass, inertia matrix, directions.
 type StoredBody = (String, f64, [[f64; 3]; 3], Vec<String>);

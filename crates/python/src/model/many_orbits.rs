@@ -1,8 +1,9 @@
 //! Many orbits of a model in one call: at many frequencies, or for many values of parameters.
 
-use crate::orbit_table::Row;
-use crate::parameters::{self, VariedParameters};
-use crate::{disk, error};
+use super::disk;
+use super::orbit_table::Row;
+use super::parameters::{self, VariedParameters};
+use crate::error;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::Arc;

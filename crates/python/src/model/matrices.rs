@@ -11,7 +11,7 @@ use stickslip::structure::Component;
 use stickslip_numerics::sparse::Matrix;
 
 /// Entries of a matrix: row, column, value.
-type Entries = Vec<(usize, usize, f64)>;
+pub(super) type Entries = Vec<(usize, usize, f64)>;
 
 /// Returns the entries of an n x n matrix: an array, or any sparse matrix of SciPy.
 fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> {

@@ -1,6 +1,6 @@
 //! Tables and figures of the results of a model.
 
-use crate::orbit::PyOrbit;
+use super::orbit::PyOrbit;
 use std::f64::consts::TAU;
 use stickslip::curve::modes::{Mode, ModePoint};
 use stickslip::model::System;

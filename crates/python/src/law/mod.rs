@@ -1,10 +1,12 @@
 //! Laws by name, with quantities as keyword arguments.
 
-use crate::python_law::{self, Magnitude, PythonLaw};
+pub mod python_law;
+
 use crate::{error, quantity};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
+use python_law::{Magnitude, PythonLaw};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
