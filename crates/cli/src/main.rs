@@ -60,7 +60,9 @@ fn main() -> ExitCode {
                 &run::RunOptions { only: &only, also: &also, json, open, watch, start, shard, progress },
             )
         }
-        Command::Merge { folders, out, only, also, open } => merge::merge(&folders, &out, (&only, &also), open),
+        Command::Merge { folders, out, only, also, open } => {
+            merge::merge(&folders, &out, &merge::MergeOptions { only: &only, also: &also, open })
+        }
         Command::Check { files, set, method, memory } => {
             run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
         }

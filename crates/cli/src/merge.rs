@@ -7,9 +7,19 @@ use stickslip_report::assemble::{Parts, assemble};
 use stickslip_report::stored::study_of;
 use stickslip_report::{check_writable, stream};
 
+/// Options of the command.
+pub struct MergeOptions<'a> {
+    /// `--only`.
+    pub only: &'a [String],
+    /// `--also`.
+    pub also: &'a [String],
+    /// `--open`.
+    pub open: bool,
+}
+
 /// Merges the parts into `out/NAME/`.
-pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String]), open: bool) -> Exit {
-    let outputs = match run::outputs(only, also) {
+pub fn merge(folders: &[PathBuf], out: &Path, options: &MergeOptions<'_>) -> Exit {
+    let outputs = match run::outputs(options.only, options.also) {
         Ok(outputs) => outputs,
         Err(exit) => return exit,
     };
@@ -39,6 +49,6 @@ pub fn merge(folders: &[PathBuf], out: &Path, (only, also): (&[String], &[String
     let parts = Parts { outline: &outline, journals: &journals, unjournaled: &[] };
     match assemble(&parts, &study, &outputs, out, &aside) {
         Err(error) => Exit::Failed(error.to_string()),
-        Ok(assembled) => run::report(&assembled, &[], (false, open)),
+        Ok(assembled) => run::report(&assembled, &[], run::Display { json: false, open: options.open }),
     }
 }

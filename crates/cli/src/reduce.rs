@@ -58,7 +58,7 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Exit {
     }
     let reduced = match (exports, model.ring.map(|ring| ring.sectors).zip(substructure.disk.as_ref())) {
         (Some(exports), _) => over_speeds(substructure, &model.places, &exports),
-        (None, Some((sectors, disk))) => sector(substructure, &model.places, (sectors, disk)),
+        (None, Some((sectors, disk))) => sector(substructure, &model.places, sectors, disk),
         (None, None) => without_rotation(substructure, &model.places),
     };
     match reduced.and_then(|reduced| save(&reduced, out).map(|()| reduced)) {
@@ -146,7 +146,8 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
 fn sector(
     substructure: &Substructure,
     places: &[Place],
-    (sectors, disk): (usize, &DiskPart),
+    sectors: usize,
+    disk: &DiskPart,
 ) -> Result<ReducedStructure, String> {
     let stated = &places[..places.len() / sectors];
     let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.clone()).collect();

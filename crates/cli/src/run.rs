@@ -173,10 +173,11 @@ pub fn run(request: &Request<'_>, destination: &Destination, options: &RunOption
         Err(exit) => return exit,
     };
     let stop = progress::stop_flag();
+    let workers = Workers { threads, stop: &stop };
     let mut open = options.open;
     loop {
         let before = read_all(request.files);
-        let exit = once(request, destination, (&outputs, &RunOptions { open, ..*options }), threads, &stop);
+        let exit = once(request, destination, &outputs, &RunOptions { open, ..*options }, workers);
         if !options.watch || stop.load(Ordering::Relaxed) {
             return exit;
         }
@@ -214,13 +215,20 @@ fn read_all(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
     files.iter().map(|file| std::fs::read(file).ok()).collect()
 }
 
+/// Threads of a run, and the flag that stops them.
+#[derive(Clone, Copy)]
+struct Workers<'a> {
+    threads: usize,
+    stop: &'a Arc<AtomicBool>,
+}
+
 /// Runs all files once.
 fn once(
     request: &Request<'_>,
     destination: &Destination,
-    (outputs, options): (&Outputs, &RunOptions<'_>),
-    threads: usize,
-    stop: &Arc<AtomicBool>,
+    outputs: &Outputs,
+    options: &RunOptions<'_>,
+    workers: Workers<'_>,
 ) -> Exit {
     let studies = match request.read() {
         Ok(studies) => studies,
@@ -248,7 +256,7 @@ fn once(
         } else if let Some(long) = summary.long_run() {
             complain!("{}: {long}", study.name());
         }
-        match one(&checked, destination, outputs, options, (threads, stop)) {
+        match one(&checked, destination, outputs, options, workers) {
             Exit::Done => {}
             Exit::SomeFailed => failed = true,
             other => return other,
@@ -263,8 +271,9 @@ fn one(
     destination: &Destination,
     outputs: &Outputs,
     options: &RunOptions<'_>,
-    (threads, stop): (usize, &Arc<AtomicBool>),
+    workers: Workers<'_>,
 ) -> Exit {
+    let Workers { threads, stop } = workers;
     let study = checked.study();
     let mut journal = match stream::begin(checked, &destination.out, options.shard, options.start, threads) {
         Ok(journal) => journal,
@@ -322,7 +331,7 @@ fn one(
         // The results exist; a folder that cannot be removed is not an error.
         let _ = std::fs::remove_dir_all(&folder);
     }
-    let exit = report(&assembled, &outline.notes, (options.json, options.open));
+    let exit = report(&assembled, &outline.notes, Display { json: options.json, open: options.open });
     match exit {
         Exit::Done | Exit::SomeFailed if stop.load(Ordering::Relaxed) => {
             let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&destination.out);
@@ -369,8 +378,18 @@ fn finish_shard(study: &Study, shard: Shard, journal: &mut Journal, whole: bool)
     if failed { Exit::SomeFailed } else { Exit::Done }
 }
 
+/// What a command shows besides the files that it writes.
+#[derive(Clone, Copy)]
+pub(crate) struct Display {
+    /// `true` prints the results as JSON.
+    pub json: bool,
+    /// `true` opens the figure in the browser.
+    pub open: bool,
+}
+
 /// Prints the messages about written results, except the notes in `known`.
-pub(crate) fn report(assembled: &Assembled, known: &[String], (json, open): (bool, bool)) -> Exit {
+pub(crate) fn report(assembled: &Assembled, known: &[String], display: Display) -> Exit {
+    let Display { json, open } = display;
     let Assembled { dataset, is_whole, files } = assembled;
     let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known.contains(note));
     late.for_each(|warning| complain!("{warning}"));

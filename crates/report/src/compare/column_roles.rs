@@ -4,6 +4,7 @@ use crate::run::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
 use stickslip_study::{Case, VariedValue};
+
 /// Columns with error measures instead of results.
 const EVIDENCE: [&str; 3] = ["residual", "energy_gap", "truncation"];
 /// Columns with texts and counts that identify rows.
@@ -93,13 +94,21 @@ fn fixed(case: &Case) -> Vec<VariedValue> {
         .collect()
 }
 
+/// A table of a run.
+#[derive(Clone, Copy)]
+pub(super) struct RunTable<'a> {
+    pub(super) run: &'a Stored,
+    pub(super) table: &'a Table,
+}
+
 /// Returns the table with a column for every parameter that only the other run varies.
-pub(super) fn with_parameter_columns(run: &Stored, table: &Table, (other, with): (&Stored, &Table)) -> Table {
-    let mut table = table.clone();
-    let (Ok(case), Ok(varied)) = (run.study.case(0), other.study.case(0).map(|case| case.varied)) else { return table };
+pub(super) fn with_parameter_columns(own: RunTable<'_>, other: RunTable<'_>) -> Table {
+    let mut table = own.table.clone();
+    let varied = other.run.study.case(0).map(|case| case.varied);
+    let (Ok(case), Ok(varied)) = (own.run.study.case(0), varied) else { return table };
     for value in fixed(&case).iter().filter(|value| varied.iter().any(|varied| varied.name == value.name)) {
         let (name, value) = value.column();
-        if with.column(&name).is_some() && table.column(&name).is_none() {
+        if other.table.column(&name).is_some() && table.column(&name).is_none() {
             table.columns.insert(0, Column::numbers(&name, vec![value; table.rows()]));
         }
     }

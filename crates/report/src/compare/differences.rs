@@ -1,11 +1,12 @@
 //! Differences between runs: the largest in every column, and all differences of peaks and
 //! optima.
 
-use super::column_roles::{ColumnRoles, with_parameter_columns};
-use super::row_matching::{MatchedRow, difference, pairs};
+use super::column_roles::{ColumnRoles, RunTable, with_parameter_columns};
+use super::row_matching::{MatchedRow, TablePair, difference, pairs};
 use crate::run::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
+
 /// Prefix of columns with values of the first run.
 pub(super) const FIRST: &str = "first_";
 /// Name of the table of the largest differences.
@@ -22,6 +23,13 @@ struct Largest {
     at: String,
     values: (f64, f64),
     points: u64,
+}
+
+/// A run with its label in the comparison.
+#[derive(Clone, Copy)]
+pub(super) struct LabelledRun<'a> {
+    pub(super) run: &'a Stored,
+    pub(super) label: &'a str,
 }
 
 /// The tables of differences, extended with every run.
@@ -42,17 +50,16 @@ struct DifferenceRow {
 }
 
 impl Differences {
-    pub(super) fn add(&mut self, (first, label): (&Stored, &str), (other, run): (&Stored, &str)) {
+    /// Adds the differences between the first run and another run.
+    pub(super) fn add(&mut self, first: LabelledRun<'_>, other: LabelledRun<'_>) {
+        let (LabelledRun { run: first, label }, LabelledRun { run: other, label: run }) = (first, other);
         for table in &first.dataset.tables {
             let Some(with) = other.dataset.tables.iter().find(|t| t.name == table.name) else {
                 self.notes.push(format!("{}: {run} does not contain this table.", table.name));
                 continue;
             };
-            let completed = (
-                with_parameter_columns(first, table, (other, with)),
-                with_parameter_columns(other, with, (first, table)),
-            );
-            let (table, with) = (&completed.0, &completed.1);
+            let (ours, theirs) = (RunTable { run: first, table }, RunTable { run: other, table: with });
+            let (table, with) = (&with_parameter_columns(ours, theirs), &with_parameter_columns(theirs, ours));
             let (reading, reading_with) = (ColumnRoles::new(first, table), ColumnRoles::new(other, with));
             if reading.keys != reading_with.keys || reading.abscissa != reading_with.abscissa {
                 let words = |reading: &ColumnRoles| {
@@ -67,12 +74,12 @@ impl Differences {
                 ));
                 continue;
             }
-            self.table((table, with), &reading, run, label);
+            self.table(TablePair { first: table, other: with }, &reading, run, label);
         }
     }
 
-    fn table(&mut self, tables: (&Table, &Table), reading: &ColumnRoles, run: &str, label: &str) {
-        let (table, with) = tables;
+    fn table(&mut self, tables: TablePair<'_>, reading: &ColumnRoles, run: &str, label: &str) {
+        let TablePair { first: table, other: with } = tables;
         let groups = reading.groups(table);
         let others: BTreeMap<String, Vec<usize>> = reading.groups(with).into_iter().collect();
         let columns: Vec<&str> =
@@ -106,7 +113,7 @@ impl Differences {
             for (name, largest) in columns.iter().zip(&mut largest) {
                 let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
                 for pair in &pairs {
-                    largest.look(name, (a[pair.first], pair.value(name, b)), &|| {
+                    largest.add(name, a[pair.first], pair.value(name, b), &|| {
                         let x = reading.abscissa.as_deref().and_then(|name| table.column(name));
                         let x = x.map(|x| format!("{} = {}", x.name, crate::output::csv::cell(&x.values, pair.first)));
                         [Some(key.clone()), x]
@@ -154,12 +161,13 @@ impl Differences {
     /// Compares every peak or optimum with that of the first run.
     fn found(
         &mut self,
-        (table, with): (&Table, &Table),
+        tables: TablePair<'_>,
         reading: &ColumnRoles,
         columns: &[&str],
         pairs: &[MatchedRow],
         run: &str,
     ) {
+        let TablePair { first: table, other: with } = tables;
         let mut made: Vec<Column> = vec![Column::texts("run", pairs.iter().map(|_| run.to_owned()).collect())];
         for key in reading.keys.iter().filter_map(|key| table.column(key)) {
             made.push(match &key.values {
@@ -235,7 +243,8 @@ fn without_unit(name: &str) -> &str {
 }
 
 impl Largest {
-    fn look(&mut self, name: &str, (a, b): (f64, f64), at: &dyn Fn() -> String) {
+    /// Compares a value `a` of the first run with the value `b` of another run.
+    fn add(&mut self, name: &str, a: f64, b: f64, at: &dyn Fn() -> String) {
         let difference = difference(name, a, b);
         if !difference.is_finite() {
             return;
@@ -259,9 +268,9 @@ mod tests {
     #[test]
     fn angles_go_the_short_way_around() {
         let mut largest = Largest::default();
-        largest.look("blade_phase_deg", (179.0, -179.0), &String::new);
+        largest.add("blade_phase_deg", 179.0, -179.0, &String::new);
         assert_eq!((largest.difference, largest.points), (2.0, 1));
-        largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
+        largest.add("blade_phase_deg", f64::NAN, 1.0, &String::new);
         assert_eq!(largest.points, 1);
         // This also holds between two points of a curve.
         let half = MatchedRow { first: 0, other: (0, 1, 0.5) };

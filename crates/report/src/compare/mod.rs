@@ -20,12 +20,13 @@ pub use table::for_terminal;
 use crate::output::result_file::{ReportError, file_name};
 use crate::output::{Outputs, write_dataset};
 use crate::run::stored::{COMPARISON, Stored, StoredError};
-use differences::Differences;
+use differences::{Differences, LabelledRun};
 use labels::{folder_name, labels};
 use overlay::overlay;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Figure, Record};
+
 /// Reason why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
@@ -77,7 +78,7 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
     }
     let mut differences = Differences::default();
     for (run, label) in others.iter().zip(&labels[1..]) {
-        differences.add((first, &labels[0]), (run, label));
+        differences.add(LabelledRun { run: first, label: &labels[0] }, LabelledRun { run, label });
     }
     notes.append(&mut differences.notes);
     let titles: BTreeSet<&str> = runs.iter().map(|run| run.dataset.title.as_str()).collect();

@@ -2,6 +2,7 @@
 
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 use stickslip_study::units;
+
 /// Line styles of successive runs: a dashed curve does not hide a curve below it.
 const STYLES: [Style; 3] = [Style::Solid, Style::Dashed, Style::Dotted];
 /// Number of colours of the palette.
@@ -158,13 +159,21 @@ fn is_same_line(a: &Series, b: &Series) -> bool {
     look(a) == look(b) && all(&a.x, &b.x) && all(&a.y, &b.y)
 }
 
-/// Returns the factors between the units of two panels, or `None` for different dimensions.
-fn factors(from: &Panel, to: &Panel) -> Option<(f64, f64)> {
-    let of = |from: &Axis, to: &Axis| units::ratio(&from.unit, &to.unit);
-    Some((of(&from.x, &to.x)?, of(&from.y, &to.y)?))
+/// Factors between the units of two panels.
+#[derive(Clone, Copy)]
+struct UnitFactors {
+    x: f64,
+    y: f64,
 }
 
-fn converted(series: &Series, (x, y): (f64, f64)) -> Series {
+/// Returns the factors between the units of two panels, or `None` for different dimensions.
+fn factors(from: &Panel, to: &Panel) -> Option<UnitFactors> {
+    let of = |from: &Axis, to: &Axis| units::ratio(&from.unit, &to.unit);
+    Some(UnitFactors { x: of(&from.x, &to.x)?, y: of(&from.y, &to.y)? })
+}
+
+fn converted(series: &Series, factors: UnitFactors) -> Series {
+    let UnitFactors { x, y } = factors;
     let times = |values: &[f64], factor: f64| -> Vec<f64> {
         if factor == 1.0 { values.to_vec() } else { values.iter().map(|value| value * factor).collect() }
     };

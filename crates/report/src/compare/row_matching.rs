@@ -1,6 +1,14 @@
 //! Finds the matching rows of two runs.
 
 use stickslip_study::dataset::Table;
+
+/// A table of the first run and the same table of another run.
+#[derive(Clone, Copy)]
+pub(super) struct TablePair<'a> {
+    pub(super) first: &'a Table,
+    pub(super) other: &'a Table,
+}
+
 /// A row of the first run, and two rows of the other run with the weight of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MatchedRow {
@@ -57,12 +65,12 @@ fn interpolated(x: (&[f64], &[f64]), first: &[usize], other: &[usize]) -> Vec<Ma
 ///
 /// Returns `None` if the curves have different numbers of monotonic pieces.
 pub(super) fn pairs(
-    tables: (&Table, &Table),
+    tables: TablePair<'_>,
     abscissa: Option<&str>,
     first: &[usize],
     other: &[usize],
 ) -> Option<(Vec<MatchedRow>, bool)> {
-    let both = |name: &str| Some((tables.0.numbers(name)?, tables.1.numbers(name)?));
+    let both = |name: &str| Some((tables.first.numbers(name)?, tables.other.numbers(name)?));
     let one_by_one = || first.iter().zip(other).map(|(a, b)| MatchedRow::rows(*a, *b)).collect::<Vec<_>>();
     let Some(x) = abscissa.and_then(both) else {
         if first.len() == other.len() {
@@ -126,7 +134,7 @@ mod tests {
             ],
         };
         let (a, b) = (table(&[1.0, 5.0]), table(&[4.9]));
-        let (found, interpolated) = pairs((&b, &a), None, &[0], &[0, 1]).unwrap();
+        let (found, interpolated) = pairs(TablePair { first: &b, other: &a }, None, &[0], &[0, 1]).unwrap();
         assert_eq!((found, interpolated), (vec![MatchedRow::rows(0, 1)], false));
     }
 }

@@ -3,6 +3,7 @@
 use super::differences::{DIFFERENCES, FIRST};
 use crate::terminal;
 use stickslip_study::dataset::{Column, Dataset, Table, Values};
+
 /// Returns the comparison with units and percentages. Quantities that are equal in all runs are
 /// omitted.
 #[must_use]

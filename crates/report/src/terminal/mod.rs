@@ -63,7 +63,7 @@ impl Terminal {
             if (1..=ROWS).contains(&table.rows()) || main && table.rows() > 0 {
                 let sorted = worst_first(table).filter(|_| table.name == "peaks");
                 let written = in_study_units(sorted.as_ref().unwrap_or(table), &dataset.record.study["units"]);
-                let _ = write!(out, "\n{}\n{}", clean(&table.name), shown((&table.name, &written), width));
+                let _ = write!(out, "\n{}\n{}", clean(&table.name), shown(&table.name, &written, width));
             }
         }
         out.push('\n');
@@ -313,7 +313,7 @@ struct FormattedColumn<'a> {
 /// Formats the first rows of a table with aligned columns, at most `limit` characters wide.
 ///
 /// A last line counts the omitted rows and columns.
-fn shown((name, table): (&str, &[ConvertedColumn<'_>]), limit: usize) -> String {
+fn shown(name: &str, table: &[ConvertedColumn<'_>], limit: usize) -> String {
     let all_rows = table.first().map_or(0, |one| one.values().len());
     let rows = all_rows.min(ROWS);
     let mut columns: Vec<FormattedColumn<'_>> = table

@@ -143,7 +143,7 @@ impl Svg {
         );
     }
 
-    pub(super) fn dot(&mut self, (x, y): (f64, f64), colour: &str) {
+    pub(super) fn dot(&mut self, (x, y): Point, colour: &str) {
         let _ = writeln!(self.0, "<circle cx=\"{}\" cy=\"{}\" r=\"2\" fill=\"{colour}\"/>", short(x), short(y));
     }
 

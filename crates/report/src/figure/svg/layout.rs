@@ -104,7 +104,8 @@ impl Layout {
 
         let title = font::wrap(&figure.title, TITLE, Weight::Bold, width - 2.0 * MARGIN);
         let mut y = MARGIN + TITLE * LEADING * title.len() as f64;
-        let (legend, bottom) = place_legend(panels::legend(figure), width, y);
+        let (entries, more) = panels::legend(figure);
+        let (legend, bottom) = place_legend(entries, more, width, y);
         y = bottom + 4.0;
         for row in 0..rows {
             let members = (row * columns)..((row + 1) * columns).min(panels.len());
@@ -244,8 +245,10 @@ fn apart(ticks: &Ticks, range: AxisRange, width: f64) -> bool {
 /// Line sample before a label, space after the sample, and space between entries, in px.
 pub(super) const SAMPLE: (f64, f64, f64) = (30.0, 7.0, 24.0);
 
-/// Places legend entries in centred rows below `top`. Returns them and the lower edge.
-fn place_legend((entries, more): (Vec<LegendEntry>, usize), width: f64, top: f64) -> (Vec<PlacedEntry>, f64) {
+/// Places legend entries in centred rows below `top`, and a note for `more` omitted ones.
+///
+/// Returns the placed entries and the lower edge.
+fn place_legend(entries: Vec<LegendEntry>, more: usize, width: f64, top: f64) -> (Vec<PlacedEntry>, f64) {
     let limit = width - 2.0 * MARGIN;
     let before = SAMPLE.0 + SAMPLE.1;
     struct Item {
