@@ -43,7 +43,7 @@ pub struct PythonLaw {
 
 impl fmt::Debug for PythonLaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Written").field("name", &self.info.name).field("number", &self.number).finish_non_exhaustive()
+        f.debug_struct("PythonLaw").field("name", &self.info.name).field("number", &self.number).finish_non_exhaustive()
     }
 }
 
@@ -101,7 +101,7 @@ pub fn is_written(law: &SharedLaw) -> bool {
 impl PythonLaw {
     /// Creates a law with one direction and no states.
     ///
-    /// The caller sets other properties before [sharing](Written::shared) it.
+    /// The caller sets other properties before [registering](PythonLaw::register) it.
     pub fn new(name: &str, kernel: Py<PyAny>, parameters: &[(String, Dimension)]) -> Self {
         PythonLaw {
             info: row(name, parameters),

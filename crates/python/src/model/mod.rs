@@ -86,8 +86,8 @@ struct CachedSolver {
 /// Creates the solver of a system that is stored together with the solver.
 fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
     let solver = advised(method, system)?;
-    // SAFETY: the system is on the heap and does not move; `CachedSolver` drops the solver before its
-    // own reference to the system, and never gives the solver away
+    // SAFETY: the system is on the heap and does not move; `CachedSolver` drops the solver before
+    // its own reference to the system, and never gives the solver away
     #[allow(unsafe_code)]
     Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
 }

@@ -13,7 +13,7 @@ pub(crate) struct ClipRect {
     pub bottom: f64,
 }
 
-/// Tolerance of the window in px, so that rounding does not remove a mark from the edge.
+/// Tolerance of the rectangle in px, so that rounding does not remove a mark from the edge.
 const EDGE: f64 = 0.01;
 /// Flatness tolerance in px: 1/40 of the line width. A point this close to the line is removed.
 const FLATNESS: f64 = 0.04;
@@ -26,7 +26,7 @@ impl ClipRect {
         x >= self.left - EDGE && x <= self.right + EDGE && y >= self.top - EDGE && y <= self.bottom + EDGE
     }
 
-    /// Returns the pieces of a line inside the window.
+    /// Returns the pieces of a line inside the rectangle.
     pub(crate) fn line(&self, points: &[Point]) -> Vec<Vec<Point>> {
         if points.iter().all(|p| self.contains(*p)) {
             return vec![points.to_vec()];
@@ -47,7 +47,7 @@ impl ClipRect {
         pieces
     }
 
-    /// Returns the part of a segment inside the window, and `true` if it reaches the segment's
+    /// Returns the part of a segment inside the rectangle, and `true` if it reaches the segment's
     /// end.
     ///
     /// Source: Liang and Barsky (1984).
@@ -72,7 +72,7 @@ impl ClipRect {
             .then(|| (if enter > 0.0 { at(enter) } else { a }, if leave < 1.0 { at(leave) } else { b }, leave >= 1.0))
     }
 
-    /// Returns the part of a polygon inside the window. Source: Sutherland and Hodgman (1974).
+    /// Returns the part of a polygon inside the rectangle. Source: Sutherland and Hodgman (1974).
     pub(crate) fn polygon(&self, points: &[Point]) -> Vec<Point> {
         let edges: [&dyn Fn(Point) -> f64; 4] =
             [&|p| p.0 - self.left, &|p| self.right - p.0, &|p| p.1 - self.top, &|p| self.bottom - p.1];
@@ -154,18 +154,18 @@ fn distance(p: Point, a: Point, b: Point) -> f64 {
 mod tests {
     use super::*;
 
-    const WINDOW: ClipRect = ClipRect { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
+    const RECT: ClipRect = ClipRect { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
 
     #[test]
     fn a_line_that_leaves_and_returns_is_two_pieces() {
-        let pieces = WINDOW.line(&[(1.0, 5.0), (3.0, 15.0), (5.0, 5.0), (8.0, 5.0)]);
+        let pieces = RECT.line(&[(1.0, 5.0), (3.0, 15.0), (5.0, 5.0), (8.0, 5.0)]);
         // The line crosses the lower edge half way to (3, 15), and again half way back.
         assert_eq!(pieces, [vec![(1.0, 5.0), (2.0, 10.0)], vec![(4.0, 10.0), (5.0, 5.0), (8.0, 5.0)]]);
-        assert!(WINDOW.line(&[(-5.0, 1.0), (-1.0, 9.0)]).is_empty());
+        assert!(RECT.line(&[(-5.0, 1.0), (-1.0, 9.0)]).is_empty());
         // Both ends are outside, the middle is inside.
-        assert_eq!(WINDOW.line(&[(-5.0, 5.0), (15.0, 5.0)]), [vec![(0.0, 5.0), (10.0, 5.0)]]);
+        assert_eq!(RECT.line(&[(-5.0, 5.0), (15.0, 5.0)]), [vec![(0.0, 5.0), (10.0, 5.0)]]);
         let inside = [(0.0, 0.0), (10.0, 10.0)];
-        assert_eq!(WINDOW.line(&inside), [inside.to_vec()]);
+        assert_eq!(RECT.line(&inside), [inside.to_vec()]);
     }
 
     #[test]
@@ -173,12 +173,12 @@ mod tests {
         let area = |p: &[Point]| {
             (0..p.len()).map(|i| (p[i], p[(i + 1) % p.len()])).map(|(a, b)| a.0 * b.1 - b.0 * a.1).sum::<f64>() / 2.0
         };
-        // The lower half of the triangle is outside the window: three quarters of its area of
+        // The lower half of the triangle is outside the rectangle: three quarters of its area of
         // 50.
         let triangle = [(0.0, 15.0), (10.0, 15.0), (5.0, 5.0)];
-        assert!((area(&WINDOW.polygon(&triangle)).abs() - 12.5).abs() < 1e-12);
-        assert!(WINDOW.polygon(&[(20.0, 1.0), (30.0, 1.0), (20.0, 9.0)]).is_empty());
-        assert!(WINDOW.polygon(&[]).is_empty());
+        assert!((area(&RECT.polygon(&triangle)).abs() - 12.5).abs() < 1e-12);
+        assert!(RECT.polygon(&[(20.0, 1.0), (30.0, 1.0), (20.0, 9.0)]).is_empty());
+        assert!(RECT.polygon(&[]).is_empty());
     }
 
     #[test]

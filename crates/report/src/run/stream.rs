@@ -2,7 +2,7 @@
 //! into shards.
 //!
 //! A run of `NAME` keeps its [`Journal`] in `out/NAME.running/`.
-//! [`assemble`](crate::run::assemble::assemble) makes the results from it. The journal of a shard
+//! [`assemble`](crate::assemble::assemble) makes the results from it. The journal of a shard
 //! stays in `out/NAME.shard-3-of-16/` until [`read_parts`] reads all shards for the merge.
 
 use crate::output::result_file::{ReportError, file_name};

@@ -25,7 +25,7 @@ const DARK: [[&str; 2]; 6] = [
     [ZERO, "#5a606a"],
 ];
 
-/// Colours of a figure: shades on white, and the map to their dark counterparts.
+/// Colours of a figure: the scheme on white, and the map to the dark counterparts.
 pub(super) struct Palette {
     pub(super) scheme: ColourScheme,
     pub(super) dark: BTreeMap<String, String>,

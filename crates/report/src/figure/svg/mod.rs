@@ -358,15 +358,15 @@ mod tests {
         let mut figure = samples::envelope().figure;
         figure.panels.truncate(1);
         let layout = Layout::new(&figure);
-        let window = layout.panels[0].clip_rect();
+        let area = layout.panels[0].clip_rect();
         let svg = to_svg(&figure);
         let document = roxmltree::Document::parse(&svg).unwrap();
         let mut points = 0;
         for path in document.descendants().filter(|n| n.attribute("stroke-linejoin").is_some()) {
             let numbers: Vec<f64> =
                 path.attribute("d").unwrap().split(['M', 'L', ' ']).filter_map(|t| t.parse().ok()).collect();
-            for p in numbers.chunks(2).map(|c| (c[0], c[1])).filter(|p| p.1 > window.top - 5.0) {
-                assert!(window.contains(p), "{p:?} {window:?}");
+            for p in numbers.chunks(2).map(|c| (c[0], c[1])).filter(|p| p.1 > area.top - 5.0) {
+                assert!(area.contains(p), "{p:?} {area:?}");
                 points += 1;
             }
         }
