@@ -67,7 +67,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
     let (mut text, mut wrong) = (String::new(), false);
     let mut square: Vec<NamedMatrix> = Vec::new();
     let mut rows = Vec::new();
-    let mut beside = None;
+    let mut row_names = None;
     for file in files {
         match inspect_file(file, format, &mut text) {
             Ok((matrices, whole)) => {
@@ -90,7 +90,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                     names.iter().filter(|name| !name.is_empty()).take(LOWEST).map(String::as_str).collect();
                 let _ =
                     writeln!(text, "{}\n  names of {} rows: {}, …\n", file.display(), names.len(), shown.join(", "));
-                beside = Some(names);
+                row_names = Some(names);
             }
             Err(other) => {
                 match (other.kind, count) {
@@ -114,7 +114,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                 let of_damping: Vec<&NamedMatrix> =
                     square.iter().filter(|named| named.role == Some(Role::Damping)).collect();
                 let damping = Some(&of_damping[..]).filter(|all| all.len() == 1).map(|all| all[0]);
-                text += &match Pair::new(stiffness, mass, damping, beside.as_deref()) {
+                text += &match Pair::new(stiffness, mass, damping, row_names.as_deref()) {
                     Ok(pair) => pair.to_string(),
                     Err(why) => format!("  no frequencies: {why}\n"),
                 };
@@ -162,8 +162,8 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
             if let Some(sparse) = converted(&matrix, &out)
                 .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
             {
-                let beside = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
-                let _ = writeln!(text, "  {}{beside}", definite(&sparse));
+                let exception = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
+                let _ = writeln!(text, "  {}{exception}", definite(&sparse));
             }
             let role = Role::from_name(file, name);
             let name = match name {
@@ -241,7 +241,7 @@ impl Pair {
         stiffness: &NamedMatrix,
         mass: &NamedMatrix,
         damping: Option<&NamedMatrix>,
-        beside: Option<&[String]>,
+        row_names: Option<&[String]>,
     ) -> Result<Pair, String> {
         let of_mass = match mass.matrix.names() {
             Some(_) => Cow::Owned(aligned(mass.matrix.clone(), &stiffness.matrix).map_err(|error| error.to_string())?),
@@ -255,7 +255,7 @@ impl Pair {
             return Err(format!("the stiffness {stiffness} has {rows} rows, but the mass {mass} has {other}"));
         }
         let out = constrained(&[&stiffness.matrix, &of_mass], rows);
-        let names = stiffness.matrix.names().or(of_mass.names()).or(beside.filter(|names| names.len() == rows));
+        let names = stiffness.matrix.names().or(of_mass.names()).or(row_names.filter(|names| names.len() == rows));
         if out.len() == rows {
             return Err("all rows are constrained".to_owned());
         }

@@ -45,9 +45,9 @@ pub fn merge(folders: &[PathBuf], out: &Path, options: &MergeOptions<'_>) -> Exi
     if let Err(error) = check_writable(&folder) {
         return Exit::Failed(error.to_string());
     }
-    let aside = out.join(format!("{}.merging.{}", outline.name, std::process::id()));
+    let staging = out.join(format!("{}.merging.{}", outline.name, std::process::id()));
     let parts = Parts { outline: &outline, journals: &journals, unjournaled: &[] };
-    match assemble(&parts, &study, &outputs, out, &aside) {
+    match assemble(&parts, &study, &outputs, out, &staging) {
         Err(error) => Exit::Failed(error.to_string()),
         Ok(assembled) => run::report(&assembled, &[], run::Display { json: false, open: options.open }),
     }

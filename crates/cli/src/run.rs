@@ -336,12 +336,12 @@ fn one(
         Exit::Done | Exit::SomeFailed if stop.load(Ordering::Relaxed) => {
             let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&destination.out);
             let whole = destination.out.join(study.name());
-            let beside = if results == whole || !interrupted {
+            let earlier = if results == whole || !interrupted {
                 String::new()
             } else {
                 format!("; the complete run in {} is unchanged", whole.join("").display())
             };
-            let on = if interrupted { "; continue with --resume" } else { "" };
+            let resume = if interrupted { "; continue with --resume" } else { "" };
             let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
                 true => {
                     "interrupted before any unit of work was finished (a stretch of points, or a whole followed \
@@ -349,7 +349,7 @@ fn one(
                 }
                 false => "interrupted; the finished points are in",
             };
-            Exit::Failed(format!("{what} {}{beside}{on}", results.join("").display()))
+            Exit::Failed(format!("{what} {}{earlier}{resume}", results.join("").display()))
         }
         exit => exit,
     }

@@ -329,7 +329,7 @@ pub(crate) mod tests {
         Page {
             title: "Dry friction between blades: the paper's figures & claims".into(),
             introduction: vec![
-                "Every figure of the paper, computed anew, beside every claim that its text makes.".into(),
+                "Every figure of the paper, computed again and compared with the claims of its text.".into(),
             ],
             sections: vec![section(samples::hysteresis()), section(samples::response()), section(samples::hostile())],
         }

@@ -76,7 +76,7 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
         }
         (true, None) if deviations.len() != sectors => {
             let message = format!(
-                "`deviation` has {} values, but the disk has {sectors} sectors: give one value per sector",
+                "`deviation` has {} value(s), but the disk has {sectors} sectors: give one value per sector",
                 deviations.len()
             );
             return Err(error::model(py, message));

@@ -111,8 +111,8 @@ fn draw_bar(svg: &mut Svg, bar: &Bar) {
     for (value, label) in bar.ticks.positions.iter().zip(&bar.ticks.labels) {
         let y = at(*value);
         svg.line((bar.left + COLOUR_BAR_WIDTH, y), (bar.left + COLOUR_BAR_WIDTH + TICK_LENGTH, y), AXIS);
-        let beside = Text::at(bar.left + COLOUR_BAR_WIDTH + TICK_LENGTH + 5.0, y + 0.36 * TICK);
-        svg.text(label, Text { size: TICK, anchor: "start", ..beside });
+        let position = Text::at(bar.left + COLOUR_BAR_WIDTH + TICK_LENGTH + 5.0, y + 0.36 * TICK);
+        svg.text(label, Text { size: TICK, anchor: "start", ..position });
     }
     for (i, line) in bar.title.iter().enumerate() {
         let x = bar.left + bar.title_offset + LABEL * (0.8 + LEADING * i as f64);
