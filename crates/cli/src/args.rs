@@ -7,10 +7,8 @@ use stickslip_report::stream::Shard;
 /// Compute the vibration of structures with dry-friction joints
 #[derive(Debug, Parser)]
 #[command(name = "stickslip", version, about, long_about = None, max_term_width = 100)]
-#[command(
-    after_help = "Exit status: 0 all points converged; 3 results written, some points failed; 2 the input is wrong, nothing \
-                        written; 1 anything else."
-)]
+#[command(after_help = "Exit status: 0 if all points converged; 3 if results were written but some points failed; 2 \
+                  if the input is wrong and nothing was written; 1 for any other error.")]
 pub struct Cli {
     /// The command to run.
     #[command(subcommand)]
@@ -164,7 +162,7 @@ pub enum Command {
     /// List laws, methods, templates, study kinds or outputs
     List {
         /// Table to list; default: all
-        what: Option<What>,
+        what: Option<ListTopic>,
     },
     /// Print the JSON Schema of study files for editors
     Schema,
@@ -202,7 +200,7 @@ pub enum Progress {
 
 /// Tables that `list` can print.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum What {
+pub enum ListTopic {
     /// Friction laws
     Laws,
     /// Methods

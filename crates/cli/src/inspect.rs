@@ -1,7 +1,7 @@
 //! `stickslip inspect`: describes matrix files, and checks whether they can belong to a
 //! structure.
 
-use crate::ending::{Ending, print};
+use crate::exit_status::{Exit, print};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write};
@@ -19,10 +19,10 @@ const LOWEST: usize = 6;
 
 /// Usual masses of parts that vibrate with dry friction, in kg: a blade or a bracket, clamped
 /// or free.
-const USUAL: RangeInclusive<f64> = 0.01..=100.0;
+const USUAL_MASSES: RangeInclusive<f64> = 0.01..=100.0;
 
 /// A matrix and its displayed name.
-struct Named {
+struct NamedMatrix {
     name: String,
     role: Option<Role>,
     matrix: Matrix,
@@ -47,7 +47,7 @@ const SHORT: usize = 4;
 impl Role {
     /// Returns the role that the name of a matrix states, or that of its file if the matrix has
     /// no name.
-    fn of(file: &Path, name: Option<&str>) -> Option<Role> {
+    fn from_name(file: &Path, name: Option<&str>) -> Option<Role> {
         let text = |part: Option<&std::ffi::OsStr>| part.map(|part| part.to_string_lossy().to_lowercase());
         let (short, all) = match name {
             Some(name) => (name.to_lowercase(), name.to_lowercase()),
@@ -63,13 +63,13 @@ impl Role {
 
 /// Describes every matrix in the files, and prints the lowest frequencies of stiffness and
 /// mass.
-pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
+pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
     let (mut text, mut wrong) = (String::new(), false);
-    let mut square: Vec<Named> = Vec::new();
+    let mut square: Vec<NamedMatrix> = Vec::new();
     let mut rows = Vec::new();
-    let mut beside = None;
+    let mut row_names = None;
     for file in files {
-        match one(file, format, &mut text) {
+        match inspect_file(file, format, &mut text) {
             Ok((matrices, whole)) => {
                 square.extend(matrices);
                 wrong |= !whole;
@@ -90,12 +90,13 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
                     names.iter().filter(|name| !name.is_empty()).take(LOWEST).map(String::as_str).collect();
                 let _ =
                     writeln!(text, "{}\n  names of {} rows: {}, …\n", file.display(), names.len(), shown.join(", "));
-                beside = Some(names);
+                row_names = Some(names);
             }
             Err(other) => {
                 match (other.kind, count) {
                     (Kind::Names, None) => complain!(
-                        "error: {}: names of rows, which are looked at beside the square matrix whose rows they name; write stickslip inspect MATRIX {}",
+                        "error: {}: this file contains row names; give it together with the square matrix, as \
+                         in `stickslip inspect MATRIX {}`",
                         file.display(),
                         file.display()
                     ),
@@ -107,12 +108,13 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
         }
     }
     if square.len() > 1 {
-        match chosen(&square) {
+        match choose(&square) {
             Ok((stiffness, mass, why)) => {
                 let _ = writeln!(text, "{} as stiffness, {} as mass, {why}", stiffness.name, mass.name);
-                let of_damping: Vec<&Named> = square.iter().filter(|named| named.role == Some(Role::Damping)).collect();
+                let of_damping: Vec<&NamedMatrix> =
+                    square.iter().filter(|named| named.role == Some(Role::Damping)).collect();
                 let damping = Some(&of_damping[..]).filter(|all| all.len() == 1).map(|all| all[0]);
-                text += &match Pair::new(stiffness, mass, damping, beside.as_deref()) {
+                text += &match Pair::new(stiffness, mass, damping, row_names.as_deref()) {
                     Ok(pair) => pair.to_string(),
                     Err(why) => format!("  no frequencies: {why}\n"),
                 };
@@ -121,15 +123,15 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Ending {
         }
     }
     match (wrong, print(&text)) {
-        (true, _) => Ending::WrongInput,
-        (false, ending) => ending,
+        (true, _) => Exit::WrongInput,
+        (false, exit) => exit,
     }
 }
 
 /// Describes the matrices of one file in `text`.
 ///
 /// Returns the square matrices, and `true` if no matrix is damaged.
-fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Named>, bool), Error> {
+fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<NamedMatrix>, bool), Error> {
     let variables = formats::list(file, format)?;
     let several = variables.len() > 1;
     if variables.is_empty() {
@@ -160,15 +162,15 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
             if let Some(sparse) = converted(&matrix, &out)
                 .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
             {
-                let beside = if out.is_empty() { "" } else { ", but for rows without an entry or with 1e36" };
-                let _ = writeln!(text, "  {}{beside}", definite(&sparse));
+                let exception = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
+                let _ = writeln!(text, "  {}{exception}", definite(&sparse));
             }
-            let role = Role::of(file, name);
+            let role = Role::from_name(file, name);
             let name = match name {
                 Some(name) => format!("{}, {name}", file.display()),
                 None => file.display().to_string(),
             };
-            found.push(Named { name, role, matrix });
+            found.push(NamedMatrix { name, role, matrix });
         }
     }
     text.push('\n');
@@ -188,7 +190,7 @@ fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::Matrix> {
 fn definite(matrix: &sparse::Matrix) -> &'static str {
     match sparse_definite(matrix) {
         Some(true) => "positive definite",
-        Some(false) => "positive semidefinite: some motion has none of it",
+        Some(false) => "positive semidefinite: it is zero for some motion",
         None => "not positive semidefinite",
     }
 }
@@ -197,20 +199,22 @@ fn definite(matrix: &sparse::Matrix) -> &'static str {
 ///
 /// The criterion is their names. If the names of two matrices do not state their roles, the matrix
 /// with the larger entries is the stiffness.
-fn chosen(square: &[Named]) -> Result<(&Named, &Named, &'static str), String> {
+fn choose(square: &[NamedMatrix]) -> Result<(&NamedMatrix, &NamedMatrix, &'static str), String> {
     let of = |role: Role| square.iter().filter(|named| named.role == Some(role)).collect::<Vec<_>>();
     let (stiffness, mass, why) = match (&of(Role::Stiffness)[..], &of(Role::Mass)[..], square) {
-        ([stiffness], [mass], _) => (*stiffness, *mass, "by their names"),
-        ([stiffness], [], [a, b]) => (*stiffness, if a.role.is_none() { a } else { b }, "by the name of the stiffness"),
-        ([], [mass], [a, b]) => (if a.role.is_none() { a } else { b }, *mass, "by the name of the mass"),
+        ([stiffness], [mass], _) => (*stiffness, *mass, "according to their names"),
+        ([stiffness], [], [a, b]) => {
+            (*stiffness, if a.role.is_none() { a } else { b }, "according to the name of the stiffness")
+        }
+        ([], [mass], [a, b]) => (if a.role.is_none() { a } else { b }, *mass, "according to the name of the mass"),
         ([], [], [a, b]) => {
             let larger = a.matrix.largest() >= b.matrix.largest();
             let (stiffness, mass) = if larger { (a, b) } else { (b, a) };
-            (stiffness, mass, "by its larger entries: their names do not say")
+            (stiffness, mass, "because the entries of the first are larger (the names do not show the roles)")
         }
         _ => {
-            return Err("which matrix is the stiffness and which the mass is not told by their names (K and M, or stiffness and mass): \
-                        name the two files alone"
+            return Err("the names do not show which matrix is the stiffness and which the mass (K and M, or \
+                        stiffness and mass): give only these two files"
                 .to_owned());
         }
     };
@@ -234,10 +238,10 @@ impl Pair {
     ///
     /// The error states why they do not form a pair.
     fn new(
-        stiffness: &Named,
-        mass: &Named,
-        damping: Option<&Named>,
-        beside: Option<&[String]>,
+        stiffness: &NamedMatrix,
+        mass: &NamedMatrix,
+        damping: Option<&NamedMatrix>,
+        row_names: Option<&[String]>,
     ) -> Result<Pair, String> {
         let of_mass = match mass.matrix.names() {
             Some(_) => Cow::Owned(aligned(mass.matrix.clone(), &stiffness.matrix).map_err(|error| error.to_string())?),
@@ -248,12 +252,12 @@ impl Pair {
         let of_damping = of_damping.filter(|damping| damping.rows() == rows);
         if of_mass.rows() != rows {
             let (stiffness, mass, other) = (&stiffness.name, &mass.name, of_mass.rows());
-            return Err(format!("{stiffness} as stiffness has {rows} rows, and {mass} as mass {other}"));
+            return Err(format!("the stiffness {stiffness} has {rows} rows, but the mass {mass} has {other}"));
         }
         let out = constrained(&[&stiffness.matrix, &of_mass], rows);
-        let names = stiffness.matrix.names().or(of_mass.names()).or(beside.filter(|names| names.len() == rows));
+        let names = stiffness.matrix.names().or(of_mass.names()).or(row_names.filter(|names| names.len() == rows));
         if out.len() == rows {
-            return Err("no row of both is free".to_owned());
+            return Err("all rows are constrained".to_owned());
         }
         let free = (0..rows).filter(|row| out.binary_search(row).is_err());
         let names: Vec<String> = free.map(|row| names.map_or_else(String::new, |names| names[row].clone())).collect();
@@ -273,7 +277,7 @@ impl fmt::Display for Pair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.constrained > 0 {
             let rows = if self.constrained == 1 { "row is" } else { "rows are" };
-            writeln!(f, "  {} {rows} constrained, and left out", self.constrained)?;
+            writeln!(f, "  {} {rows} constrained and removed", self.constrained)?;
         }
         match &self.frequencies {
             Ok(lowest) => {
@@ -283,7 +287,7 @@ impl fmt::Display for Pair {
                 writeln!(f, "  lowest frequencies, Hz: {} (times in seconds)", hertz(1.0))?;
                 writeln!(f, "                          {} (times in milliseconds)", hertz(1e3))?;
                 if lowest.len() < LOWEST {
-                    writeln!(f, "                          there are no more of them")?;
+                    writeln!(f, "                          the structure has no further frequencies")?;
                 }
             }
             Err(error) => writeln!(f, "  no frequencies: {error}")?,
@@ -295,21 +299,21 @@ impl fmt::Display for Pair {
         let Some(&(_, first)) = self.mass.first() else {
             return writeln!(
                 f,
-                "  mass: no row is called by a direction (449.x), so that nobody can tell it, nor the units"
+                "  mass: unknown, because no row name contains a direction (as in 449.x); the units cannot be checked"
             );
         };
         let each: Vec<String> = self.mass.iter().map(|(along, total)| format!("along {along} {total:.6e}")).collect();
-        writeln!(f, "  mass of what is free, in its units: {}", each.join(", "))?;
+        writeln!(f, "  mass of the free rows, in the units of the file: {}", each.join(", "))?;
         for set in unit_sets::TABLE {
             let kilograms = set.mass * first;
-            let usual = if USUAL.contains(&kilograms) { ", as a blade may have" } else { "" };
+            let usual = if USUAL_MASSES.contains(&kilograms) { ", plausible for a blade" } else { "" };
             writeln!(f, "    {kilograms:.4e} kg if units = \"{}\"{usual}", set.name)?;
         }
-        let (from, to) = (USUAL.start(), USUAL.end());
+        let (from, to) = (USUAL_MASSES.start(), USUAL_MASSES.end());
         writeln!(
             f,
-            "  the files do not say their units: take those with which it weighs what it does; blades have {from} kg to {to} kg. Frequencies tell seconds \
-             from milliseconds only"
+            "  the files do not state their units: choose the units that give the correct mass; blades have \
+             {from} kg to {to} kg. The frequencies only distinguish seconds from milliseconds"
         )
     }
 }

@@ -1,18 +1,19 @@
 //! `stickslip list`: prints the tables of laws, methods, templates, study kinds and outputs.
 
-use crate::args::What;
+use crate::args::ListTopic;
 use clap::ValueEnum;
 use stickslip::{law, method};
 use stickslip_study::{kinds, templates};
 
 /// Returns one list as text, or all lists with headings.
-pub fn text(what: Option<What>) -> String {
-    let all =
-        What::value_variants().iter().map(|what| format!("{}\n\n{}", format!("{what:?}").to_uppercase(), one(*what)));
+pub fn text(what: Option<ListTopic>) -> String {
+    let all = ListTopic::value_variants()
+        .iter()
+        .map(|what| format!("{}\n\n{}", format!("{what:?}").to_uppercase(), one(*what)));
     what.map_or_else(|| all.collect::<Vec<_>>().join("\n"), one)
 }
 
-fn one(what: What) -> String {
+fn one(what: ListTopic) -> String {
     let mut out = String::new();
     let mut entry = |name: &str, summary: &str, keys: &[(String, String)]| {
         out += &format!("{name}\n    {summary}\n");
@@ -22,33 +23,33 @@ fn one(what: What) -> String {
         }
     };
     match what {
-        What::Laws => {
+        ListTopic::Laws => {
             for row in law::TABLE {
                 let keys: Vec<_> =
                     row.parameters.iter().map(|p| (p.key.to_owned(), format!("{}: {}", p.doc, p.takes()))).collect();
                 entry(row.name, row.summary, &keys);
             }
         }
-        What::Methods => {
+        ListTopic::Methods => {
             for row in method::TABLE {
                 let keys: Vec<_> = row.options.iter().map(|o| (o.key.to_owned(), o.doc.to_owned())).collect();
                 entry(row.name, row.summary, &keys);
             }
         }
-        What::Templates => {
+        ListTopic::Templates => {
             for row in templates::TABLE {
                 let keys: Vec<_> =
                     row.parameters().into_iter().map(|p| (format!("{} = {}", p.key, p.default), p.doc)).collect();
                 entry(row.name, row.summary(), &keys);
             }
         }
-        What::Studies => {
+        ListTopic::Studies => {
             for row in kinds::TABLE.iter().map(|kind| kind.info) {
                 let keys: Vec<_> = row.keys.iter().map(|k| (k.name.to_owned(), k.doc.to_owned())).collect();
                 entry(row.name, row.summary, &keys);
             }
         }
-        What::Outputs => kinds::outputs().iter().for_each(|(name, doc)| entry(name, doc, &[])),
+        ListTopic::Outputs => kinds::outputs().iter().for_each(|(name, doc)| entry(name, doc, &[])),
     }
     out
 }

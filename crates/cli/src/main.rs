@@ -1,36 +1,36 @@
 //! The `stickslip` command.
 
-/// Prints a message on standard error; see [`speak`].
+/// Prints a message on standard error; see [`messages`].
 macro_rules! complain {
     ($($text:tt)*) => {
-        $crate::speak::line(&format!($($text)*))
+        $crate::messages::message(&format!($($text)*))
     };
 }
 
 mod args;
-mod ending;
+mod browser;
+mod exit_status;
 mod inspect;
 mod list;
 mod merge;
-mod open;
+mod messages;
 mod plot;
 mod progress;
 mod reduce;
 mod run;
-mod speak;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
-use ending::{Ending, print};
+use exit_status::{Exit, print};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use stickslip_report::stream::Start;
+use stickslip_report::stream::StartMode;
 use stickslip_study::templates;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let ending = match cli.command {
+    let exit = match cli.command {
         Command::Paper { destination, open } => run::paper(&destination, open),
         Command::Run {
             files,
@@ -50,23 +50,25 @@ fn main() -> ExitCode {
         } => {
             let request = run::Request { files: &files, set: &set, method: method.as_deref(), memory };
             let start = match (resume, restart || watch) {
-                (true, _) => Start::Resume,
-                (false, true) => Start::Anew,
-                (false, false) => Start::First,
+                (true, _) => StartMode::Resume,
+                (false, true) => StartMode::Restart,
+                (false, false) => StartMode::First,
             };
             run::run(
                 &request,
                 &destination,
-                &run::Wanted { only: &only, also: &also, json, open, watch, start, shard, progress },
+                &run::RunOptions { only: &only, also: &also, json, open, watch, start, shard, progress },
             )
         }
-        Command::Merge { folders, out, only, also, open } => merge::merge(&folders, &out, (&only, &also), open),
+        Command::Merge { folders, out, only, also, open } => {
+            merge::merge(&folders, &out, &merge::MergeOptions { only: &only, also: &also, open })
+        }
         Command::Check { files, set, method, memory } => {
             run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
         }
         Command::Plot { folders, overlay, study, out, only, open } => {
             let study = study.as_deref();
-            plot::plot(&folders, &plot::Wanted { overlay, study, out: out.as_deref(), only: &only, open })
+            plot::plot(&folders, &plot::PlotOptions { overlay, study, out: out.as_deref(), only: &only, open })
         }
         Command::Inspect { files, format } => inspect::inspect(&files, format.as_deref()),
         Command::Reduce { file, out, set } => reduce::reduce(&file, &set, &out),
@@ -74,7 +76,7 @@ fn main() -> ExitCode {
         Command::List { what } => print(&list::text(what)),
         Command::Schema => match serde_json::to_string_pretty(&stickslip_study::schema::json_schema()) {
             Ok(text) => print(&(text + "\n")),
-            Err(error) => Ending::Failed(error.to_string()),
+            Err(error) => Exit::Failed(error.to_string()),
         },
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -85,24 +87,24 @@ fn main() -> ExitCode {
             let mut page = Vec::new();
             match clap_mangen::Man::new(Cli::command()).render(&mut page) {
                 Ok(()) => print(&String::from_utf8_lossy(&page)),
-                Err(error) => Ending::Failed(error.to_string()),
+                Err(error) => Exit::Failed(error.to_string()),
             }
         }
     };
-    if let Ending::Failed(message) = &ending {
-        speak::error(message);
+    if let Exit::Failed(message) = &exit {
+        messages::error(message);
     }
-    ending.code()
+    exit.code()
 }
 
 /// `stickslip new`: writes the study of a template to a file. The file name `-` prints the
 /// study.
-fn new(name: &str, file: Option<&Path>) -> Ending {
+fn new(name: &str, file: Option<&Path>) -> Exit {
     let Some(template) = templates::find(name) else {
-        let meant = templates::nearest(name).map_or_else(String::new, |near| format!("did you mean `{near}`? "));
+        let meant = templates::nearest(name).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
         let names: Vec<&str> = templates::TABLE.iter().map(|t| t.name).collect();
-        complain!("error: there is no template `{name}`; {meant}there are {}", names.join(", "));
-        return Ending::WrongInput;
+        complain!("error: unknown template `{name}`{meant}; the templates are {}", names.join(", "));
+        return Exit::WrongInput;
     };
     let own = PathBuf::from(format!("{name}.toml"));
     let file = file.unwrap_or(&own);
@@ -116,16 +118,17 @@ fn new(name: &str, file: Option<&Path>) -> Ending {
         .and_then(|mut f| f.write_all(template.study.as_bytes()));
     match written {
         Ok(()) => {
-            complain!("{} is written; `stickslip run {}` computes it", file.display(), file.display());
-            Ending::Done
+            complain!("wrote {}; run it with `stickslip run {}`", file.display(), file.display());
+            Exit::Done
         }
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             complain!(
-                "error: {} is there already and stays as it is; name another file, as in `stickslip new {name} other.toml`, or `-` to print it",
+                "error: {} already exists and is unchanged; give another file name, as in `stickslip new {name} \
+                 other.toml`, or `-` to print the study",
                 file.display()
             );
-            Ending::WrongInput
+            Exit::WrongInput
         }
-        Err(error) => Ending::Failed(format!("{}: {error}", file.display())),
+        Err(error) => Exit::Failed(format!("{}: {error}", file.display())),
     }
 }

@@ -1,6 +1,6 @@
 //! `stickslip plot`: draws stored results and comparisons of runs. It computes no points.
 
-use crate::ending::{Ending, print};
+use crate::exit_status::{Exit, print};
 use crate::run::{outputs, show, show_figure};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use stickslip_report::{Outputs, terminal::Terminal};
 use stickslip_study::read_file;
 
 /// Options of the command.
-pub struct Wanted<'a> {
+pub struct PlotOptions<'a> {
     /// `--overlay`.
     pub overlay: bool,
     /// `--study`.
@@ -24,22 +24,22 @@ pub struct Wanted<'a> {
 }
 
 /// Runs `stickslip plot`.
-pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
-    let outputs = match outputs(wanted.only, &[]) {
+pub fn plot(folders: &[PathBuf], options: &PlotOptions<'_>) -> Exit {
+    let outputs = match outputs(options.only, &[]) {
         Ok(outputs) => outputs,
-        Err(ending) => return ending,
+        Err(exit) => return exit,
     };
     let mut runs = Vec::new();
     let mut wrong = false;
     // All results are read before anything is written.
     for folder in folders {
-        match read(folder).map_err(Some).and_then(|run| like(run, wanted.study).map_err(|()| None)) {
+        match read(folder).map_err(Some).and_then(|run| with_figure_of(run, options.study).map_err(|()| None)) {
             Ok(run) => runs.push(run),
             Err(error) => {
                 match error {
                     // The location in the recorded study helps the user.
                     Some(StoredError::Study { path, cause }) => {
-                        complain!("error: {}: the study in it cannot be read", path.display());
+                        complain!("error: {}: cannot read the study in this record", path.display());
                         show(&cause);
                     }
                     Some(error) => complain!("error: {error}"),
@@ -50,19 +50,19 @@ pub fn plot(folders: &[PathBuf], wanted: &Wanted<'_>) -> Ending {
         }
     }
     if wrong {
-        return Ending::WrongInput;
+        return Exit::WrongInput;
     }
     for run in runs.iter().filter(|run| run.dataset.record.interrupted) {
         complain!(
-            "warning: {}: the run was interrupted, only the points finished until then are drawn",
+            "warning: {}: the run was interrupted; the figure shows only the points finished before the interruption",
             run.folder.display()
         );
     }
-    if wanted.overlay { overlay(&runs, wanted, &outputs) } else { each(&runs, wanted, &outputs) }
+    if options.overlay { overlay(&runs, options, &outputs) } else { each(&runs, options, &outputs) }
 }
 
 /// Applies the figure settings of the study file, if given. Errors have been printed.
-fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
+fn with_figure_of(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     let Some(file) = file else { return Ok(run) };
     let study = read_file(file, &run.overrides()).map_err(|error| show(&error))?;
     // The run may have taken its method from the command line.
@@ -72,7 +72,7 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     };
     if study.kind().name != run.dataset.kind {
         complain!(
-            "error: {} is a study of the kind `{}`, {} holds results of the kind `{}`",
+            "error: {} is a study of the kind `{}`, but {} contains results of the kind `{}`",
             file.display(),
             study.kind().name,
             run.folder.display(),
@@ -82,13 +82,14 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     }
     if study.wants_references() && !run.study.wants_references() && run.dataset.kind == "response" {
         complain!(
-            "warning: {} has no reference curves, which are computed; run the study again for them",
+            "warning: {} contains no reference curves; run the study again to compute them",
             run.folder.display()
         );
     }
-    if !run.draw_like(&study) {
+    if !run.apply_figure_of(&study) {
         complain!(
-            "warning: {} has changed in more than its figure; {} is drawn as it was computed, run the study again for the rest",
+            "warning: {} differs from the run in more than its figure; the figure shows the computed results in \
+             {}. Run the study again for the other changes",
             file.display(),
             run.folder.display()
         );
@@ -97,46 +98,46 @@ fn like(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
 }
 
 /// Draws every run in its folder.
-fn each(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
+fn each(runs: &[Stored], options: &PlotOptions<'_>, outputs: &Outputs) -> Exit {
     for run in runs {
         if run.dataset.figure.panels.is_empty() {
-            complain!("warning: {}: there is nothing to draw", run.folder.display());
+            complain!("warning: {}: the results contain nothing to draw", run.folder.display());
         }
         let files = match run.write_figure(outputs) {
             Ok(files) => files,
-            Err(error) => return Ending::Failed(error.to_string()),
+            Err(error) => return Exit::Failed(error.to_string()),
         };
         if std::io::stdout().is_terminal()
-            && let ending @ Ending::Failed(_) = print(&Terminal::default().files(&files))
+            && let exit @ Exit::Failed(_) = print(&Terminal::default().files(&files))
         {
-            return ending;
+            return exit;
         }
-        if wanted.open {
+        if options.open {
             show_figure(&files);
         }
     }
-    Ending::Done
+    Exit::Done
 }
 
 /// Draws all runs in one figure, and prints their differences.
-fn overlay(runs: &[Stored], wanted: &Wanted<'_>, outputs: &Outputs) -> Ending {
+fn overlay(runs: &[Stored], options: &PlotOptions<'_>, outputs: &Outputs) -> Exit {
     let comparison = match compare::compare(runs) {
         Ok(comparison) => comparison,
         Err(error) => {
             complain!("error: {error}");
-            return Ending::WrongInput;
+            return Exit::WrongInput;
         }
     };
-    let out = wanted.out.unwrap_or(Path::new("stickslip-out"));
+    let out = options.out.unwrap_or(Path::new("stickslip-out"));
     let files = match compare::write(&comparison, out, outputs) {
         Ok(files) => files,
-        Err(error) => return Ending::Failed(error.to_string()),
+        Err(error) => return Exit::Failed(error.to_string()),
     };
     let colour = std::io::stdout().is_terminal();
     let width = terminal_size::terminal_size().filter(|_| colour).map(|(width, _)| usize::from(width.0));
-    let ending = print(&Terminal { colour, width }.text(&compare::for_people(&comparison), &files));
-    if wanted.open {
+    let exit = print(&Terminal { colour, width }.text(&compare::for_terminal(&comparison), &files));
+    if options.open {
         show_figure(&files);
     }
-    ending
+    exit
 }

@@ -3,8 +3,8 @@
 //! A terminal shows a progress bar, a pipe shows nothing. Ctrl-C stops the run and keeps the
 //! finished points, as do SIGTERM and SIGHUP.
 
-use crate::args::Progress as Shown;
-use crate::speak;
+use crate::args::Progress;
+use crate::messages;
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use serde_json::json;
 use std::fmt::Write;
@@ -21,7 +21,8 @@ pub fn stop_flag() -> Arc<AtomicBool> {
     let _ = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
             // Some senders signal a process and then its group, which counts as one request.
-            let repeated = first.lock().is_ok_and(|first| first.is_some_and(|first| first.elapsed() < REPEATED));
+            let repeated =
+                first.lock().is_ok_and(|first| first.is_some_and(|first| first.elapsed() < SAME_SIGNAL_TIME));
             if !repeated {
                 std::process::exit(1);
             }
@@ -30,54 +31,54 @@ pub fn stop_flag() -> Arc<AtomicBool> {
         if let Ok(mut first) = first.lock() {
             *first = Some(Instant::now());
         }
-        complain!("\nstopping: finished parts are kept; Ctrl-C again ends at once");
+        complain!("\nstopping: finished points are kept; press Ctrl-C again to end at once");
     });
     stop
 }
 
 /// Signals within this time after the first are the same request.
-const REPEATED: Duration = Duration::from_millis(400);
+const SAME_SIGNAL_TIME: Duration = Duration::from_millis(400);
 
 /// Display of the progress of a run.
 #[derive(Clone)]
-pub enum Progress {
+pub enum ProgressDisplay {
     /// A bar on a terminal.
     Bar(ProgressBar),
     /// JSON lines for programs.
-    Lines(Arc<Lines>),
+    Json(Arc<JsonProgress>),
     /// No display.
     Silent,
 }
 
 /// State of the JSON lines.
-pub struct Lines {
+pub struct JsonProgress {
     study: String,
     points: AtomicU64,
     kept: AtomicU64,
     begun: Instant,
-    said: Mutex<Instant>,
+    last_line: Mutex<Instant>,
 }
 
 /// Minimum time between two progress lines.
-const SAID: Duration = Duration::from_millis(500);
+const LINE_INTERVAL: Duration = Duration::from_millis(500);
 
-impl Progress {
+impl ProgressDisplay {
     /// Starts the display for a study with `points` points, of which `done` are finished.
-    pub fn new(how: Shown, points: Option<u64>, done: u64, study: &str) -> Progress {
+    pub fn new(how: Progress, points: Option<u64>, done: u64, study: &str) -> ProgressDisplay {
         match how {
-            Shown::None => Progress::Silent,
-            Shown::Bar => {
+            Progress::None => ProgressDisplay::Silent,
+            Progress::Bar => {
                 let bar = bar(points, study);
                 bar.inc(done);
                 bar.reset_eta();
-                Progress::Bar(bar)
+                ProgressDisplay::Bar(bar)
             }
-            Shown::Json => Progress::Lines(Arc::new(Lines {
+            Progress::Json => ProgressDisplay::Json(Arc::new(JsonProgress {
                 study: study.to_owned(),
                 points: AtomicU64::new(done),
                 kept: AtomicU64::new(0),
                 begun: Instant::now(),
-                said: Mutex::new(Instant::now()),
+                last_line: Mutex::new(Instant::now()),
             })),
         }
     }
@@ -85,24 +86,24 @@ impl Progress {
     /// Counts a finished point.
     pub fn point(&self) {
         match self {
-            Progress::Bar(bar) => bar.inc(1),
-            Progress::Lines(lines) => {
+            ProgressDisplay::Bar(bar) => bar.inc(1),
+            ProgressDisplay::Json(lines) => {
                 lines.points.fetch_add(1, Ordering::Relaxed);
                 // If another thread holds the lock, it prints the line.
-                if let Ok(mut said) = lines.said.try_lock()
-                    && said.elapsed() >= SAID
+                if let Ok(mut last_line) = lines.last_line.try_lock()
+                    && last_line.elapsed() >= LINE_INTERVAL
                 {
-                    *said = Instant::now();
+                    *last_line = Instant::now();
                     lines.say();
                 }
             }
-            Progress::Silent => {}
+            ProgressDisplay::Silent => {}
         }
     }
 
     /// Sets the number of units on disk.
     pub fn kept(&self, units: usize) {
-        if let Progress::Lines(lines) = self {
+        if let ProgressDisplay::Json(lines) = self {
             lines.kept.store(units as u64, Ordering::Relaxed);
         }
     }
@@ -110,16 +111,16 @@ impl Progress {
     /// Ends the display.
     pub fn end(&self) {
         match self {
-            Progress::Bar(bar) => bar.finish_and_clear(),
-            Progress::Lines(lines) => lines.say(),
-            Progress::Silent => {}
+            ProgressDisplay::Bar(bar) => bar.finish_and_clear(),
+            ProgressDisplay::Json(lines) => lines.say(),
+            ProgressDisplay::Silent => {}
         }
     }
 }
 
-impl Lines {
+impl JsonProgress {
     fn say(&self) {
-        speak::event(
+        messages::event(
             "progress",
             json!({
                 "study": self.study,
@@ -138,7 +139,7 @@ fn bar(points: Option<u64>, what: &str) -> ProgressBar {
     let bar = points.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let template = match points {
         Some(_) => "{msg} {bar:24} {pos}/{len} points, {left}",
-        None => "{msg} {pos} points, as many as the curve needs",
+        None => "{msg} {pos} points (the total depends on the curve)",
     };
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.with_key("left", |state: &ProgressState, out: &mut dyn Write| {

@@ -1,7 +1,7 @@
 //! `stickslip reduce`: saves the reduced structure of a study as files for other studies.
 
-use crate::ending::{Ending, print};
-use crate::{run, speak};
+use crate::exit_status::{Exit, print};
+use crate::{messages, run};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -19,69 +19,71 @@ const ROWS: &str = "rows.csv";
 const BOUNDARY: &str = "boundary.csv";
 
 /// Reduces the structure of the first case and writes it into the folder `out`.
-pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Ending {
+pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Exit {
     let read = stickslip_study::read_file(file, set).and_then(|study| Ok((study.case(0)?.model, study.stiffened())));
     let (model, exports) = match read {
         Ok(read) => read,
         Err(error) => {
             run::show(&error);
-            return Ending::WrongInput;
+            return Exit::WrongInput;
         }
     };
-    let failed = |message: &str| Ending::Failed(format!("{}: {message}", file.display()));
+    let failed = |message: &str| Exit::Failed(format!("{}: {message}", file.display()));
     let wrong = |message: &str| {
-        speak::error(&format!("{}: {message}", file.display()));
-        Ending::WrongInput
+        messages::error(&format!("{}: {message}", file.display()));
+        Exit::WrongInput
     };
     let Some(substructure) = &model.substructure else {
-        return wrong("there is no [structure] that could be reduced");
+        return wrong("the study has no [structure] to reduce");
     };
     if let Reduction::None { .. } = substructure.reduction {
         return wrong(
-            "all rows of its [structure] are kept, since there are few or reduce = false says so: nothing is to be saved; say how far the reduction is to \
-             reach, as in reduce = { up_to = \"5 kHz\" }",
+            "nothing to reduce: the study keeps all rows of its [structure], because they are few or because of \
+             reduce = false. State the frequency range of the reduction, as in reduce = { up_to = \"5 kHz\" }",
         );
     }
     if let Some(disk) = &substructure.disk {
         if exports.is_some() {
             return wrong(
-                "the sector of a disk is saved at one speed: leave out `stiffened`, and name the file of that speed under `stiffness`",
+                "the sector of a disk can be saved at one speed only: remove `stiffened`, and give the matrix \
+                 of that speed as `stiffness`",
             );
         }
         if !disk.blade.is_empty() || disk.deviations.iter().any(|deviation| *deviation != 0.0) {
             return wrong(
-                "the blades of this disk differ, and what is left out of a sector is chosen for blades that do not: leave out `blade` and `mistuning`",
+                "the blades of this disk differ, but the reduction of a sector requires equal blades: remove \
+                 `blade` and `mistuning`",
             );
         }
     }
-    let few = match (exports, model.ring.map(|ring| ring.sectors).zip(substructure.disk.as_ref())) {
+    let reduced = match (exports, model.ring.map(|ring| ring.sectors).zip(substructure.disk.as_ref())) {
         (Some(exports), _) => over_speeds(substructure, &model.places, &exports),
-        (None, Some((sectors, disk))) => sector(substructure, &model.places, (sectors, disk)),
-        (None, None) => at_rest(substructure, &model.places),
+        (None, Some((sectors, disk))) => sector(substructure, &model.places, sectors, disk),
+        (None, None) => without_rotation(substructure, &model.places),
     };
-    match few.and_then(|few| save(&few, out).map(|()| few)) {
-        Ok(few) => print(&format!(
-            "{}: {} rows, {}\n  written to {}; put {} in the place of {}\n",
+    match reduced.and_then(|reduced| save(&reduced, out).map(|()| reduced)) {
+        Ok(reduced) => print(&format!(
+            "{}: {} rows, {}\n  written to {}; in the study file, replace {} by {}\n",
             file.display(),
             substructure.component.dofs(),
-            few.what,
+            reduced.description,
             out.display(),
+            if reduced.sector.is_some() { "[structure], [[place]] and [disk]" } else { "[structure] and [[place]]" },
             out.join(TABLES).display(),
-            if few.sector.is_some() { "[structure], [[place]] and [disk]" } else { "[structure] and [[place]]" },
         )),
         Err(message) => failed(&message),
     }
 }
 
 /// The reduced structure to save.
-struct Few {
+struct ReducedStructure {
     system: System,
     /// Description of the reduction, with its error.
-    what: String,
+    description: String,
     /// Additional keys of `[structure]`.
     keys: Vec<String>,
     /// Stiffness at the second speed, if rotation stiffens the structure.
-    there: Option<sparse::Matrix>,
+    second_stiffness: Option<sparse::Matrix>,
     /// Data of a disk sector.
     sector: Option<Sector>,
 }
@@ -98,32 +100,38 @@ struct Sector {
 /// Row, column, value.
 type Entries = Vec<(usize, usize, f64)>;
 
-fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String> {
+fn without_rotation(substructure: &Substructure, places: &[Place]) -> Result<ReducedStructure, String> {
     let alone = Model { substructure: Some(substructure.clone()), places: places.to_vec(), ..Model::default() };
     let system = alone.assemble().map_err(|error| error.to_string())?;
     let what = system.reduced().map(ToString::to_string).unwrap_or_default();
-    Ok(Few { system, what, keys: vec!["reduce = false".to_owned()], there: None, sector: None })
+    Ok(ReducedStructure {
+        system,
+        description: what,
+        keys: vec!["reduce = false".to_owned()],
+        second_stiffness: None,
+        sector: None,
+    })
 }
 
 /// Reduces with one basis for all speeds up to that of the second export.
-fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<Few, String> {
+fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<ReducedStructure, String> {
     let seen: Vec<Row> =
         places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
-    let few = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);
-    let few = few.map_err(|error| error.to_string())?;
-    let mut seen = few.seen.into_iter();
+    let reduced = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);
+    let reduced = reduced.map_err(|error| error.to_string())?;
+    let mut seen = reduced.seen.into_iter();
     let mut places: Vec<Place> = places.to_vec();
     let rows = places.iter_mut().filter(|place| place.of.is_none()).flat_map(|place| &mut place.rows);
     rows.zip(&mut seen).for_each(|(row, seen)| *row = seen);
-    let n = few.component.dofs();
-    let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
+    let n = reduced.component.dofs();
+    let earlier = ReductionEvidence { error: reduced.error, up_to: reduced.up_to };
     let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
-    let system = whole(few.component, earlier, places)?;
+    let system = assembled(reduced.component, earlier, places)?;
     let what = format!(
         "{n} coordinates ({}), error {:.1e} up to {:.6} Hz, at all speeds up to {:.6} rpm",
-        few.kind,
-        few.error,
-        few.up_to / TAU,
+        reduced.kind,
+        reduced.error,
+        reduced.up_to / TAU,
         60.0 * exports.at / TAU
     );
     let speed = format!(
@@ -131,33 +139,45 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
         exports.at, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
-    Ok(Few { system, what, keys, there: Some(few.there), sector: None })
+    Ok(ReducedStructure { system, description: what, keys, second_stiffness: Some(reduced.there), sector: None })
 }
 
 /// Reduces the sector of a disk with one basis for all its travelling waves.
-fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize, &DiskPart)) -> Result<Few, String> {
+fn sector(
+    substructure: &Substructure,
+    places: &[Place],
+    sectors: usize,
+    disk: &DiskPart,
+) -> Result<ReducedStructure, String> {
     let stated = &places[..places.len() / sectors];
     let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.clone()).collect();
-    let few = substructure.component.reduced_sector(&disk.boundary, sectors, &seen, &substructure.reduction);
-    let few = few.map_err(|error| error.to_string())?;
-    let mut seen = few.seen.into_iter();
+    let reduced = substructure.component.reduced_sector(&disk.boundary, sectors, &seen, &substructure.reduction);
+    let reduced = reduced.map_err(|error| error.to_string())?;
+    let mut seen = reduced.seen.into_iter();
     let mut places = stated.to_vec();
     for place in &mut places {
         // The file uses the name without the sector number.
         place.name = place.name.strip_suffix("_0").unwrap_or(&place.name).to_owned();
         place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen);
     }
-    let n = few.pairs.len();
-    let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
+    let n = reduced.pairs.len();
+    let earlier = ReductionEvidence { error: reduced.error, up_to: reduced.up_to };
     let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
-    let sector = Sector { sectors, rows: few.component.rows().to_vec(), pairs: few.pairs };
-    let system = whole(few.component, earlier, places)?;
-    let what = format!("{n} coordinates ({}), error {:.1e} up to {:.6} Hz", few.kind, few.error, few.up_to / TAU);
-    Ok(Few { system, what, keys: damping_keys(substructure), there: None, sector: Some(sector) })
+    let sector = Sector { sectors, rows: reduced.component.rows().to_vec(), pairs: reduced.pairs };
+    let system = assembled(reduced.component, earlier, places)?;
+    let what =
+        format!("{n} coordinates ({}), error {:.1e} up to {:.6} Hz", reduced.kind, reduced.error, reduced.up_to / TAU);
+    Ok(ReducedStructure {
+        system,
+        description: what,
+        keys: damping_keys(substructure),
+        second_stiffness: None,
+        sector: Some(sector),
+    })
 }
 
 /// Assembles reduced matrices as a structure.
-fn whole(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -> Result<System, String> {
+fn assembled(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -> Result<System, String> {
     let (damping, reduction) = (SubstructureDamping::Own, Reduction::None { up_to: 0.0 });
     let whole = Substructure { component, damping, reduction, earlier: Some(earlier), disk: None };
     let model = Model { substructure: Some(whole), places, ..Model::default() };
@@ -171,13 +191,13 @@ fn whole(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -
 fn damping_keys(substructure: &Substructure) -> Vec<String> {
     let reduce = match substructure.reduction {
         Reduction::UpTo { up_to, tolerance, kind } => {
-            format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, named(kind))
+            format!("reduce = {{ up_to = \"{:e} rad/s\", tolerance = {tolerance:e}{} }}", up_to, kind_key(kind))
         }
         // The frequency limit of its error comes from the study.
         Reduction::Modes { modes, kind: ReductionKind::Rubin, orders, .. } if orders > 1 => {
             format!("reduce = {{ modes = {modes}, orders = {orders} }}")
         }
-        Reduction::Modes { modes, kind, .. } => format!("reduce = {{ modes = {modes}{} }}", named(Some(kind))),
+        Reduction::Modes { modes, kind, .. } => format!("reduce = {{ modes = {modes}{} }}", kind_key(Some(kind))),
         Reduction::None { .. } => "reduce = false".to_owned(),
     };
     match substructure.damping {
@@ -192,7 +212,7 @@ fn damping_keys(substructure: &Substructure) -> Vec<String> {
     }
 }
 
-fn named(kind: Option<ReductionKind>) -> &'static str {
+fn kind_key(kind: Option<ReductionKind>) -> &'static str {
     match kind {
         None => "",
         Some(ReductionKind::Rubin) => ", kind = \"rubin\"",
@@ -200,25 +220,25 @@ fn named(kind: Option<ReductionKind>) -> &'static str {
     }
 }
 
-fn save(few: &Few, out: &Path) -> Result<(), String> {
+fn save(reduced: &ReducedStructure, out: &Path) -> Result<(), String> {
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-    let (system, n, structure) = (&few.system, few.system.dofs(), few.system.structure());
+    let (system, n, structure) = (&reduced.system, reduced.system.dofs(), reduced.system.structure());
     let mut files: Vec<(&str, Entries)> = Vec::new();
     for (number, key) in ["mass", "damping", "stiffness"].into_iter().enumerate() {
         if key != "damping" || structure.largest()[number] > 0.0 {
             files.push((key, structure.entries().map(|(i, k, values)| (i, k, values[number])).collect()));
         }
     }
-    files.extend(few.there.iter().map(|there| ("stiffened", there.entries().collect())));
-    let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", few.what, few.keys.join("\n"));
-    if let Some(ReductionEvidence { error, up_to }) = few.system.reduction_evidence() {
+    files.extend(reduced.second_stiffness.iter().map(|there| ("stiffened", there.entries().collect())));
+    let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", reduced.description, reduced.keys.join("\n"));
+    if let Some(ReductionEvidence { error, up_to }) = reduced.system.reduction_evidence() {
         let _ = writeln!(text, "reduced = {{ error = {error:e}, up_to = \"{up_to:e} rad/s\" }}");
     }
     for (key, entries) in files {
         let path: PathBuf = out.join(format!("{key}.mtx"));
         let made = Matrix::new(n, n, Symmetry::General, entries).map_err(|error| error.to_string())?;
         stickslip_formats::write(&path, &made).map_err(|error| error.to_string())?;
-        if let (Some(sector), "mass") = (&few.sector, key) {
+        if let (Some(sector), "mass") = (&reduced.sector, key) {
             let made = made.with_names(sector.rows.clone());
             let made = made.and_then(|named| names::write(out.join(ROWS), &named));
             made.map_err(|error| error.to_string())?;
@@ -229,7 +249,7 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
             let _ = writeln!(text, "{key} = \"{key}.mtx\"");
         }
     }
-    if let Some(Sector { sectors, pairs, .. }) = &few.sector {
+    if let Some(Sector { sectors, pairs, .. }) = &reduced.sector {
         let lines: String = pairs.iter().map(|(low, high)| format!("{low},{high}\n")).collect();
         let path = out.join(BOUNDARY);
         std::fs::write(&path, format!("low,high\n{lines}")).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -249,7 +269,7 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
         if axes.iter().any(|(along, _)| !along.is_empty()) {
             let _ = writeln!(text, "directions = [{}]", directions.join(", "));
         }
-        let sums: Vec<String> = axes.iter().map(|(_, axis)| sum(axis, few.sector.as_ref())).collect();
+        let sums: Vec<String> = axes.iter().map(|(_, axis)| sum(axis, reduced.sector.as_ref())).collect();
         let _ = writeln!(text, "sum = [\n  {},\n]", sums.join(",\n  "));
     }
     let path = out.join(TABLES);

@@ -1,9 +1,9 @@
 //! `stickslip run`, `check` and `paper`.
 
 use crate::args::Destination;
-use crate::ending::{Ending, print};
-use crate::progress::{self, Progress};
-use crate::{open, speak};
+use crate::exit_status::{Exit, print};
+use crate::progress::{self, ProgressDisplay};
+use crate::{browser, messages};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
@@ -14,8 +14,9 @@ use std::time::Duration;
 use stickslip::orbit::Accuracy;
 use stickslip_report::assemble::{Assembled, Parts, assemble};
 use stickslip_report::journal::{Journal, JournalError};
-use stickslip_report::stream::{self, Shard, Start, StreamError};
-use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal};
+use stickslip_report::output::json::write_dataset_json;
+use stickslip_report::stream::{self, Shard, StartMode, StreamError};
+use stickslip_report::{Outputs, check_writable, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
 use stickslip_study::schema::MOST_BYTES;
@@ -37,7 +38,7 @@ pub struct Request<'a> {
 
 impl Request<'_> {
     /// Reads and checks every file before anything runs.
-    fn read(&self) -> Result<Vec<Checked>, Ending> {
+    fn read(&self) -> Result<Vec<Checked>, Exit> {
         let mut studies = Vec::new();
         let mut wrong = false;
         for file in self.files {
@@ -61,7 +62,7 @@ impl Request<'_> {
                 }
             }
         }
-        if wrong { Err(Ending::WrongInput) } else { Ok(studies) }
+        if wrong { Err(Exit::WrongInput) } else { Ok(studies) }
     }
 }
 
@@ -83,21 +84,21 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
 
 /// Prints an error of a study file with its location underlined.
 pub(crate) fn show(error: &StudyError) {
-    if speak::is_for_programs() {
-        return speak::error(&error.to_string());
+    if messages::is_for_programs() {
+        return messages::error(&error.to_string());
     }
     let report = miette::Report::new(error.clone());
     complain!("{report:?}");
 }
 
 /// Runs `stickslip check`.
-pub fn check(request: &Request<'_>) -> Ending {
+pub fn check(request: &Request<'_>) -> Exit {
     match request.read() {
-        Err(ending) => ending,
+        Err(exit) => exit,
         Ok(studies) => {
             let mut text = String::new();
             for (checked, file) in studies.iter().zip(request.files) {
-                let (study, summary) = (checked.study(), warned(checked));
+                let (study, summary) = (checked.study(), print_warnings(checked));
                 let (cases, points) = (study.cases(), study.points());
                 let plural = |count: usize| if count == 1 { "" } else { "s" };
                 let verdict = match summary.warnings.len() {
@@ -120,7 +121,7 @@ pub fn check(request: &Request<'_>) -> Ending {
 }
 
 /// Options of a run.
-pub struct Wanted<'a> {
+pub struct RunOptions<'a> {
     /// `--only`.
     pub only: &'a [String],
     /// `--also`.
@@ -132,7 +133,7 @@ pub struct Wanted<'a> {
     /// `--watch`.
     pub watch: bool,
     /// `--resume`, `--restart`.
-    pub start: Start,
+    pub start: StartMode,
     /// `--shard`.
     pub shard: Option<Shard>,
     /// `--progress`.
@@ -140,62 +141,63 @@ pub struct Wanted<'a> {
 }
 
 /// Returns the summary of a study, and prints its warnings on standard error.
-fn warned(checked: &Checked) -> &ModelSummary {
+fn print_warnings(checked: &Checked) -> &ModelSummary {
     checked.summary().warnings.iter().for_each(|warning| complain!("{warning}"));
     checked.summary()
 }
 
 /// Returns the outputs of `--only`, or the default ones, together with those of `--also`.
-pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Ending> {
-    let outputs = if only.is_empty() { Ok(Outputs::usual()) } else { Outputs::only(only) };
-    outputs.and_then(|outputs| Ok(outputs.and(&Outputs::only(also)?))).map_err(|error| {
+pub(crate) fn outputs(only: &[String], also: &[String]) -> Result<Outputs, Exit> {
+    let outputs = if only.is_empty() { Ok(Outputs::defaults()) } else { Outputs::select(only) };
+    outputs.and_then(|outputs| Ok(outputs.union(&Outputs::select(also)?))).map_err(|error| {
         complain!("error: {error}");
-        Ending::WrongInput
+        Exit::WrongInput
     })
 }
 
 /// Runs `stickslip run`.
-pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>) -> Ending {
-    if wanted.progress == crate::args::Progress::Json {
-        speak::for_programs();
+pub fn run(request: &Request<'_>, destination: &Destination, options: &RunOptions<'_>) -> Exit {
+    if options.progress == crate::args::Progress::Json {
+        messages::for_programs();
     }
-    let outputs = match outputs(wanted.only, wanted.also) {
+    let outputs = match outputs(options.only, options.also) {
         Ok(outputs) => outputs,
-        Err(ending) => return ending,
+        Err(exit) => return exit,
     };
-    if wanted.watch && request.files.iter().any(|file| file == Path::new(STDIN)) {
-        complain!("error: standard input does not change, --watch needs files");
-        return Ending::WrongInput;
+    if options.watch && request.files.iter().any(|file| file == Path::new(STDIN)) {
+        complain!("error: --watch needs files, not standard input");
+        return Exit::WrongInput;
     }
     let threads = match pool(destination) {
         Ok(threads) => threads,
-        Err(ending) => return ending,
+        Err(exit) => return exit,
     };
     let stop = progress::stop_flag();
-    let mut open = wanted.open;
+    let workers = Workers { threads, stop: &stop };
+    let mut open = options.open;
     loop {
-        let before = contents(request.files);
-        let ending = once(request, destination, (&outputs, &Wanted { open, ..*wanted }), threads, &stop);
-        if !wanted.watch || stop.load(Ordering::Relaxed) {
-            return ending;
+        let before = read_all(request.files);
+        let exit = once(request, destination, &outputs, &RunOptions { open, ..*options }, workers);
+        if !options.watch || stop.load(Ordering::Relaxed) {
+            return exit;
         }
         // The browser shows the figure after the first run; a reload shows later ones.
-        open &= matches!(ending, Ending::WrongInput);
-        if let Ending::Failed(message) = &ending {
-            speak::error(message);
+        open &= matches!(exit, Exit::WrongInput);
+        if let Exit::Failed(message) = &exit {
+            messages::error(message);
         }
-        complain!("waiting for a change; Ctrl-C ends");
-        while contents(request.files) == before {
-            std::thread::sleep(LOOK);
+        complain!("waiting for a change of the files; Ctrl-C ends");
+        while read_all(request.files) == before {
+            std::thread::sleep(POLL_INTERVAL);
             if stop.load(Ordering::Relaxed) {
-                return Ending::Done;
+                return Exit::Done;
             }
         }
         // A file can be empty for a moment while an editor writes it.
         loop {
-            let now = contents(request.files);
-            std::thread::sleep(WRITTEN);
-            if contents(request.files) == now {
+            let now = read_all(request.files);
+            std::thread::sleep(SETTLE_TIME);
+            if read_all(request.files) == now {
                 break;
             }
         }
@@ -203,54 +205,64 @@ pub fn run(request: &Request<'_>, destination: &Destination, wanted: &Wanted<'_>
 }
 
 /// Interval between two checks of the files for changes.
-const LOOK: Duration = Duration::from_millis(300);
+const POLL_INTERVAL: Duration = Duration::from_millis(300);
 /// Changed files are read when they stay unchanged for this time.
-const WRITTEN: Duration = Duration::from_millis(50);
+const SETTLE_TIME: Duration = Duration::from_millis(50);
 
 /// Returns the contents of the files. Modification times do not reveal every change by an
 /// editor.
-fn contents(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
+fn read_all(files: &[PathBuf]) -> Vec<Option<Vec<u8>>> {
     files.iter().map(|file| std::fs::read(file).ok()).collect()
+}
+
+/// Threads of a run, and the flag that stops them.
+#[derive(Clone, Copy)]
+struct Workers<'a> {
+    threads: usize,
+    stop: &'a Arc<AtomicBool>,
 }
 
 /// Runs all files once.
 fn once(
     request: &Request<'_>,
     destination: &Destination,
-    (outputs, wanted): (&Outputs, &Wanted<'_>),
-    threads: usize,
-    stop: &Arc<AtomicBool>,
-) -> Ending {
+    outputs: &Outputs,
+    options: &RunOptions<'_>,
+    workers: Workers<'_>,
+) -> Exit {
     let studies = match request.read() {
         Ok(studies) => studies,
-        Err(ending) => return ending,
+        Err(exit) => return exit,
     };
     let mut names = BTreeSet::new();
     if let Some(twice) = studies.iter().map(Checked::study).find(|study| !names.insert(study.name())) {
-        complain!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
-        return Ending::WrongInput;
+        complain!(
+            "error: two files have the name `{}`, so their results would be in the same folder; rename one file",
+            twice.name()
+        );
+        return Exit::WrongInput;
     }
     if let Some(error) =
         studies.iter().find_map(|checked| check_writable(&destination.out.join(checked.study().name())).err())
     {
-        return Ending::Failed(error.to_string());
+        return Exit::Failed(error.to_string());
     }
     let mut failed = false;
     // Each study is dropped after its run, together with its cached case.
     for checked in studies {
-        let (study, summary) = (checked.study(), warned(&checked));
-        if std::io::stderr().is_terminal() && wanted.progress == crate::args::Progress::Bar {
+        let (study, summary) = (checked.study(), print_warnings(&checked));
+        if std::io::stderr().is_terminal() && options.progress == crate::args::Progress::Bar {
             complain!("{}\n{}", study.title(), summary.to_string().trim_end());
         } else if let Some(long) = summary.long_run() {
             complain!("{}: {long}", study.name());
         }
-        match one(&checked, destination, outputs, wanted, (threads, stop)) {
-            Ending::Done => {}
-            Ending::SomeFailed => failed = true,
+        match one(&checked, destination, outputs, options, workers) {
+            Exit::Done => {}
+            Exit::SomeFailed => failed = true,
             other => return other,
         }
     }
-    if failed { Ending::SomeFailed } else { Ending::Done }
+    if failed { Exit::SomeFailed } else { Exit::Done }
 }
 
 /// Runs one study once.
@@ -258,56 +270,57 @@ fn one(
     checked: &Checked,
     destination: &Destination,
     outputs: &Outputs,
-    wanted: &Wanted<'_>,
-    (threads, stop): (usize, &Arc<AtomicBool>),
-) -> Ending {
+    options: &RunOptions<'_>,
+    workers: Workers<'_>,
+) -> Exit {
+    let Workers { threads, stop } = workers;
     let study = checked.study();
-    let mut journal = match stream::begin(checked, &destination.out, wanted.shard, wanted.start, threads) {
+    let mut journal = match stream::begin(checked, &destination.out, options.shard, options.start, threads) {
         Ok(journal) => journal,
-        Err(error @ (StreamError::Other { .. } | StreamError::Unfinished { .. } | StreamError::Name(_))) => {
-            speak::error(&error.to_string());
-            return Ending::WrongInput;
+        Err(error @ (StreamError::DifferentRun { .. } | StreamError::Unfinished { .. } | StreamError::Name(_))) => {
+            messages::error(&error.to_string());
+            return Exit::WrongInput;
         }
-        Err(error) => return Ending::Failed(error.to_string()),
+        Err(error) => return Exit::Failed(error.to_string()),
     };
     let done: u64 = journal.tally().points().values().sum();
     let range = journal.head().range.clone();
     // The number of points of adaptive frequencies and of a shard is unknown in advance.
-    let points = Some(study.points() as u64).filter(|_| !study.is_adaptive() && wanted.shard.is_none());
-    speak::event(
+    let points = Some(study.points() as u64).filter(|_| !study.is_adaptive() && options.shard.is_none());
+    messages::event(
         "begin",
         json!({ "study": study.name(), "kind": study.kind().name, "points": points, "units": journal.head().units,
                 "from": range.start, "to": range.end, "kept": journal.units().len() }),
     );
     if !journal.units().is_empty() {
-        complain!("{}: {} of {} units are kept from before", study.name(), journal.units().len(), range.len());
+        complain!("{}: {} of {} units come from an earlier run", study.name(), journal.units().len(), range.len());
     }
-    let progress = Progress::new(wanted.progress, points, done, study.name());
+    let progress = ProgressDisplay::new(options.progress, points, done, study.name());
     let counter = progress.clone();
     let context = Context { threads, stop: stop.clone(), finished: Arc::new(move || counter.point()) };
     let computed =
-        stream::compute(checked, &mut journal, &context, &|journal| progress.kept(journal.kept() - range.start));
+        stream::compute(checked, &mut journal, &context, &|journal| progress.kept(journal.synced_end() - range.start));
     progress.end();
     let rest = match computed {
         Ok(rest) => rest,
         Err(StreamError::Journal(JournalError::Study(error))) => {
             show(&error);
-            return Ending::WrongInput;
+            return Exit::WrongInput;
         }
-        Err(error) => return Ending::Failed(error.to_string()),
+        Err(error) => return Exit::Failed(error.to_string()),
     };
-    if let Some(shard) = wanted.shard {
-        return part(study, shard, &mut journal, rest.is_empty());
+    if let Some(shard) = options.shard {
+        return finish_shard(study, shard, &mut journal, rest.is_empty());
     }
     let folder = journal.folder().to_owned();
     let mut outline = journal.head().outline.clone();
     outline.record.threads = threads;
-    let parts = Parts { outline: &outline, journals: std::slice::from_ref(&journal), rest: &rest };
+    let parts = Parts { outline: &outline, journals: std::slice::from_ref(&journal), unjournaled: &rest };
     let assembled = match assemble(&parts, study, outputs, &destination.out, &folder) {
         Ok(assembled) => assembled,
         Err(error) => {
-            return Ending::Failed(format!(
-                "{error}; what was computed stays in {}: --resume makes the results of it",
+            return Exit::Failed(format!(
+                "{error}; the computed units are in {}: --resume writes the results from them",
                 folder.join("").display()
             ));
         }
@@ -318,54 +331,65 @@ fn one(
         // The results exist; a folder that cannot be removed is not an error.
         let _ = std::fs::remove_dir_all(&folder);
     }
-    let ending = told(&assembled, &outline.notes, (wanted.json, wanted.open));
-    match ending {
-        Ending::Done | Ending::SomeFailed if stop.load(Ordering::Relaxed) => {
+    let exit = report(&assembled, &outline.notes, Display { json: options.json, open: options.open });
+    match exit {
+        Exit::Done | Exit::SomeFailed if stop.load(Ordering::Relaxed) => {
             let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&destination.out);
             let whole = destination.out.join(study.name());
-            let beside = if results == whole || !interrupted {
+            let earlier = if results == whole || !interrupted {
                 String::new()
             } else {
-                format!("; the whole run in {} stays", whole.join("").display())
+                format!("; the complete run in {} is unchanged", whole.join("").display())
             };
-            let on = if interrupted { "; --resume goes on from there" } else { "" };
+            let resume = if interrupted { "; continue with --resume" } else { "" };
             let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
                 true => {
-                    "interrupted before any part was finished, which is a stretch of points or a curve that is followed as a whole; the record is in"
+                    "interrupted before any unit of work was finished (a stretch of points, or a whole followed \
+                     curve); the record is in"
                 }
                 false => "interrupted; the finished points are in",
             };
-            Ending::Failed(format!("{what} {}{beside}{on}", results.join("").display()))
+            Exit::Failed(format!("{what} {}{earlier}{resume}", results.join("").display()))
         }
-        ending => ending,
+        exit => exit,
     }
 }
 
 /// Ends a run of a shard, whose journal stays.
-fn part(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Ending {
+fn finish_shard(study: &Study, shard: Shard, journal: &mut Journal, whole: bool) -> Exit {
     let folder = journal.folder().join("").display().to_string();
     if !whole {
-        return Ending::Failed(format!("interrupted; the finished units are in {folder}; --resume goes on from there"));
+        return Exit::Failed(format!("interrupted; the finished units are in {folder}; continue with --resume"));
     }
     if let Err(error) = journal.seal() {
-        return Ending::Failed(error.to_string());
+        return Exit::Failed(error.to_string());
     }
     let failed = journal.tally().points().keys().any(|status| status != CONVERGED);
-    speak::event(
+    messages::event(
         "end",
         json!({ "study": study.name(), "status": if failed { "some-failed" } else { "done" }, "points": journal.tally().points() }),
     );
-    if !speak::is_for_programs() {
+    if !messages::is_for_programs() {
         complain!(
-            "{}: part {shard} is in {folder}; `stickslip merge` joins the parts when all are there",
+            "{}: part {shard} is in {folder}; when all parts are computed, merge them with `stickslip merge`",
             study.name()
         );
     }
-    if failed { Ending::SomeFailed } else { Ending::Done }
+    if failed { Exit::SomeFailed } else { Exit::Done }
+}
+
+/// What a command shows besides the files that it writes.
+#[derive(Clone, Copy)]
+pub(crate) struct Display {
+    /// `true` prints the results as JSON.
+    pub json: bool,
+    /// `true` opens the figure in the browser.
+    pub open: bool,
 }
 
 /// Prints the messages about written results, except the notes in `known`.
-pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool, bool)) -> Ending {
+pub(crate) fn report(assembled: &Assembled, known: &[String], display: Display) -> Exit {
+    let Display { json, open } = display;
     let Assembled { dataset, is_whole, files } = assembled;
     let late = dataset.notes.iter().filter(|note| note.starts_with("warning") && !known.contains(note));
     late.for_each(|warning| complain!("{warning}"));
@@ -375,15 +399,15 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
         (false, true) => "some-failed",
         (false, false) => "done",
     };
-    speak::event("written", json!({ "study": dataset.name, "files": files }));
+    messages::event("written", json!({ "study": dataset.name, "files": files }));
     // The summary on a terminal contains these messages.
     let summary = !json && std::io::stdout().is_terminal();
     if !(summary && std::io::stderr().is_terminal()) {
         complain(dataset);
     }
-    let ending = if json && !is_whole {
-        Ending::Failed(format!(
-            "--json prints tables of up to {MOST_ROWS} rows; the results are in {}",
+    let exit = if json && !is_whole {
+        Exit::Failed(format!(
+            "--json cannot print tables with more than {MOST_ROWS} rows; the results are in {}",
             files.first().map_or(String::new(), |file| file.with_file_name("").display().to_string())
         ))
     } else if json {
@@ -392,15 +416,15 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
         let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
         print(&Terminal { colour: true, width }.text(dataset, files))
     } else {
-        Ending::Done
+        Exit::Done
     };
-    speak::event("end", json!({ "study": dataset.name, "status": status, "points": dataset.record.points }));
+    messages::event("end", json!({ "study": dataset.name, "status": status, "points": dataset.record.points }));
     if open {
         show_figure(files);
     }
-    match ending {
-        Ending::Done if failed => Ending::SomeFailed,
-        ending => ending,
+    match exit {
+        Exit::Done if failed => Exit::SomeFailed,
+        exit => exit,
     }
 }
 
@@ -408,11 +432,11 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
 const NAMED_FAILURES: usize = 10;
 
 /// Prints one line of JSON on standard output. A closed pipe (`| head`) is not an error.
-fn print_json(dataset: &Dataset) -> Ending {
+fn print_json(dataset: &Dataset) -> Exit {
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     match write_dataset_json(dataset, &mut out).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Ending::Failed(error.to_string()),
-        _ => Ending::Done,
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Exit::Failed(error.to_string()),
+        _ => Exit::Done,
     }
 }
 
@@ -424,7 +448,7 @@ fn complain(dataset: &Dataset) {
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
         if let Some(points) = dataset.record.points.get(status) {
             complain!(
-                "{}: {points} {status}, less accurate than was asked; the notes in record.json say how far",
+                "{}: {points} {status}: less accurate than requested; the notes in record.json state the error",
                 dataset.name
             );
         }
@@ -440,22 +464,22 @@ fn complain(dataset: &Dataset) {
 
 /// Opens the figure among these files in the browser.
 pub(crate) fn show_figure(files: &[PathBuf]) {
-    match open::figure(files).map(open::show) {
+    match browser::figure(files).map(browser::show) {
         Some(Ok(())) => {}
         // The results exist even if they cannot be shown.
         Some(Err(message)) => complain!("{message}"),
-        None => complain!("there is no figure to show: it is not among the outputs of --only"),
+        None => complain!("no figure to open: --only does not include svg, png or html"),
     }
 }
 
 /// Runs `stickslip paper`.
-pub fn paper(destination: &Destination, open: bool) -> Ending {
+pub fn paper(destination: &Destination, open: bool) -> Exit {
     if let Err(error) = check_writable(&destination.out) {
-        return Ending::Failed(error.to_string());
+        return Exit::Failed(error.to_string());
     }
     let threads = match pool(destination) {
         Ok(threads) => threads,
-        Err(ending) => return ending,
+        Err(exit) => return exit,
     };
     let context = Context { stop: progress::stop_flag(), ..Context::unwatched(threads) };
     let say = |line: &str| {
@@ -464,31 +488,31 @@ pub fn paper(destination: &Destination, open: bool) -> Ending {
         }
     };
     match stickslip_paper::paper(&destination.out, &context, &say) {
-        Err(error) => Ending::Failed(error.to_string()),
+        Err(error) => Exit::Failed(error.to_string()),
         Ok(outcome) => {
-            if let ending @ Ending::Failed(_) = print(&outcome.summary) {
-                return ending;
+            if let exit @ Exit::Failed(_) = print(&outcome.summary) {
+                return exit;
             }
-            if open && let Err(message) = open::show(&outcome.report) {
+            if open && let Err(message) = browser::show(&outcome.report) {
                 complain!("{message}");
             }
             if context.stopped() {
-                Ending::Failed("interrupted; the finished figures are written".to_owned())
+                Exit::Failed("interrupted; the finished figures were written".to_owned())
             } else if outcome.failed > 0 {
-                Ending::SomeFailed
+                Exit::SomeFailed
             } else {
-                Ending::Done
+                Exit::Done
             }
         }
     }
 }
 
 /// Creates the thread pool and returns its number of threads.
-fn pool(destination: &Destination) -> Result<usize, Ending> {
+fn pool(destination: &Destination) -> Result<usize, Exit> {
     let mut builder = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = destination.threads {
         builder = builder.num_threads(usize::from(threads));
     }
-    builder.build_global().map_err(|error| Ending::Failed(format!("no threads: {error}")))?;
+    builder.build_global().map_err(|error| Exit::Failed(format!("cannot create threads: {error}")))?;
     Ok(rayon::current_num_threads())
 }

@@ -205,7 +205,7 @@ fn a_series_that_is_too_short_says_so_and_ends_with_3() {
     fs::write(&path, &text).unwrap();
     let output = stickslip(folder.path(), &["run", "study.toml", "--only", "csv,json"]);
     assert_eq!(code(&output), 3, "{}", stderr(&output));
-    assert!(stderr(&output).contains("truncated, less accurate than was asked"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("truncated: less accurate than requested"), "{}", stderr(&output));
     let out = folder.path().join("stickslip-out/study");
     let curve = fs::read_to_string(out.join("curve.csv")).unwrap();
     let column = curve.lines().next().unwrap().split(',').position(|name| name == "truncation").unwrap();
@@ -312,7 +312,7 @@ fn results_belong_to_one_run() {
     fs::write(&path, text).unwrap();
     let output = interrupted(folder.path(), "-INT");
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert!(stderr(&output).contains("the whole run in stickslip-out/study/ stays"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the complete run in stickslip-out/study/ is unchanged"), "{}", stderr(&output));
     assert_eq!(fs::read_to_string(out.join("record.json")).unwrap(), record);
     let cut_short = folder.path().join("stickslip-out/study.interrupted");
     // Peaks exist if a stretch of the curve was finished.
@@ -407,7 +407,7 @@ fn the_figure_is_shown() {
         command.args(["run", "study.toml", "--open", "--only", only]).output().unwrap()
     };
     let output = run("svg");
-    assert!(code(&output) == 0 && stderr(&output).contains("cannot be shown"), "{}", stderr(&output));
+    assert!(code(&output) == 0 && stderr(&output).contains("cannot open"), "{}", stderr(&output));
     let shown = folder.path().join("shown");
     let script = desktop.join("xdg-open");
     fs::write(&script, format!("#!/bin/sh\necho \"$1\" > {}\n", shown.display())).unwrap();
@@ -416,7 +416,7 @@ fn the_figure_is_shown() {
     assert!(code(&output) == 0 && output.stderr.is_empty(), "{}", stderr(&output));
     let path = fs::read_to_string(&shown).unwrap();
     assert!(path.starts_with('/') && path.trim_end().ends_with("stickslip-out/study/figure.html"), "{path}");
-    assert!(stderr(&run("csv")).contains("no figure to show"));
+    assert!(stderr(&run("csv")).contains("no figure to open"));
 }
 
 #[test]
@@ -594,8 +594,7 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     let said = stickslip(folder.path(), &["reduce", "few/study.toml", "--out", "fewer"]);
     assert_eq!(said.status.code(), Some(2), "{}", String::from_utf8_lossy(&said.stderr));
     assert!(
-        String::from_utf8_lossy(&said.stderr).contains("nothing is to be saved")
-            && !folder.path().join("fewer").exists()
+        String::from_utf8_lossy(&said.stderr).contains("nothing to reduce") && !folder.path().join("fewer").exists()
     );
     // A second reduction with fewer coordinates.
     let again = few.replace("reduce = false", "reduce = { modes = 5 }");
@@ -678,7 +677,7 @@ fn the_sector_of_a_disk_is_saved_and_read_again() {
         let saved = stickslip(folder.path(), &["reduce", "study.toml", "--out", "few"]);
         assert_eq!(code(&saved), 0, "{}", stderr(&saved));
         let said = String::from_utf8_lossy(&saved.stdout).into_owned();
-        assert!(said.contains("in the place of [structure], [[place]] and [disk]"), "{said}");
+        assert!(said.contains("replace [structure], [[place]] and [disk] by few/structure.toml"), "{said}");
         let few = fs::read_to_string(folder.path().join("few/structure.toml")).unwrap();
         assert!(few.contains("sectors = 7\nboundary = \"boundary.csv\"") && few.contains("name = \"rim\""), "{few}");
         write("few/study.toml", &format!("schema = 1\n{few}{response}"));
@@ -706,7 +705,7 @@ fn the_sector_of_a_disk_is_saved_and_read_again() {
     write("study.toml", &format!("schema = 1\n{tables}{response}"));
     let saved = stickslip(folder.path(), &["reduce", "study.toml", "--out", "none"]);
     assert_eq!(code(&saved), 2);
-    assert!(stderr(&saved).contains("leave out `blade` and `mistuning`"), "{}", stderr(&saved));
+    assert!(stderr(&saved).contains("remove `blade` and `mistuning`"), "{}", stderr(&saved));
     assert!(!folder.path().join("none").exists());
 }
 
@@ -796,8 +795,8 @@ fn inspect_tells_frequencies_and_mass() {
     for words in [
         "names of 30 rows",
         "bricks.sti as stiffness, bricks.mas as mass",
-        "by their names",
-        "mass of what is free, in its units: along x 1.354889e-8",
+        "according to their names",
+        "mass of the free rows, in the units of the file: along x 1.354889e-8",
         // Millimetre, tonne, second: 1000 kg; inch: 4.4482216152605 N by 0.0254 m.
         "1.3549e-5 kg if units = \"mm-t-s\"",
         "1.3549e-8 kg if units = \"mm-kg-s\"",
@@ -807,7 +806,11 @@ fn inspect_tells_frequencies_and_mass() {
     }
     // Without names there are no directions.
     let unnamed = inspect(&["bricks.sti", "bricks.mas"]);
-    assert!(unnamed.contains("lowest frequencies") && unnamed.contains("mass: no row"), "{unnamed}");
+    assert!(
+        unnamed.contains("lowest frequencies")
+            && unnamed.contains("mass: unknown, because no row name contains a direction"),
+        "{unnamed}"
+    );
 }
 
 /// `inspect` treats constrained and massless rows in the same way as a study.
@@ -837,10 +840,10 @@ fn inspect_leaves_out_what_is_constrained() {
     for (kind, left_out) in [("zero", true), ("light", false), ("held", true)] {
         let said = inspect(kind, kind);
         assert!(said.contains(&format!("lowest frequencies, Hz: {lowest} (times in seconds)")), "{kind}: {said}");
-        assert!(said.contains("there are no more of them"), "{kind}: {said}");
-        assert_eq!(said.contains("1 row is constrained, and left out"), left_out, "{kind}: {said}");
+        assert!(said.contains("the structure has no further frequencies"), "{kind}: {said}");
+        assert_eq!(said.contains("1 row is constrained and removed"), left_out, "{kind}: {said}");
         assert_eq!(
-            said.contains("positive definite, but for rows without an entry or with 1e36"),
+            said.contains("positive definite, except for rows without an entry or with 1e36"),
             left_out,
             "{kind}: {said}"
         );
@@ -873,13 +876,13 @@ fn inspect_goes_by_names() {
     };
     for files in [&["K.mtx", "M.mtx"][..], &["M.mtx", "K.mtx"], &["C.mtx", "K.mtx", "M.mtx"]] {
         let said = inspect(files);
-        assert!(said.contains("K.mtx as stiffness, M.mtx as mass, by their names"), "{said}");
+        assert!(said.contains("K.mtx as stiffness, M.mtx as mass, according to their names"), "{said}");
         assert!(said.contains(&format!("{:.6e}", 0.2 / std::f64::consts::TAU)), "{said}");
     }
     let said = inspect(&["a.mtx", "b.mtx"]);
-    assert!(said.contains("b.mtx as stiffness, a.mtx as mass, by its larger entries"), "{said}");
+    assert!(said.contains("b.mtx as stiffness, a.mtx as mass, because the entries of the first are larger"), "{said}");
     let said = inspect(&["a.mtx", "b.mtx", "e.mtx"]);
-    assert!(said.contains("no frequencies: which matrix"), "{said}");
+    assert!(said.contains("no frequencies: the names do not show which matrix"), "{said}");
 }
 
 /// `inspect` and `check` report invalid matrix files.
@@ -922,8 +925,8 @@ fn wrong_files_of_matrices_say_what_to_do() {
     };
     for (file, words) in [
         ("empty.npz", &["empty.npz: the file contains no matrix", "export"][..]),
-        ("bricks.dof", &["bricks.dof: names of rows", "stickslip inspect MATRIX bricks.dof"]),
-        ("hbmat.mapping", &["hbmat.mapping: names of rows"]),
+        ("bricks.dof", &["bricks.dof: this file contains row names", "stickslip inspect MATRIX bricks.dof"]),
+        ("hbmat.mapping", &["hbmat.mapping: this file contains row names"]),
         ("coordinate.mtx", &["coordinate.mtx, line 11: the file ends within a line", "copy it again"]),
         ("input.mtx", &["input.mtx, line 8: the file ends within a line"]),
         ("cut.op4", &["cut.op4, byte", "the file ends after", "not complete"]),
@@ -943,7 +946,7 @@ fn wrong_files_of_matrices_say_what_to_do() {
     assert!(status == 2 && said.contains("hbmat.mapping: the file has 6 names for 30 rows"), "{said}");
     let (status, said) = inspect(&["general.mtx", "bricks.dof"]);
     assert!(
-        status == 2 && said.contains("beside the square matrix whose rows they name") && said.contains("4 x 3"),
+        status == 2 && said.contains("give it together with the square matrix") && said.contains("4 x 3"),
         "{said}"
     );
     // A text and complex numbers in the file of a matrix are not errors.

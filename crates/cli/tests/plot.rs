@@ -73,7 +73,7 @@ fn a_figure_is_drawn_again_without_computing() {
     fs::write(folder.join("study.toml"), other).unwrap();
     let output = stickslip(folder, &["plot", "out/study", "--study", "study.toml", "--only", "svg"]);
     assert_eq!(code(&output), 0);
-    assert!(stderr(&output).contains("has changed in more than its figure"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("differs from the run in more than its figure"), "{}", stderr(&output));
     // An impossible `[figure]`.
     fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nx_unit = \"N\"\n")).unwrap();
     let output = stickslip(folder, &["plot", "out/study", "--study", "study.toml"]);
@@ -90,7 +90,7 @@ fn two_slip_limits_differ_by_the_closed_form() {
     let output = stickslip(folder, &["plot", "weak/study", "strong/study", "--overlay", "--out", "both"]);
     assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     let text = stdout(&output);
-    assert!(text.contains("dissipation_J") && text.contains("Differences are against Ft = 0.001 N"), "{text}");
+    assert!(text.contains("dissipation_J") && text.contains("Every run is compared with Ft = 0.001 N"), "{text}");
     let both = folder.join("both/study+study");
     for file in ["differences.csv", "figure.svg", "figure.png", "figure.html", "record.json"] {
         assert!(fs::metadata(both.join(file)).unwrap().len() > 100, "{file}");
@@ -120,10 +120,10 @@ fn two_slip_limits_differ_by_the_closed_form() {
     fs::rename(folder.join("clash/study"), folder.join("clash/study+study")).unwrap();
     let output = stickslip(folder, &["plot", "weak/study", "strong/study", "--overlay", "--out", "clash"]);
     assert_eq!(code(&output), 1);
-    assert!(stderr(&output).contains("the results of a run are there"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the folder contains the results of a run"), "{}", stderr(&output));
     let output = stickslip(folder, &["plot", "both/study+study"]);
     assert_eq!(code(&output), 2);
-    assert!(stderr(&output).contains("name the folders of the runs"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("give the folders of the compared runs"), "{}", stderr(&output));
 }
 
 #[test]
@@ -172,11 +172,14 @@ fn one_case_is_compared_with_the_same_case_of_many() {
     fs::write(folder.join("study.toml"), study.replacen("points = 241", "points = 13", 1)).unwrap();
     run(folder, "many", &[]);
     run(folder, "one", &["--set", "Ft=4N"]);
-    for (order, words) in [(["many/study", "one/study"], "1 of 4 cases"), (["one/study", "many/study"], "1 of 1 cases")]
+    for (order, words) in
+        [(["many/study", "one/study"], [" has 4, ", " has 1."]), (["one/study", "many/study"], [" has 1, ", " has 4."])]
     {
         let output = stickslip(folder, &["plot", order[0], order[1], "--overlay", "--only", "csv"]);
         assert_eq!((code(&output), stderr(&output)), (0, String::new()));
-        assert!(stdout(&output).contains(words), "{}", stdout(&output));
+        let text = stdout(&output);
+        assert!(text.contains("only the cases and places of both runs are compared (1)"), "{text}");
+        assert!(words.iter().all(|words| text.contains(words)), "{text}");
         let differences = rows(&folder.join("stickslip-out/study+study/differences.csv"));
         let points: Vec<&str> =
             differences.iter().filter(|row| row["table"] == "curve").map(|row| row["points"].as_str()).collect();
@@ -197,14 +200,14 @@ fn what_cannot_be_drawn_is_named() {
         stderr(&output)
     };
     assert!(wrong(&["plot", "nowhere"]).contains("no results in nowhere"));
-    assert!(wrong(&["plot", "out"]).contains("there are results in out/study"));
-    assert!(wrong(&["plot", "out/study", "--overlay"]).contains("needs two runs"));
+    assert!(wrong(&["plot", "out"]).contains("these folders inside it have results: out/study"));
+    assert!(wrong(&["plot", "out/study", "--overlay"]).contains("needs at least two runs"));
     assert!(wrong(&["plot", "out/study", "--only", "pdf"]).contains("`pdf`"));
     assert!(wrong(&["plot", "out/study", "--study", "study.tom"]).contains("did you mean"));
     wrong(&["plot"]);
     // No tables.
     assert_eq!(code(&stickslip(folder, &["run", "study.toml", "--out", "bare", "--only", "svg"])), 0);
-    assert!(wrong(&["plot", "bare/study"]).contains("with csv among them"));
+    assert!(wrong(&["plot", "bare/study"]).contains("with `csv` among its outputs"));
     // Different kinds.
     fs::write(
         folder.join("study.toml"),
@@ -214,10 +217,12 @@ fn what_cannot_be_drawn_is_named() {
     run(folder, "couple", &[]);
     let text = wrong(&["plot", "out/study", "couple/study", "--overlay"]);
     assert!(
-        text.contains("out/study holds results of the kind `hysteresis`, couple/study of the kind `response`"),
+        text.contains("out/study contains results of the kind `hysteresis`, couple/study of the kind `response`"),
         "{text}"
     );
-    assert!(wrong(&["plot", "out/study", "--study", "study.toml"]).contains("holds results of the kind `hysteresis`"));
+    assert!(
+        wrong(&["plot", "out/study", "--study", "study.toml"]).contains("contains results of the kind `hysteresis`")
+    );
     // Reference curves require a computation.
     let study = fs::read_to_string(folder.join("study.toml")).unwrap();
     fs::write(folder.join("study.toml"), format!("{study}\n[figure]\nreferences = true\n")).unwrap();
@@ -229,7 +234,7 @@ fn what_cannot_be_drawn_is_named() {
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.lines().take(5).collect::<Vec<_>>().join("\n")).unwrap();
     let text = wrong(&["plot", "out/study"]);
-    assert!(text.contains("loops.csv, line 5:") && text.contains("ends after 4 rows"), "{text}");
+    assert!(text.contains("loops.csv, line 5:") && text.contains("the table has 4 rows"), "{text}");
     // An interrupted run is drawn with a warning.
     let path = folder.join("couple/study/record.json");
     let record = fs::read_to_string(&path).unwrap();

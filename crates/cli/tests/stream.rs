@@ -161,16 +161,16 @@ fn parts_joined_are_the_whole() {
 
     let part = |number: usize| format!("parts/couple.shard-{number}-of-3");
     let said = refused(folder.path(), &["merge", &part(1), &part(3), "--out", "no"]);
-    assert!(said.contains("are in none of the parts, after parts/couple.shard-1-of-3"), "{said}");
+    assert!(said.contains("are missing in the given parts, after parts/couple.shard-1-of-3"), "{said}");
     let said = refused(folder.path(), &["merge", &part(1), &part(2), "--out", "no"]);
     assert!(said.contains("after parts/couple.shard-2-of-3"), "{said}");
     let said = refused(folder.path(), &["merge", &part(1), &part(2), &part(2), &part(3), "--out", "no"]);
-    assert!(said.contains("both have unit"), "{said}");
+    assert!(said.contains("both contain unit"), "{said}");
     done(folder.path(), &["run", "couple.toml", "--out", "other", "--shard", "2/3", "--set", "kt=9 N/mm"]);
     let said = refused(folder.path(), &["merge", &part(1), "other/couple.shard-2-of-3", &part(3), "--out", "no"]);
     assert!(said.contains("with --set kt=9 N/mm, not without --set"), "{said}");
     let said = refused(folder.path(), &["merge", "whole", "--out", "no"]);
-    assert!(said.contains("there is no part of a study in whole"), "{said}");
+    assert!(said.contains("no part of a study in whole"), "{said}");
     // An unfinished shard.
     let journal = at(&part(2)).join("journal");
     let bytes = fs::read(&journal).unwrap();
@@ -205,13 +205,13 @@ fn a_run_is_not_gone_on_with_as_another_one() {
     let folder = couple(100_000);
     assert!(unfinished(folder.path()).join("journal").is_file());
     let said = refused(folder.path(), &["run", "couple.toml", "--resume", "--set", "Ft=3 N"]);
-    assert!(said.contains("it is of a run without --set, not with --set Ft=3 N"), "{said}");
+    assert!(said.contains("it belongs to a run without --set, not with --set Ft=3 N"), "{said}");
     let said = refused(folder.path(), &["run", "couple.toml", "--resume", "--method", "transient"]);
     assert!(said.contains("with the method auto, not transient"), "{said}");
     let text = fs::read_to_string(folder.path().join("couple.toml")).unwrap();
     fs::write(folder.path().join("couple.toml"), text.replace("\"0.2 kg/s\" ", "\"0.3 kg/s\" ")).unwrap();
     let said = refused(folder.path(), &["run", "couple.toml", "--resume"]);
-    assert!(said.contains("another state of the study file") && said.contains("0.3 kg/s"), "{said}");
+    assert!(said.contains("its study file is different") && said.contains("0.3 kg/s"), "{said}");
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn a_journal_that_is_taken_away_ends_the_run() {
     fs::remove_dir_all(&running).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("was removed or replaced while the run went on"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("was removed or replaced during the run"), "{}", stderr(&output));
     assert!(!folder.path().join("stickslip-out/couple").exists());
 }
 
@@ -257,7 +257,7 @@ fn a_full_disk_ends_the_run_and_loses_nothing() {
     // The journal now fits, the table does not.
     let output = limited(35_000);
     let said = stderr(&output);
-    assert!(output.status.code() == Some(1) && said.contains("--resume makes the results of it"), "{said}");
+    assert!(output.status.code() == Some(1) && said.contains("--resume writes the results from them"), "{said}");
     assert!(!folder.path().join("full/couple").exists());
     done(folder.path(), &["run", "couple.toml", "--out", "full", "--only", "csv", "--resume"]);
     same(&folder.path().join("whole/couple"), &folder.path().join("full/couple"));

@@ -7,19 +7,19 @@
 //! Source: Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and
 //! Computational Mechanics 9 (2015) 31-40.
 
-mod couple;
-mod elements;
-mod evidence;
-mod further;
+mod accuracy;
+mod additional_cases;
+mod finding;
+mod loops;
 mod measure;
 mod optimum;
-mod part;
+mod responses;
 mod studies;
 mod text;
 mod verdict;
 
-use further::Further;
-use part::{Finding, Part};
+use additional_cases::AdditionalCases;
+use finding::{Finding, ReportPart};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_report::{Outputs, Page, ReportError, Section, Verdict, write_dataset};
@@ -50,7 +50,7 @@ pub enum PaperError {
 }
 
 /// Amount of computation, which tests reduce.
-struct Extent {
+struct Effort {
     points: Option<usize>,
     outputs: Outputs,
 }
@@ -73,39 +73,39 @@ struct Extent {
 /// # Ok::<(), stickslip_paper::PaperError>(())
 /// ```
 pub fn paper(out: &Path, context: &Context, say: &dyn Fn(&str)) -> Result<Outcome, PaperError> {
-    produce(out, context, say, &Extent { points: None, outputs: Outputs::usual() })
+    produce(out, context, say, &Effort { points: None, outputs: Outputs::defaults() })
 }
 
-fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -> Result<Outcome, PaperError> {
+fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), effort: &Effort) -> Result<Outcome, PaperError> {
     let mut results = Results::default();
     for (name, _) in FILES {
         if context.stopped() {
             break;
         }
-        let study = read(name, extent.points, &[])?;
+        let study = read(name, effort.points, &[])?;
         let dataset = run(&study, context)?;
-        write_dataset(&dataset, out, &extent.outputs)?;
+        write_dataset(&dataset, out, &effort.outputs)?;
         let points: u64 = dataset.record.points.values().sum();
         let failed = dataset.failures.len();
         let failed = if failed > 0 { format!(", {failed} failed") } else { String::new() };
         say(&format!("{}: {points} points{failed}, {:.2} s", dataset.title, dataset.record.wall_time_s));
         results.insert(study, dataset);
     }
-    say("Further cases that the claims ask for: other slip limits, contact stiffnesses, frequencies");
-    let further = Further::new(context, extent.points);
-    let parts: Vec<Part> = [
-        elements::exact(&results),
-        elements::approximate(&results, &further),
-        elements::coulomb(&results),
-        couple::figure6(&results, &further),
-        couple::figure7(&results, &further),
-        couple::dependence(&results, &further),
-        couple::figure8(&results),
-        couple::figure10(&results),
-        couple::optimum(&further),
-        couple::laws(&results),
-        Some(evidence::open(&further)),
-        Some(evidence::record(&results)),
+    say("Additional cases for the claims: other slip limits, contact stiffnesses, frequencies");
+    let additional = AdditionalCases::new(context, effort.points);
+    let parts: Vec<ReportPart> = [
+        loops::exact(&results),
+        loops::approximate(&results, &additional),
+        loops::coulomb(&results),
+        responses::figure6(&results, &additional),
+        responses::figure7(&results, &additional),
+        responses::dependence(&results, &additional),
+        responses::figure8(&results),
+        responses::figure10(&results),
+        responses::optimum(&additional),
+        responses::laws(&results),
+        Some(accuracy::inferred_values(&additional)),
+        Some(accuracy::error_measures(&results)),
     ]
     .into_iter()
     .flatten()
@@ -119,19 +119,20 @@ fn produce(out: &Path, context: &Context, say: &dyn Fn(&str), extent: &Extent) -
     Ok(Outcome { summary, failed: results.failed(), report })
 }
 
-fn page(parts: Vec<Part>) -> Page {
+fn page(parts: Vec<ReportPart>) -> Page {
     Page {
         title: "Blade couple with dry friction connection: figures and claims".to_owned(),
         introduction: vec![
-            "Every figure of Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and Computational Mechanics 9 \
-             (2015) 31-40, computed anew, beside what its text claims of it."
+            "Every figure of Pust, Pesek, Radolfova: Blade couple with dry friction connection, Applied and \
+             Computational Mechanics 9 (2015) 31-40, computed again and compared with the claims of its text."
                 .to_owned(),
             format!(
-                "Every verdict follows from the measured number by a fixed rule: two quantities are similar up to {:.0} %, \
-                 approximately the same up to {:.0} %, and nobody would call them similar beyond {:.0} %; a frequency is met within {} Hz, half \
-                 the step in which the paper prints it; a claim about several cases needs all of them, and is qualified if \
-                 only some agree. Unless said otherwise friction is exact Coulomb friction; the last sections compare the paper's arctangent law, \
-                 and list what the paper leaves open and had to be inferred.",
+                "Every verdict follows from the measured number by a fixed rule. Two quantities are similar up \
+                 to {:.0} %, approximately the same up to {:.0} %, and not similar beyond {:.0} %. A frequency \
+                 matches within {} Hz, half the step in which the paper prints it. A claim about several cases \
+                 needs all of them; it holds with a qualification if only some agree. Friction is exact Coulomb \
+                 friction unless stated otherwise. The last sections compare the paper's arctangent law, and \
+                 list the data that the paper does not state and that had to be inferred.",
                 100.0 * verdict::SIMILAR,
                 100.0 * verdict::APPROXIMATE,
                 100.0 * verdict::DIFFERENT,
@@ -146,7 +147,7 @@ fn page(parts: Vec<Part>) -> Page {
 }
 
 /// Returns the claims as text for the terminal.
-fn summary(report: &Path, parts: &[Part], results: &Results) -> String {
+fn summary(report: &Path, parts: &[ReportPart], results: &Results) -> String {
     let mut text = String::new();
     for part in parts.iter().filter(|part| !part.findings.is_empty()) {
         let _ = writeln!(text, "{}", part.section.heading);
@@ -179,8 +180,8 @@ mod tests {
     fn reduced(stop: bool) -> (tempfile::TempDir, Outcome) {
         let out = tempfile::tempdir().unwrap();
         let context = Context { stop: Arc::new(AtomicBool::new(stop)), ..Context::unwatched(1) };
-        let extent = Extent { points: Some(25), outputs: Outputs::only(&["csv", "json", "svg"]).unwrap() };
-        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        let effort = Effort { points: Some(25), outputs: Outputs::select(&["csv", "json", "svg"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &effort).unwrap();
         (out, outcome)
     }
 
@@ -195,7 +196,7 @@ mod tests {
         }
         let report = std::fs::read_to_string(out.path().join("report.html")).unwrap();
         for heading in
-            ["Fig. 2", "Figs. 3 and 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 10", "What the paper leaves open"]
+            ["Fig. 2", "Figs. 3 and 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 10", "Data that the paper does not state"]
         {
             assert!(report.contains(&format!("<h2>{heading}")), "{heading}");
         }
@@ -221,8 +222,8 @@ mod tests {
         let whole = out.path().join("report.html");
         std::fs::write(&whole, "whole").unwrap();
         let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
-        let extent = Extent { points: Some(25), outputs: Outputs::only(&["json"]).unwrap() };
-        let outcome = produce(out.path(), &context, &|_| (), &extent).unwrap();
+        let effort = Effort { points: Some(25), outputs: Outputs::select(&["json"]).unwrap() };
+        let outcome = produce(out.path(), &context, &|_| (), &effort).unwrap();
         assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");
         assert!(outcome.report.ends_with("report.interrupted.html") && outcome.report.is_file());
         assert!(outcome.summary.contains("report.interrupted.html"), "{}", outcome.summary);

@@ -7,7 +7,7 @@ use stickslip_study::run::{Context, run};
 
 /// Relative excess of the peak at the highest limit over the lowest peak, above which the
 /// minimum lies inside the range. The value excludes rounding errors.
-const WORSE_AGAIN: f64 = 1e-3;
+const MIN_RISE: f64 = 1e-3;
 
 /// The peak of the excited blade over the slip limit.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,12 +34,12 @@ impl Optimum {
         let best = (0..peaks.len()).min_by(|a, b| peaks[*a].total_cmp(&peaks[*b]))?;
         let refined = curve.optimum.map(|optimum| (optimum.value, optimum.amplitude));
         let lowest = refined.unwrap_or((limits[best], peaks[best]));
-        let interior = peaks.last().is_some_and(|last| *last > (1.0 + WORSE_AGAIN) * lowest.1) && best > 0;
+        let interior = peaks.last().is_some_and(|last| *last > (1.0 + MIN_RISE) * lowest.1) && best > 0;
         Some(Optimum { limits, peaks, lowest, interior })
     }
 
     /// Returns the peak at one of the limits of the curve in m, or NaN for another limit.
-    pub fn at(&self, limit: f64) -> f64 {
+    pub fn peak_at(&self, limit: f64) -> f64 {
         self.limits.iter().position(|l| *l == limit).map_or(f64::NAN, |i| self.peaks[i])
     }
 }

@@ -1,26 +1,15 @@
 //! The Rust part `stickslip._core` of the Python package; the Python part is in
 //! `python/stickslip`.
 
-mod arrow;
-mod disk;
-mod drawn;
 mod error;
 mod law;
-mod lend;
 mod lock;
-mod matrices;
 mod model;
-mod orbit;
-mod parameters;
-mod points;
 mod progress;
-mod python_law;
 mod quantity;
 mod result;
-mod rows;
-mod stored;
 mod study;
-mod watch;
+mod supervision;
 
 use pyo3::prelude::*;
 
@@ -33,13 +22,13 @@ mod _core {
     #[pymodule_export]
     use crate::law::{_law, _rate_law};
     #[pymodule_export]
-    use crate::law::{PyLaw, laws, named};
+    use crate::law::{PyLaw, law_by_name, laws};
     #[pymodule_export]
     use crate::lock::{_lock, Lock};
     #[pymodule_export]
-    use crate::model::{_model, _orbit, PyModel};
+    use crate::model::orbit::PyOrbit;
     #[pymodule_export]
-    use crate::orbit::PyOrbit;
+    use crate::model::{_model, _orbit, PyModel};
     #[pymodule_export]
     use crate::result::{_result, _table, PyResultSet, Table};
     #[pymodule_export]

@@ -14,7 +14,7 @@ use stickslip_study::expression::{Expression, quantity};
 
 /// Returns a quantity of this dimension in SI units. `what` names the quantity in error
 /// messages.
-pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResult<f64> {
+pub fn to_si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResult<f64> {
     let py = value.py();
     if let Ok(text) = value.cast::<PyString>() {
         return quantity(text.to_str()?, dimension).map_err(|fault| {
@@ -27,7 +27,7 @@ pub fn si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyResul
             dimension.name_and_unit().map_or_else(|| dimension.to_string(), |(name, unit)| format!("{name} ({unit})"));
         error::model(
             py,
-            format!("{what} must be a {unit}: a number in SI or a string with a unit, found {}", kind(value)),
+            format!("{what} must be a {unit}: a number in SI units or a string with a unit, found {}", kind(value)),
         )
     })?;
     if !number.is_finite() {
@@ -48,7 +48,7 @@ pub fn of_any_dimension(value: &Bound<'_, PyAny>, what: &str) -> PyResult<(f64, 
             .unwrap_or(Dimension::NONE),
         Err(_) => Dimension::NONE,
     };
-    Ok((si(value, dimension, what)?, dimension))
+    Ok((to_si(value, dimension, what)?, dimension))
 }
 
 /// Returns one or several quantities in SI units.
@@ -57,7 +57,7 @@ pub fn of_any_dimension(value: &Bound<'_, PyAny>, what: &str) -> PyResult<(f64, 
 /// `None` accepts any dimension.
 pub fn many(value: &Bound<'_, PyAny>, dimension: Option<Dimension>, what: &str) -> PyResult<Vec<f64>> {
     let one = |value: &Bound<'_, PyAny>| match dimension {
-        Some(dimension) => si(value, dimension, what),
+        Some(dimension) => to_si(value, dimension, what),
         None => Ok(of_any_dimension(value, what)?.0),
     };
     if value.cast::<PyString>().is_ok() || number(value)?.is_some() {
@@ -91,7 +91,7 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
 /// Returns the number that a user would give for an SI value: Hz for frequencies, otherwise SI.
 ///
 /// Passing the number back gives exactly the same SI value.
-pub fn in_unit(si: f64, dimension: Option<Dimension>) -> f64 {
+pub fn user_value(si: f64, dimension: Option<Dimension>) -> f64 {
     let is_frequency = |dimension| dimension == Dimension::FREQUENCY || dimension == Dimension::SWEEP_RATE;
     if !dimension.is_some_and(is_frequency) {
         return si;
@@ -184,7 +184,7 @@ fn is_sequence(value: &Bound<'_, PyAny>) -> PyResult<bool> {
 
 fn no_sequence(value: &Bound<'_, PyAny>, what: &str) -> PyErr {
     let message = format!(
-        "{what} must be one value or a list of them, numbers in SI or strings with units, found {}",
+        "{what} must be one value or a list of them, numbers in SI units or strings with units, found {}",
         kind(value)
     );
     error::model(value.py(), message)

@@ -3,7 +3,7 @@
 use crate::model::PyModel;
 use crate::progress::{bar, close};
 use crate::result::{PyResultSet, Table};
-use crate::watch::{Watch, alone, apart, watched};
+use crate::supervision::{Supervision, run_here, run_on_new_thread, run_supervised};
 use crate::{error, quantity};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
@@ -48,13 +48,13 @@ impl PyStudy {
         }
         // The lock is not held during the check. A concurrent check gives the same result.
         let study = self.study.clone();
-        let checked = apart(py, move || check(&study))?.map_err(|cause| error::study(py, &cause))?;
+        let checked = run_on_new_thread(py, move || check(&study))?.map_err(|cause| error::study(py, &cause))?;
         Ok(kept().insert(Arc::new(checked)).clone())
     }
 
     /// Returns the model of a case.
     pub fn model_of(&self, py: Python<'_>, index: usize) -> PyResult<Model> {
-        let case = alone(py, || self.study.case(index))?;
+        let case = run_here(py, || self.study.case(index))?;
         Ok(case.map_err(|cause| error::study(py, &cause))?.model)
     }
 
@@ -66,7 +66,7 @@ impl PyStudy {
         read: impl FnOnce(&[(String, String)]) -> Result<stickslip_study::Study, StudyError> + Send + 'static,
     ) -> PyResult<PyStudy> {
         let (name, set) = (method.clone(), overrides.clone());
-        let study = apart(py, move || {
+        let study = run_on_new_thread(py, move || {
             let study = read(&set)?;
             match name {
                 Some(name) => study.with_method(&name),
@@ -105,7 +105,8 @@ fn typed(
             text.to_str()?.to_owned()
         } else {
             let number = quantity::number(&value)?.filter(|number| number.is_finite()).ok_or_else(|| {
-                let message = format!("`{name}` takes a finite number in SI or a string with a unit, found {value}");
+                let message =
+                    format!("`{name}` must be a finite number in SI units or a string with a unit, found {value}");
                 error::model(value.py(), message)
             })?;
             let unit = match dimension(&name)? {
@@ -167,7 +168,7 @@ impl PyStudy {
             Some(found) => PyStudy::from_text(py, found.study, found.name, set),
             None => {
                 let names: Vec<&str> = templates::TABLE.iter().map(|one| one.name).collect();
-                let message = format!("there is no template `{template}`; there are {}", names.join(", "));
+                let message = format!("unknown template `{template}`; the templates are {}", names.join(", "));
                 Err(error::model(py, message))
             }
         }
@@ -260,7 +261,7 @@ impl PyStudy {
         let parameters = PyDict::new(py);
         case.parameters
             .iter()
-            .try_for_each(|(name, (si, dimension))| parameters.set_item(name, quantity::in_unit(*si, *dimension)))?;
+            .try_for_each(|(name, (si, dimension))| parameters.set_item(name, quantity::user_value(*si, *dimension)))?;
         Ok(parameters)
     }
 
@@ -309,8 +310,8 @@ impl PyStudy {
         };
         let total = (!study.is_adaptive()).then_some(study.points() as u64);
         let bar = bar(py, progress, study.name())?;
-        let watch = Watch { threads, progress: bar.as_ref().map(|bar| bar.clone().unbind()), total };
-        let outcome = watched(py, &watch, |context| check(&study)?.run(context));
+        let supervision = Supervision { threads, progress: bar.as_ref().map(|bar| bar.clone().unbind()), total };
+        let outcome = run_supervised(py, &supervision, |context| check(&study)?.run(context));
         close(bar)?;
         outcome?.map(PyResultSet::new).map_err(|cause| error::study(py, &cause))
     }
@@ -326,8 +327,8 @@ impl PyStudy {
     /// Returns their tables, points and tally for `_joined`.
     fn _batch<'py>(&self, py: Python<'py>, start: usize, stop: usize) -> PyResult<Bound<'py, PyDict>> {
         let checked = self.checked(py)?;
-        let watch = Watch { threads: Some(1), progress: None, total: None };
-        let batch = watched(py, &watch, |context| checked.block(start..stop, context))?;
+        let supervision = Supervision { threads: Some(1), progress: None, total: None };
+        let batch = run_supervised(py, &supervision, |context| checked.block(start..stop, context))?;
         let Block { tables, tally, .. } = batch.map_err(|cause| error::study(py, &cause))?;
         let out = PyDict::new(py);
         out.set_item("told", serde_json::to_string(&tally).map_err(|cause| error::report(py, cause))?)?;
@@ -353,14 +354,14 @@ impl PyStudy {
         )
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'_>)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledStudy<'_>)> {
         let build = py.import("stickslip._core")?.getattr("_study")?;
         Ok((build, (&self.file, self.study.text(), self.overrides.clone(), self.method.clone())))
     }
 }
 
 /// Pickled study: name of the file, text, values of parameters, method.
-type Pickled<'a> = (&'a str, &'a str, Vec<(String, String)>, Option<String>);
+type PickledStudy<'a> = (&'a str, &'a str, Vec<(String, String)>, Option<String>);
 
 /// Recreates a study from its pickle.
 #[pyfunction]

@@ -45,34 +45,20 @@
 //! assert!(stickslip_report::html::to_html(&figure, "plotly.js").contains("plotly.js"));
 //! ```
 
-mod answers;
-pub mod assemble;
-mod axis;
-mod clip;
-mod colour;
 pub mod compare;
-pub mod csv;
-pub mod file;
-pub mod folder;
-mod font;
-mod frame;
-pub mod html;
-pub mod journal;
-pub mod json;
+mod figure;
 pub mod output;
 pub mod page;
-pub mod parquet;
-pub mod png;
-pub mod stored;
-pub mod stream;
-pub mod svg;
+mod run;
 pub mod terminal;
 
 #[cfg(test)]
 mod samples;
 
-pub use file::{Output, ReportError, write_file};
-pub use folder::check_writable;
+pub use figure::{html, png, svg};
+pub use output::folder::check_writable;
+pub use output::result_file::{Output, ReportError, write_file};
 pub use output::{Outputs, write_dataset};
 pub use page::{Claim, Page, PageTable, Section, Verdict};
+pub use run::{assemble, journal, stored, stream};
 pub use stickslip_study::dataset::{Dataset, Figure};

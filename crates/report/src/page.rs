@@ -4,9 +4,9 @@
 //! All figures share one script, which is a file in the folder of the page. In print, or
 //! without the script, the page shows the static figures instead.
 
-use crate::file::{ReportError, write_file, write_once};
-use crate::html::{document, fragment, script, script_name};
-use crate::svg::escape;
+use crate::figure::html::{document, fragment, script, script_name};
+use crate::figure::svg::escape;
+use crate::output::result_file::{ReportError, write_file, write_if_changed};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::Figure;
@@ -141,7 +141,7 @@ impl Page {
     /// # Errors
     /// [`ReportError::Write`] with the path and the cause.
     pub fn write(&self, path: &Path) -> Result<PathBuf, ReportError> {
-        write_once(&path.with_file_name(script_name()), script().as_bytes())?;
+        write_if_changed(&path.with_file_name(script_name()), script().as_bytes())?;
         write_file(path, self.to_html().as_bytes())
     }
 
@@ -329,7 +329,7 @@ pub(crate) mod tests {
         Page {
             title: "Dry friction between blades: the paper's figures & claims".into(),
             introduction: vec![
-                "Every figure of the paper, computed anew, beside every claim that its text makes.".into(),
+                "Every figure of the paper, computed again and compared with the claims of its text.".into(),
             ],
             sections: vec![section(samples::hysteresis()), section(samples::response()), section(samples::hostile())],
         }
@@ -347,7 +347,7 @@ pub(crate) mod tests {
         assert!(html.len() < 500_000, "{}", html.len());
         assert!(html.contains("3 do not hold") && html.contains("sticks elsewhere &lt;if at all&gt;"));
         assert!(!html.contains("<script>alert"));
-        let links = crate::html::tests::markup(&html);
+        let links = crate::figure::html::tests::markup(&html);
         assert_eq!(links.matches("href=").count(), links.matches("href=\"#section-").count());
         assert_eq!(links.matches("src=").count(), 1);
     }

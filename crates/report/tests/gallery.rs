@@ -79,7 +79,7 @@ fn dataset(name: &str, text: &str) -> Dataset {
 }
 
 fn picture(dataset: &Dataset) -> String {
-    let svg = Outputs::only(&["svg"]).unwrap();
+    let svg = Outputs::select(&["svg"]).unwrap();
     let files: Vec<_> = svg.iter().flat_map(|output| (output.make)(dataset).unwrap()).collect();
     let [file] = &files[..] else { panic!("{}: {} pictures", dataset.name, files.len()) };
     String::from_utf8(file.content.clone()).unwrap()

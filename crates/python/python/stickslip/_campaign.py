@@ -52,8 +52,8 @@ TRIES = 2
 WORKER = "stickslip-campaign"
 #: Error message for a script without the `__main__` guard.
 GUARD = (
-    'a script has to start a campaign under `if __name__ == "__main__":`, because every process that computes reads the script again; '
-    "a campaign cannot be started by a script that comes from standard input"
+    'a script must start a campaign under `if __name__ == "__main__":`, because every worker process imports the script; '
+    "a script from standard input cannot start a campaign"
 )
 
 
@@ -93,7 +93,7 @@ def campaign(
     if processes is not None and _count(processes) < 1:
         raise ValueError(f"`processes` must be a whole number from 1, found {processes!r}")
     if not seconds > 0:
-        raise ValueError(f"`seconds` that a batch takes must be more than zero, found {seconds!r}")
+        raise ValueError(f"`seconds`, the duration of a batch, must be more than zero, found {seconds!r}")
     folder = Path(out)
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"`out` must be a folder for the parts of the campaign, and {out} is a file")
@@ -268,7 +268,7 @@ def _unpickled(pickled: bytes) -> Study:
     """Returns the checked study on a worker."""
     study, matrices = pickle.loads(pickled)
     if study._matrices != matrices:
-        raise CampaignError("the files of [structure] hold other matrices than where the campaign began")
+        raise CampaignError("the files of [structure] contain other matrices than at the start of the campaign")
     return study  # type: ignore[no-any-return]
 
 
@@ -399,9 +399,9 @@ class _Local:
         try:
             pool.submit(_ready, self._study).result()
         except BrokenProcessPool:
-            raise CampaignError(f"a process of this machine ended before it began to compute: {GUARD}") from None
+            raise CampaignError(f"a worker process ended before it started to compute: {GUARD}") from None
         except Exception as error:
-            raise CampaignError(f"processes of this machine cannot compute this study: {_reason(error)}") from error
+            raise CampaignError(f"worker processes cannot compute this study: {_reason(error)}") from error
         return pool
 
     def submit(self, start: int, stop: int, tries: int, avoid: str | None) -> Any:
@@ -411,7 +411,7 @@ class _Local:
             except BrokenProcessPool:
                 # a process died, and all running batches fail; new processes replace it
                 self.close(at_once=True)
-        raise CampaignError("processes of this machine cannot be started")
+        raise CampaignError("worker processes cannot be started on this machine")
 
     def wait(self, running: list[Future[dict[str, Any]]]) -> Iterable[Any]:
         return wait(running, return_when=FIRST_COMPLETED).done
@@ -441,12 +441,12 @@ class Campaign:
         try:
             head = json.loads((self.folder / "campaign.json").read_text("utf-8"))
         except FileNotFoundError:
-            raise CampaignError(f"{self.folder} holds no campaign: there is no campaign.json in it") from None
+            raise CampaignError(f"{self.folder} contains no campaign: campaign.json is missing") from None
         except ValueError as error:
             raise CampaignError(f"{self.folder / 'campaign.json'} cannot be read: {error}") from None
         if not isinstance(head, dict) or head.get("format") != FORMAT:
             found = head.get("format") if isinstance(head, dict) else None
-            raise CampaignError(f"{self.folder} has the format {found}, and this version reads {FORMAT}")
+            raise CampaignError(f"{self.folder} has the format {found}, but this version reads {FORMAT}")
         self._head: dict[str, Any] = head
         self._done, self._useless = _folder.read(self.folder, self.units)
 
@@ -470,12 +470,12 @@ class Campaign:
             return cls(out)
         there = cls(out)
         if lies := _difference(there._head, head):
-            raise CampaignError(f"{out} holds the campaign of {lies}; choose another folder, or remove that one")
+            raise CampaignError(f"{out} contains the campaign of {lies}; choose another folder, or remove that campaign")
         _folder.clear(out)
         batches, useless = _folder.read(out, there.units, checksums=True)
         if useless:
             count = there.units - sum(batch.stop - batch.start for batch in batches)
-            message = f"{len(useless)} batches in {out} are damaged or lack a part: their units are computed again, {count} units are left"
+            message = f"{len(useless)} batches in {out} have damaged or missing parts: their units are computed again; {count} units remain"
             warnings.warn(message, stacklevel=3)
         failed = [batch for batch in batches if retry and batch.told.get("failed")]
         for file in [*useless, *(out / "done" / f"{batch.stem}.json" for batch in failed)]:
@@ -545,7 +545,7 @@ class Campaign:
         folder = self.folder / "parts" / table
         found = [folder / f"{batch.stem}.parquet" for batch in self._done if table in batch.told["parts"]]
         if not found:
-            raise CampaignError(f"there is no table `{table}`, there are {', '.join(self.tables) or 'none yet'}")
+            raise CampaignError(f"unknown table `{table}`; the tables are {', '.join(self.tables) or 'none yet'}")
         return found
 
     def table(self, name: str | None = None, *, library: Literal["polars", "pyarrow"] = "polars") -> Any:
@@ -634,7 +634,7 @@ class Campaign:
         if not self.is_complete or self.failed:
             open_units = "units whose parts are damaged or missing" if self.damaged else "units that were not computed yet"
             lacks = "units that failed" if self.is_complete else open_units
-            raise CampaignError(f"{self.folder} has {lacks}: there is no whole result; read its tables instead")
+            raise CampaignError(f"{self.folder} has {lacks}: the result is incomplete; read its tables instead")
         study = self.study
         tables = []
         for name in study.tables:
@@ -658,17 +658,17 @@ def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str | Non
     """
     (_, text, overrides, method), (_, our_text, our_overrides, our_method) = theirs["study"], ours["study"]
     if theirs["version"] != ours["version"]:
-        return f"another version: {theirs['version']}, and this is {ours['version']}"
+        return f"another version: {theirs['version']}; this version is {ours['version']}"
     if text != our_text:
         lines = itertools.zip_longest(text.splitlines(), our_text.splitlines(), fillvalue="")
         changed = next(((line, one, other) for line, (one, other) in enumerate(lines, 1) if one != other), None)
-        where = "its lines end otherwise" if changed is None else "its line {} is `{}`, and this one's `{}`".format(*changed)
+        where = "its line endings differ" if changed is None else "its line {} is `{}`, but the line of this study is `{}`".format(*changed)
         return f"another study: {where}"
     if overrides != our_overrides:
         words = ", ".join(f"{name} = {value}" for name, value in overrides) or "none of them set"
-        return f"another study: the same with other values of parameters ({words})"
+        return f"the same study with other values of parameters ({words})"
     if method != our_method:
-        return f"another study: the same by another method ({method or 'its own'})"
+        return f"the same study with another method ({method or 'its own'})"
     if theirs.get("matrices") != ours["matrices"]:
         return "a study with other matrices: the files of [structure] have changed"
     return None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-UNKNOWN = "no derivative of numpy.{} is known: give the law's `derivatives`"
+UNKNOWN = "the derivative of numpy.{} is unknown: provide `derivatives` of the law"
 
 #: Derivatives of functions of one argument x, in terms of x and the value y.
 _ONE: dict[Any, Callable[..., Any]] = {
@@ -141,13 +141,13 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         self.slope[_behind(index, self)] = value.slope if isinstance(value, Dual) else 0.0
 
     def __bool__(self) -> bool:
-        raise TypeError("a law acts on all instants alike: choose between them by numpy.where, not by if")
+        raise TypeError("a law must treat all points alike: use numpy.where instead of if")
 
     def __float__(self) -> float:
         raise TypeError("the derivative of a law would be lost: use NumPy's functions instead of float() and math")
 
     def __array__(self, *_: Any, **__: Any) -> Any:
-        raise TypeError("the derivative of a law would be lost: put rows together by numpy.stack instead of numpy.array")
+        raise TypeError("the derivative of a law would be lost: combine rows with numpy.stack instead of numpy.array")
 
     def copy(self) -> Dual:
         return Dual(self.value.copy(), self.slope.copy())
@@ -186,7 +186,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
             return answer
         (into,) = out
         if not isinstance(into, Dual):
-            raise TypeError("the derivative of a law would be lost in an array of numbers: begin with numpy.zeros_like of an argument")
+            raise TypeError("the derivative of a law would be lost in an array of numbers: create the array with numpy.zeros_like of an argument")
         into[...] = answer
         return into
 

@@ -60,7 +60,7 @@ def lock(out: Path) -> Any:
 
     held = _lock(out / "lock")
     if held is None:
-        raise CampaignError(f"another campaign is writing into {out}: wait for its end, or choose another folder")
+        raise CampaignError(f"another campaign is writing into {out}: wait until it ends, or choose another folder")
     return held
 
 

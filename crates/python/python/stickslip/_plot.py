@@ -24,7 +24,7 @@ def plot(figure: dict[str, Any], axes: Any = None) -> Any:
     else:
         axes = list(np.ravel(axes))
         if len(axes) < len(panels):
-            raise ValueError(f"the figure has {len(panels)} panels, and there are {len(axes)} axes")
+            raise ValueError(f"the figure has {len(panels)} panels, but {len(axes)} axes were given")
         drawing = axes[0].figure if axes else plt.figure()
     for panel, pair in zip(panels, axes):
         _panel(panel, pair)

@@ -166,7 +166,10 @@ class _Kernel:
             found = None
         if isinstance(found, _core.Law) and found._kernel is self:
             return _renewed, (module, name, law.parameters)
-        message = f"law `{law.name}` cannot be pickled: its function must be decorated, or its law stand, at the top of a module under its own name"
+        message = (
+            f"law `{law.name}` cannot be pickled: decorate its function at module level, "
+            "or assign the law to a module-level variable with the name of its function"
+        )
         raise _pickling_error(message)
 
     def _call(self, u: Any, v: Any, z: Any, values: Sequence[float]) -> list[Any]:
@@ -183,7 +186,7 @@ class _Kernel:
             raise TypeError(f"`{self.name}` returned None: return the force, or force and rates")
         if len(pair) != 2 or (self._states > 0) != (answer is pair):
             wanted = f"(force, rates) for its {self._states} states" if self._states else "the force alone, as it has states=0"
-            raise TypeError(f"`{self.name}` must return {wanted}, and returned {len(pair) if answer is pair else 1} of them")
+            raise TypeError(f"`{self.name}` must return {wanted}, but returned {len(pair) if answer is pair else 1} value(s)")
         return pair[0], pair[1]
 
     def _rows(self, answer: Any, count: int, what: str) -> list[Any]:
@@ -211,7 +214,7 @@ class _Kernel:
         with np.errstate(all="ignore"):
             there, back = self.value(u, v, z, values)[0], self.value(-u, -v, -z, values)[0]
         if not np.allclose(back, -there, rtol=1e-9, atol=1e-12 * np.nanmax(np.abs(there), initial=0.0), equal_nan=True):
-            raise ValueError(f"`{self.name}` is not odd: its answer to -u, -v, -z is not the negative one; leave out odd=True")
+            raise ValueError(f"`{self.name}` is not odd: its value at -u, -v, -z is not the negative value; remove odd=True")
 
     def value(self, u: Array, v: Array, z: Array, values: Sequence[float]) -> tuple[Array]:
         rows = self._call(u, v, z, values)
@@ -261,7 +264,7 @@ class _Kernel:
             row, at = np.unravel_index(np.argmax(np.where(np.isnan(error), np.inf, error)), error.shape)
             if not error[row, at] <= worst[0]:
                 names = (self._row_name(int(row)), self._argument_name(argument))
-                where = f"{names[0]} by {names[1]} is {slopes[row, argument, at]:.6g}, and differences have {quotient[row, at]:.6g}"
+                where = f"{names[0]} by {names[1]} is {slopes[row, argument, at]:.6g}, but the difference quotient is {quotient[row, at]:.6g}"
                 worst = (float(error[row, at]), f"{where}, at u = {instants[0, at]:.4g} m, v = {instants[d, at]:.4g} m/s")
         if not worst[0] <= tolerance:
             raise ValueError(f"the derivative of `{self.name}` is wrong: {worst[1]}")

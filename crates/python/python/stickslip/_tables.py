@@ -49,7 +49,7 @@ def to_array(table: Table, dtype: Any = None, copy: bool | None = None) -> NDArr
     It contains real numbers, or objects if a column contains other values.
     """
     if copy is False:
-        raise ValueError("a table holds its columns one after the other: an array of it is a copy")
+        raise ValueError("a table stores its columns separately: an array of it is always a copy")
     columns = [table[name] for name in table.columns]
     if any(column.dtype.kind not in "fiu" for column in columns):
         columns = [column.astype(object) for column in columns]

@@ -86,7 +86,7 @@ def sobol(
     qmc = importlib.import_module("scipy.stats").qmc
     d = len(bounds)
     if d == 0:
-        raise ValueError("`bounds` must name one input or more")
+        raise ValueError("`bounds` must contain at least one input")
     if count < 2 or count & (count - 1):
         raise ValueError(f"count must be a power of two, found {count}")
     both = qmc.Sobol(2 * d, seed=seed).random(count)
@@ -103,12 +103,12 @@ def sobol(
     mixed = [np.column_stack([b[:, k] if k == i else a[:, k] for k in range(d)]) for i in range(d)]
     answer = np.asarray(function(scaled(np.concatenate([a, b, *mixed]))), float)
     if answer.size != (d + 2) * count:
-        raise ValueError(f"`function` must return {(d + 2) * count} values, one for each row of its argument, and returned {answer.size}")
+        raise ValueError(f"`function` must return {(d + 2) * count} values, one for each row of its argument, but returned {answer.size}")
     values = answer.reshape(d + 2, count)
     whole = np.isfinite(values)
     if not whole.all():
         lost = values.size - np.count_nonzero(whole)
-        message = f"{lost} of {values.size} values of the function are not finite: the indices are those of the points without them"
+        message = f"{lost} of {values.size} values of the function are not finite: the indices are computed without these points"
         warnings.warn(message, stacklevel=2)
     pairs = [_indices(values[0][keep], values[1][keep], values[2 + i][keep]) for i in range(d) for keep in [whole[[0, 1, 2 + i]].all(axis=0)]]
     first, total = np.array(pairs).T

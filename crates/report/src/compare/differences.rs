@@ -1,11 +1,12 @@
 //! Differences between runs: the largest in every column, and all differences of peaks and
 //! optima.
 
-use super::pairs::{Pair, difference, pairs};
-use super::reading::{Reading, completed};
-use crate::stored::Stored;
+use super::column_roles::{ColumnRoles, RunTable, with_parameter_columns};
+use super::row_matching::{MatchedRow, TablePair, difference, pairs};
+use crate::run::stored::Stored;
 use std::collections::BTreeMap;
 use stickslip_study::dataset::{Column, Table, Values};
+
 /// Prefix of columns with values of the first run.
 pub(super) const FIRST: &str = "first_";
 /// Name of the table of the largest differences.
@@ -24,16 +25,23 @@ struct Largest {
     points: u64,
 }
 
+/// A run with its label in the comparison.
+#[derive(Clone, Copy)]
+pub(super) struct LabelledRun<'a> {
+    pub(super) run: &'a Stored,
+    pub(super) label: &'a str,
+}
+
 /// The tables of differences, extended with every run.
 #[derive(Debug, Default)]
 pub(super) struct Differences {
-    rows: Vec<Row>,
+    rows: Vec<DifferenceRow>,
     found: Vec<Table>,
     pub(super) notes: Vec<String>,
 }
 
 #[derive(Debug)]
-struct Row {
+struct DifferenceRow {
     table: String,
     column: String,
     run: String,
@@ -42,41 +50,43 @@ struct Row {
 }
 
 impl Differences {
-    pub(super) fn add(&mut self, (first, label): (&Stored, &str), (other, run): (&Stored, &str)) {
+    /// Adds the differences between the first run and another run.
+    pub(super) fn add(&mut self, first: LabelledRun<'_>, other: LabelledRun<'_>) {
+        let (LabelledRun { run: first, label }, LabelledRun { run: other, label: run }) = (first, other);
         for table in &first.dataset.tables {
             let Some(with) = other.dataset.tables.iter().find(|t| t.name == table.name) else {
-                self.notes.push(format!("{}: {run} has no such table.", table.name));
+                self.notes.push(format!("{}: {run} does not contain this table.", table.name));
                 continue;
             };
-            let completed = (completed(first, table, (other, with)), completed(other, with, (first, table)));
-            let (table, with) = (&completed.0, &completed.1);
-            let (reading, reading_with) = (Reading::new(first, table), Reading::new(other, with));
+            let (ours, theirs) = (RunTable { run: first, table }, RunTable { run: other, table: with });
+            let (table, with) = (&with_parameter_columns(ours, theirs), &with_parameter_columns(theirs, ours));
+            let (reading, reading_with) = (ColumnRoles::new(first, table), ColumnRoles::new(other, with));
             if reading.keys != reading_with.keys || reading.abscissa != reading_with.abscissa {
-                let words = |reading: &Reading| {
+                let words = |reading: &ColumnRoles| {
                     let keys: Vec<&str> = reading.keys.iter().chain(&reading.abscissa).map(String::as_str).collect();
                     if keys.is_empty() { "nothing".to_owned() } else { keys.join(", ") }
                 };
                 self.notes.push(format!(
-                    "{}: not compared, its rows are told apart by {} in {label}, by {} in {run}.",
+                    "{}: not compared, because its rows are identified by {} in {label}, but by {} in {run}.",
                     table.name,
                     words(&reading),
                     words(&reading_with)
                 ));
                 continue;
             }
-            self.table((table, with), &reading, run, label);
+            self.table(TablePair { first: table, other: with }, &reading, run, label);
         }
     }
 
-    fn table(&mut self, tables: (&Table, &Table), reading: &Reading, run: &str, label: &str) {
-        let (table, with) = tables;
+    fn table(&mut self, tables: TablePair<'_>, reading: &ColumnRoles, run: &str, label: &str) {
+        let TablePair { first: table, other: with } = tables;
         let groups = reading.groups(table);
         let others: BTreeMap<String, Vec<usize>> = reading.groups(with).into_iter().collect();
         let columns: Vec<&str> =
             reading.values(table).into_iter().filter(|name| with.numbers(name).is_some()).collect();
         let mut largest: Vec<Largest> = columns.iter().map(|_| Largest::default()).collect();
         let (mut interpolates, mut exact, mut common) = (false, false, 0);
-        let mut one_by_one: Vec<Pair> = Vec::new();
+        let mut one_by_one: Vec<MatchedRow> = Vec::new();
         for (key, rows) in &groups {
             let Some(rows_with) = others.get(key) else { continue };
             common += 1;
@@ -84,7 +94,7 @@ impl Differences {
             if reading.abscissa.is_none() && rows.len() != rows_with.len() {
                 let place = if key.is_empty() { String::new() } else { format!(" at {key}") };
                 self.notes.push(format!(
-                    "{}: {} rows{place} in {label}, {} in {run}.",
+                    "{}: {} rows{place} in {label}, but {} in {run}.",
                     table.name,
                     rows.len(),
                     rows_with.len()
@@ -92,7 +102,10 @@ impl Differences {
             }
             let Some((pairs, interpolated)) = pairs(tables, reading.abscissa.as_deref(), &rows, &rows_with) else {
                 let place = if key.is_empty() { String::new() } else { format!(" at {key}") };
-                self.notes.push(format!("{}: not compared{place}, the curves turn differently often.", table.name));
+                self.notes.push(format!(
+                    "{}: not compared{place}, because the curves have different numbers of turning points.",
+                    table.name
+                ));
                 continue;
             };
             interpolates |= interpolated && !pairs.is_empty();
@@ -100,9 +113,9 @@ impl Differences {
             for (name, largest) in columns.iter().zip(&mut largest) {
                 let (Some(a), Some(b)) = (table.numbers(name), with.numbers(name)) else { continue };
                 for pair in &pairs {
-                    largest.look(name, (a[pair.first], pair.value(name, b)), &|| {
+                    largest.add(name, a[pair.first], pair.value(name, b), &|| {
                         let x = reading.abscissa.as_deref().and_then(|name| table.column(name));
-                        let x = x.map(|x| format!("{} = {}", x.name, crate::csv::cell(&x.values, pair.first)));
+                        let x = x.map(|x| format!("{} = {}", x.name, crate::output::csv::cell(&x.values, pair.first)));
                         [Some(key.clone()), x]
                             .into_iter()
                             .flatten()
@@ -116,7 +129,7 @@ impl Differences {
         }
         if common < groups.len().max(others.len()) {
             self.notes.push(format!(
-                "{}: {common} of {} cases and places in {label} and {} in {run} are the same, only these are compared.",
+                "{}: only the cases and places of both runs are compared ({common}); {label} has {}, {run} has {}.",
                 table.name,
                 groups.len(),
                 others.len()
@@ -135,7 +148,7 @@ impl Differences {
             self.found(tables, reading, &columns, &one_by_one, run);
         }
         for (name, largest) in columns.into_iter().zip(largest).filter(|(_, largest)| largest.points > 0) {
-            self.rows.push(Row {
+            self.rows.push(DifferenceRow {
                 table: table.name.clone(),
                 column: name.to_owned(),
                 run: run.to_owned(),
@@ -148,17 +161,20 @@ impl Differences {
     /// Compares every peak or optimum with that of the first run.
     fn found(
         &mut self,
-        (table, with): (&Table, &Table),
-        reading: &Reading,
+        tables: TablePair<'_>,
+        reading: &ColumnRoles,
         columns: &[&str],
-        pairs: &[Pair],
+        pairs: &[MatchedRow],
         run: &str,
     ) {
+        let TablePair { first: table, other: with } = tables;
         let mut made: Vec<Column> = vec![Column::texts("run", pairs.iter().map(|_| run.to_owned()).collect())];
         for key in reading.keys.iter().filter_map(|key| table.column(key)) {
             made.push(match &key.values {
                 Values::Number(values) => Column::numbers(&key.name, pairs.iter().map(|p| values[p.first]).collect()),
-                values => Column::texts(&key.name, pairs.iter().map(|p| crate::csv::cell(values, p.first)).collect()),
+                values => {
+                    Column::texts(&key.name, pairs.iter().map(|p| crate::output::csv::cell(values, p.first)).collect())
+                }
             });
         }
         for name in columns {
@@ -167,7 +183,7 @@ impl Differences {
             let relative = a.iter().zip(&b).map(|(a, b)| if a == b { 0.0 } else { (b - a) / a.abs() }).collect();
             made.push(Column::numbers(&format!("{FIRST}{name}"), a));
             made.push(Column::numbers(name, b));
-            made.push(Column::numbers(&format!("{}_change", stem(name)), relative));
+            made.push(Column::numbers(&format!("{}_change", without_unit(name)), relative));
         }
         match self.found.iter_mut().find(|t| t.name == table.name) {
             None => self.found.push(Table { name: table.name.clone(), columns: made }),
@@ -187,8 +203,10 @@ impl Differences {
 
     pub(super) fn tables(self) -> Vec<Table> {
         let rows = &self.rows;
-        let words = |name: &str, of: &dyn Fn(&Row) -> String| Column::texts(name, rows.iter().map(of).collect());
-        let numbers = |name: &str, of: &dyn Fn(&Row) -> f64| Column::numbers(name, rows.iter().map(of).collect());
+        let words =
+            |name: &str, of: &dyn Fn(&DifferenceRow) -> String| Column::texts(name, rows.iter().map(of).collect());
+        let numbers =
+            |name: &str, of: &dyn Fn(&DifferenceRow) -> f64| Column::numbers(name, rows.iter().map(of).collect());
         let columns = vec![
             words("table", &|row| row.table.clone()),
             words("column", &|row| row.column.clone()),
@@ -220,12 +238,13 @@ fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
 }
 
 /// Returns the name of a column without its unit.
-fn stem(name: &str) -> &str {
+fn without_unit(name: &str) -> &str {
     ["_Hz", "_m", "_N", "_rad"].iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name)
 }
 
 impl Largest {
-    fn look(&mut self, name: &str, (a, b): (f64, f64), at: &dyn Fn() -> String) {
+    /// Compares a value `a` of the first run with the value `b` of another run.
+    fn add(&mut self, name: &str, a: f64, b: f64, at: &dyn Fn() -> String) {
         let difference = difference(name, a, b);
         if !difference.is_finite() {
             return;
@@ -249,12 +268,12 @@ mod tests {
     #[test]
     fn angles_go_the_short_way_around() {
         let mut largest = Largest::default();
-        largest.look("blade_phase_deg", (179.0, -179.0), &String::new);
+        largest.add("blade_phase_deg", 179.0, -179.0, &String::new);
         assert_eq!((largest.difference, largest.points), (2.0, 1));
-        largest.look("blade_phase_deg", (f64::NAN, 1.0), &String::new);
+        largest.add("blade_phase_deg", f64::NAN, 1.0, &String::new);
         assert_eq!(largest.points, 1);
         // This also holds between two points of a curve.
-        let half = Pair { first: 0, other: (0, 1, 0.5) };
+        let half = MatchedRow { first: 0, other: (0, 1, 0.5) };
         assert_eq!(half.value("blade_phase_deg", &[179.0, -179.0]), 180.0);
         assert_eq!(half.value("blade_amplitude_m", &[179.0, -179.0]), 0.0);
     }

@@ -1,10 +1,11 @@
 //! Labels of runs: the parameters, methods and options in which they differ, otherwise the
 //! folder.
 
-use crate::stored::Stored;
+use crate::run::stored::Stored;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
+
 /// Returns the name of a folder.
 pub(super) fn folder_name(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());

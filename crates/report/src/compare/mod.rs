@@ -8,32 +8,33 @@
 //! - A relative difference refers to the largest absolute value in that column of the first
 //!   run, so that it stays finite at a zero of the curve.
 
+mod column_roles;
 mod differences;
 mod labels;
 mod overlay;
-mod pairs;
-mod people;
-mod reading;
+mod row_matching;
+mod table;
 
-pub use people::for_people;
+pub use table::for_terminal;
 
-use crate::file::{ReportError, file_name};
+use crate::output::result_file::{ReportError, file_name};
 use crate::output::{Outputs, write_dataset};
-use crate::stored::{COMPARISON, Stored, StoredError};
-use differences::Differences;
+use crate::run::stored::{COMPARISON, Stored, StoredError};
+use differences::{Differences, LabelledRun};
 use labels::{folder_name, labels};
 use overlay::overlay;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{Dataset, Figure, Record};
+
 /// Reason why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// Only one run was given.
-    #[error("a comparison needs two runs: name the folders of both")]
+    #[error("a comparison needs at least two runs: give the folder of each")]
     Single,
     /// The runs have different kinds.
-    #[error("{} holds results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
+    #[error("{} contains results of the kind `{kind}`, {} of the kind `{other_kind}`; only runs of one kind can be compared", folder.display(), other.display())]
     Kinds {
         /// Folder of the first run.
         folder: PathBuf,
@@ -68,7 +69,8 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
     }
     let labels = labels(runs);
     let mut notes = vec![format!(
-        "Differences are against {}; relative ones are relative to the largest size in that column there.",
+        "Every run is compared with {}. Relative differences refer to the largest absolute value of the column \
+         in that run.",
         labels[0]
     )];
     for (run, label) in runs.iter().zip(&labels).filter(|(run, _)| run.dataset.record.interrupted) {
@@ -76,7 +78,7 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
     }
     let mut differences = Differences::default();
     for (run, label) in others.iter().zip(&labels[1..]) {
-        differences.add((first, &labels[0]), (run, label));
+        differences.add(LabelledRun { run: first, label: &labels[0] }, LabelledRun { run, label });
     }
     notes.append(&mut differences.notes);
     let titles: BTreeSet<&str> = runs.iter().map(|run| run.dataset.title.as_str()).collect();
@@ -120,10 +122,13 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
 /// [`ReportError`] if the folder holds a run or a file cannot be written.
 pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<PathBuf>, ReportError> {
     let folder = out.join(file_name(&comparison.name, "comparison")?);
-    match crate::stored::read(&folder) {
+    match crate::run::stored::read(&folder) {
         // Unreadable results may still be a run.
-        Err(StoredError::Nothing { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
-        _ => Err(ReportError::Write { path: folder, cause: std::io::Error::other("the results of a run are there") }),
+        Err(StoredError::NoRecord { .. } | StoredError::Comparison { .. }) => write_dataset(comparison, out, outputs),
+        _ => Err(ReportError::Write {
+            path: folder,
+            cause: std::io::Error::other("the folder contains the results of a run; choose another --out"),
+        }),
     }
 }
 

@@ -2,10 +2,11 @@
 
 use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 use stickslip_study::units;
+
 /// Line styles of successive runs: a dashed curve does not hide a curve below it.
 const STYLES: [Style; 3] = [Style::Solid, Style::Dashed, Style::Dotted];
 /// Number of colours of the palette.
-const COLOURS: usize = crate::colour::PALETTE.len();
+const COLOURS: usize = crate::figure::colour::PALETTE.len();
 
 /// Combines figures. Panels with the same title and quantities become one.
 ///
@@ -14,8 +15,8 @@ pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
     let names = curve_names(figures);
     let mut panels: Vec<Panel> = Vec::new();
     for (run, (label, figure)) in figures.iter().enumerate() {
-        let run = Run { index: run, label, names: &names };
-        let (places, by_order) = places(&panels, figure);
+        let run = OverlaidRun { index: run, label, names: &names };
+        let (places, by_order) = match_panels(&panels, figure);
         for (panel, place) in figure.panels.iter().zip(places) {
             let at = place.unwrap_or_else(|| {
                 panels.push(Panel { series: Vec::new(), ..panel.clone() });
@@ -53,7 +54,7 @@ fn curve_names<'f>(figures: &[(&str, &'f Figure)]) -> Vec<&'f str> {
 ///
 /// If all titles differ but the axes agree, panels are assigned in order, and the flag is
 /// `true`: the titles then name what differs between the runs.
-fn places(known: &[Panel], figure: &Figure) -> (Vec<Option<usize>>, bool) {
+fn match_panels(known: &[Panel], figure: &Figure) -> (Vec<Option<usize>>, bool) {
     let key = |panel: &Panel| (panel.title.clone(), panel.x.quantity.clone(), panel.y.quantity.clone());
     let fits =
         |a: &Panel, b: &Panel| a.x.quantity == b.x.quantity && a.y.quantity == b.y.quantity && factors(b, a).is_some();
@@ -77,14 +78,14 @@ fn style_key(figures: &[(&str, &Figure)]) -> String {
 }
 
 /// One of the runs in a combined figure.
-struct Run<'f> {
+struct OverlaidRun<'f> {
     index: usize,
     label: &'f str,
     /// Labels of the curves of all runs.
     names: &'f [&'f str],
 }
 
-impl Run<'_> {
+impl OverlaidRun<'_> {
     /// Adds a panel of this run to the common panel.
     fn add(&self, panel: &Panel, target: &mut Panel) {
         let Some(factors) = factors(panel, target) else { return };
@@ -158,13 +159,21 @@ fn is_same_line(a: &Series, b: &Series) -> bool {
     look(a) == look(b) && all(&a.x, &b.x) && all(&a.y, &b.y)
 }
 
-/// Returns the factors between the units of two panels, or `None` for different dimensions.
-fn factors(from: &Panel, to: &Panel) -> Option<(f64, f64)> {
-    let of = |from: &Axis, to: &Axis| units::ratio(&from.unit, &to.unit);
-    Some((of(&from.x, &to.x)?, of(&from.y, &to.y)?))
+/// Factors between the units of two panels.
+#[derive(Clone, Copy)]
+struct UnitFactors {
+    x: f64,
+    y: f64,
 }
 
-fn converted(series: &Series, (x, y): (f64, f64)) -> Series {
+/// Returns the factors between the units of two panels, or `None` for different dimensions.
+fn factors(from: &Panel, to: &Panel) -> Option<UnitFactors> {
+    let of = |from: &Axis, to: &Axis| units::ratio(&from.unit, &to.unit);
+    Some(UnitFactors { x: of(&from.x, &to.x)?, y: of(&from.y, &to.y)? })
+}
+
+fn converted(series: &Series, factors: UnitFactors) -> Series {
+    let UnitFactors { x, y } = factors;
     let times = |values: &[f64], factor: f64| -> Vec<f64> {
         if factor == 1.0 { values.to_vec() } else { values.iter().map(|value| value * factor).collect() }
     };

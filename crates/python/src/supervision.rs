@@ -1,0 +1,203 @@
+//! Runs long work without the lock of the Python interpreter, with progress and interruption.
+//!
+//! Ctrl-C, or an exception in a law written in Python, ends the work at once. The stack of the
+//! work unwinds, see [`stickslip_numerics::interrupt`], and its partial state is discarded.
+
+use crate::error;
+use pyo3::prelude::*;
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
+use std::time::{Duration, Instant};
+use stickslip_numerics::interrupt::{self, Interrupted, Stop};
+use stickslip_study::run::Context;
+
+/// Interval between progress reports, and between checks for Ctrl-C.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Maximum number of threads in a request.
+const MOST_THREADS: usize = 1024;
+
+/// Supervision of a call.
+pub struct Supervision {
+    /// Number of threads. The default is that of the machine or of `RAYON_NUM_THREADS`.
+    pub threads: Option<usize>,
+    /// Receives the number of finished points and of all points (`None` if unknown).
+    pub progress: Option<Py<PyAny>>,
+    /// Number of all points.
+    pub total: Option<u64>,
+}
+
+/// Runs short `work` on this thread.
+pub fn run_here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
+    let (begun, last_check) = (Instant::now(), AtomicU64::new(0));
+    let slot = raised.clone();
+    let stop = Stop::asking(move || {
+        let now = begun.elapsed().as_millis() as u64;
+        if now < last_check.load(Ordering::Relaxed) + POLL_INTERVAL.as_millis() as u64 {
+            return false;
+        }
+        last_check.store(now, Ordering::Relaxed);
+        let error = Python::attach(|py| py.check_signals()).err();
+        let ends = error.is_some();
+        *slot.lock().unwrap_or_else(PoisonError::into_inner) = error;
+        ends
+    });
+    let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(|| stop.watch(work))));
+    outcome.map_err(|panic| ended(panic, raised.lock().unwrap_or_else(PoisonError::into_inner).take()))
+}
+
+/// Runs long `work` on a new thread, which Ctrl-C abandons if it cannot end at once.
+pub fn run_on_new_thread<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    let stop = Stop::new();
+    let (send, receive) = mpsc::channel();
+    let stop_flag = stop.clone();
+    let spawned = std::thread::Builder::new().spawn(move || {
+        // The result of an abandoned thread has no receiver.
+        let _ = send.send(catch_unwind(AssertUnwindSafe(|| stop_flag.watch(work))));
+    });
+    spawned.map_err(|cause| error::exception(py, "StickslipError", format!("cannot create a thread: {cause}")))?;
+    let receive = Mutex::new(receive);
+    loop {
+        let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL_INTERVAL));
+        match next {
+            Ok(outcome) => return outcome.map_err(|panic| ended(panic, None)),
+            Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
+            Err(mpsc::RecvTimeoutError::Timeout) => py.check_signals().inspect_err(|_| stop.set())?,
+        }
+    }
+}
+
+/// Returns the exception that ended the work: that of a law, or that of Ctrl-C.
+///
+/// Any other panic is a bug and continues to unwind.
+fn ended(panic: Box<dyn Any + Send>, interrupted: Option<PyErr>) -> PyErr {
+    match (panic.downcast::<PyErr>(), interrupted) {
+        (Ok(error), _) => *error,
+        (Err(panic), Some(error)) if panic.is::<Interrupted>() => error,
+        (Err(panic), _) => resume_unwind(panic),
+    }
+}
+
+/// Process that first created threads; a forked process does not have them.
+static PROCESS: OnceLock<u32> = OnceLock::new();
+/// Idle thread pools by number of threads. Concurrent calls use different pools.
+static POOLS: Mutex<BTreeMap<usize, Vec<rayon::ThreadPool>>> = Mutex::new(BTreeMap::new());
+
+/// Threads in use by one call.
+struct PoolLease {
+    number: usize,
+    pool: Option<rayon::ThreadPool>,
+    /// Flag that ends their work.
+    stop: Stop,
+}
+
+impl PoolLease {
+    fn pool(&self) -> &rayon::ThreadPool {
+        self.pool.as_ref().unwrap_or_else(|| unreachable!("a pool is given back once"))
+    }
+}
+
+impl Drop for PoolLease {
+    fn drop(&mut self) {
+        if self.stop.is_set() {
+            return; // The threads may still be working.
+        }
+        let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+        pools.entry(self.number).or_default().extend(self.pool.take());
+    }
+}
+
+/// Returns threads for one call: the requested number, or that of the machine.
+fn lease_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<PoolLease> {
+    let process = std::process::id();
+    if *PROCESS.get_or_init(|| process) != process {
+        let message = "this process was forked after Stickslip started its threads, which a fork does not \
+                       inherit: start processes with multiprocessing's method \"spawn\" or \"forkserver\"";
+        return Err(error::exception(py, "StickslipError", message.to_owned()));
+    }
+    let number = threads.unwrap_or(0);
+    if threads == Some(0) || number > MOST_THREADS {
+        let message = format!("threads must be a whole number from 1 to {MOST_THREADS}, found {number}");
+        return Err(error::exception(py, "StickslipError", message));
+    }
+    let idle = POOLS.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&number).and_then(Vec::pop);
+    let pool = match idle {
+        Some(pool) => pool,
+        None => rayon::ThreadPoolBuilder::new()
+            .num_threads(number)
+            .build()
+            .map_err(|cause| error::exception(py, "StickslipError", format!("cannot create threads: {cause}")))?,
+    };
+    let stop = Stop::new();
+    pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
+    Ok(PoolLease { number, pool: Some(pool), stop })
+}
+
+/// Runs `work` on the threads of a pool, reports progress, and lets Ctrl-C end the work.
+pub fn run_supervised<T: Send>(
+    py: Python<'_>,
+    supervision: &Supervision,
+    work: impl FnOnce(&Context) -> T + Send,
+) -> PyResult<T> {
+    let lease = lease_pool(py, supervision.threads)?;
+    let pool = lease.pool();
+    let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+    let counter = done.clone();
+    let count = move || {
+        counter.fetch_add(1, Ordering::Relaxed);
+    };
+    let context =
+        Context { stop: stop.clone(), finished: Arc::new(count), ..Context::unwatched(pool.current_num_threads()) };
+    let (send, receive) = mpsc::channel();
+    let receive = Mutex::new(receive);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let outcome = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&context))));
+            // The caller waits for the result in every case.
+            let _ = send.send(outcome);
+        });
+        let mut wrong: Option<PyErr> = None;
+        let mut reported = None;
+        let outcome = loop {
+            let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL_INTERVAL));
+            match next {
+                Ok(outcome) => break outcome,
+                Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
+                Err(mpsc::RecvTimeoutError::Timeout) if wrong.is_some() => {}
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    let checked =
+                        py.check_signals().and_then(|()| report_progress(py, supervision, &done, &mut reported));
+                    if let Err(error) = checked {
+                        stop.store(true, Ordering::Relaxed);
+                        lease.stop.set();
+                        wrong = Some(error);
+                    }
+                }
+            }
+        };
+        if let Some(error) = wrong {
+            return Err(error);
+        }
+        let outcome = outcome.map_err(|panic| ended(panic, None))?;
+        py.check_signals()?;
+        report_progress(py, supervision, &done, &mut reported)?;
+        Ok(outcome)
+    })
+}
+
+fn report_progress(
+    py: Python<'_>,
+    supervision: &Supervision,
+    done: &AtomicU64,
+    reported: &mut Option<u64>,
+) -> PyResult<()> {
+    let now = done.load(Ordering::Relaxed);
+    if let Some(progress) = supervision.progress.as_ref().filter(|_| *reported != Some(now)) {
+        progress.call1(py, (now, supervision.total))?;
+        *reported = Some(now);
+    }
+    Ok(())
+}

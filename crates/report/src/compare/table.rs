@@ -1,0 +1,106 @@
+//! A comparison for the terminal: differences with units and in percent, without equal columns.
+
+use super::differences::{DIFFERENCES, FIRST};
+use crate::terminal;
+use stickslip_study::dataset::{Column, Dataset, Table, Values};
+
+/// Returns the comparison with units and percentages. Quantities that are equal in all runs are
+/// omitted.
+#[must_use]
+pub fn for_terminal(comparison: &Dataset) -> Dataset {
+    let mut formatted = comparison.clone();
+    for table in &mut formatted.tables {
+        let several = table.column("run").is_some_and(|column| match &column.values {
+            Values::Text(runs) => runs.iter().any(|run| *run != runs[0]),
+            _ => false,
+        });
+        table.columns.retain(|column| several || column.name != "run");
+        // A narrow terminal drops the last columns.
+        table.columns.sort_by_key(|column| column.name.starts_with(FIRST));
+        for column in &mut table.columns {
+            if let (Values::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
+                column.values = Values::Text(values.iter().map(|value| percent(*value, true)).collect());
+            }
+        }
+        if table.name == DIFFERENCES {
+            let same = shown_differences(table);
+            if !same.is_empty() {
+                formatted.notes.push(format!("Equal in all runs: {}.", same.join(", ")));
+            }
+        }
+    }
+    formatted
+}
+
+/// Formats the differences. Returns the names of columns without any difference.
+fn shown_differences(table: &mut Table) -> Vec<String> {
+    let words = |name: &str| match table.column(name).map(|column| &column.values) {
+        Some(Values::Text(words)) => words.clone(),
+        _ => vec![String::new(); table.rows()],
+    };
+    let numbers = |name: &str| table.numbers(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);
+    let (tables, columns, places, ways) = (words("table"), words("column"), words("at"), words("how"));
+    let (differences, relative) = (numbers("largest_difference"), numbers("relative"));
+    let runs = table.column("run").map(|_| words("run"));
+    let (differ, same): (Vec<usize>, Vec<usize>) = (0..table.rows()).partition(|row| differences[*row] != 0.0);
+    let of = |all: &[String]| differ.iter().map(|row| all[*row].clone()).collect::<Vec<_>>();
+    let mut made = vec![Column::texts("table", of(&tables)), Column::texts("column", of(&columns))];
+    made.extend(runs.map(|runs| Column::texts("run", of(&runs))));
+    let shown = differ.iter().map(|row| terminal::quantity(&columns[*row], differences[*row]));
+    made.push(Column::texts("largest_difference", shown.collect()));
+    made.push(Column::texts("relative", differ.iter().map(|row| percent(relative[*row], false)).collect()));
+    made.push(Column::texts("at", of(&places).iter().map(|place| rounded(place)).collect()));
+    made.push(Column::texts("how", of(&ways)));
+    table.columns = made;
+    let mut names: Vec<String> = same.iter().map(|row| format!("{} of {}", columns[*row], tables[*row])).collect();
+    names.dedup();
+    names
+}
+
+/// Digits of abscissa and parameter values; the table file has all digits.
+const PLACE_DIGITS: usize = 7;
+
+/// Rounds the numbers in a text.
+fn rounded(text: &str) -> String {
+    let word = |word: &str| match word.trim_end_matches(',').parse::<f64>() {
+        Ok(value) => {
+            let short: f64 = format!("{value:.*e}", PLACE_DIGITS - 1).parse().unwrap_or(value);
+            let comma = if word.ends_with(',') { "," } else { "" };
+            format!("{short}{comma}")
+        }
+        Err(_) => word.to_owned(),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Formats a ratio in percent with three digits.
+fn percent(share: f64, signed: bool) -> String {
+    let percent = 100.0 * share;
+    let decimals = match percent.abs() {
+        size if size == 0.0 || size >= 100.0 => 0,
+        // A very small percentage is a rounding error; its digits are not shown.
+        size => (2 - size.log10().floor() as i32).clamp(0, 9) as usize,
+    };
+    match signed && percent > 0.0 {
+        _ if !percent.is_finite() => "–".to_owned(),
+        true => format!("+{percent:.decimals$} %"),
+        false => format!("{percent:.decimals$} %"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_read_as_percent() {
+        assert_eq!(percent(0.0012345, true), "+0.123 %");
+        assert_eq!(percent(-0.25, true), "-25.0 %");
+        assert_eq!(percent(0.0, true), "0 %");
+        assert_eq!(percent(3.4e-6, false), "0.000340 %");
+        assert_eq!([percent(12.5, false), percent(f64::NAN, false)], ["1250 %".to_owned(), "–".to_owned()]);
+        assert_eq!(terminal::quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
+        assert_eq!(terminal::quantity("slip_fraction", 0.038_24), "0.0382");
+        assert_eq!(rounded("Ft_N = 6.0, time_s = 0.030387205387205383"), "Ft_N = 6, time_s = 0.03038721");
+    }
+}
