@@ -206,19 +206,6 @@ impl PythonLawInstance {
     }
 }
 
-impl PythonLawInstance {
-    /// Computes forces, rates and their derivatives at several points.
-    fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
-        let (out, slopes) = self.call(motions, z, true);
-        let n = motions.len();
-        for (i, point) in points.iter_mut().enumerate() {
-            (0..directions).for_each(|a| point.force[a] = out[a * n + i]);
-            point.rate.iter_mut().enumerate().for_each(|(s, rate)| *rate = out[(directions + s) * n + i]);
-            point.slopes_mut().iter_mut().enumerate().for_each(|(at, slope)| *slope = slopes[at * n + i]);
-        }
-    }
-}
-
 impl Law for PythonLawInstance {
     fn info(&self) -> &'static LawInfo {
         self.written.info
@@ -269,5 +256,23 @@ impl Rate for PythonLawInstance {
     }
     fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint) {
         self.linearise_many(directions, std::slice::from_ref(motion), z, std::slice::from_mut(point));
+    }
+    fn is_batched(&self) -> bool {
+        true
+    }
+    fn value_many(&self, motions: &[Relative<f64>], forces: &mut [[f64; MOST_DIRECTIONS]]) {
+        let (out, _) = self.call(motions, &[], false);
+        for (i, force) in forces.iter_mut().enumerate() {
+            (0..self.written.directions).for_each(|a| force[a] = out[a * motions.len() + i]);
+        }
+    }
+    fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
+        let (out, slopes) = self.call(motions, z, true);
+        let n = motions.len();
+        for (i, point) in points.iter_mut().enumerate() {
+            (0..directions).for_each(|a| point.force[a] = out[a * n + i]);
+            point.rate.iter_mut().enumerate().for_each(|(s, rate)| *rate = out[(directions + s) * n + i]);
+            point.slopes_mut().iter_mut().enumerate().for_each(|(at, slope)| *slope = slopes[at * n + i]);
+        }
     }
 }

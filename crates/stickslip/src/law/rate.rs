@@ -40,6 +40,23 @@ pub trait Rate: Debug + Send + Sync {
     fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS];
     /// Evaluates force and rates with exact derivatives, in the first `directions`.
     fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint);
+    /// Tells whether one evaluation at many instants is much cheaper than many evaluations, as for
+    /// a law that an interpreter evaluates over arrays.
+    fn is_batched(&self) -> bool {
+        false
+    }
+    /// Writes the force (N) at many instants of a law without internal states.
+    fn value_many(&self, motions: &[Relative<f64>], forces: &mut [[f64; MOST_DIRECTIONS]]) {
+        forces.iter_mut().zip(motions).for_each(|(force, motion)| *force = self.value(motion, &[], &mut []));
+    }
+    /// Evaluates force and rates with exact derivatives at many instants. `z` has the states of the
+    /// first instant, then those of the second one, and so on.
+    fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
+        let states = self.states();
+        for (i, (motion, point)) in motions.iter().zip(points).enumerate() {
+            self.linearise(directions, motion, &z[i * states..(i + 1) * states], point);
+        }
+    }
 }
 
 /// Force and rates of a law at one instant, with derivatives. The arguments are `u` in all

@@ -13,7 +13,7 @@ use super::Port;
 use super::alternation::Alternation;
 use super::march::March;
 use crate::law::{MOST_DIRECTIONS, Rate, RatePoint, Relative};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -59,25 +59,7 @@ impl Alternation {
         }
         self.state.clear();
         self.reserve_slopes(2 * axes * axes);
-        let mut point = RatePoint::new(axes, 0);
-        for i in 0..self.samples() {
-            let motion = Relative {
-                displacement: std::array::from_fn(|a| self.displacement[a][i]),
-                velocity: std::array::from_fn(|a| self.velocity[a][i]),
-            };
-            if tangent.is_none() {
-                let values = rate.value(&motion, &[], &mut []);
-                (0..axes).for_each(|a| self.force[a][i] = values[a]);
-                continue;
-            }
-            rate.linearise(axes, &motion, &[], &mut point);
-            for a in 0..axes {
-                self.force[a][i] = point.force[a];
-                for (b, slope) in point.force_slope(a).iter().enumerate() {
-                    self.slopes[2 * axes * a + b][i] = *slope;
-                }
-            }
-        }
+        self.sample_rate(rate, axes, tangent.is_some());
         for a in 0..axes {
             self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
         }
@@ -100,6 +82,36 @@ impl Alternation {
                 }
                 if self.slope_spectrum(2 * axes * a + axes + b, 0) {
                     self.add_slope(tangent, (a, b), axes, turn);
+                }
+            }
+        }
+    }
+
+    /// Samples the force of a law without internal states, and its slopes if asked.
+    fn sample_rate(&mut self, rate: &dyn Rate, axes: usize, slopes: bool) {
+        let at_once = if rate.is_batched() { self.samples() } else { 1 };
+        let mut motions = vec![Relative::along(0.0, 0.0); at_once];
+        let mut values = vec![[0.0; MOST_DIRECTIONS]; if slopes { 0 } else { at_once }];
+        let mut points = vec![RatePoint::new(axes, 0); if slopes { at_once } else { 0 }];
+        for first in (0..self.samples()).step_by(at_once) {
+            for (i, motion) in motions.iter_mut().enumerate() {
+                motion.displacement = std::array::from_fn(|a| self.displacement[a][first + i]);
+                motion.velocity = std::array::from_fn(|a| self.velocity[a][first + i]);
+            }
+            if !slopes {
+                rate.value_many(&motions, &mut values);
+                for (i, value) in values.iter().enumerate() {
+                    (0..axes).for_each(|a| self.force[a][first + i] = value[a]);
+                }
+                continue;
+            }
+            rate.linearise_many(axes, &motions, &[], &mut points);
+            for (i, point) in points.iter().enumerate() {
+                for a in 0..axes {
+                    self.force[a][first + i] = point.force[a];
+                    for (b, slope) in point.force_slope(a).iter().enumerate() {
+                        self.slopes[2 * axes * a + b][first + i] = *slope;
+                    }
                 }
             }
         }
@@ -142,6 +154,7 @@ impl Alternation {
             at_rest,
             points: [RatePoint::new(axes, states), RatePoint::new(axes, states)],
             stage: DVector::zeros(2 * states),
+            whole: Vec::new(),
             frequency: self.by_frequency.is_some(),
         };
         self.march(&mut march, force, tangent);
@@ -169,6 +182,8 @@ struct RateMarch<'a> {
     at_rest: Vec<f64>,
     points: [RatePoint; 2],
     stage: DVector<f64>,
+    /// Stages of all steps of the last period of a batched law, [step][stage][state].
+    whole: Vec<f64>,
     /// True if the derivative by ω is requested.
     frequency: bool,
 }
@@ -194,25 +209,9 @@ impl RateMarch<'_> {
                 self.rate.linearise(d, motion, z, &mut self.points[stage]);
             }
             let points = &self.points;
-            let matrix = DMatrix::from_fn(2 * m, 2 * m, |row, column| {
-                let (i, s, k, t) = (row / m, row % m, column / m, column % m);
-                let one = if row == column { 1.0 } else { 0.0 };
-                one - length * RADAU[i][k] * points[k].rate_slope(s)[2 * d + t]
-            });
-            let right = DVector::from_fn(2 * m, |row, _| {
-                let (i, s) = (row / m, row % m);
-                let pull: f64 = (0..2).map(|k| RADAU[i][k] * points[k].rate[s]).sum();
-                before[s] + length * pull - self.stage[row]
-            });
-            let lu = matrix.lu();
-            let Some(mut change) = lu.solve(&right) else { return false };
-            let size = change.amax();
-            if !size.is_finite() {
+            let Some((change, size, lu)) = newton_step(d, length, points, before, self.stage.as_slice(), scale) else {
                 return false;
-            }
-            if size > LONGEST * scale {
-                change *= LONGEST * scale / size;
-            }
+            };
             self.stage += &change;
             factor = Some(lu);
             if size <= SOLVED * scale {
@@ -226,9 +225,82 @@ impl RateMarch<'_> {
         };
         self.rate.linearise(d, &motions[1], after, &mut self.points[1]);
         *force = self.points[1].force;
+        factor.is_some_and(|lu| self.step_rows(length, &self.points, &motions, &lu, rows))
+    }
+
+    /// All steps of a period at once: Newton's method on the stages of all steps, with one
+    /// evaluation of the law at all of them in each iteration. `motions` has the two stages of the
+    /// step to sample 1, and at last those of the step to sample 0. Returns false, with `z` as it
+    /// was, if the method does not converge.
+    fn around_at_once(
+        &mut self,
+        motions: &[Relative<f64>],
+        z: &mut [f64],
+        force: &mut [Vec<f64>; MOST_DIRECTIONS],
+        mut rows: Option<&mut [f64]>,
+    ) -> bool {
+        let (n, m, d) = (motions.len() / 2, z.len(), self.axes);
+        let size = (m + d) * (4 * d + m + usize::from(self.frequency));
+        let scale = self.rate.state_scale();
+        let mut points = vec![RatePoint::new(d, m); 2 * n];
+        if self.whole.len() != 2 * n * m {
+            self.whole = z.iter().copied().cycle().take(2 * n * m).collect();
+        }
+        for _ in 0..ITERATIONS {
+            self.rate.linearise_many(d, motions, &self.whole, &mut points);
+            let mut factors = Vec::with_capacity(n);
+            let mut before = z.to_vec();
+            let mut largest = 0.0f64;
+            for step in 0..n {
+                let stage = &mut self.whole[2 * step * m..2 * (step + 1) * m];
+                let stages = &points[2 * step..2 * step + 2];
+                let Some((change, size, lu)) = newton_step(d, self.length, stages, &before, stage, scale) else {
+                    self.whole.clear();
+                    return false;
+                };
+                largest = largest.max(size);
+                stage.iter_mut().zip(&change).for_each(|(stage, change)| *stage += change);
+                before.copy_from_slice(&stage[m..]);
+                factors.push((change, lu));
+            }
+            if largest > SOLVED * scale {
+                continue;
+            }
+            for (step, (change, lu)) in factors.iter().enumerate() {
+                let (i, stages) = ((step + 1) % n, 2 * step..2 * step + 2);
+                let point = &points[2 * step + 1];
+                for a in 0..d {
+                    let moved = point.force_slope(a)[2 * d..].iter().zip(change.iter().skip(m));
+                    force[a][i] = point.force[a] + moved.map(|(slope, change)| slope * change).sum::<f64>();
+                }
+                if let Some(rows) = rows.as_deref_mut() {
+                    let rows = &mut rows[i * size..(i + 1) * size];
+                    if !self.step_rows(self.length, &points[stages.clone()], &motions[stages], lu, rows) {
+                        return false;
+                    }
+                }
+            }
+            z.copy_from_slice(&before);
+            return true;
+        }
+        self.whole.clear();
+        false
+    }
+
+    /// Writes the derivatives of a step from its stages and the factor of their equations. Returns
+    /// false if the factor is singular.
+    fn step_rows(
+        &self,
+        length: f64,
+        points: &[RatePoint],
+        motions: &[Relative<f64>],
+        factor: &LU<f64, Dyn, Dyn>,
+        rows: &mut [f64],
+    ) -> bool {
+        let (m, d) = (points[0].rate.len(), self.axes);
         let inputs = 4 * d;
         let width = inputs + m + usize::from(self.frequency);
-        let (points, omega) = (&self.points, self.omega);
+        let omega = self.omega;
         // a higher ω raises velocities and shortens the step
         let faster = |slope: &[f64], stage: usize| -> f64 {
             (0..d).map(|a| slope[d + a] * motions[stage].velocity[a] / omega).sum()
@@ -245,7 +317,7 @@ impl RateMarch<'_> {
                 None => length * RADAU[i][column / (2 * d)] * points[column / (2 * d)].rate_slope(s)[column % (2 * d)],
             }
         });
-        let Some(by) = factor.and_then(|lu| lu.solve(&right)) else { return false };
+        let Some(by) = factor.solve(&right) else { return false };
         for column in 0..width {
             for s in 0..m {
                 rows[s * width + column] = by[(m + s, column)];
@@ -263,6 +335,39 @@ impl RateMarch<'_> {
         }
         true
     }
+}
+
+/// Newton's step for the two stages of a step, from their present values. Returns the change, its
+/// size, and the factor of the equations.
+fn newton_step(
+    directions: usize,
+    length: f64,
+    points: &[RatePoint],
+    before: &[f64],
+    stage: &[f64],
+    scale: f64,
+) -> Option<(DVector<f64>, f64, LU<f64, Dyn, Dyn>)> {
+    let m = before.len();
+    let matrix = DMatrix::from_fn(2 * m, 2 * m, |row, column| {
+        let (i, s, k, t) = (row / m, row % m, column / m, column % m);
+        let one = if row == column { 1.0 } else { 0.0 };
+        one - length * RADAU[i][k] * points[k].rate_slope(s)[2 * directions + t]
+    });
+    let right = DVector::from_fn(2 * m, |row, _| {
+        let (i, s) = (row / m, row % m);
+        let pull: f64 = (0..2).map(|k| RADAU[i][k] * points[k].rate[s]).sum();
+        before[s] + length * pull - stage[row]
+    });
+    let lu = matrix.lu();
+    let mut change = lu.solve(&right)?;
+    let size = change.amax();
+    if !size.is_finite() {
+        return None;
+    }
+    if size > LONGEST * scale {
+        change *= LONGEST * scale / size;
+    }
+    Some((change, size, lu))
 }
 
 impl March for RateMarch<'_> {
@@ -297,10 +402,17 @@ impl March for RateMarch<'_> {
             displacement: std::array::from_fn(|a| if a < d { signals[0][a][i] } else { 0.0 }),
             velocity: std::array::from_fn(|a| if a < d { signals[1][a][i] } else { 0.0 }),
         };
+        let (at, [first, last]) = (self.at, self.stages);
+        let motions_of = |step: usize| [read([first, last], step % n), read(at, step % n)];
+        if self.rate.is_batched() {
+            let motions: Vec<_> = (1..=n).flat_map(motions_of).collect();
+            if self.around_at_once(&motions, z, force, rows.as_deref_mut()) {
+                return true;
+            }
+        }
         let (mut before, mut now) = (z.to_vec(), [0.0; MOST_DIRECTIONS]);
         for step in 1..=n {
-            let i = step % n;
-            let motions = [read([&self.stages[0], &self.stages[1]], i), read(self.at, i)];
+            let (i, motions) = (step % n, motions_of(step));
             let rows = rows.as_deref_mut().map(|rows| &mut rows[i * size..(i + 1) * size]);
             if !self.advance((self.length, motions), &before, z, &mut now, rows) {
                 return false;
