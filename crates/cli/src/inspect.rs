@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
 use stickslip_formats::{self as formats, Error, Kind, Matrix, Report, aligned, constrained, names};
-use stickslip_numerics::definite::sparse_definite;
+use stickslip_numerics::definiteness::sparse_definite;
 use stickslip_numerics::sparse;
 use stickslip_study::summary::{DIRECTIONS, mass_along};
 use stickslip_study::unit_sets;

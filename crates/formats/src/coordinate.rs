@@ -8,9 +8,9 @@
 //! Analysis User's Guide, Generating matrices.
 
 use crate::error::{Error, Kind, Location};
+use crate::first_line::{FirstLine, unclear, whole};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::sizes::{FirstLine, unclear, whole};
 use crate::text::{Line, Lines, integer, must_end_its_lines, real};
 
 pub(crate) const FORMAT: Format = Format {

@@ -30,6 +30,7 @@ mod coordinate;
 mod dense;
 mod error;
 mod file;
+mod first_line;
 mod format;
 mod fortran;
 mod harwell_boeing;
@@ -44,7 +45,6 @@ mod nastran_op4;
 mod npy;
 mod npz;
 mod report;
-mod sizes;
 mod text;
 
 use std::path::Path;

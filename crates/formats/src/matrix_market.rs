@@ -14,9 +14,9 @@
 //! Initial Design, NISTIR 5935 (1996).
 
 use crate::error::{Error, Kind, Location};
+use crate::first_line::{FirstLine, is_comment, unclear};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::sizes::{FirstLine, is_comment, unclear};
 use crate::text::{Line, Lines, shown, truncated};
 
 pub(crate) const FORMAT: Format = Format {

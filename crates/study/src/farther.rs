@@ -13,7 +13,7 @@ use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::leading;
 
 /// Factors on the frequency limit of the basis. The check uses the first factor whose number of
 /// modes is at most [`MODES`].

@@ -14,7 +14,7 @@
 //!   67-90.
 
 use std::convert::Infallible;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::maximum;
 
 /// The distribution of maxima with the largest likelihood for some values.
 #[derive(Debug, Clone, Copy, PartialEq)]

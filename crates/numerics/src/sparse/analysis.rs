@@ -2,7 +2,7 @@
 
 use super::factor::{ComplexFactor, Factor, Singular};
 use super::matrix::Matrix;
-use super::pattern::Pattern;
+use super::symbolic::Pattern;
 use num_complex::Complex64;
 use std::sync::Arc;
 

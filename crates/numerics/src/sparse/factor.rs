@@ -1,7 +1,7 @@
 //! Real and complex factors of sparse matrices, and their solutions.
 
 use super::matrix::Matrix;
-use super::pattern::{Pattern, Symbolic};
+use super::symbolic::{Pattern, Symbolic};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor::LbltParams;
 use faer::linalg::lu::partial_pivoting::factor::PartialPivLuParams;

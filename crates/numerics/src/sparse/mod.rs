@@ -12,12 +12,12 @@
 //! symmetric indefinite systems", for pivoting inside supernodes only.
 
 mod analysis;
-pub mod columns;
 mod compliance;
 mod factor;
 mod matrix;
 mod modes;
-mod pattern;
+pub mod multi_vector;
+mod symbolic;
 
 pub use analysis::Analysis;
 pub use factor::{ComplexFactor, Factor, Singular};

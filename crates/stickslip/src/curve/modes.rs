@@ -29,7 +29,7 @@ use crate::method::{MethodError, ways};
 use crate::model::System;
 use follow::ModeCurve;
 use num_complex::Complex64;
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::leading;
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone, PartialEq)]

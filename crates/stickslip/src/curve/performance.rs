@@ -15,7 +15,7 @@ use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::maximum;
 
 /// Specification of a performance curve.
 #[derive(Clone, Copy)]

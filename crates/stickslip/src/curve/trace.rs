@@ -16,7 +16,7 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::convert::Infallible;
 use stickslip_numerics::continuation::{self, Steps};
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::maximum;
 
 pub use stickslip_numerics::continuation::End;
 

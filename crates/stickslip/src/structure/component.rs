@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use stickslip_numerics::definite::sparse_definite_in_order;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
+use stickslip_numerics::definiteness::sparse_definite_in_order;
+use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, multi_vector};
 
 /// Matrices of a structure and the names of their rows.
 ///
@@ -275,7 +275,7 @@ impl Component {
             return Ok(None);
         };
         let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count.saturating_mul(4)))?;
-        let products = columns::products(self.dofs(), &modes.shapes, &damping.times_columns(&modes.shapes));
+        let products = multi_vector::products(self.dofs(), &modes.shapes, &damping.times_columns(&modes.shapes));
         let found = free_vibrations(&modes.values, &products);
         Ok(found.map(|found| found.iter().take(count).map(|one| one.omega).collect()))
     }
@@ -385,7 +385,7 @@ impl Component {
         let r = reduced.dofs();
         let columns = kept.sector.whole_columns(&reduced.basis);
         let (mass, damping, stiffness) = self.matrices();
-        let project = |matrix: &Matrix| columns::products(self.dofs(), &columns, &matrix.times_columns(&columns));
+        let project = |matrix: &Matrix| multi_vector::products(self.dofs(), &columns, &matrix.times_columns(&columns));
         // symmetric up to rounding
         let symmetric = |matrix: &Matrix| {
             let product = project(matrix);

@@ -466,7 +466,7 @@ impl Blade {
     /// Returns `Vᵀ D V` over columns of length `n`, with the matrix `D` of [`Blade::entries`].
     pub fn along(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
         let forces: Vec<f64> = basis.chunks_exact(n).flat_map(|column| self.times(column)).collect();
-        let energy = stickslip_numerics::sparse::columns::products(n, basis, &forces);
+        let energy = stickslip_numerics::sparse::multi_vector::products(n, basis, &forces);
         let all = (0..energy.ncols()).flat_map(|k| (0..energy.nrows()).map(move |i| (i, k)));
         all.map(|(i, k)| (i, k, 0.5 * (energy[(i, k)] + energy[(k, i)]))).collect()
     }

@@ -27,7 +27,7 @@ pub(crate) use uncoupled::UncoupledModes;
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
-use stickslip_numerics::definite::{is_semidefinite, semidefinite, sparse_definite};
+use stickslip_numerics::definiteness::{is_semidefinite, semidefinite, sparse_definite};
 use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
 
 /// `M x'' + C x' + K x`, over the places that are free to move.

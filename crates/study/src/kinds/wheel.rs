@@ -6,7 +6,7 @@
 use crate::dataset::{Axis, Panel, Series};
 use crate::drawing::join;
 use std::f64::consts::TAU;
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::leading;
 
 /// A place of every sector: its name, and sector, amplitude and phase (degrees) of each.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,10 +1,10 @@
 //! A run of the block Lanczos process: a basis that grows by blocks, and the
 //! modes that converge in it.
 
-use super::found::{BLOCK, ModesError, NaturalModes};
+use super::natural_modes::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::interrupt;
-use crate::sparse::{Factor, Matrix, columns};
+use crate::sparse::{Factor, Matrix, multi_vector};
 use nalgebra::DMatrix;
 
 /// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
@@ -147,10 +147,10 @@ impl<'a> Lanczos<'a> {
             return coefficients;
         }
         for _ in 0..2 {
-            let known = columns::products(n, self.found, forces);
-            columns::add(n, block, -1.0, self.found, &known);
-            let along = columns::products(n, &self.basis, forces);
-            columns::add(n, block, -1.0, &self.basis, &along);
+            let known = multi_vector::products(n, self.found, forces);
+            multi_vector::add(n, block, -1.0, self.found, &known);
+            let along = multi_vector::products(n, &self.basis, forces);
+            multi_vector::add(n, block, -1.0, &self.basis, &along);
             coefficients += along;
             *forces = self.mass.times_columns(block);
         }
@@ -171,9 +171,9 @@ impl<'a> Lanczos<'a> {
             let mut along = DMatrix::zeros(self.size() - first, 1);
             let mut left = self.norm(&column, &force)?;
             for _ in 0..2 {
-                let part = columns::products(n, &self.basis[first * n..], &force);
-                columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
-                columns::add(n, &mut force, -1.0, &self.heavy[(first - self.expanded) * n..], &part);
+                let part = multi_vector::products(n, &self.basis[first * n..], &force);
+                multi_vector::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
+                multi_vector::add(n, &mut force, -1.0, &self.heavy[(first - self.expanded) * n..], &part);
                 along += part;
                 // The sign of a product that cancels to rounding is not reliable either.
                 if dot(&column, &force) < (FOLLOWED * left).powi(2) {
@@ -260,17 +260,17 @@ impl<'a> Lanczos<'a> {
         }
         let failed = || ModesError::NotConverged { found: 0, counted: count, below: shift };
         let coefficients = DMatrix::from_fn(self.expanded, count, |i, k| pairs[k].vector[i]);
-        let ritz = columns::combination(n, &self.basis[..self.expanded * n], &coefficients);
+        let ritz = multi_vector::combination(n, &self.basis[..self.expanded * n], &coefficients);
         let mut shapes = self.operator(&ritz);
         shapes.chunks_mut(n).zip(pairs).for_each(|(shape, pair)| scale(shape, 1.0 / pair.theta));
         let mut forces = self.mass.times_columns(&shapes);
         if !self.found.is_empty() {
-            let known = columns::products(n, self.found, &forces);
-            columns::add(n, &mut shapes, -1.0, self.found, &known);
+            let known = multi_vector::products(n, self.found, &forces);
+            multi_vector::add(n, &mut shapes, -1.0, self.found, &known);
             forces = self.mass.times_columns(&shapes);
         }
-        let m = columns::products(n, &shapes, &forces);
-        let k = columns::products(n, &shapes, &stiffness.times_columns(&shapes));
+        let m = multi_vector::products(n, &shapes, &forces);
+        let k = multi_vector::products(n, &shapes, &stiffness.times_columns(&shapes));
         let inverse = m
             .clone()
             .cholesky()
@@ -280,7 +280,7 @@ impl<'a> Lanczos<'a> {
         // Relative to the shift, so that the rounding of modes far above does
         // not affect those near it.
         let eigen = eigen::symmetric(&inverse * (k - m * shift) * inverse.transpose()).ok_or_else(failed)?;
-        let shapes = columns::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
+        let shapes = multi_vector::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
         let values: Vec<f64> = eigen.eigenvalues.iter().map(|v| v + shift).collect();
         let mut off = self.operator(&shapes);
         for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
@@ -289,8 +289,8 @@ impl<'a> Lanczos<'a> {
         // K and M are diagonal in the space of the modes. The rounding of the factor inside
         // that space is therefore not an error of the modes.
         for modes in [self.found, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
-            let inside = columns::products(n, modes, &self.mass.times_columns(&off));
-            columns::add(n, &mut off, -1.0, modes, &inside);
+            let inside = multi_vector::products(n, modes, &self.mass.times_columns(&off));
+            multi_vector::add(n, &mut off, -1.0, modes, &inside);
         }
         let residuals = self.norms(&off, &self.mass.times_columns(&off))?;
         // A rigid-body mode not found yet may spoil others by the rounding of

@@ -21,13 +21,13 @@
 //! singular M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving
 //! sparse symmetric generalized eigenproblems", for blocks, shifts and counts.
 
-mod found;
 mod lanczos;
+mod natural_modes;
 
 use super::{Analysis, Factor, Matrix, Singular};
-use found::BLOCK;
-pub use found::{Effort, ModesError, NaturalModes};
 use lanczos::{Lanczos, Pair};
+use natural_modes::BLOCK;
+pub use natural_modes::{Effort, ModesError, NaturalModes};
 
 /// Residual in the Lanczos process, relative to θ, at which a mode has
 /// converged. The error of the eigenvalue is about its square.
@@ -321,7 +321,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sparse::columns;
+    use crate::sparse::multi_vector;
     use nalgebra::DMatrix;
     use proptest::prelude::*;
     use std::f64::consts::PI;
@@ -355,7 +355,7 @@ mod tests {
         for (value, expected) in modes.values.iter().zip(expected) {
             assert!((value - expected).abs() <= 1e-11 * expected + rounding, "{value} instead of {expected}");
         }
-        let gram = columns::products(n, &modes.shapes, &m.times_columns(&modes.shapes));
+        let gram = multi_vector::products(n, &modes.shapes, &m.times_columns(&modes.shapes));
         assert!((gram - DMatrix::identity(modes.count(), modes.count())).amax() < 1e-10);
         let (kx, mx) = (k.times_columns(&modes.shapes), m.times_columns(&modes.shapes));
         for mode in 0..modes.count() {

@@ -3,7 +3,7 @@
 
 use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
 use std::convert::Infallible;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::maximum;
 
 /// A part of the curve that turns back. Below `at`, the motion does not continue the motion at
 /// `at`.

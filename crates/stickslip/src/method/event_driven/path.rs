@@ -13,8 +13,8 @@ use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetr
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
-use stickslip_numerics::extremes::{Extremes, Range};
 use stickslip_numerics::signal::{Basis, FourierIntegrals, Products, real_dot};
+use stickslip_numerics::signal_range::{Extremes, Range};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 

@@ -4,7 +4,7 @@
 //! springs in series with sliders, and stops are forces that are constant or linear in `x`. Let
 //! `N` be an M-orthonormal basis of the remaining free directions and `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`.
 //! The motion is `x = N q + S (c - g)` with `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the
-//! modes of [`stickslip_numerics::modes`] solve in closed form.
+//! modes of [`stickslip_numerics::quadratic_modes`] solve in closed form.
 //!
 //! A pattern does not depend on time, excitation frequency or slip direction. Its key is the
 //! set of stuck and closed parts.
@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense::multiply;
 use stickslip_numerics::eigen;
-use stickslip_numerics::modes::{Defective, Modes};
+use stickslip_numerics::quadratic_modes::{Defective, Modes};
 use stickslip_numerics::signal::Basis;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);

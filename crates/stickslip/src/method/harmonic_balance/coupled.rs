@@ -18,9 +18,9 @@ use super::rest::CACHED;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
+use stickslip_numerics::complex_gemv::Pairs;
 use stickslip_numerics::dense::{ComplexLu, Lu, multiply_in_blocks};
-use stickslip_numerics::krylov::{Gmres, Limits};
-use stickslip_numerics::pairs::Pairs;
+use stickslip_numerics::gmres::{Gmres, Limits};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 

@@ -4,7 +4,7 @@ use super::hold::HOLD;
 use crate::model::System;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use stickslip_numerics::modes::Modes;
+use stickslip_numerics::quadratic_modes::Modes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 

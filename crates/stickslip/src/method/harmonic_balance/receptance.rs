@@ -5,8 +5,8 @@ use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
+use stickslip_numerics::complex_gemv::Pairs;
 use stickslip_numerics::dense::{Lu, multiply_in_blocks};
-use stickslip_numerics::pairs::Pairs;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 

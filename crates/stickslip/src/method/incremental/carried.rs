@@ -8,7 +8,7 @@ use super::law::Follower;
 use super::step::Eliminated;
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::DMatrix;
-use stickslip_numerics::lu::Lu;
+use stickslip_numerics::small_lu::Lu;
 
 /// Derivatives with respect to the initial state of a run. Each matrix has one column per
 /// coordinate.

@@ -8,7 +8,7 @@
 
 use crate::law::{Contact, MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, StepPoint};
 use crate::method::assembly::PlacedLaw;
-use stickslip_numerics::lu::Lu;
+use stickslip_numerics::small_lu::Lu;
 
 /// The view used to evaluate a law.
 #[derive(Debug, Clone, Copy, PartialEq)]

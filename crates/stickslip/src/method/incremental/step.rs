@@ -11,7 +11,7 @@ use crate::method::assembly::{Assembly, PlacedLaw};
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
-use stickslip_numerics::lu::Lu;
+use stickslip_numerics::small_lu::Lu;
 
 /// The eliminated structure for one step size.
 #[derive(Debug, Clone)]

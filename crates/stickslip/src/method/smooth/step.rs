@@ -11,9 +11,9 @@ use crate::law::{RatePoint, Relative};
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
-use stickslip_numerics::lu::Lu;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
-use stickslip_numerics::short::{add, add_product, add_product_of_rows};
+use stickslip_numerics::small_lu::Lu;
+use stickslip_numerics::small_matvec::{add, add_product, add_product_of_rows};
 
 /// The eliminated structure for one step size.
 #[derive(Debug, Clone)]

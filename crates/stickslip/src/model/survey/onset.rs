@@ -6,7 +6,7 @@ use super::{Onset, Survey};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::maximum;
 
 /// Limit of complex multiplications for an estimate of first slip: about 0.1 s.
 const WORK: f64 = 2.5e7;

@@ -14,8 +14,8 @@ use crate::structure::{Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
-use stickslip_numerics::leading::leading;
 use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+use stickslip_numerics::tie_break::leading;
 
 /// The modes of one nodal diameter.
 #[derive(Debug, Clone, PartialEq)]

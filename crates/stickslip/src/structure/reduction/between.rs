@@ -12,7 +12,7 @@
 use super::free::independent;
 use super::{Deviation, Reduced, ReductionError, Reference, Whole};
 use nalgebra::DMatrix;
-use stickslip_numerics::sparse::{Matrix, columns};
+use stickslip_numerics::sparse::{Matrix, multi_vector};
 
 /// Values of s at which a basis is compared with the whole structure.
 const HELD: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
@@ -96,11 +96,11 @@ impl Whole {
     /// Returns independent combinations of columns.
     fn common(&self, vectors: &[f64], up_to: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.dofs();
-        let mut energies = columns::products(n, vectors, &self.stiffness.times_columns(vectors));
+        let mut energies = multi_vector::products(n, vectors, &self.stiffness.times_columns(vectors));
         // free motions have kinetic energy only
-        energies += columns::products(n, vectors, &self.mass.times_columns(vectors)) * (up_to * up_to);
+        energies += multi_vector::products(n, vectors, &self.mass.times_columns(vectors)) * (up_to * up_to);
         let all = energies.ncols();
         let weights = independent(&DMatrix::identity(all, all), &energies).ok_or(ReductionError::OutOfRange)?;
-        Ok(columns::combination(n, vectors, &weights))
+        Ok(multi_vector::combination(n, vectors, &weights))
     }
 }

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::dense::{cholesky_in_blocks, solve_lower_in_blocks};
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
+use stickslip_numerics::sparse::{Matrix, NaturalModes, multi_vector};
 
 /// Relative stiffness below which residual vectors of unit size are linearly dependent. This
 /// occurs for ports that observe the same motion, up to rounding. A port whose residual
@@ -56,7 +56,7 @@ impl<'a> Free<'a> {
         let n = whole.dofs();
         let (basis, shift) = residual::basis(whole, modes, shift, order)?;
         let own = match &whole.damping {
-            Damping::Matrix(c) => Some(columns::products(n, &basis, &c.times_columns(&basis))),
+            Damping::Matrix(c) => Some(multi_vector::products(n, &basis, &c.times_columns(&basis))),
             _ => None,
         };
         let mass = square(&whole.mass, &basis);
@@ -118,7 +118,7 @@ impl<'a> Free<'a> {
         let own = self
             .damping
             .as_ref()
-            .map(|c| columns::products(c.nrows(), small.as_slice(), product(c, &small).as_slice()));
+            .map(|c| multi_vector::products(c.nrows(), small.as_slice(), product(c, &small).as_slice()));
         let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
         let n = self.whole.dofs();
         let (residual, plural) = (small.ncols() - modes, |count: usize| if count == 1 { "" } else { "s" });
@@ -141,7 +141,7 @@ impl<'a> Free<'a> {
     fn combination(&self, modes: usize, order: usize) -> Option<(DMatrix<f64>, Vec<[f64; 2]>)> {
         let all = self.mass.nrows();
         let along = |a: &DMatrix<f64>, matrix: &DMatrix<f64>, b: &DMatrix<f64>| {
-            columns::products(all, a.as_slice(), product(matrix, b).as_slice())
+            multi_vector::products(all, a.as_slice(), product(matrix, b).as_slice())
         };
         let mut vectors = DMatrix::zeros(all, 0);
         for order in 0..order {
@@ -171,7 +171,7 @@ fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
     for first in (0..all).step_by(AT_ONCE) {
         let last = all.min(first + AT_ONCE);
         let moved = matrix.times_columns(&basis[first * n..last * n]);
-        let below = columns::products(n, &basis[first * n..], &moved);
+        let below = multi_vector::products(n, &basis[first * n..], &moved);
         for (k, i) in (first..last).flat_map(|k| (k..all).map(move |i| (k, i))) {
             let value = below[(i - first, k - first)];
             (square[(i, k)], square[(k, i)]) = (value, value);
@@ -193,7 +193,7 @@ fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 /// Returns combinations of columns that are orthonormal in `stiffness`, without linearly
 /// dependent ones.
 pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let energies = columns::products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
+    let energies = multi_vector::products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
     let energies = symmetric(energies);
     let size = |i: usize| energies[(i, i)].max(0.0).sqrt();
     let moving: Vec<usize> = (0..vectors.ncols()).filter(|&i| size(i) > 0.0).collect();

@@ -53,7 +53,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use stickslip_numerics::dense::{ComplexLu, Lu};
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, columns};
+use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, multi_vector};
 
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
 pub type Row = Vec<(usize, f64)>;
@@ -418,7 +418,7 @@ impl Reduced {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
     fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
-        let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
+        let square = |matrix: &Matrix| multi_vector::products(n, &basis, &matrix.times_columns(&basis));
         let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
         let own = match &whole.damping {
             Damping::Matrix(c) => Some(square(c)),
@@ -461,7 +461,7 @@ impl Reduced {
                 port
             } else {
                 let largest =
-                    most(&columns::combination(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
+                    most(&multi_vector::combination(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
                 if port > UNSEEN * largest { port } else { largest }
             };
             if size == 0.0 {
@@ -490,7 +490,7 @@ impl Reduced {
 
     /// Returns all displacements of the whole structure, n × r.
     fn columns(&self) -> DMatrix<f64> {
-        DMatrix::from_vec(self.n, self.dofs(), columns::combination(self.n, &self.basis, &self.weights))
+        DMatrix::from_vec(self.n, self.dofs(), multi_vector::combination(self.n, &self.basis, &self.weights))
     }
 
     /// Returns all displacements of the whole structure for coordinates `q`.
@@ -499,7 +499,7 @@ impl Reduced {
     /// If `q` does not have r entries.
     pub fn expand(&self, q: &[f64]) -> Vec<f64> {
         let weights = product(&self.weights, &DMatrix::from_column_slice(q.len(), 1, q));
-        columns::combination(self.n, &self.basis, &weights)
+        multi_vector::combination(self.n, &self.basis, &weights)
     }
 
     /// Returns the natural frequencies of the reduced structure, rad/s, in ascending order.
@@ -524,7 +524,7 @@ impl Reduced {
             Complex::new(s - omega * omega * m, omega * c)
         };
         let free = ReductionError::Singular { omega, singular: Singular { row: 0 } };
-        let forces = columns::products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
+        let forces = multi_vector::products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
         let moved = if [&self.mass, &self.damping, &self.stiffness].into_iter().all(is_diagonal) {
             let own: Vec<Complex<f64>> = (0..self.dofs()).map(|i| at(i, i)).collect();
             if own.contains(&Complex::new(0.0, 0.0)) {
@@ -560,7 +560,7 @@ fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if a.is_empty() || b.is_empty() {
         return DMatrix::zeros(a.nrows(), b.ncols());
     }
-    DMatrix::from_vec(a.nrows(), b.ncols(), columns::combination(a.nrows(), a.as_slice(), b))
+    DMatrix::from_vec(a.nrows(), b.ncols(), multi_vector::combination(a.nrows(), a.as_slice(), b))
 }
 
 fn is_diagonal(matrix: &DMatrix<f64>) -> bool {

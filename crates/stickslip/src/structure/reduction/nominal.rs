@@ -29,7 +29,7 @@ use crate::structure::{RingEntry, turn};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Analysis, Factor, Matrix, ModesError, columns};
+use stickslip_numerics::sparse::{Analysis, Factor, Matrix, ModesError, multi_vector};
 
 /// Multiples of the frequency of interest up to which modes of the tuned ring start the
 /// iteration. Modes above that frequency leave an almost static remainder to the residual
@@ -138,8 +138,8 @@ impl NominalRing {
             let forces = self.mass.times_columns(&shapes);
             let mut moved = forces.clone();
             factor.solve(&mut moved);
-            let held = columns::products(n, &moved, &forces);
-            let mass = columns::products(n, &moved, &self.mass.times_columns(&moved));
+            let held = multi_vector::products(n, &moved, &forces);
+            let mass = multi_vector::products(n, &moved, &self.mass.times_columns(&moved));
             // the largest θ has the lowest frequency
             let found = eigen::symmetric_pair(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
             let rising: Vec<usize> = (0..found.0.len()).rev().collect();
@@ -148,7 +148,7 @@ impl NominalRing {
             for (mut column, theta) in mixing.column_iter_mut().zip(&thetas) {
                 column.unscale_mut(theta.sqrt());
             }
-            shapes = columns::combination(n, &moved, &mixing);
+            shapes = multi_vector::combination(n, &moved, &mixing);
             let before = std::mem::replace(&mut values, thetas.iter().map(|theta| 1.0 / theta - shift).collect());
             let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= SETTLED * (now + shift);
             let inside = values.partition_point(|value| *value <= highest);
@@ -193,16 +193,17 @@ impl NominalRing {
         for (mut row, root) in answered.row_iter_mut().zip(&root) {
             row.unscale_mut(*root);
         }
-        columns::add(n, &mut moved, -1.0, shapes, &answered);
+        multi_vector::add(n, &mut moved, -1.0, shapes, &answered);
         let flexible = self.rows_of(&moved);
         let independent = independent(&flexible, &whole)?;
         // inertia of both, over vectors normalized in A
         let heavy = self.mass.times_columns(&moved);
-        let mut coupling = product(&columns::products(n, shapes, &heavy), &independent);
+        let mut coupling = product(&multi_vector::products(n, shapes, &heavy), &independent);
         for (mut row, root) in coupling.row_iter_mut().zip(&root) {
             row.unscale_mut(*root);
         }
-        let residual = product(&independent.transpose(), &product(&columns::products(n, &moved, &heavy), &independent));
+        let residual =
+            product(&independent.transpose(), &product(&multi_vector::products(n, &moved, &heavy), &independent));
         let all = low + independent.ncols();
         let inertia = DMatrix::from_fn(all, all, |i, k| match (i.min(k), i.max(k)) {
             (i, k) if k < low => {
@@ -243,13 +244,13 @@ impl NominalRing {
             for (mut row, root) in of_modes.row_iter_mut().zip(&root) {
                 row.unscale_mut(*root);
             }
-            let mut whole = columns::combination(n, shapes, &of_modes);
-            columns::add(n, &mut whole, 1.0, &moved, &product(&independent, &of_rest));
+            let mut whole = multi_vector::combination(n, shapes, &of_modes);
+            multi_vector::add(n, &mut whole, 1.0, &moved, &product(&independent, &of_rest));
             whole
                 .chunks_exact_mut(n.max(1))
                 .zip(&sizes)
                 .for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
-            columns::products(n, &whole, &damping.times_columns(&whole))
+            multi_vector::products(n, &whole, &damping.times_columns(&whole))
         });
         let kind = format!("modes of the mistuned ring; {}", self.sector.kind);
         Ok((RingModes { kind, own, damping, seen }, Deviation { error, omega: self.up_to }))

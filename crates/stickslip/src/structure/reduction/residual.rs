@@ -17,7 +17,7 @@
 //! augmentation methods for modal response analysis".
 
 use super::{AT_ONCE, ReductionError, Whole};
-use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
+use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, multi_vector};
 
 /// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
 /// `STEP`.
@@ -36,8 +36,8 @@ pub(super) fn basis(
     let (factor, shift) = factor(whole, modes, shift)?;
     let heavy = whole.mass.times_columns(&modes.shapes);
     let clear = |some: &mut [f64]| {
-        let along = columns::products(n, &heavy, some);
-        columns::add(n, some, -1.0, &modes.shapes, &along);
+        let along = multi_vector::products(n, &heavy, some);
+        multi_vector::add(n, some, -1.0, &modes.shapes, &along);
     };
     let mut basis = Vec::with_capacity(modes.shapes.len() + n * ports * order);
     basis.extend_from_slice(&modes.shapes);
@@ -53,8 +53,8 @@ pub(super) fn basis(
             };
             // removes the modal part of the forces, A F = (1 - M Φ Φᵀ) F, which makes them
             // self-equilibrated
-            let along = columns::products(n, &modes.shapes, &some);
-            columns::add(n, &mut some, -1.0, &heavy, &along);
+            let along = multi_vector::products(n, &modes.shapes, &some);
+            multi_vector::add(n, &mut some, -1.0, &heavy, &along);
             factor.solve(&mut some);
             clear(&mut some);
             clear(&mut some);

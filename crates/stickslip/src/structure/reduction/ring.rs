@@ -26,7 +26,7 @@ use crate::structure::{CyclicSector, RingEntry, turn};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{NaturalModes, Wanted, columns};
+use stickslip_numerics::sparse::{NaturalModes, Wanted, multi_vector};
 
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
 /// which a combination is dropped. They are tried in this sequence.
@@ -299,8 +299,8 @@ impl Waves<'_> {
         let n = self.sector.dofs;
         let (mass, stiffness) = (self.sector.alone(&self.sector.mass)?, self.sector.alone(&self.sector.stiffness)?);
         let highest = self.met.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
-        let mut energies = columns::products(n, vectors, &stiffness.times_columns(vectors));
-        energies += columns::products(n, vectors, &mass.times_columns(vectors)) * highest;
+        let mut energies = multi_vector::products(n, vectors, &stiffness.times_columns(vectors));
+        energies += multi_vector::products(n, vectors, &mass.times_columns(vectors)) * highest;
         let size: Vec<f64> = energies.diagonal().iter().map(|e| e.max(0.0).sqrt()).collect();
         let moving: Vec<usize> = (0..size.len()).filter(|&k| size[k] > 0.0).collect();
         let gram = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
@@ -317,7 +317,7 @@ impl Waves<'_> {
                 weights[(row, column)] = eigen.eigenvectors[(i, k)] / (eigen.eigenvalues[k].sqrt() * size[row]);
             }
         }
-        let mut basis = columns::combination(n, vectors, &weights);
+        let mut basis = multi_vector::combination(n, vectors, &weights);
         let seen: Vec<_> = self.seen.iter().map(|row| self.sector.row(row)).collect();
         for column in basis.chunks_exact_mut(n.max(1)) {
             let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -391,7 +391,7 @@ fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
                 moved[k * n + row] += value * basis[k * n + column];
             }
         }
-        let product = columns::products(n, basis, &moved);
+        let product = multi_vector::products(n, basis, &moved);
         let all = (0..r).flat_map(|row| (0..r).map(move |column| (row, column)));
         out.extend(all.map(|at| (at.0, at.1, shift, product[at])).filter(|entry| entry.3 != 0.0));
     }

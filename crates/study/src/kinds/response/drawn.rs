@@ -8,7 +8,7 @@ use crate::drawing::{Drawing, Stretch, join, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
-use stickslip_numerics::leading::{EQUAL, leading};
+use stickslip_numerics::tie_break::{EQUAL, leading};
 
 /// Largest number of places drawn one by one. For more places, the largest amplitude is drawn,
 /// with pale curves behind it.

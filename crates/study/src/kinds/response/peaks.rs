@@ -7,7 +7,7 @@ use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
 use stickslip::model::System;
 use stickslip::orbit::{Orbit, PlaceMotion};
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::leading;
 
 /// Amplitudes below this share of the largest are rounding.
 const ROUNDING: f64 = 1e-10;

@@ -5,7 +5,7 @@ use super::{ModeEquations, ModeState, ZERO};
 use crate::model::Axis;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::maximum;
 
 /// Samples per wave of the highest harmonic in which the extremes of a motion are bracketed.
 const SAMPLES: f64 = 16.0;

@@ -14,7 +14,7 @@ pub const EQUAL: f64 = 1e-6;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::leading::leading;
+/// use stickslip_numerics::tie_break::leading;
 /// assert_eq!(leading([1.0, 3.0, 3.0 + 1e-12].into_iter()), Some(1));
 /// assert_eq!(leading([0.0, f64::NAN].into_iter()), None);
 /// ```

@@ -7,7 +7,7 @@
 /// # Example
 /// ```
 /// let mut out = [1.0, 0.0];
-/// stickslip_numerics::short::add_product(&[1.0, 2.0, 3.0, 4.0], &[1.0, 10.0], &mut out);
+/// stickslip_numerics::small_matvec::add_product(&[1.0, 2.0, 3.0, 4.0], &[1.0, 10.0], &mut out);
 /// assert_eq!(out, [32.0, 42.0]);
 /// ```
 pub fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
@@ -32,7 +32,7 @@ pub fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
 /// ```
 /// let mut out = [0.0; 4];
 /// // twice the identity matrix, and rows of two columns
-/// stickslip_numerics::short::add_product_of_rows(&[2.0, 0.0, 0.0, 2.0], 2, &[1.0, 2.0, 3.0, 4.0], &mut out, 2);
+/// stickslip_numerics::small_matvec::add_product_of_rows(&[2.0, 0.0, 0.0, 2.0], 2, &[1.0, 2.0, 3.0, 4.0], &mut out, 2);
 /// assert_eq!(out, [2.0, 4.0, 6.0, 8.0]);
 /// ```
 pub fn add_product_of_rows(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64], columns: usize) {

@@ -35,7 +35,7 @@ impl Pairs {
     /// # Example
     /// ```
     /// use num_complex::Complex64;
-    /// use stickslip_numerics::pairs::Pairs;
+    /// use stickslip_numerics::complex_gemv::Pairs;
     /// let (one, j) = (Complex64::ONE, Complex64::I);
     /// let mut v = [one, j];
     /// Pairs::new(&[one, j, j, 2.0 * one], 2).apply(&mut v, &mut Vec::new());

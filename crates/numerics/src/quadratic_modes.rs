@@ -71,7 +71,7 @@ impl Modes {
     /// # Example
     /// ```
     /// use nalgebra::dmatrix;
-    /// use stickslip_numerics::modes::Modes;
+    /// use stickslip_numerics::quadratic_modes::Modes;
     /// let modes = Modes::new(&dmatrix![0.02], &dmatrix![1.0]).unwrap();
     /// assert!((modes.lambda[0].re + 0.01).abs() < 1e-15);
     /// ```

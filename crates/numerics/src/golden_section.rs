@@ -22,7 +22,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::maximum::maximum;
+/// use stickslip_numerics::golden_section::maximum;
 /// let close = |a: f64, b: f64| (b - a).abs() < 1e-6;
 /// let (at, height) = maximum((0.0, 3.0), close, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
 /// assert!((at - 2.0).abs() < 1e-6 && (height - 1.0).abs() < 1e-6);

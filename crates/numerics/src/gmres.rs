@@ -57,7 +57,7 @@ impl Gmres {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::krylov::{Gmres, Limits};
+    /// use stickslip_numerics::gmres::{Gmres, Limits};
     /// let mut x = [3.0, 4.0];
     /// let multiply = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 2.0 * v[1]]);
     /// let limits = Limits { tolerance: 1e-12, vectors: 5, products: 10 };

@@ -31,7 +31,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// use stickslip_numerics::definite::semidefinite;
+/// use stickslip_numerics::definiteness::semidefinite;
 /// assert_eq!(semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0]), Some(1));
 /// assert_eq!(semidefinite(&dmatrix![1e9, 0.0; 0.0, -1e-3]), None);
 /// ```
@@ -96,7 +96,7 @@ fn by_rows(matrix: &DMatrix<f64>) -> Option<usize> {
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// use stickslip_numerics::definite::is_semidefinite;
+/// use stickslip_numerics::definiteness::is_semidefinite;
 /// assert!(is_semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0]) && !is_semidefinite(&dmatrix![1.0, 2.0; 2.0, 1.0]));
 /// ```
 pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
@@ -160,7 +160,7 @@ fn positive(matrix: &DMatrix<f64>, shift: f64) -> bool {
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::{definite::sparse_definite, sparse::Matrix};
+/// use stickslip_numerics::{definiteness::sparse_definite, sparse::Matrix};
 /// let spring = |ground: f64| Matrix::from_triplets(2, [(0, 0, 2.0 + ground), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]);
 /// let definite = [1.0, 0.0, -1.0].map(|ground| sparse_definite(&spring(ground).unwrap()));
 /// assert_eq!(definite, [Some(true), Some(false), None]);

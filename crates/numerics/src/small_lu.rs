@@ -6,7 +6,7 @@
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::lu::Lu;
+/// use stickslip_numerics::small_lu::Lu;
 /// let mut lu = Lu::default();
 /// lu.zeros(2).copy_from_slice(&[0.0, 2.0, 4.0, 1.0]);
 /// assert!(lu.factorise());

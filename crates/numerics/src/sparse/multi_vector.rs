@@ -12,8 +12,8 @@ use nalgebra::DMatrix;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::columns;
-/// let product = columns::products(2, &[1.0, 2.0], &[3.0, 4.0, 5.0, 6.0]);
+/// use stickslip_numerics::sparse::multi_vector;
+/// let product = multi_vector::products(2, &[1.0, 2.0], &[3.0, 4.0, 5.0, 6.0]);
 /// assert_eq!((product[(0, 0)], product[(0, 1)]), (11.0, 17.0));
 /// ```
 pub fn products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
