@@ -12,7 +12,7 @@ use num_complex::Complex64;
 pub struct Pairs {
     n: usize,
     /// Column-major, `2 n × n`: pairs of real and imaginary parts.
-    parts: Vec<f64>,
+    interleaved: Vec<f64>,
 }
 
 impl Pairs {
@@ -22,15 +22,15 @@ impl Pairs {
     /// If `matrix` does not have n² entries.
     pub fn new(matrix: &[Complex64], n: usize) -> Self {
         assert_eq!(matrix.len(), n * n, "the matrix must be square");
-        Pairs { n, parts: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
+        Pairs { n, interleaved: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
     }
 
     /// Returns the memory of the entries, bytes.
     pub fn bytes(&self) -> usize {
-        size_of::<f64>() * self.parts.len()
+        size_of::<f64>() * self.interleaved.len()
     }
 
-    /// Replaces `v` by `A v`. `memory` is scratch memory.
+    /// Replaces `v` by `A v`. `scratch` is working memory.
     ///
     /// # Example
     /// ```
@@ -44,14 +44,14 @@ impl Pairs {
     ///
     /// # Panics
     /// If the length of `v` is not n.
-    pub fn apply(&self, v: &mut [Complex64], memory: &mut Vec<f64>) {
+    pub fn apply(&self, v: &mut [Complex64], scratch: &mut Vec<f64>) {
         let n = self.n;
         assert_eq!(v.len(), n, "the vector must be as long as the matrix");
-        memory.resize(6 * n, 0.0);
-        let (parts, products) = memory.split_at_mut(2 * n);
+        scratch.resize(6 * n, 0.0);
+        let (parts, products) = scratch.split_at_mut(2 * n);
         let (re, im) = parts.split_at_mut(n);
         re.iter_mut().zip(im).zip(&*v).for_each(|((re, im), v)| (*re, *im) = (v.re, v.im));
-        multiply_in_blocks(&self.parts, parts, products, (2 * n, n, 2), false);
+        multiply_in_blocks(&self.interleaved, parts, products, (2 * n, n, 2), false);
         let (by_re, by_im) = products.split_at(2 * n);
         for (v, (by_re, by_im)) in v.iter_mut().zip(by_re.chunks_exact(2).zip(by_im.chunks_exact(2))) {
             *v = Complex64::new(by_re[0] - by_im[1], by_re[1] + by_im[0]);

@@ -82,9 +82,9 @@ pub enum End {
 const ITERATIONS: usize = 20;
 /// A step with at most this number of corrector iterations makes the next step
 /// longer. See [`ITERATIONS`].
-const FEW: usize = 10;
+const EASY_ITERATIONS: usize = 10;
 /// A step below the largest step size divided by this number calls [`Equations::leap`].
-const LEAP: f64 = 32.0;
+const JUMP_DIVISOR: f64 = 32.0;
 
 /// Follows the branch from `(x, p)`, which solves the equations.
 ///
@@ -117,27 +117,27 @@ pub fn trace<E: Equations>(
     visit: &mut dyn FnMut(&mut E, &[f64], f64) -> bool,
 ) -> End {
     let n = equations.size();
-    let mut work = Work::new(n);
+    let mut corrector = Corrector::new(n);
     let (mut x, mut p) = (x.to_vec(), p);
     let mut tangent = vec![0.0; n + 1];
     tangent[n] = steps.direction;
-    let mut length = 0.25 * steps.longest;
+    let mut step_size = 0.25 * steps.longest;
     if !visit(equations, &x, p) {
         return End::Stopped;
     }
-    let mut fresh = true;
-    let mut ahead = steps.direction;
+    let mut tangent_outdated = true;
+    let mut direction = steps.direction;
     for _ in 1..steps.points {
         // The largest step size grows with the norm of x, so a branch to infinity takes few steps.
         let longest = steps.longest * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
-        length = length.min(longest);
-        if fresh {
-            work.tangent(equations, &x, p, steps.unit, &mut tangent);
-            fresh = false;
+        step_size = step_size.min(longest);
+        if tangent_outdated {
+            corrector.tangent(equations, &x, p, steps.unit, &mut tangent);
+            tangent_outdated = false;
         }
         let (low, high) = steps.range;
-        let mut next: Vec<f64> = x.iter().zip(&tangent).map(|(x, t)| x + length * t).collect();
-        let mut q = p + length * tangent[n] * steps.unit;
+        let mut next: Vec<f64> = x.iter().zip(&tangent).map(|(x, t)| x + step_size * t).collect();
+        let mut q = p + step_size * tangent[n] * steps.unit;
         // A step that leaves the range ends on the border, with the parameter fixed.
         let border = if q > high {
             Some(high)
@@ -149,35 +149,35 @@ pub fn trace<E: Equations>(
         let solved = match border {
             Some(value) => {
                 let share = if q == p { 0.0 } else { (value - p) / (q - p) };
-                next = x.iter().zip(&tangent).map(|(x, t)| x + share * length * t).collect();
+                next = x.iter().zip(&tangent).map(|(x, t)| x + share * step_size * t).collect();
                 q = value;
-                work.correct(equations, &mut next, &mut q, steps.unit, None)
+                corrector.correct(equations, &mut next, &mut q, steps.unit, None)
             }
             None => {
                 let predicted = (next.clone(), q);
-                work.correct(equations, &mut next, &mut q, steps.unit, Some((&tangent, &predicted)))
+                corrector.correct(equations, &mut next, &mut q, steps.unit, Some((&tangent, &predicted)))
             }
         };
         let inside = q >= low && q <= high;
         // A corrector that moves too far has converged to another branch.
         let moved: f64 = next.iter().zip(&x).map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
             + ((q - p) / steps.unit) * ((q - p) / steps.unit);
-        let near = moved.sqrt() <= 2.0 * length + 1e-12;
+        let close_to_last_point = moved.sqrt() <= 2.0 * step_size + 1e-12;
         let accepted = match solved {
-            Some(iterations) if inside && near => Some(iterations),
+            Some(iterations) if inside && close_to_last_point => Some(iterations),
             _ => None,
         };
         let Some(iterations) = accepted else {
-            length *= 0.5;
-            if length < longest / LEAP {
+            step_size *= 0.5;
+            if step_size < longest / JUMP_DIVISOR {
                 // Let the equations jump over the kink, by a fraction of the largest step size.
-                let q = (p + (4.0 / LEAP) * steps.longest * steps.unit * ahead).clamp(low, high);
+                let q = (p + (4.0 / JUMP_DIVISOR) * steps.longest * steps.unit * direction).clamp(low, high);
                 next.copy_from_slice(&x);
                 if q != p && equations.leap(&mut next, q) {
                     let border = q == low || q == high;
-                    (x, p, fresh, length) = (next, q, true, 0.25 * steps.longest);
+                    (x, p, tangent_outdated, step_size) = (next, q, true, 0.25 * steps.longest);
                     tangent.fill(0.0);
-                    tangent[n] = ahead;
+                    tangent[n] = direction;
                     if !visit(equations, &x, p) {
                         return End::Stopped;
                     }
@@ -187,21 +187,21 @@ pub fn trace<E: Equations>(
                     continue;
                 }
             }
-            if length < steps.shortest {
+            if step_size < steps.shortest {
                 return End::Stalled { at: p };
             }
             continue;
         };
-        ahead = if q < p { -1.0 } else { 1.0 };
-        (x, p, fresh) = (next, q, true);
+        direction = if q < p { -1.0 } else { 1.0 };
+        (x, p, tangent_outdated) = (next, q, true);
         if !visit(equations, &x, p) {
             return End::Stopped;
         }
         if border.is_some() {
             return End::Border;
         }
-        if iterations <= FEW {
-            length *= 1.5;
+        if iterations <= EASY_ITERATIONS {
+            step_size *= 1.5;
         }
     }
     End::Points
@@ -210,7 +210,7 @@ pub fn trace<E: Equations>(
 /// A predicted point: unknowns and parameter.
 type Predicted = (Vec<f64>, f64);
 
-struct Work {
+struct Corrector {
     n: usize,
     f: Vec<f64>,
     by_x: Vec<f64>,
@@ -219,9 +219,9 @@ struct Work {
     right: Vec<f64>,
 }
 
-impl Work {
+impl Corrector {
     fn new(n: usize) -> Self {
-        Work {
+        Corrector {
             n,
             f: vec![0.0; n],
             by_x: vec![0.0; n * n],
@@ -270,8 +270,8 @@ impl Work {
         across: Option<(&[f64], &Predicted)>,
     ) -> Option<usize> {
         let n = self.n;
-        let mut held = vec![0.0; n + 1];
-        held[n] = 1.0;
+        let mut fixed_parameter_row = vec![0.0; n + 1];
+        fixed_parameter_row[n] = 1.0;
         for iteration in 0..=ITERATIONS {
             if !equations.evaluate(x, *p, &mut self.f, &mut self.by_x, &mut self.by_p) {
                 return None;
@@ -291,7 +291,7 @@ impl Work {
                     self.right[n] = along + (*p - start) / unit * tangent[n];
                 }
                 None => {
-                    self.border(unit, &held);
+                    self.border(unit, &fixed_parameter_row);
                     self.right[n] = 0.0;
                 }
             }
@@ -332,7 +332,7 @@ mod tests {
 
     /// Each step is at most a tenth of the distance covered, so 193 steps reach a hundred million.
     #[test]
-    fn what_leads_to_infinity_takes_few_steps() {
+    fn branches_to_infinity_take_few_steps() {
         let (mut visited, mut farthest) = (0, 0.0f64);
         let end = trace(&mut Pole, &[1.0], 0.0, Steps::between(0.0, 2.0, 0.2), &mut |_, x, p| {
             visited += 1;

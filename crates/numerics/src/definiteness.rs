@@ -36,7 +36,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// assert_eq!(semidefinite(&dmatrix![1e9, 0.0; 0.0, -1e-3]), None);
 /// ```
 pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
-    by_rows(matrix).or_else(|| {
+    rank_scaled(matrix).or_else(|| {
         let size = largest(matrix)?;
         let (values, _) = symmetric_in_blocks(&(matrix / size))?;
         let zero = ROUNDING * matrix.nrows() as f64;
@@ -55,13 +55,13 @@ fn largest(matrix: &DMatrix<f64>) -> Option<f64> {
 }
 
 /// Returns the rank by the test with ones on the diagonal.
-fn by_rows(matrix: &DMatrix<f64>) -> Option<usize> {
+fn rank_scaled(matrix: &DMatrix<f64>) -> Option<usize> {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
     let (mut rest, scale) = scaled(matrix)?;
     // Every pivot is at least the smallest eigenvalue, so the rank is full if
     // all eigenvalues exceed `zero`.
-    if n >= LARGE && positive(&rest, -zero) {
+    if n >= BLOCKED_FROM && is_positive_definite(&rest, -zero) {
         return Some(n);
     }
     let mut left: Vec<usize> = (0..n).filter(|&i| scale[i] > 0.0).collect();
@@ -102,15 +102,15 @@ fn by_rows(matrix: &DMatrix<f64>) -> Option<usize> {
 pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
-    if n < LARGE {
+    if n < BLOCKED_FROM {
         return semidefinite(matrix).is_some();
     }
-    scaled(matrix).is_some_and(|(rows, _)| positive(&rows, zero))
-        || largest(matrix).is_some_and(|size| positive(&(matrix / size), zero))
+    scaled(matrix).is_some_and(|(rows, _)| is_positive_definite(&rows, zero))
+        || largest(matrix).is_some_and(|size| is_positive_definite(&(matrix / size), zero))
 }
 
 /// Size from which factors in blocks are faster, as in [`dense`](crate::dense).
-const LARGE: usize = 96;
+const BLOCKED_FROM: usize = 96;
 
 /// Returns the matrix with rows and columns scaled to ones on the diagonal, and
 /// the square roots of the diagonal.
@@ -142,7 +142,7 @@ fn scaled(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
 }
 
 /// Returns true if a symmetric matrix with `shift` added to its diagonal is positive definite.
-fn positive(matrix: &DMatrix<f64>, shift: f64) -> bool {
+fn is_positive_definite(matrix: &DMatrix<f64>, shift: f64) -> bool {
     let n = matrix.nrows();
     let mut shifted = matrix.clone();
     (0..n).for_each(|i| shifted[(i, i)] += shift);
@@ -169,15 +169,15 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
     definite(matrix, Analysis::new)
 }
 
-/// Tests a matrix like [`sparse_definite`], in the known elimination order of `of`.
+/// Tests a matrix like [`sparse_definite`], in the known elimination order of `analysis`.
 ///
 /// Any order gives the same result. The order of an analysis whose matrices have entries
 /// wherever this one has keeps the fill-in small.
 ///
 /// # Panics
 /// If the matrix does not have the size of the matrices analysed.
-pub fn sparse_definite_in_order(matrix: &Matrix, of: &Analysis) -> Option<bool> {
-    definite(matrix, |matrices| of.in_order(matrices))
+pub fn sparse_definite_in_order(matrix: &Matrix, analysis: &Analysis) -> Option<bool> {
+    definite(matrix, |matrices| analysis.in_order(matrices))
 }
 
 fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> Analysis) -> Option<bool> {
@@ -292,14 +292,14 @@ mod tests {
         let link = 1e-6;
         let cases = [([link, link * link - 2e-16], Some(1)), ([0.0, -1e-16], Some(1)), ([link, 0.0], None)];
         for ([beside, own], expected) in cases.into_iter().chain([([0.0, -1e-12], None)]) {
-            for size in [2, 2 * LARGE] {
+            for size in [2, 2 * BLOCKED_FROM] {
                 // The 2 × 2 block of the link, repeated.
                 let mut mass = DMatrix::zeros(size, size);
                 for i in (0..size).step_by(2) {
                     (mass[(i, i)], mass[(i + 1, i + 1)]) = (3.0, 3.0 * own);
                     (mass[(i, i + 1)], mass[(i + 1, i)]) = (3.0 * beside, 3.0 * beside);
                 }
-                assert_eq!(by_rows(&mass), None, "the rows by themselves say it is negative");
+                assert_eq!(rank_scaled(&mass), None, "the rows by themselves say it is negative");
                 assert_eq!(semidefinite(&mass), expected.map(|rank: usize| rank * size / 2), "{beside} {own}");
                 assert_eq!(is_semidefinite(&mass), expected.is_some(), "{beside} {own}");
                 let all = (0..size * size).map(|at| (at / size, at % size, mass[at]));
@@ -337,8 +337,8 @@ mod tests {
 
     /// Large matrices have the ranks of small ones, with the same bounds.
     #[test]
-    fn large_matrices_are_told_as_small_ones() {
-        let n = 3 * LARGE;
+    fn large_matrices_use_the_same_bounds() {
+        let n = 3 * BLOCKED_FROM;
         for (ends, rank) in [([0.7, 0.0], Some(n)), ([0.0, 0.0], Some(n - 1)), ([0.7, -0.7], None)] {
             let chain = chain(n, 0.3, ends);
             assert_eq!((semidefinite(&chain), is_semidefinite(&chain)), (rank, rank.is_some()), "{ends:?}");

@@ -16,7 +16,7 @@ use faer::{Accum, Conj, MatMut, MatRef, Par, Spec};
 use num_complex::Complex64;
 
 /// Size from which elimination in blocks is faster.
-const LARGE: usize = 96;
+const BLOCKED_FROM: usize = 96;
 
 /// Solves `A x = b` by elimination with row exchanges. Returns false if a pivot
 /// is zero or not finite.
@@ -38,8 +38,8 @@ pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
 /// Solves `A x = b` like [`solve`]. Returns the sign ±1 of the determinant of
 /// A, or `None` if [`solve`] returns false.
 pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
-    if n >= LARGE {
-        return in_blocks(&mut matrix[..n * n], n, &mut right[..n]);
+    if n >= BLOCKED_FROM {
+        return solve_blocked(&mut matrix[..n * n], n, &mut right[..n]);
     }
     let exchanges = eliminate(matrix, n, right)?;
     for k in (0..n).rev() {
@@ -93,7 +93,7 @@ fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
 ///
 /// `faer` reads the row-major memory by columns and therefore factors the transpose. The
 /// solution uses the transpose of these factors.
-fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+fn solve_blocked(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     let params = Spec::<PartialPivLuParams, f64>::default();
     let mut memory = MemBuffer::new(StackReq::any_of(&[
         lu_in_place_scratch::<u32, f64>(n, n, Par::Seq, params),
@@ -369,7 +369,7 @@ mod tests {
     /// With and without blocks, the solution is the vector that the matrix was multiplied with.
     #[test]
     fn large_systems_are_solved_in_blocks() {
-        for n in [1, 7, LARGE - 1, LARGE, 2 * LARGE + 5] {
+        for n in [1, 7, BLOCKED_FROM - 1, BLOCKED_FROM, 2 * BLOCKED_FROM + 5] {
             // Entries without a pattern between -1 and 1. The zero diagonal forces row exchanges.
             let entry =
                 |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
@@ -382,7 +382,7 @@ mod tests {
             }
         }
         // A cyclic permutation of n rows has the sign (-1)^(n - 1). Every second entry is negative.
-        for n in [1, 2, 3, 4, 2 * LARGE + 5, 2 * LARGE + 6, 2 * LARGE + 7] {
+        for n in [1, 2, 3, 4, 2 * BLOCKED_FROM + 5, 2 * BLOCKED_FROM + 6, 2 * BLOCKED_FROM + 7] {
             let mut matrix = vec![0.0; n * n];
             for i in 0..n {
                 matrix[i * n + (i + 1) % n] = if i % 2 == 1 { -2.0 } else { 3.0 };

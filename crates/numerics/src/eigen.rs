@@ -32,25 +32,25 @@ const SWEEPS: usize = 20;
 ///
 /// Measured: reducing a structure with 900 ports took 7.5 s, mostly in three such
 /// decompositions. With blocks it takes 1.8 s.
-const IN_BLOCKS: usize = 256;
+const BLOCKED_FROM: usize = 256;
 /// Size from which computing the largest eigenvalue alone is cheaper than computing all.
-const LARGE: usize = 64;
+const ARNOLDI_FROM: usize = 64;
 /// First dimension of the Arnoldi process; it doubles from there.
-const FIRST: usize = 24;
+const ARNOLDI_START: usize = 24;
 /// Residual, relative to the eigenvalue, at which an eigenvalue of the Arnoldi
 /// process has converged.
 ///
 /// Its error is then far below the threshold of stability decisions (1e-6), even if the
 /// eigenvectors are a hundred times worse conditioned than orthogonal ones.
-const SETTLED: f64 = 1e-9;
+const CONVERGED: f64 = 1e-9;
 /// Eigenvalues with a modulus above this fraction of the largest must converge
 /// too, because one of them may still exceed it.
-const RIVAL: f64 = 0.9;
+const COMPETING: f64 = 0.9;
 
 /// Returns the eigenvalues and eigenvectors of a symmetric matrix, or `None` if an entry is not
 /// finite or the iteration does not converge.
 pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
-    if matrix.nrows() >= IN_BLOCKS {
+    if matrix.nrows() >= BLOCKED_FROM {
         let (values, eigenvectors) = symmetric_in_blocks(&matrix)?;
         return Some(SymmetricEigen { eigenvalues: DVector::from_vec(values), eigenvectors });
     }
@@ -156,7 +156,7 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex64>> {
     let mut found = match core.nrows() {
         0 => Vec::new(),
         1 => vec![Complex64::new(core[0], 0.0)],
-        _ => of_hessenberg(balanced(core).hessenberg().unpack_h().map(|x| Complex64::new(x, 0.0)))?,
+        _ => hessenberg_eigenvalues(balanced(core).hessenberg().unpack_h().map(|x| Complex64::new(x, 0.0)))?,
     };
     found.resize(found.len() + zeros, ZERO);
     Some(found)
@@ -177,7 +177,7 @@ pub fn largest_modulus(matrix: &DMatrix<f64>) -> Option<f64> {
         return None;
     }
     let (core, _) = deflated(matrix);
-    if core.nrows() > LARGE
+    if core.nrows() > ARNOLDI_FROM
         && let Some(largest) = arnoldi(&balanced(core.clone()))
     {
         return Some(largest);
@@ -236,7 +236,7 @@ fn balanced(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Returns the eigenvalues of an upper Hessenberg matrix.
-fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
+fn hessenberg_eigenvalues(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     let n = h.nrows();
     let small = f64::EPSILON * h.norm();
     if !small.is_finite() {
@@ -324,7 +324,7 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
     // The start vector needs a component along every eigenvector. Golden-ratio steps never repeat.
     let first = DVector::from_fn(n, |i, _| 0.5 + (i as f64 * 0.618_033_988_749_894_9).fract());
     basis.set_column(0, &first.normalize());
-    let mut check = FIRST.min(most);
+    let mut check = ARNOLDI_START.min(most);
     for k in 0..most {
         interrupt::check();
         let mut next = matrix * basis.column(k);
@@ -344,10 +344,10 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
         basis.set_column(k + 1, &(next / length));
         if k + 1 == check {
             let square = h.view((0, 0), (check, check)).into_owned();
-            let found = of_hessenberg(square.map(|x| Complex64::new(x, 0.0)))?;
+            let found = hessenberg_eigenvalues(square.map(|x| Complex64::new(x, 0.0)))?;
             let largest = found.iter().map(|z| z.norm()).fold(0.0, f64::max);
-            let settled = |value: Complex64| residual(&square, value, length) <= SETTLED * largest;
-            if found.iter().filter(|z| z.norm() >= RIVAL * largest).all(|z| settled(*z)) {
+            let converged = |value: Complex64| residual(&square, value, length) <= CONVERGED * largest;
+            if found.iter().filter(|z| z.norm() >= COMPETING * largest).all(|z| converged(*z)) {
                 return Some(largest);
             }
             check = (2 * check).min(most);
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_finite_is_asked() {
+    fn non_finite_matrices_have_no_eigenvalues() {
         assert_eq!(eigenvalues(&dmatrix![f64::NAN, 0.0; 1.0, 2.0]), None);
         assert_eq!(largest_modulus(&dmatrix![f64::INFINITY]), None);
         assert!(symmetric(dmatrix![1.0, f64::NAN; f64::NAN, 1.0]).is_none());

@@ -38,15 +38,16 @@ pub struct Gmres {
     basis: Vec<f64>,
     /// Columns of the triangular factor, each of `vectors + 1` entries.
     triangle: Vec<f64>,
-    turns: Vec<(f64, f64)>,
-    rest: Vec<f64>,
+    rotations: Vec<(f64, f64)>,
+    /// Right side of the least-squares problem; its last entry is the residual.
+    rotated_rhs: Vec<f64>,
     sum: Vec<f64>,
     product: Vec<f64>,
 }
 
 /// A new vector shorter than this fraction of the product it comes from is
 /// rounding: the Krylov space is exhausted.
-const EXHAUSTED: f64 = 1e-14;
+const BREAKDOWN: f64 = 1e-14;
 
 impl Gmres {
     /// Solves `A x = b`.
@@ -73,14 +74,14 @@ impl Gmres {
     ) -> Outcome {
         let n = x.len();
         let most = limits.vectors.clamp(1, n.max(1));
-        let right = x.to_vec();
-        let size = norm(&right);
+        let rhs = x.to_vec();
+        let size = norm(&rhs);
         x.fill(0.0);
         let mut outcome = Outcome { products: 0, residual: 0.0, solved: true };
         if size == 0.0 {
             return outcome;
         }
-        let mut residual = right.clone();
+        let mut residual = rhs.clone();
         let mut left = size;
         loop {
             let columns = self.cycle(
@@ -105,14 +106,14 @@ impl Gmres {
             }
             precondition(&mut self.sum);
             x.iter_mut().zip(&self.sum).for_each(|(x, sum)| *x += sum);
-            let expected = self.rest.last().map_or(left, |rest| rest.abs());
-            if limits.tolerance >= UNCHECKED && expected <= limits.tolerance * size {
+            let expected = self.rotated_rhs.last().map_or(left, |entry| entry.abs());
+            if limits.tolerance >= TRUSTED_TOLERANCE && expected <= limits.tolerance * size {
                 outcome.residual = expected / size;
                 return outcome;
             }
             multiply(x, &mut self.product);
             outcome.products += 1;
-            residual.iter_mut().zip(&right).zip(&self.product).for_each(|((r, b), ax)| *r = b - ax);
+            residual.iter_mut().zip(&rhs).zip(&self.product).for_each(|((r, b), ax)| *r = b - ax);
             let before = left;
             left = norm(&residual);
             outcome.residual = left / size;
@@ -140,9 +141,9 @@ impl Gmres {
         self.basis.clear();
         self.basis.extend(residual.iter().map(|r| r / size));
         self.triangle.clear();
-        self.turns.clear();
-        self.rest.clear();
-        self.rest.push(size);
+        self.rotations.clear();
+        self.rotated_rhs.clear();
+        self.rotated_rhs.push(size);
         self.product.resize(n, 0.0);
         let mut count = 0;
         while count < vectors.min(products) {
@@ -157,14 +158,14 @@ impl Gmres {
             // Orthogonalize twice, to remove the rounding of the first projection.
             for _ in 0..2 {
                 for (i, v) in self.basis.chunks_exact(n).enumerate() {
-                    let share = dot(v, &self.product);
-                    self.triangle[start + i] += share;
-                    self.product.iter_mut().zip(v).for_each(|(p, v)| *p -= share * v);
+                    let component = dot(v, &self.product);
+                    self.triangle[start + i] += component;
+                    self.product.iter_mut().zip(v).for_each(|(p, v)| *p -= component * v);
                 }
             }
             let next = norm(&self.product);
             let column = &mut self.triangle[start..start + tall];
-            for (i, &(c, s)) in self.turns.iter().enumerate() {
+            for (i, &(c, s)) in self.rotations.iter().enumerate() {
                 (column[i], column[i + 1]) = (c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]);
             }
             let length = column[count].hypot(next);
@@ -173,17 +174,17 @@ impl Gmres {
             }
             let (c, s) = (column[count] / length, next / length);
             column[count] = length;
-            self.turns.push((c, s));
-            let left = self.rest[count];
-            self.rest[count] = c * left;
-            self.rest.push(-s * left);
+            self.rotations.push((c, s));
+            let left = self.rotated_rhs[count];
+            self.rotated_rhs[count] = c * left;
+            self.rotated_rhs.push(-s * left);
             count += 1;
-            if (s * left).abs() <= goal || next <= EXHAUSTED * whole {
+            if (s * left).abs() <= goal || next <= BREAKDOWN * whole {
                 break;
             }
             self.basis.extend(self.product.iter().map(|p| p / next));
         }
-        let mut weights = self.rest[..count].to_vec();
+        let mut weights = self.rotated_rhs[..count].to_vec();
         for i in (0..count).rev() {
             let sum: f64 = (i + 1..count).map(|j| self.triangle[j * tall + i] * weights[j]).sum();
             weights[i] = (weights[i] - sum) / self.triangle[i * tall + i];
@@ -194,7 +195,7 @@ impl Gmres {
 
 /// Tolerance from which the residual of the recurrence is trusted. With few
 /// vectors it differs from the true residual by rounding only.
-const UNCHECKED: f64 = 1e-4;
+const TRUSTED_TOLERANCE: f64 = 1e-4;
 /// Factor on the tolerance by which the true residual may exceed that of the
 /// recurrence, because of rounding in the products.
 const SLACK: f64 = 2.0;
@@ -261,7 +262,7 @@ mod tests {
 
     /// Without a solution, or with too few products, the outcome is not solved.
     #[test]
-    fn what_is_not_solved_is_told() {
+    fn unsolved_systems_are_reported() {
         let limits = Limits { tolerance: 1e-12, vectors: 10, products: 4 };
         let (outcome, _) = solve(80, limits, false);
         assert!(!outcome.solved && outcome.products <= 5, "{outcome:?}");

@@ -34,25 +34,25 @@ pub fn maximum<E>(
 ) -> Result<(f64, f64), E> {
     let (mut a, mut b) = ends;
     let (mut left, mut right) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
-    let (mut at_left, mut at_right) = (value(left)?, value(right)?);
-    let mut best = if at_right > at_left { (right, at_right) } else { (left, at_left) };
-    let apart = |a: f64, left: f64, right: f64, b: f64| {
+    let (mut value_left, mut value_right) = (value(left)?, value(right)?);
+    let mut best = if value_right > value_left { (right, value_right) } else { (left, value_left) };
+    let distinct = |a: f64, left: f64, right: f64, b: f64| {
         (a < left && left < right && right < b) || (a > left && left > right && right > b)
     };
-    while apart(a, left, right, b) && !close(a, b) {
-        let met = if at_left >= at_right {
-            (b, right, at_right) = (right, left, at_left);
+    while distinct(a, left, right, b) && !close(a, b) {
+        let candidate = if value_left >= value_right {
+            (b, right, value_right) = (right, left, value_left);
             left = b - GOLDEN * (b - a);
-            at_left = value(left)?;
-            (left, at_left)
+            value_left = value(left)?;
+            (left, value_left)
         } else {
-            (a, left, at_left) = (left, right, at_right);
+            (a, left, value_left) = (left, right, value_right);
             right = a + GOLDEN * (b - a);
-            at_right = value(right)?;
-            (right, at_right)
+            value_right = value(right)?;
+            (right, value_right)
         };
-        if met.1 > best.1 {
-            best = met;
+        if candidate.1 > best.1 {
+            best = candidate;
         }
     }
     Ok(best)

@@ -36,11 +36,11 @@ pub struct Stop(Arc<Inner>);
 struct Inner {
     set: AtomicBool,
     /// A function called at every check in addition to the flag.
-    ask: Option<Box<dyn Fn() -> bool + Send + Sync>>,
+    callback: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
 thread_local! {
-    static WATCHED: RefCell<Option<Stop>> = const { RefCell::new(None) };
+    static THREAD_FLAG: RefCell<Option<Stop>> = const { RefCell::new(None) };
 }
 
 impl Stop {
@@ -49,11 +49,11 @@ impl Stop {
         Stop::default()
     }
 
-    /// Creates a flag that is also set once `ask` returns true.
+    /// Creates a flag that is also set once `callback` returns true.
     ///
-    /// Every check calls `ask`, on the thread that computes.
-    pub fn asking(ask: impl Fn() -> bool + Send + Sync + 'static) -> Stop {
-        Stop(Arc::new(Inner { set: AtomicBool::new(false), ask: Some(Box::new(ask)) }))
+    /// Every check calls `callback`, on the thread that computes.
+    pub fn asking(callback: impl Fn() -> bool + Send + Sync + 'static) -> Stop {
+        Stop(Arc::new(Inner { set: AtomicBool::new(false), callback: Some(Box::new(callback)) }))
     }
 
     /// Sets the flag: the watched computations end at their next check.
@@ -72,7 +72,7 @@ impl Stop {
     /// Unwinds with [`Interrupted`] at the first [`check`] after the flag is
     /// set, or with the reason given to [`throw`].
     pub fn watch<T>(&self, work: impl FnOnce() -> T) -> T {
-        let _lent = Lent(WATCHED.replace(Some(self.clone())));
+        let _guard = FlagGuard(THREAD_FLAG.replace(Some(self.clone())));
         work()
     }
 }
@@ -86,24 +86,24 @@ impl fmt::Debug for Stop {
 /// Sets or removes the flag of this thread, for threads that receive work from
 /// others. The flag stays until the next call.
 pub fn lend(stop: Option<Stop>) {
-    WATCHED.set(stop);
+    THREAD_FLAG.set(stop);
 }
 
 /// Restores the thread's former flag when dropped.
-struct Lent(Option<Stop>);
+struct FlagGuard(Option<Stop>);
 
-impl Drop for Lent {
+impl Drop for FlagGuard {
     fn drop(&mut self) {
-        WATCHED.set(self.0.take());
+        THREAD_FLAG.set(self.0.take());
     }
 }
 
 /// Unwinds if the flag of this thread is set.
 #[inline]
 pub fn check() {
-    // Cloned, not borrowed: `ask` may run a computation that has a flag too.
-    if let Some(stop) = WATCHED.with_borrow(Clone::clone)
-        && (stop.is_set() || stop.0.ask.as_ref().is_some_and(|ask| ask()))
+    // Cloned, not borrowed: `callback` may run a computation that has a flag too.
+    if let Some(stop) = THREAD_FLAG.with_borrow(Clone::clone)
+        && (stop.is_set() || stop.0.callback.as_ref().is_some_and(|callback| callback()))
     {
         stop.set();
         resume_unwind(Box::new(Interrupted));
@@ -114,8 +114,8 @@ pub fn check() {
 ///
 /// Returns normally if the thread has no flag.
 pub fn throw(reason: Box<dyn Any + Send>) {
-    let watched = WATCHED.with_borrow(Clone::clone);
-    if let Some(stop) = watched {
+    let flag = THREAD_FLAG.with_borrow(Clone::clone);
+    if let Some(stop) = flag {
         stop.set();
         resume_unwind(reason);
     }
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_question_is_asked_until_it_is_answered_with_yes() {
+    fn callback_runs_until_it_returns_true() {
         let asked = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let count = asked.clone();
         let stop = Stop::asking(move || count.fetch_add(1, Ordering::Relaxed) == 2);
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_watches_goes_on() {
+    fn threads_without_a_flag_continue() {
         Stop::new().set();
         check();
         throw(Box::new("nobody hears it"));

@@ -57,7 +57,7 @@ const CLUSTER: f64 = 1e-7;
 const DEFECTIVE: f64 = 1e-7;
 /// A damping matrix is not symmetric if mirrored entries differ by more than
 /// this fraction of the largest entry.
-const SKEW: f64 = 1e-12;
+const UNSYMMETRIC: f64 = 1e-12;
 /// Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
 const SCHUR_STEPS: usize = 40;
 
@@ -91,28 +91,27 @@ impl Modes {
         let undamped = eigen::symmetric((stiffness + stiffness.transpose()) * 0.5).ok_or(out_of_range)?;
         let basis = split_free(damping, &undamped, &mut modes.free).ok_or(out_of_range)?;
         let (c, k) = (basis.transpose() * damping * &basis, basis.transpose() * stiffness * &basis);
-        for component in components(&c, &k) {
-            let part = DMatrix::from_fn(m, component.len(), |i, j| basis[(i, component[j])]);
-            let select = |matrix: &DMatrix<f64>| {
-                DMatrix::from_fn(component.len(), component.len(), |i, j| matrix[(component[i], component[j])])
-            };
-            modes.add_component(&part, &select(&c), &select(&k))?;
+        for group in coupled_groups(&c, &k) {
+            let part = DMatrix::from_fn(m, group.len(), |i, j| basis[(i, group[j])]);
+            let select =
+                |matrix: &DMatrix<f64>| DMatrix::from_fn(group.len(), group.len(), |i, j| matrix[(group[i], group[j])]);
+            modes.add_group(&part, &select(&c), &select(&k))?;
         }
         Ok(modes)
     }
 
     /// Adds the modes of a coupled group of coordinates. The columns of `part` span the group.
-    fn add_component(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
+    fn add_group(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
         let r = c.nrows();
         let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
-        let eigenvalues = if r == 1 { Some(single(c[0], k[0])) } else { companion_eigenvalues(c, k) };
+        let eigenvalues = if r == 1 { Some(quadratic_roots(c[0], k[0])) } else { companion_eigenvalues(c, k) };
         let eigenvalues =
             eigenvalues.filter(|all| all.iter().all(|l| l.re.is_finite() && l.im.is_finite())).ok_or(out_of_range)?;
         let scale = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let mut done = vec![false; eigenvalues.len()];
         let part = part.map(|x| Complex64::new(x, 0.0));
         let cc = c.map(|x| Complex64::new(x, 0.0));
-        let skew = is_skew(c);
+        let unsymmetric = is_unsymmetric(c);
         for i in 0..eigenvalues.len() {
             // Keep the eigenvalue above the real axis of each pair. An
             // eigenvalue within rounding of the axis is real.
@@ -136,7 +135,7 @@ impl Modes {
             let vectors = |lambda: Complex64| {
                 let matrix = quadratic(&cc, k, lambda);
                 let phi = null_space(&matrix, members.len())?;
-                let psi = if skew { null_space(&matrix.transpose(), members.len())? } else { phi.clone() };
+                let psi = if unsymmetric { null_space(&matrix.transpose(), members.len())? } else { phi.clone() };
                 Some((phi, psi))
             };
             let (mut phi, mut psi) = vectors(lambda).ok_or(out_of_range)?;
@@ -152,7 +151,7 @@ impl Modes {
             }
             if real {
                 phi = real_basis(&phi).ok_or(out_of_range)?;
-                psi = if skew { real_basis(&psi).ok_or(out_of_range)? } else { phi.clone() };
+                psi = if unsymmetric { real_basis(&psi).ok_or(out_of_range)? } else { phi.clone() };
                 theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             }
             let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
@@ -202,7 +201,7 @@ fn split_free(
         let null = undamped.eigenvectors.select_columns(&soft);
         // The quadratic form of a gyroscopic matrix vanishes. Instead, the test uses the
         // products of the direction with the matrix and its transpose.
-        let (resists, threshold) = if is_skew(damping) {
+        let (resists, threshold) = if is_unsymmetric(damping) {
             (damping.transpose() * damping + damping * damping.transpose(), (RIGID * damping.amax()).powi(2))
         } else {
             (damping.clone(), RIGID * damping.amax())
@@ -221,12 +220,12 @@ fn split_free(
 }
 
 /// Returns true if a damping matrix is not symmetric.
-fn is_skew(damping: &DMatrix<f64>) -> bool {
-    (damping - damping.transpose()).amax() > SKEW * damping.amax()
+fn is_unsymmetric(damping: &DMatrix<f64>) -> bool {
+    (damping - damping.transpose()).amax() > UNSYMMETRIC * damping.amax()
 }
 
 /// Returns the groups of coordinates that damping or stiffness couples.
-fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
+fn coupled_groups(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let r = c.nrows();
     let (c_scale, k_scale) = (COUPLED * c.amax(), 10.0 * RIGID * k.amax());
     let one_way = |i: usize, j: usize| c[(i, j)].abs() > c_scale || k[(i, j)].abs() > k_scale;
@@ -250,7 +249,7 @@ fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
 }
 
 /// Returns the roots of λ² + cλ + k without cancellation.
-fn single(c: f64, k: f64) -> Vec<Complex64> {
+fn quadratic_roots(c: f64, k: f64) -> Vec<Complex64> {
     let discriminant = 0.25 * c * c - k;
     if discriminant < 0.0 {
         let root = (-discriminant).sqrt();
@@ -350,7 +349,7 @@ mod tests {
     /// A chain of many masses with dampers that couple all of its modes; then two such chains
     /// in parallel, with pairs of equal modes.
     #[test]
-    fn chains_with_dampers_of_their_own() {
+    fn chains_with_nonproportional_damping() {
         let n = 24;
         let chain = |of: fn(usize) -> f64| {
             DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {

@@ -42,7 +42,7 @@ fn phi1(z: Complex64) -> Complex64 {
 
 /// Returns [`phi1`] for a known `e^z`.
 #[inline]
-fn phi1_of(z: Complex64, exp: Complex64) -> Complex64 {
+fn phi1_from_exp(z: Complex64, exp: Complex64) -> Complex64 {
     if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW { phi1_series(z) } else { (exp - 1.0) / z }
 }
 
@@ -84,7 +84,7 @@ const TIME_RESOLUTION: f64 = 4e-16;
 
 /// A derivative of a signal counts as zero at the start if it is below this fraction of its
 /// bound. The solution that leads to it has rounding errors of about 1e-13.
-const VANISHES: f64 = 1e-9;
+const ZERO_TOLERANCE: f64 = 1e-9;
 
 impl Basis {
     /// Returns the number of coefficients of a signal.
@@ -194,17 +194,17 @@ impl Basis {
     }
 
     /// Computes the magnitudes of the exponents into `out`.
-    pub(crate) fn speeds(&self, out: &mut [f64]) {
+    pub(crate) fn exponent_magnitudes(&self, out: &mut [f64]) {
         let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
         out.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
     }
 
     /// Computes bounds on the magnitudes of the coefficients of a derivative into `out`.
-    /// `sizes` are those of the signal, and `speeds` are the magnitudes of the exponents.
+    /// `sizes` are those of the signal.
     #[inline]
-    pub(crate) fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
+    pub(crate) fn differentiate_sizes(&self, sizes: &[f64], exponent_magnitudes: &[f64], out: &mut [f64]) {
         let (e, c) = (self.exponents.len(), self.constant());
-        for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(speeds) {
+        for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(exponent_magnitudes) {
             *out = size * speed;
         }
         for (r, &driven_by) in self.driven_by.iter().enumerate() {
@@ -243,20 +243,29 @@ impl Basis {
     pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
-        let Scratch { values, magnitudes, speeds, first, second, second_weights, third_weights, clear_until, rising } =
-            scratch;
-        self.speeds(speeds);
+        let Scratch {
+            values,
+            magnitudes,
+            exponent_magnitudes,
+            first,
+            second,
+            second_weights,
+            third_weights,
+            zero_free_until,
+            rising,
+        } = scratch;
+        self.exponent_magnitudes(exponent_magnitudes);
         for k in 0..count {
             let range = k * nb..(k + 1) * nb;
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
             self.differentiate(&first[range.clone()], &mut second[range.clone()]);
             let (weights, signal) = (&mut second_weights[range.clone()], &second[range.clone()]);
             weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
-            self.differentiate_sizes(weights, speeds, &mut third_weights[range]);
+            self.differentiate_sizes(weights, exponent_magnitudes, &mut third_weights[range]);
         }
         self.magnitudes(end, magnitudes);
         for k in 0..count {
-            clear_until[k] = match begins[k] {
+            zero_free_until[k] = match begins[k] {
                 Begin::Positive => 0.0,
                 Begin::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
                     Some(until) => until,
@@ -272,11 +281,11 @@ impl Basis {
                     magnitudes[b] = size; // it decays from here on
                 }
             });
-            let (mut step, mut nearest, mut settled) = (f64::INFINITY, 0, false);
+            let (mut step, mut nearest, mut converged) = (f64::INFINITY, 0, false);
             for k in 0..count {
-                if time < clear_until[k] {
-                    if clear_until[k] - time < step {
-                        (step, nearest, settled) = (clear_until[k] - time, k, false);
+                if time < zero_free_until[k] {
+                    if zero_free_until[k] - time < step {
+                        (step, nearest, converged) = (zero_free_until[k] - time, k, false);
                     }
                     continue;
                 }
@@ -286,30 +295,30 @@ impl Basis {
                     return FirstZero::At { index: k, time };
                 }
                 let slope = real_dot(&first[range.clone()], values);
-                let bound = bounded_by(&second_weights[range.clone()], magnitudes);
-                let safe = fall(g, slope, -bound);
+                let bound = magnitude_bound(&second_weights[range.clone()], magnitudes);
+                let safe = first_root(g, slope, -bound);
                 if safe >= step {
                     continue;
                 }
                 // Over twice that step the second derivative stays within `change` of its value.
                 let reach = 2.0 * safe;
                 let curvature = real_dot(&second[range.clone()], values);
-                let change = reach * bounded_by(&third_weights[range], magnitudes);
+                let change = reach * magnitude_bound(&third_weights[range], magnitudes);
                 let (mut first_possible, mut last_possible) = (safe, f64::INFINITY);
                 if curvature - change > -bound {
-                    first_possible = fall(g, slope, curvature - change).min(reach);
-                    last_possible = fall(g, slope, curvature + change);
+                    first_possible = first_root(g, slope, curvature - change).min(reach);
+                    last_possible = first_root(g, slope, curvature + change);
                 }
                 if first_possible < step {
                     // The interval of the zero is below the resolution of the time.
-                    let settled_here = last_possible <= reach && last_possible - first_possible <= resolution;
-                    (step, nearest, settled) = (first_possible, k, settled_here);
+                    let converged_here = last_possible <= reach && last_possible - first_possible <= resolution;
+                    (step, nearest, converged) = (first_possible, k, converged_here);
                 }
             }
             if time + step >= end {
                 return FirstZero::None;
             }
-            if settled {
+            if converged {
                 return FirstZero::At { index: nearest, time: time + step };
             }
             if step <= resolution {
@@ -338,7 +347,7 @@ impl Basis {
             }
             let value = self.beginning(current);
             let size: f64 = current[..=self.constant()].iter().map(size_of).sum();
-            if value.abs() > VANISHES * size {
+            if value.abs() > ZERO_TOLERANCE * size {
                 if value < 0.0 {
                     return None;
                 }
@@ -386,10 +395,10 @@ impl Products {
             let (s, s_end) = term(b);
             for c in 0..=b {
                 let (r, r_end) = term(c);
-                let value = phi1_of((s + r) * length, s_end * r_end) * length;
+                let value = phi1_from_exp((s + r) * length, s_end * r_end) * length;
                 plain[b * terms + c] = value;
                 plain[c * terms + b] = value;
-                let value = phi1_of((s + r.conj()) * length, s_end * r_end.conj()) * length;
+                let value = phi1_from_exp((s + r.conj()) * length, s_end * r_end.conj()) * length;
                 mixed[b * terms + c] = value;
                 mixed[c * terms + b] = value.conj();
             }
@@ -403,7 +412,8 @@ impl Products {
             return quadrature((basis, g), (basis, h), self.length);
         }
         let zero = Complex64::new(0.0, 0.0);
-        let coefficient = |of: &[Complex64], b: usize| of[if b + 1 < self.terms { b } else { basis.constant() }];
+        let coefficient =
+            |coefficients: &[Complex64], b: usize| coefficients[if b + 1 < self.terms { b } else { basis.constant() }];
         let mut sum = 0.0;
         for b in 0..self.terms {
             let c = coefficient(g, b);
@@ -440,7 +450,7 @@ impl FourierIntegrals {
         let (rate, turn) = (Complex64::new(0.0, -nu), Complex64::new(cos, -sin));
         let constant = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
         let terms = basis.exponents.iter().copied().zip(at_end.iter().copied()).chain([constant]).map(|(s, end)| {
-            let part = |s: Complex64, end: Complex64| phi1_of((s + rate) * length, end * turn) * length;
+            let part = |s: Complex64, end: Complex64| phi1_from_exp((s + rate) * length, end * turn) * length;
             (part(s, end), part(s.conj(), end.conj()))
         });
         FourierIntegrals { nu, length, terms: terms.collect() }
@@ -492,7 +502,7 @@ fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Com
 /// Returns the first positive root of `g + slope h + curvature h²/2`, `g > 0`,
 /// in the form without cancellation.
 #[inline]
-fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
+fn first_root(g: f64, slope: f64, curvature: f64) -> f64 {
     let square = slope * slope - 2.0 * curvature * g;
     if square < 0.0 || (slope >= 0.0 && curvature >= 0.0) {
         return f64::INFINITY;
@@ -503,7 +513,7 @@ fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
 
 /// Returns a bound of a signal from the magnitudes of its coefficients and of the basis functions.
 #[inline]
-pub(crate) fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
+pub(crate) fn magnitude_bound(weights: &[f64], magnitudes: &[f64]) -> f64 {
     weights.iter().zip(magnitudes).map(|(w, m)| w * m).sum()
 }
 
@@ -525,12 +535,12 @@ pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
 pub struct Scratch {
     values: Vec<Complex64>,
     magnitudes: Vec<f64>,
-    speeds: Vec<f64>,
+    exponent_magnitudes: Vec<f64>,
     first: Vec<Complex64>,
     second: Vec<Complex64>,
     second_weights: Vec<f64>,
     third_weights: Vec<f64>,
-    clear_until: Vec<f64>,
+    zero_free_until: Vec<f64>,
     rising: [Vec<Complex64>; 2],
 }
 
@@ -539,12 +549,12 @@ impl Scratch {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
         self.magnitudes.resize(nb, 0.0);
-        self.speeds.resize(nb, 0.0);
+        self.exponent_magnitudes.resize(nb, 0.0);
         self.first.resize(nb * count, zero);
         self.second.resize(nb * count, zero);
         self.second_weights.resize(nb * count, 0.0);
         self.third_weights.resize(nb * count, 0.0);
-        self.clear_until.resize(count, 0.0);
+        self.zero_free_until.resize(count, 0.0);
     }
 }
 

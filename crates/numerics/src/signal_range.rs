@@ -6,7 +6,7 @@
 //! Subintervals that cannot extend the known range are skipped. If the curvature has one sign,
 //! Newton's method finds the single turning point. All other subintervals are halved.
 
-use crate::signal::{Basis, bounded_by, real_dot, size_of};
+use crate::signal::{Basis, magnitude_bound, real_dot, size_of};
 use num_complex::Complex64;
 
 /// A mode below this fraction of a signal is rounding. It does not change an
@@ -19,7 +19,7 @@ const ROUNDING: f64 = 2.0 * f64::EPSILON;
 ///
 /// A turning point takes about three. A mode that vibrates undamped at a hundred times the
 /// excitation frequency has two hundred turning points in a period.
-const MOST_TIMES: usize = 20_000;
+const MAX_SUBDIVISIONS: usize = 20_000;
 /// Maximum number of steps towards one turning point. They converge cubically
 /// in value; bisection is the fallback.
 const STEPS: usize = 60;
@@ -65,15 +65,15 @@ pub struct Extremes {
     /// Bounds on the basis functions.
     magnitudes: Vec<f64>,
     /// Magnitudes of the exponents.
-    speeds: Vec<f64>,
+    exponent_magnitudes: Vec<f64>,
     /// Magnitudes of the coefficients of the second derivative, and bounds on those of the third.
     sizes: [Vec<f64>; 2],
-    open: Vec<[At; 2]>,
+    intervals: Vec<[SignalSample; 2]>,
 }
 
 /// A signal and its derivatives at one time.
 #[derive(Debug, Clone, Copy)]
-struct At {
+struct SignalSample {
     time: f64,
     value: f64,
     slope: f64,
@@ -89,19 +89,21 @@ impl Extremes {
         self.values.resize(nb, zero);
         self.slopes.iter_mut().for_each(|slope| slope.resize(nb, zero));
         self.magnitudes.resize(nb, 0.0);
-        self.speeds.resize(nb, 0.0);
+        self.exponent_magnitudes.resize(nb, 0.0);
         self.sizes.iter_mut().for_each(|sizes| sizes.resize(nb, 0.0));
-        self.open.clear();
+        self.intervals.clear();
     }
 
     /// Computes the derivatives of the signal without negligible modes, and their bounds.
     /// Returns the size of the signal's terms.
     fn differentiate(&mut self, basis: &Basis, signal: &[Complex64], length: f64) -> f64 {
         self.prepare(basis.len());
-        let Extremes { slopes: [kept, first, second], magnitudes, speeds, sizes: [weights, third], .. } = self;
+        let Extremes {
+            slopes: [kept, first, second], magnitudes, exponent_magnitudes, sizes: [weights, third], ..
+        } = self;
         basis.magnitudes(length, magnitudes);
         weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
-        let size = bounded_by(weights, magnitudes);
+        let size = magnitude_bound(weights, magnitudes);
         kept.copy_from_slice(signal);
         for ((kept, weight), exponent) in kept.iter_mut().zip(&*weights).zip(&basis.exponents) {
             if exponent.re <= 0.0 && *weight <= NEGLIGIBLE * size {
@@ -111,42 +113,48 @@ impl Extremes {
         basis.differentiate(kept, first);
         basis.differentiate(first, second);
         weights.iter_mut().zip(&*second).for_each(|(weight, c)| *weight = size_of(c));
-        basis.speeds(speeds);
-        basis.differentiate_sizes(weights, speeds, third);
+        basis.exponent_magnitudes(exponent_magnitudes);
+        basis.differentiate_sizes(weights, exponent_magnitudes, third);
         size
     }
 
-    fn at(&mut self, basis: &Basis, signal: &[Complex64], time: f64) -> At {
+    fn sample(&mut self, basis: &Basis, signal: &[Complex64], time: f64) -> SignalSample {
         let Extremes { values, slopes: [_, first, second], magnitudes, sizes: [weights, third], .. } = self;
         basis.evaluate_and(time, values, |b, size| {
             if basis.exponents[b].re < 0.0 {
                 magnitudes[b] = size; // it decays from then on
             }
         });
-        At {
+        SignalSample {
             time,
             value: real_dot(signal, values),
             slope: real_dot(first, values),
             curvature: real_dot(second, values),
-            second: bounded_by(weights, magnitudes),
-            third: bounded_by(third, magnitudes),
+            second: magnitude_bound(weights, magnitudes),
+            third: magnitude_bound(third, magnitudes),
         }
     }
 
     /// Returns the extreme value between two times with slopes of opposite sign
     /// and a curvature of one sign.
-    fn turning(&mut self, basis: &Basis, signal: &[Complex64], [left, right]: [At; 2], rounding: f64) -> f64 {
+    fn turning_value(
+        &mut self,
+        basis: &Basis,
+        signal: &[Complex64],
+        [left, right]: [SignalSample; 2],
+        rounding: f64,
+    ) -> f64 {
         let (mut from, mut to) = (left.time, right.time);
         let mut time = from + (to - from) * first_guess(&left, &right);
         let mut value = left.value;
         for _ in 0..STEPS {
-            let at = self.at(basis, signal, time);
-            let step = -at.slope / at.curvature;
-            value = at.value + 0.5 * at.slope * step;
+            let sample = self.sample(basis, signal, time);
+            let step = -sample.slope / sample.curvature;
+            value = sample.value + 0.5 * sample.slope * step;
             if left.third * step.abs().powi(3) <= rounding {
                 break;
             }
-            if at.slope * left.slope > 0.0 {
+            if sample.slope * left.slope > 0.0 {
                 from = time
             } else {
                 to = time
@@ -162,7 +170,7 @@ impl Extremes {
 
 /// Returns the zero of the cubic with these slopes and curvatures as a fraction of the
 /// interval. It takes one Newton step from the zero of the chord.
-fn first_guess(left: &At, right: &At) -> f64 {
+fn first_guess(left: &SignalSample, right: &SignalSample) -> f64 {
     let h = right.time - left.time;
     let s = left.slope / (left.slope - right.slope);
     // The cubic deviates from the chord by s (1 - s) (p (1 - s) - q s).
@@ -178,7 +186,7 @@ fn first_guess(left: &At, right: &At) -> f64 {
 ///
 /// `left` and `right` are value and slope at the ends. The curvature is at most `most`, so the
 /// signal lies below the parabolas that start at the ends.
-fn highest(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
+fn upper_bound(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
     let curvature = most.max(0.0);
     let opening = left.1 - right.1 + curvature * h;
     if opening <= 0.0 {
@@ -203,9 +211,9 @@ impl Basis {
         memory: &mut Extremes,
     ) -> Result<(), TooFast> {
         let rounding = ROUNDING * memory.differentiate(self, signal, length);
-        let begin = memory.at(self, signal, 0.0);
+        let begin = memory.sample(self, signal, 0.0);
         let [_, first, second] = &memory.slopes;
-        let end = At {
+        let end = SignalSample {
             time: length,
             value: real_dot(signal, at_end),
             slope: real_dot(first, at_end),
@@ -215,21 +223,21 @@ impl Basis {
         };
         range.take(begin.value);
         range.take(end.value);
-        memory.open.push([begin, end]);
+        memory.intervals.push([begin, end]);
         let mut times = 0;
-        while let Some([left, right]) = memory.open.pop() {
+        while let Some([left, right]) = memory.intervals.pop() {
             let h = right.time - left.time;
             let (middle, change) = (0.5 * (left.curvature + right.curvature), 0.5 * left.third * h);
             let (least, most) = ((middle - change).max(-left.second), (middle + change).min(left.second));
-            let above = highest(h, (left.value, left.slope), (right.value, right.slope), most);
-            let below = -highest(h, (-left.value, -left.slope), (-right.value, -right.slope), -least);
+            let above = upper_bound(h, (left.value, left.slope), (right.value, right.slope), most);
+            let below = -upper_bound(h, (-left.value, -left.slope), (-right.value, -right.slope), -least);
             if above <= range.high + rounding && below >= range.low - rounding {
                 continue;
             }
             let turned = left.slope * right.slope <= 0.0;
             if most < 0.0 || least > 0.0 {
                 if turned {
-                    let value = memory.turning(self, signal, [left, right], rounding);
+                    let value = memory.turning_value(self, signal, [left, right], rounding);
                     range.take(value);
                 }
                 continue;
@@ -243,13 +251,13 @@ impl Basis {
                 continue; // no number lies in between
             }
             times += 1;
-            if times > MOST_TIMES {
+            if times > MAX_SUBDIVISIONS {
                 return Err(TooFast);
             }
-            let between = memory.at(self, signal, time);
+            let between = memory.sample(self, signal, time);
             range.take(between.value);
-            memory.open.push([left, between]);
-            memory.open.push([between, right]);
+            memory.intervals.push([left, between]);
+            memory.intervals.push([between, right]);
         }
         Ok(())
     }

@@ -31,7 +31,7 @@ mod tests {
     /// A size smaller by half of the tolerance is equal, by twice the tolerance it is not. A
     /// size that is not finite is never the largest.
     #[test]
-    fn of_equal_sizes_the_first_leads() {
+    fn first_of_equal_sizes_is_returned() {
         for (first, expected) in [(1.0 - 0.5 * EQUAL, 1), (1.0 - 2.0 * EQUAL, 2)] {
             assert_eq!(leading([f64::NAN, first, 1.0, f64::INFINITY].into_iter()), Some(expected));
         }

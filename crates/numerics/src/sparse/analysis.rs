@@ -51,7 +51,7 @@ impl Analysis {
     /// exceed the 32-bit indices.
     #[must_use]
     pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
-        Analysis { pattern: Arc::new(self.pattern.in_order(matrices)) }
+        Analysis { pattern: Arc::new(self.pattern.with_order(matrices)) }
     }
 
     /// Returns the number of rows and columns.

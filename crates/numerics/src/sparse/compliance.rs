@@ -26,20 +26,20 @@ impl Factor {
     pub fn compliance(&self, forces: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
         let k = forces.len();
         let mut compliance = DMatrix::zeros(k, k);
-        let Some(parts) = self.parts() else { return compliance };
+        let Some(supernodes) = self.supernodes() else { return compliance };
         // The rows of Y in elimination order, k numbers each.
         let mut y = vec![0.0; self.n() * k];
         let mut moved = vec![false; self.n()];
         for (column, force) in forces.iter().enumerate() {
             for &(row, value) in force {
-                let at = self.place(row);
+                let at = self.elimination_place(row);
                 y[at * k + column] += value;
                 moved[at] = true;
             }
         }
         let (mut below, mut weighted) = (Vec::new(), Vec::new());
-        for s in 0..parts.symbolic().n_supernodes() {
-            let part = parts.supernode(s);
+        for s in 0..supernodes.symbolic().n_supernodes() {
+            let part = supernodes.supernode(s);
             let (first, values) = (part.start(), part.val());
             let size = values.ncols();
             if !moved[first..first + size].contains(&true) {
@@ -59,7 +59,7 @@ impl Factor {
                 Par::Seq,
             );
             for (&row, below) in part.pattern().iter().zip(below.chunks_exact(k)) {
-                let at = self.exchanged(row as usize);
+                let at = self.pivoted_place(row as usize);
                 y[at * k..(at + 1) * k].iter_mut().zip(below).for_each(|(y, below)| *y -= below);
                 moved[at] = true;
             }

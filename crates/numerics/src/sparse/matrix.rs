@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// Maximum number of rows and entries. Indices have 32 bits, which halves the
 /// memory of the pattern.
-const MOST: usize = i32::MAX as usize;
+const MAX_SIZE: usize = i32::MAX as usize;
 
 /// A square matrix of which only nonzero entries are stored, by columns with rising rows.
 ///
@@ -54,7 +54,7 @@ pub enum MatrixError {
     },
     /// The numbers of rows or entries exceed the 32-bit indices.
     #[error(
-        "a matrix with {n} rows and {entries} entries is too large; at most {MOST} rows and {MOST} entries are supported"
+        "a matrix with {n} rows and {entries} entries is too large; at most {MAX_SIZE} rows and {MAX_SIZE} entries are supported"
     )]
     TooLarge {
         /// Number of rows.
@@ -94,15 +94,15 @@ impl Matrix {
             if row >= n || column >= n {
                 return Err(MatrixError::OutOfRange { row, column, n });
             }
-            if n > MOST || entries.len() == MOST {
+            if n > MAX_SIZE || entries.len() == MAX_SIZE {
                 return Err(MatrixError::TooLarge { n, entries: entries.len() + 1 });
             }
             entries.push((column as u32, row as u32, value));
         }
         // Both sorts are stable, so contributions to one place keep their order.
         if !entries.is_sorted_by_key(|&(column, row, _)| (column, row)) {
-            entries = sorted_by(n, &entries, |entry| entry.1);
-            entries = sorted_by(n, &entries, |entry| entry.0);
+            entries = counting_sort(n, &entries, |entry| entry.1);
+            entries = counting_sort(n, &entries, |entry| entry.0);
         }
         entries.dedup_by(|next, kept| {
             let same = (next.0, next.1) == (kept.0, kept.1);
@@ -217,7 +217,7 @@ type Entry = (u32, u32, f64);
 ///
 /// Two such sorts, by row and by column, take as long as reading the entries a
 /// few times, for any number of entries.
-fn sorted_by(n: usize, entries: &[Entry], key: impl Fn(&Entry) -> u32) -> Vec<Entry> {
+fn counting_sort(n: usize, entries: &[Entry], key: impl Fn(&Entry) -> u32) -> Vec<Entry> {
     let mut next = vec![0u32; n + 1];
     entries.iter().for_each(|entry| next[key(entry) as usize + 1] += 1);
     (0..n).for_each(|at| next[at + 1] += next[at]);

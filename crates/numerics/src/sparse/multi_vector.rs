@@ -72,22 +72,22 @@ impl Matrix {
         let all = count(n, v);
         let mut product = vec![0.0; n * all];
         let at = |column: usize| column * n;
-        let whole = all / TOGETHER * TOGETHER;
-        self.times_side_by_side::<TOGETHER>(&v[..at(whole)], &mut product[..at(whole)]);
+        let whole = all / COLUMNS_AT_ONCE * COLUMNS_AT_ONCE;
+        self.multiply_n::<COLUMNS_AT_ONCE>(&v[..at(whole)], &mut product[..at(whole)]);
         let rest = (&v[at(whole)..], &mut product[at(whole)..]);
         match all - whole {
             0 => {}
-            1 => self.times_side_by_side::<1>(rest.0, rest.1),
-            2 => self.times_side_by_side::<2>(rest.0, rest.1),
-            3 | 4 => self.times_side_by_side::<4>(rest.0, rest.1),
-            _ => self.times_side_by_side::<TOGETHER>(rest.0, rest.1),
+            1 => self.multiply_n::<1>(rest.0, rest.1),
+            2 => self.multiply_n::<2>(rest.0, rest.1),
+            3 | 4 => self.multiply_n::<4>(rest.0, rest.1),
+            _ => self.multiply_n::<COLUMNS_AT_ONCE>(rest.0, rest.1),
         }
         product
     }
 
     /// Computes `A V` for `N` columns at once, with zeros in place of missing columns. The columns
     /// are stored row by row, so an entry meets one row of all columns in consecutive memory.
-    fn times_side_by_side<const N: usize>(&self, v: &[f64], product: &mut [f64]) {
+    fn multiply_n<const N: usize>(&self, v: &[f64], product: &mut [f64]) {
         let n = self.n();
         if v.is_empty() {
             return;
@@ -127,7 +127,7 @@ fn add_column<const N: usize>(from: [f64; N], rows: &[u32], values: &[f64], to: 
 }
 
 /// Number of columns multiplied at once: the entries are read once for all of them.
-const TOGETHER: usize = 8;
+const COLUMNS_AT_ONCE: usize = 8;
 
 /// Returns the number of columns of length `n`.
 fn count(n: usize, v: &[f64]) -> usize {

@@ -47,12 +47,12 @@ impl Pattern {
 
     /// Builds the pattern of other matrices with the order of this one,
     /// rearranged by their elimination tree.
-    pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
+    pub fn with_order(&self, matrices: &[&Matrix]) -> Self {
         Pattern::ordered(self.n, union(self.n, matrices), &self.order)
     }
 
     fn ordered(n: usize, (starts, rows): (Vec<u32>, Vec<u32>), order: &[u32]) -> Self {
-        let order = by_tree(order, &starts, &rows);
+        let order = postordered(order, &starts, &rows);
         let mut inverse = vec![0; n];
         order.iter().enumerate().for_each(|(at, &row)| inverse[row as usize] = at as u32);
         let (real, complex, unsymmetric) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
@@ -168,12 +168,12 @@ impl Pattern {
 /// by columns with rising rows.
 fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
     assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum must have one size");
-    let mirrored: Vec<_> = matrices.iter().map(|matrix| mirrored(n, &matrix.starts, &matrix.rows)).collect();
+    let transposed: Vec<_> = matrices.iter().map(|matrix| transposed(n, &matrix.starts, &matrix.rows)).collect();
     let most = matrices.iter().map(|matrix| matrix.rows.len()).max().unwrap_or(0);
     let (mut starts, mut rows) = (Vec::with_capacity(n + 1), Vec::with_capacity(most + n));
     starts.push(0);
     // The last column in which a row was added.
-    let mut met = vec![NONE; n];
+    let mut met = vec![NO_ROW; n];
     for column in 0..n {
         let first = rows.len();
         let mut meet = |some: &[u32]| {
@@ -184,7 +184,7 @@ fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
                 }
             }
         };
-        for (matrix, (starts, rows)) in matrices.iter().zip(&mirrored) {
+        for (matrix, (starts, rows)) in matrices.iter().zip(&transposed) {
             meet(&matrix.rows[matrix.range(column)]);
             meet(&rows[starts[column] as usize..starts[column + 1] as usize]);
         }
@@ -196,7 +196,7 @@ fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// Returns the transposed pattern, by columns with rising rows.
-fn mirrored(n: usize, starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
+fn transposed(n: usize, starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let mut next = vec![0; n + 1];
     rows.iter().for_each(|row| next[*row as usize + 1] += 1);
     (0..n).for_each(|row| next[row + 1] += next[row]);
@@ -218,16 +218,16 @@ fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
     // The first row with the same pattern. The diagonal is whole, so this row
     // is one of the row's entries.
     let mut first: Vec<u32> = (0..n as u32).collect();
-    let mut alike = vec![0u32; n];
+    let mut vertex_of = vec![0u32; n];
     let mut number = 0;
     for row in 0..n as u32 {
         let own = column(row);
         let same = own.iter().take_while(|other| **other < row);
         let same = same.filter(|other| first[**other as usize] == **other).find(|other| column(**other) == own);
         match same {
-            Some(&other) => (first[row as usize], alike[row as usize]) = (other, alike[other as usize]),
+            Some(&other) => (first[row as usize], vertex_of[row as usize]) = (other, vertex_of[other as usize]),
             None => {
-                alike[row as usize] = number;
+                vertex_of[row as usize] = number;
                 number += 1;
             }
         }
@@ -235,18 +235,18 @@ fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
     let (mut among, mut links) = (vec![0i32], Vec::new());
     for row in (0..n as u32).filter(|row| first[*row as usize] == *row) {
         let others = column(row).iter().filter(|other| first[**other as usize] == **other);
-        links.extend(others.map(|other| alike[*other as usize] as i32));
+        links.extend(others.map(|other| vertex_of[*other as usize] as i32));
         among.push(links.len() as i32);
     }
     let pattern = CscPattern::new(number as usize, &among, &links).expect("the union of patterns is a pattern");
     let order = metis_order(&pattern).unwrap_or_else(|error| panic!("{n} rows, {} entries: {error:?}", rows.len()));
     let mut members = vec![Vec::new(); number as usize];
-    alike.iter().enumerate().for_each(|(row, &number)| members[number as usize].push(row as u32));
+    vertex_of.iter().enumerate().for_each(|(row, &number)| members[number as usize].push(row as u32));
     order.iter().flat_map(|number| members[*number as usize].iter().copied()).collect()
 }
 
 /// Marks the absence of a row.
-const NONE: u32 = u32::MAX;
+const NO_ROW: u32 = u32::MAX;
 
 /// Returns the order sorted by the elimination tree, children before parents.
 ///
@@ -254,11 +254,11 @@ const NONE: u32 = u32::MAX;
 /// and form the largest possible supernodes.
 ///
 /// Source: Liu (1990), "The role of elimination trees in sparse factorization".
-fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
+fn postordered(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
     let n = order.len();
     let mut at = vec![0u32; n];
     order.iter().enumerate().for_each(|(place, &row)| at[row as usize] = place as u32);
-    let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
+    let (mut parent, mut ancestor) = (vec![NO_ROW; n], vec![NO_ROW; n]);
     for place in 0..n as u32 {
         let row = order[place as usize] as usize;
         for other in &rows[starts[row] as usize..starts[row + 1] as usize] {
@@ -266,7 +266,7 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
             // Path compression: visited paths lead directly to this place.
             while below < place {
                 let next = std::mem::replace(&mut ancestor[below as usize], place);
-                if next == NONE {
+                if next == NO_ROW {
                     parent[below as usize] = place;
                     break;
                 }
@@ -275,16 +275,16 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
         }
     }
     // The children of each row as a linked list, the lowest first.
-    let (mut child, mut next) = (vec![NONE; n + 1], vec![NONE; n]);
+    let (mut child, mut next) = (vec![NO_ROW; n + 1], vec![NO_ROW; n]);
     for place in (0..n).rev() {
-        let of = if parent[place] == NONE { n } else { parent[place] as usize };
-        (next[place], child[of]) = (child[of], place as u32);
+        let owner = if parent[place] == NO_ROW { n } else { parent[place] as usize };
+        (next[place], child[owner]) = (child[owner], place as u32);
     }
     let mut sorted = Vec::with_capacity(n);
     let mut path = vec![n];
     while let Some(&last) = path.last() {
         match child[last] {
-            NONE => {
+            NO_ROW => {
                 path.pop();
                 sorted.extend(order.get(last));
             }
@@ -315,9 +315,9 @@ mod tests {
         assert!(sorted.iter().enumerate().all(|(at, row)| at == *row as usize));
         assert!(pattern.order.chunks(3).all(|rows| rows.iter().all(|row| row / 3 == rows[0] / 3)));
         // An order that follows the tree does not change.
-        assert_eq!(by_tree(&pattern.order, &pattern.starts, &pattern.rows), pattern.order);
+        assert_eq!(postordered(&pattern.order, &pattern.starts, &pattern.rows), pattern.order);
         // A diagonal matrix has an elimination tree without edges, so the order does not change.
         let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap();
-        assert_eq!(pattern.in_order(&[&one]).order, pattern.order);
+        assert_eq!(pattern.with_order(&[&one]).order, pattern.order);
     }
 }

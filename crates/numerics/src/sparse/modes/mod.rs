@@ -25,7 +25,7 @@ mod lanczos;
 mod natural_modes;
 
 use super::{Analysis, Factor, Matrix, Singular};
-use lanczos::{Lanczos, Pair};
+use lanczos::{Lanczos, RitzPair};
 use natural_modes::BLOCK;
 pub use natural_modes::{Effort, ModesError, NaturalModes};
 
@@ -35,10 +35,10 @@ const CONVERGED: f64 = 1e-10;
 /// An eigenvalue above a bound by less than this relative difference counts as below it.
 const ROUNDING: f64 = 1e-9;
 /// Maximum number of vectors of a run. Each takes memory of n numbers.
-const MOST: usize = 320;
+const MAX_VECTORS: usize = 320;
 /// Maximum number of runs. Each run except the first starts where eigenvalues are known to be
-/// missing, and finds about `MOST` / 3 modes.
-const RUNS: usize = 100;
+/// missing, and finds about `MAX_VECTORS` / 3 modes.
+const MAX_RUNS: usize = 100;
 /// The first shift without other knowledge, relative to a typical `k_ii / m_ii`.
 ///
 /// It is below the first mode of a compact body and far above the rounding of a rigid-body
@@ -53,12 +53,12 @@ const SHIFT_OF_BOUND: f64 = 0.01;
 const SLENDER: (f64, f64) = (1e-6, 0.1);
 /// Number of blocks after which an unfinished search tests if its first shift was too large.
 /// These blocks cost about as much as another factor.
-const JUDGED: usize = 12;
+const SLENDER_CHECK_BLOCKS: usize = 12;
 /// Number of blocks between two convergence checks.
-const CHECKED: usize = 4;
+const CHECK_INTERVAL: usize = 4;
 /// Divisor of the number of blocks so far that gives a longer interval between checks. The cost
 /// of the projected problem grows with the cube of the blocks.
-const CHECKED_SHARE: usize = 8;
+const CHECK_DIVISOR: usize = 8;
 /// Smallest gap between two eigenvalues, relative to their distance from the
 /// first shift, in which eigenvalues can be counted.
 const GAP: f64 = 1e-5;
@@ -66,7 +66,7 @@ const GAP: f64 = 1e-5;
 /// starts. It is relative to the distance of that mode from the first shift.
 ///
 /// It is at least the magnitude of that shift, for structures with many rigid-body modes.
-const BEYOND: f64 = 0.1;
+const NEXT_SHIFT_DISTANCE: f64 = 0.1;
 /// Number of attempts to factor near an eigenvalue, each further away by `GAP`.
 const ATTEMPTS: usize = 8;
 
@@ -107,15 +107,16 @@ impl NaturalModes {
     /// ```
     pub fn new(analysis: &Analysis, stiffness: &Matrix, mass: &Matrix, wanted: Wanted) -> Result<Self, ModesError> {
         if mass.n() == 0 {
-            return Ok(NaturalModes::none());
+            return Ok(NaturalModes::empty());
         }
-        let scale = usual(stiffness, mass);
-        Search { analysis, stiffness, mass, wanted, scale, found: NaturalModes { scale, ..NaturalModes::none() } }.run()
+        let scale = typical_eigenvalue(stiffness, mass);
+        Search { analysis, stiffness, mass, wanted, scale, found: NaturalModes { scale, ..NaturalModes::empty() } }
+            .run()
     }
 }
 
 /// Returns the median of `k_ii / m_ii`, rad²/s², or one if no ratio is positive and finite.
-fn usual(stiffness: &Matrix, mass: &Matrix) -> f64 {
+fn typical_eigenvalue(stiffness: &Matrix, mass: &Matrix) -> f64 {
     let mut ratios: Vec<f64> = (0..mass.n())
         .map(|i| stiffness.get(i, i) / mass.get(i, i))
         .filter(|ratio| ratio.is_finite() && *ratio > 0.0)
@@ -136,14 +137,14 @@ struct Search<'a> {
 }
 
 /// The result of a run of the Lanczos process.
-struct Run {
+struct LanczosRun {
     modes: NaturalModes,
     vectors: usize,
-    end: End,
+    end: RunEnd,
 }
 
 /// The reason why a run ended.
-enum End {
+enum RunEnd {
     /// Enough modes, or the maximum number of vectors.
     Full,
     /// The maximum number of vectors without a converged mode: the eigenvalues are closer to
@@ -158,30 +159,31 @@ enum End {
 impl Search<'_> {
     fn run(mut self) -> Result<NaturalModes, ModesError> {
         let least = LEAST_SHIFT * self.scale;
-        let mut depth = match self.wanted {
+        // The magnitude of the first, negative shift.
+        let mut first_shift = match self.wanted {
             Wanted::Lowest(0) => return Ok(self.found),
             Wanted::Lowest(_) => SHIFT * self.scale,
             Wanted::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
             Wanted::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
         };
-        let (mut shift, mut factor) = self.first(depth, None)?;
+        let (mut shift, mut factor) = self.first_factor(first_shift, None)?;
         let mut counted = 0;
-        for _ in 0..RUNS {
-            let run = self.around(shift, &factor, counted, depth)?;
+        for _ in 0..MAX_RUNS {
+            let run = self.run_at(shift, &factor, counted, first_shift)?;
             self.found.effort.vectors += run.vectors;
-            if let End::Slender(value) = run.end {
-                depth = value.max(least);
-                (shift, factor) = self.first(depth, Some(factor))?;
+            if let RunEnd::Slender(value) = run.end {
+                first_shift = value.max(least);
+                (shift, factor) = self.first_factor(first_shift, Some(factor))?;
                 continue;
             }
-            if let End::Clustered(value) = run.end {
-                (shift, factor) = self.beside(value, depth, factor)?;
+            if let RunEnd::Clustered(value) = run.end {
+                (shift, factor) = self.factor_near(value, first_shift, factor)?;
                 counted = factor.negative();
                 continue;
             }
-            let (exhausted, more) = (matches!(run.end, End::Exhausted), run.modes.count());
-            self.found.join(self.mass.n(), run.modes);
-            (shift, factor) = self.beside(self.bound(exhausted, depth), depth, factor)?;
+            let (exhausted, more) = (matches!(run.end, RunEnd::Exhausted), run.modes.count());
+            self.found.merge(self.mass.n(), run.modes);
+            (shift, factor) = self.factor_near(self.complete_up_to(exhausted, first_shift), first_shift, factor)?;
             counted = factor.negative();
             let found = self.found.below(shift);
             let (enough, keep) = match self.wanted {
@@ -192,7 +194,7 @@ impl Search<'_> {
                 Wanted::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
             };
             if found == counted && (enough || exhausted) {
-                return self.whole(keep);
+                return self.checked(keep);
             }
             if found > counted || exhausted || more == 0 {
                 break;
@@ -203,7 +205,7 @@ impl Search<'_> {
 
     /// Returns the first `keep` modes. Fails if a mode is negative, because a large first shift
     /// does not detect eigenvalues just below zero.
-    fn whole(mut self, keep: usize) -> Result<NaturalModes, ModesError> {
+    fn checked(mut self, keep: usize) -> Result<NaturalModes, ModesError> {
         let below = -SHIFT * self.scale;
         match self.found.below(below) {
             0 => {
@@ -225,19 +227,19 @@ impl Search<'_> {
     }
 
     /// Factors at the first, negative shift.
-    fn first(&mut self, depth: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
-        let factor = self.factor(-depth, last).map_err(ModesError::Massless)?;
+    fn first_factor(&mut self, first_shift: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
+        let factor = self.factor(-first_shift, last).map_err(ModesError::Massless)?;
         match factor.negative() {
-            0 => Ok((-depth, factor)),
-            count => Err(ModesError::Negative { count, below: -depth }),
+            0 => Ok((-first_shift, factor)),
+            count => Err(ModesError::Negative { count, below: -first_shift }),
         }
     }
 
     /// Factors at a shift, or slightly above it if the shift is an eigenvalue.
-    fn beside(&mut self, shift: f64, depth: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
+    fn factor_near(&mut self, shift: f64, first_shift: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
         let (mut last, mut failed) = (Some(last), Singular { row: 0 });
         for attempt in 0..ATTEMPTS {
-            let shift = shift + attempt as f64 * GAP * (shift.abs() + depth);
+            let shift = shift + attempt as f64 * GAP * (shift.abs() + first_shift);
             match self.factor(shift, last.take()) {
                 Ok(factor) => return Ok((shift, factor)),
                 Err(singular) => failed = singular,
@@ -247,7 +249,7 @@ impl Search<'_> {
     }
 
     /// Returns a value up to which the modes found may be complete, in a gap between them.
-    fn bound(&self, exhausted: bool, depth: f64) -> f64 {
+    fn complete_up_to(&self, exhausted: bool, first_shift: f64) -> f64 {
         let values = &self.found.values;
         // The bound needs this number of modes below it, and lies above `above`.
         let (below, above) = match self.wanted {
@@ -259,34 +261,36 @@ impl Search<'_> {
         };
         let last = values.last().copied().unwrap_or(0.0).max(above);
         let gaps = (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
-        let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + depth);
+        let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + first_shift);
         // Inside a cluster no gap is wide, so the widest one serves.
         let widest = || gaps.clone().filter(wide(ROUNDING)).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
         let gap = gaps.clone().find(wide(GAP)).or_else(widest);
-        gap.map_or(last + (BEYOND * (last + depth)).max(depth), |(low, high)| 0.5 * (low + high))
+        gap.map_or(last + (NEXT_SHIFT_DISTANCE * (last + first_shift)).max(first_shift), |(low, high)| {
+            0.5 * (low + high)
+        })
     }
 
     /// Runs the Lanczos process at a shift with `counted` eigenvalues below it.
-    fn around(&self, shift: f64, factor: &Factor, counted: usize, depth: f64) -> Result<Run, ModesError> {
+    fn run_at(&self, shift: f64, factor: &Factor, counted: usize, first_shift: f64) -> Result<LanczosRun, ModesError> {
         let mut lanczos = Lanczos::new(factor, self.mass, &self.found.shapes);
         let missing = counted.saturating_sub(self.found.below(shift));
         let wanted = match self.wanted {
             Wanted::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
-            Wanted::UpTo { .. } => MOST,
+            Wanted::UpTo { .. } => MAX_VECTORS,
         };
-        let value = |pair: &Pair| shift + 1.0 / pair.theta;
-        let (mut blocks, mut next) = (0, CHECKED);
+        let value = |pair: &RitzPair| shift + 1.0 / pair.theta;
+        let (mut blocks, mut next) = (0, CHECK_INTERVAL);
         loop {
             blocks += 1;
             let exhausted = !lanczos.expand()?;
-            let full = lanczos.expanded + BLOCK > MOST;
+            let full = lanczos.expanded + BLOCK > MAX_VECTORS;
             if !(exhausted || full || blocks == next) {
                 continue;
             }
-            next += CHECKED.max(blocks / CHECKED_SHARE);
+            next += CHECK_INTERVAL.max(blocks / CHECK_DIVISOR);
             let mut pairs = lanczos.pairs()?;
             let nearest_value = pairs.first().map(value);
-            let converged = |pair: &Pair| pair.residual <= CONVERGED * pair.theta.abs();
+            let converged = |pair: &RitzPair| pair.residual <= CONVERGED * pair.theta.abs();
             let nearest = pairs.iter().take_while(|pair| converged(pair)).count();
             pairs.retain(converged);
             let near = &pairs[..nearest];
@@ -300,18 +304,18 @@ impl Search<'_> {
             if (enough && low >= missing) || full || exhausted {
                 let modes = lanczos.modes(self.stiffness, shift, &pairs)?;
                 let end = match nearest_value {
-                    _ if exhausted => End::Exhausted,
-                    Some(value) if pairs.is_empty() => End::Clustered(value),
-                    _ => End::Full,
+                    _ if exhausted => RunEnd::Exhausted,
+                    Some(value) if pairs.is_empty() => RunEnd::Clustered(value),
+                    _ => RunEnd::Full,
                 };
-                return Ok(Run { modes, vectors: lanczos.expanded, end });
+                return Ok(LanczosRun { modes, vectors: lanczos.expanded, end });
             }
-            if blocks >= JUDGED && self.found.count() == 0 && depth > LEAST_SHIFT * self.scale {
-                let elastic = pairs.iter().map(value).filter(|value| *value > SLENDER.0 * depth);
+            if blocks >= SLENDER_CHECK_BLOCKS && self.found.count() == 0 && first_shift > LEAST_SHIFT * self.scale {
+                let elastic = pairs.iter().map(value).filter(|value| *value > SLENDER.0 * first_shift);
                 let first = elastic.fold(f64::INFINITY, f64::min);
-                if first < SLENDER.1 * depth {
-                    let end = End::Slender(first);
-                    return Ok(Run { modes: NaturalModes::none(), vectors: lanczos.expanded, end });
+                if first < SLENDER.1 * first_shift {
+                    let end = RunEnd::Slender(first);
+                    return Ok(LanczosRun { modes: NaturalModes::empty(), vectors: lanczos.expanded, end });
                 }
             }
         }
@@ -523,7 +527,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_modes_says_why() {
+    fn errors_of_systems_without_modes() {
         let n = 30;
         let (free, m) = (springs(n, (1..n).map(|i| (i - 1, i))), identity(n));
         let unstable = matrix(n, free.entries().chain([(4, 4, -0.5)]));
