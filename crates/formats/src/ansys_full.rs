@@ -11,10 +11,10 @@
 
 use std::rc::Rc;
 
-use crate::bytes::{Bytes, Order};
+use crate::bytes::{ByteCursor, ByteOrder};
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
 
 pub(crate) const FORMAT: Format = Format {
@@ -51,21 +51,21 @@ mod item {
 }
 
 /// Returns the byte order, if the file has a standard header of a full file.
-fn order(bytes: &[u8]) -> Option<Order> {
-    [Order::Little, Order::Big].into_iter().find(|&order| {
-        let mut words = Bytes::new(bytes, order);
+fn order(bytes: &[u8]) -> Option<ByteOrder> {
+    [ByteOrder::Little, ByteOrder::Big].into_iter().find(|&order| {
+        let mut words = ByteCursor::new(bytes, order);
         let mut word = || words.u32().ok();
         (word(), word().is_some(), word()) == (Some(STANDARD), true, Some(FULL))
     })
 }
 
 /// Moves to a word of the file.
-fn seek(file: &mut Bytes, word: usize) -> Result<(), Error> {
+fn seek(file: &mut ByteCursor, word: usize) -> Result<(), Error> {
     file.seek(word.saturating_mul(4))
 }
 
 /// Reads the next record: its flags and its data.
-fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
+fn record<'a>(file: &mut ByteCursor<'a>) -> Result<(u32, ByteCursor<'a>), Error> {
     let location = file.clone();
     let words = file.u32()? as usize;
     let flags = file.u32()?;
@@ -76,38 +76,38 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
     }
     let data = file.take(words.saturating_mul(4))?;
     file.skip(4);
-    Ok((flags, Bytes::new(data, file.order)))
+    Ok((flags, ByteCursor::new(data, file.order)))
 }
 
 /// Reads the next record as integers.
-fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
+fn integers(file: &mut ByteCursor) -> Result<Vec<i64>, Error> {
     let location = file.clone();
     let (flags, mut data) = record(file)?;
     if flags & INTEGERS == 0 {
         return Err(location.malformed("a record of whole numbers", format!("one with flags {flags:#x}")));
     }
     match flags & SHORT {
-        0 => (0..data.left() / 4).map(|_| data.i32().map(i64::from)).collect(),
-        _ => (0..data.left() / 2).map(|_| data.i16().map(i64::from)).collect(),
+        0 => (0..data.remaining() / 4).map(|_| data.i32().map(i64::from)).collect(),
+        _ => (0..data.remaining() / 2).map(|_| data.i16().map(i64::from)).collect(),
     }
 }
 
 /// Reads the next record as real numbers.
-fn reals(file: &mut Bytes) -> Result<Vec<f64>, Error> {
+fn reals(file: &mut ByteCursor) -> Result<Vec<f64>, Error> {
     let location = file.clone();
     let (flags, mut data) = record(file)?;
     if flags & INTEGERS != 0 {
         return Err(location.malformed("a record of real numbers", format!("one with flags {flags:#x}")));
     }
     match flags & SHORT {
-        0 => (0..data.left() / 8).map(|_| data.f64()).collect(),
-        _ => (0..data.left() / 4).map(|_| data.f32().map(f64::from)).collect(),
+        0 => (0..data.remaining() / 8).map(|_| data.f64()).collect(),
+        _ => (0..data.remaining() / 4).map(|_| data.f32().map(f64::from)).collect(),
     }
 }
 
 /// The data that the matrices of a file share.
 struct System<'a> {
-    file: Bytes<'a>,
+    file: ByteCursor<'a>,
     /// Number of equations in the file, including the constrained ones.
     equations: usize,
     /// The constrained equations.
@@ -118,8 +118,8 @@ struct System<'a> {
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let order = order(bytes).unwrap_or(Order::Little);
-    let mut file = Bytes::new(bytes, order);
+    let order = order(bytes).unwrap_or(ByteOrder::Little);
+    let mut file = ByteCursor::new(bytes, order);
     seek(&mut file, HEADER)?;
     let header = integers(&mut file)?;
     if header.len() < item::COUNT {
@@ -186,7 +186,7 @@ fn names_of(labels: &[i64], nodes: &[i64], counts: &[i64], dofs: &[i64]) -> Opti
 fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
     let mut file = system.file.clone();
     seek(&mut file, start)?;
-    let mut triplets = Triplets::new(system.equations, system.equations, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(system.equations, system.equations, 0, Location::File)?;
     if name == "mass" && system.lumped {
         let location = file.location();
         let diagonal = reals(&mut file)?;
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_said() {
+    fn unsupported_files_are_refused() {
         let check = |change: fn(&mut [i32]), kind| {
             let found = read_bytes(&file(change), None, Some("stiffness")).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind));

@@ -2,13 +2,13 @@
 //!
 //! Some programs omit rows without entries in one matrix but not in the other.
 //! Such rows are matched by their names. ANSYS writes a constrained row as a
-//! row of zeros, and Abaqus with [`CLAMPED`] on its diagonal.
+//! row of zeros, and Abaqus with [`CONSTRAINED_DIAGONAL`] on its diagonal.
 
 use crate::error::Error;
 use crate::matrix::Matrix;
 
 /// Diagonal value of a constrained row in Abaqus. A larger value is not a stiffness either.
-pub(crate) const CLAMPED: f64 = 1e36;
+pub(crate) const CONSTRAINED_DIAGONAL: f64 = 1e36;
 
 /// Returns `matrix` with the rows of `first`, in their order. If either has no
 /// names, the function returns `matrix` unchanged.
@@ -52,7 +52,7 @@ pub fn constrained(matrices: &[&Matrix], rows: usize) -> Vec<usize> {
     let entries = || matrices.iter().flat_map(|matrix| matrix.entries());
     entries().for_each(|entry| (free[entry.row as usize], free[entry.column as usize]) = (true, true));
     entries()
-        .filter(|entry| entry.row == entry.column && entry.value >= CLAMPED)
+        .filter(|entry| entry.row == entry.column && entry.value >= CONSTRAINED_DIAGONAL)
         .for_each(|entry| free[entry.row as usize] = false);
     (0..rows).filter(|&row| !free[row]).collect()
 }

@@ -8,10 +8,10 @@
 //! Analysis User's Guide, Generating matrices.
 
 use crate::error::{Error, Kind, Location};
-use crate::first_line::{FirstLine, unclear, whole};
+use crate::first_line::{FirstLine, ambiguous, whole};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::text::{Line, Lines, integer, must_end_its_lines, real};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, integer, real, require_final_newline};
 
 pub(crate) const FORMAT: Format = Format {
     name: "coordinate",
@@ -36,9 +36,9 @@ fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(usize, usize, f64, Line
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    match FirstLine::of(bytes) {
+    match FirstLine::classify(bytes) {
         FirstLine::Entry => {}
-        FirstLine::Unclear(line) => return Err(unclear(&line)),
+        FirstLine::Ambiguous(line) => return Err(ambiguous(&line)),
         FirstLine::Sizes => {
             let problem = "the first line contains sizes, not an entry".into();
             let remedy = "omit the format, or state matrix-market";
@@ -60,7 +60,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let problem = "the file has no entry; lines `row column value` are required".into();
         return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
     }
-    must_end_its_lines(bytes)?;
+    require_final_newline(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
 }
 
@@ -73,7 +73,7 @@ fn is_full_of_three(bytes: &[u8]) -> bool {
 }
 
 fn read(bytes: &[u8], size: usize, count: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(size, size, count, Location::File)?;
+    let mut triplets = TripletBuilder::new(size, size, count, Location::File)?;
     for entry in entries(bytes) {
         let (row, column, value, line) = entry?;
         triplets.push(row, column, value, line.location())?;
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let error =
                 read_bytes(text.as_bytes(), Some("coordinate"), None).map(|_| ()).map_err(|e| (e.kind, e.location));

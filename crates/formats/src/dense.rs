@@ -11,8 +11,8 @@
 
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::text::{Line, Lines, integer, must_end_its_lines, real};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, integer, real, require_final_newline};
 
 pub(crate) const FORMAT: Format = Format {
     name: "dense-text",
@@ -66,7 +66,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let remedy = "for full rows, write all numbers with a decimal point; for entries, remove comments and commas";
         return fault(Kind::Malformed, problem, remedy);
     }
-    must_end_its_lines(bytes)?;
+    require_final_newline(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size))])
 }
 
@@ -76,7 +76,7 @@ fn has_indices(line: &Line) -> bool {
 }
 
 fn read(bytes: &[u8], size: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(size, size, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(size, size, 0, Location::File)?;
     for (row, line) in rows(bytes).enumerate() {
         for (column, field) in fields(&line).enumerate() {
             triplets.push(row, column, line.real(field)?, line.location())?;
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_square_of_numbers_is_refused_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let found = read_bytes(text.as_bytes(), Some("dense-text"), None).map(|_| ());
             assert_eq!(found.map_err(|e| (e.kind, e.location)), Err((kind, location)), "{text}");

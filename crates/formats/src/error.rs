@@ -26,13 +26,13 @@ impl Error {
     }
 
     /// Returns the error with a path, if it has none yet.
-    pub(crate) fn of(mut self, path: &Path) -> Self {
+    pub(crate) fn with_path(mut self, path: &Path) -> Self {
         self.path.get_or_insert_with(|| path.to_path_buf());
         self
     }
 
     /// Returns the error with a location, if it has none yet.
-    pub(crate) fn at(mut self, location: Location) -> Self {
+    pub(crate) fn with_location(mut self, location: Location) -> Self {
         if self.location == Location::File {
             self.location = location;
         }
@@ -121,10 +121,10 @@ mod tests {
         let error =
             Error::new(Kind::Count, Location::Line(3), "two numbers, three were expected".into(), "export it again");
         assert_eq!(error.to_string(), "line 3: two numbers, three were expected; export it again");
-        let error = error.of(Path::new("blade.mtx"));
+        let error = error.with_path(Path::new("blade.mtx"));
         assert_eq!(error.to_string(), "blade.mtx, line 3: two numbers, three were expected; export it again");
         let whole = Error::new(Kind::Io, Location::File, "no such file".into(), "check the path");
-        assert_eq!(whole.clone().of(Path::new("a")).to_string(), "a: no such file; check the path");
+        assert_eq!(whole.clone().with_path(Path::new("a")).to_string(), "a: no such file; check the path");
         assert_eq!(whole.to_string(), "no such file; check the path");
     }
 }

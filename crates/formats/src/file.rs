@@ -16,11 +16,13 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     if found.is_dir() {
         let help = format!("give the path of a matrix file in it, such as {}", path.join("stiffness.mtx").display());
         let problem = "the path is a folder, not a file".to_owned();
-        return Err(Error::new(Kind::Io, Location::File, problem, help).of(path));
+        return Err(Error::new(Kind::Io, Location::File, problem, help).with_path(path));
     }
     if !found.is_file() {
         let problem = "the path is a device or a pipe, which has no known size".into();
-        return Err(Error::new(Kind::TooLarge, Location::File, problem, "save its content to a file first").of(path));
+        return Err(
+            Error::new(Kind::TooLarge, Location::File, problem, "save its content to a file first").with_path(path)
+        );
     }
     let mut bytes = Vec::new();
     if found.len() <= LARGEST_FILE {
@@ -34,12 +36,12 @@ pub(crate) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     }
     let problem = format!("the file has {size} bytes; the limit is {LARGEST_FILE} bytes");
     let remedy = "save the matrix in binary (.npz, .mat), or export a smaller structure";
-    Err(Error::new(Kind::TooLarge, Location::File, problem, remedy).of(path))
+    Err(Error::new(Kind::TooLarge, Location::File, problem, remedy).with_path(path))
 }
 
 /// Converts an error of the operating system.
 pub(crate) fn io(path: &Path, error: &std::io::Error) -> Error {
-    Error::new(Kind::Io, Location::File, error.to_string(), "check the path and its permissions").of(path)
+    Error::new(Kind::Io, Location::File, error.to_string(), "check the path and its permissions").with_path(path)
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ impl<'a> Item<'a> {
     }
 
     /// Creates an item that is not a real matrix. `note` describes it.
-    pub fn other(name: impl Into<String>, note: impl Into<String>) -> Self {
+    pub fn not_a_matrix(name: impl Into<String>, note: impl Into<String>) -> Self {
         let (name, note) = (name.into(), note.into());
         let (kind, remedy) = match note == COMPLEX {
             true => (Kind::Complex, "save its real part, or select another matrix"),

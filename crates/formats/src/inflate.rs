@@ -18,11 +18,11 @@ pub const UNPACKED_ALWAYS: usize = 256 << 20;
 
 /// Limit on the decompressed bytes of a file.
 #[derive(Clone, Copy)]
-pub(crate) struct Limit(usize);
+pub(crate) struct DecompressionLimit(usize);
 
-impl Limit {
+impl DecompressionLimit {
     /// Returns the limit for a file of `file` bytes.
-    pub fn of(file: usize) -> Self {
+    pub fn for_file(file: usize) -> Self {
         Self(UNPACKED_ALWAYS.max(file.saturating_mul(EXPANSION)))
     }
 
@@ -34,7 +34,7 @@ impl Limit {
 
 /// The two containers of deflate.
 #[derive(Clone, Copy)]
-pub(crate) enum Wrapping {
+pub(crate) enum Container {
     /// With header and checksum, in MATLAB files.
     Zlib,
     /// Without header, in zip files.
@@ -42,9 +42,14 @@ pub(crate) enum Wrapping {
 }
 
 /// Decompresses all of `packed`.
-pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location: &Location) -> Result<Vec<u8>, Error> {
+pub(crate) fn inflate(
+    packed: &[u8],
+    container: Container,
+    limit: DecompressionLimit,
+    location: &Location,
+) -> Result<Vec<u8>, Error> {
     let most = limit.0;
-    let (bytes, damage) = up_to(packed, wrapping, most + 1);
+    let (bytes, damage) = up_to(packed, container, most + 1);
     let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, location.clone(), problem, remedy));
     if bytes.len() > most {
         let problem =
@@ -61,16 +66,16 @@ pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location:
 }
 
 /// Returns the first `count` decompressed bytes, fewer if the data ends or is damaged.
-pub(crate) fn beginning(packed: &[u8], wrapping: Wrapping, count: usize) -> Vec<u8> {
-    up_to(packed, wrapping, count).0
+pub(crate) fn beginning(packed: &[u8], container: Container, count: usize) -> Vec<u8> {
+    up_to(packed, container, count).0
 }
 
-fn up_to(packed: &[u8], wrapping: Wrapping, count: usize) -> (Vec<u8>, Option<std::io::Error>) {
+fn up_to(packed: &[u8], container: Container, count: usize) -> (Vec<u8>, Option<std::io::Error>) {
     let mut bytes = Vec::new();
     let most = count as u64;
-    let end = match wrapping {
-        Wrapping::Zlib => ZlibDecoder::new(packed).take(most).read_to_end(&mut bytes),
-        Wrapping::Bare => DeflateDecoder::new(packed).take(most).read_to_end(&mut bytes),
+    let end = match container {
+        Container::Zlib => ZlibDecoder::new(packed).take(most).read_to_end(&mut bytes),
+        Container::Bare => DeflateDecoder::new(packed).take(most).read_to_end(&mut bytes),
     };
     (bytes, end.err())
 }
@@ -89,24 +94,25 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_stops_early() -> std::io::Result<()> {
-        let limit = Limit::of(1);
+    fn decompression_bomb_is_refused() -> std::io::Result<()> {
+        let limit = DecompressionLimit::for_file(1);
         let bomb = pack(&vec![0; UNPACKED_ALWAYS + 1])?;
         assert!(bomb.len() < 300_000);
-        let found = inflate(&bomb, Wrapping::Zlib, limit, &Location::Byte(7)).map_err(|e| (e.kind, e.location));
+        let found = inflate(&bomb, Container::Zlib, limit, &Location::Byte(7)).map_err(|e| (e.kind, e.location));
         assert_eq!(found, Err((Kind::TooLarge, Location::Byte(7))));
-        assert_eq!(beginning(&bomb, Wrapping::Zlib, 5), [0; 5]);
+        assert_eq!(beginning(&bomb, Container::Zlib, 5), [0; 5]);
         Ok(())
     }
 
     #[test]
-    fn what_is_damaged_or_short_is_refused() -> std::io::Result<()> {
+    fn damaged_data_is_refused() -> std::io::Result<()> {
         let packed = pack(b"a text that is packed")?;
         assert_eq!(
-            inflate(&packed, Wrapping::Zlib, Limit::of(1), &Location::File).as_deref(),
+            inflate(&packed, Container::Zlib, DecompressionLimit::for_file(1), &Location::File).as_deref(),
             Ok(&b"a text that is packed"[..])
         );
-        let short = inflate(&packed[..packed.len() - 6], Wrapping::Zlib, Limit::of(1), &Location::File);
+        let short =
+            inflate(&packed[..packed.len() - 6], Container::Zlib, DecompressionLimit::for_file(1), &Location::File);
         assert_eq!(short.map_err(|e| e.kind), Err(Kind::Malformed));
         Ok(())
     }

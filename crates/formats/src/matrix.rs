@@ -76,7 +76,7 @@ impl Matrix {
         symmetry: Symmetry,
         entries: impl IntoIterator<Item = (usize, usize, f64)>,
     ) -> Result<Self, Error> {
-        let mut triplets = Triplets::new(rows, columns, 0, Location::File)?;
+        let mut triplets = TripletBuilder::new(rows, columns, 0, Location::File)?;
         for (row, column, value) in entries {
             triplets.push(row, column, value, Location::File)?;
         }
@@ -267,7 +267,7 @@ impl Matrix {
             })
         };
         let symmetry = if self.symmetric { Symmetry::Symmetric } else { Symmetry::General };
-        let mut triplets = Triplets::new(names.len(), names.len(), self.entries.len(), Location::File)?;
+        let mut triplets = TripletBuilder::new(names.len(), names.len(), self.entries.len(), Location::File)?;
         for e in &self.entries {
             triplets.push(place_of(e.row)?, place_of(e.column)?, e.value, Location::File)?;
         }
@@ -311,7 +311,7 @@ impl Matrix {
     }
 
     /// Returns true if both triangles are present and equal to the last bit.
-    fn equals_its_transpose(&self) -> bool {
+    fn is_exactly_symmetric(&self) -> bool {
         if self.rows != self.columns {
             return false;
         }
@@ -342,7 +342,7 @@ impl Matrix {
     }
 
     /// Returns true if any off-diagonal entry has its mirrored entry.
-    fn has_mirror_images(&self) -> bool {
+    fn has_mirrored_entries(&self) -> bool {
         let mirror = |e: &Entry| self.entries.binary_search_by_key(&(e.row, e.column), |e| (e.column, e.row)).is_ok();
         self.entries.iter().any(|e| e.row != e.column && mirror(e))
     }
@@ -375,14 +375,14 @@ fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
 }
 
 /// Entries of a file that become a matrix.
-pub(crate) struct Triplets {
+pub(crate) struct TripletBuilder {
     rows: usize,
     columns: usize,
     entries: Vec<Entry>,
     zeros: usize,
 }
 
-impl Triplets {
+impl TripletBuilder {
     /// Creates a list with room for `expected` entries. The size of the file
     /// must bound this number, not its header.
     pub fn new(rows: usize, columns: usize, expected: usize, location: Location) -> Result<Self, Error> {
@@ -444,7 +444,7 @@ impl Triplets {
         if symmetry == Symmetry::Skew {
             self.add_negative()?;
         }
-        sum_equal(&mut self.entries)?;
+        sum_duplicates(&mut self.entries)?;
         let mut matrix = Matrix {
             rows: self.rows,
             columns: self.columns,
@@ -453,13 +453,13 @@ impl Triplets {
             names: None,
             origin: Origin { zeros: self.zeros, ..Origin::default() },
         };
-        if matches!(symmetry, Symmetry::Symmetric | Symmetry::Unsaid) && !matrix.has_mirror_images() {
+        if matches!(symmetry, Symmetry::Symmetric | Symmetry::Unsaid) && !matrix.has_mirrored_entries() {
             for e in &mut matrix.entries {
                 (e.row, e.column) = (e.row.max(e.column), e.row.min(e.column));
             }
-            sum_equal(&mut matrix.entries)?;
+            sum_duplicates(&mut matrix.entries)?;
             matrix.symmetric = true;
-        } else if matrix.equals_its_transpose() {
+        } else if matrix.is_exactly_symmetric() {
             matrix.entries.retain(|e| e.row >= e.column);
             matrix.symmetric = true;
         } else if symmetry == Symmetry::Symmetric {
@@ -471,7 +471,7 @@ impl Triplets {
     }
 }
 
-impl Triplets {
+impl TripletBuilder {
     /// Adds the other triangle of a skew-symmetric matrix.
     fn add_negative(&mut self) -> Result<(), Error> {
         let lower = self.entries.iter().any(|e| e.row > e.column);
@@ -496,28 +496,28 @@ impl Triplets {
 
 /// Storage order of a full matrix.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Along {
+pub(crate) enum StorageOrder {
     Rows,
     Columns,
 }
 
 /// Builds a matrix from a full one. `value` returns a number by its position in the file.
-pub(crate) fn dense(
+pub(crate) fn from_dense(
     (rows, columns): (usize, usize),
-    along: Along,
+    along: StorageOrder,
     location: &Location,
     value: impl Fn(usize) -> Result<f64, Error>,
 ) -> Result<Matrix, Error> {
     let count = rows.saturating_mul(columns);
     // Allocate for the nonzero values only: full matrices of structures are mostly zeros.
     let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
-    let mut triplets = Triplets::new(rows, columns, filled, location.clone())?;
+    let mut triplets = TripletBuilder::new(rows, columns, filled, location.clone())?;
     // In the storage order of a matrix, so that the entries are sorted already.
     for column in 0..columns {
         for row in 0..rows {
             let at = match along {
-                Along::Rows => row * columns + column,
-                Along::Columns => column * rows + row,
+                StorageOrder::Rows => row * columns + column,
+                StorageOrder::Columns => column * rows + row,
             };
             triplets.push(row, column, value(at)?, location.clone())?;
         }
@@ -527,7 +527,7 @@ pub(crate) fn dense(
 
 /// Calls `push` for the entries of a matrix in compressed column (or row)
 /// storage. `pointers` are the starts of the columns (rows).
-pub(crate) fn compressed(
+pub(crate) fn for_each_compressed(
     pointers: &[usize],
     inner: &[usize],
     values: &[f64],
@@ -559,7 +559,7 @@ pub(crate) fn compressed(
 }
 
 /// Sorts the entries and sums those at one position, in file order.
-fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
+fn sum_duplicates(entries: &mut Vec<Entry>) -> Result<(), Error> {
     let key = |e: &Entry| (e.column, e.row);
     if !entries.is_sorted_by_key(key) {
         entries.sort_by_key(key);
@@ -588,7 +588,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stands_twice_is_summed_and_what_cancels_is_gone() -> Result<(), Error> {
+    fn duplicates_are_summed_and_zeros_dropped() -> Result<(), Error> {
         let entries = [(1, 0, 2.0), (0, 0, 1.0), (1, 0, 0.5), (0, 1, 4.0), (0, 1, -4.0), (1, 1, 0.0)];
         let matrix = Matrix::new(2, 2, Symmetry::General, entries)?;
         let expected = [Entry { row: 0, column: 0, value: 1.0 }, Entry { row: 1, column: 0, value: 2.5 }];

@@ -14,15 +14,15 @@
 //! Initial Design, NISTIR 5935 (1996).
 
 use crate::error::{Error, Kind, Location};
-use crate::first_line::{FirstLine, is_comment, unclear};
+use crate::first_line::{FirstLine, ambiguous, is_comment};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::text::{Line, Lines, shown, truncated};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, quoted, truncated};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matrix-market",
     summary: "Matrix Market (.mtx): coordinate or array; SciPy `mmwrite`, MATLAB, Julia, most sparse libraries",
-    sniff: |bytes| banner(bytes).is_some() || !matches!(FirstLine::of(bytes), FirstLine::Entry),
+    sniff: |bytes| banner(bytes).is_some() || !matches!(FirstLine::classify(bytes), FirstLine::Entry),
     open,
 };
 
@@ -34,7 +34,7 @@ struct Layout {
 }
 
 /// The banner and the line of sizes.
-struct Header {
+struct MatrixMarketHeader {
     layout: Layout,
     rows: usize,
     columns: usize,
@@ -61,15 +61,15 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(vec![Item::new("", rows, columns, move || read(bytes))])
 }
 
-fn header(lines: &mut Lines) -> Result<Header, Error> {
+fn header(lines: &mut Lines) -> Result<MatrixMarketHeader, Error> {
     let mut layout = match banner(lines.rest()) {
         Some(line) => layout(&line)?,
-        None => match FirstLine::of(lines.rest()) {
+        None => match FirstLine::classify(lines.rest()) {
             FirstLine::Sizes => Layout { coordinate: true, pattern: false, symmetry: Symmetry::Unsaid },
-            FirstLine::Unclear(line) => return Err(unclear(&line)),
+            FirstLine::Ambiguous(line) => return Err(ambiguous(&line)),
             FirstLine::Entry => {
                 let line = lines.expect_filled("the banner `%%MatrixMarket matrix …`")?;
-                return Err(line.malformed("the banner `%%MatrixMarket matrix …`", &shown(line.text)));
+                return Err(line.malformed("the banner `%%MatrixMarket matrix …`", &quoted(line.text)));
             }
         },
     };
@@ -93,14 +93,14 @@ fn header(lines: &mut Lines) -> Result<Header, Error> {
         return Err(sizes.malformed("a square symmetric matrix", &format!("{rows} x {columns}")));
     }
     let entries = entries.map_or_else(|| stored(rows, columns, layout.symmetry, &sizes), Ok)?;
-    Ok(Header { layout, rows, columns, entries })
+    Ok(MatrixMarketHeader { layout, rows, columns, entries })
 }
 
 fn layout(banner: &Line) -> Result<Layout, Error> {
     let words = words(banner);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let [_, "matrix", layout, field, symmetry] = words[..] else {
-        return Err(banner.malformed("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &shown(banner.text)));
+        return Err(banner.malformed("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &quoted(banner.text)));
     };
     let coordinate = match layout {
         "coordinate" => true,
@@ -145,8 +145,8 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     let header = header(&mut lines)?;
     // The shortest line of an entry is `1 1` with a line end, that of a number `0` with a line end.
     let shortest = if header.layout.coordinate { 4 } else { 2 };
-    let room = header.entries.min(lines.left() / shortest + 1);
-    let mut triplets = Triplets::new(header.rows, header.columns, room, lines.location())?;
+    let room = header.entries.min(lines.remaining() / shortest + 1);
+    let mut triplets = TripletBuilder::new(header.rows, header.columns, room, lines.location())?;
     if header.layout.coordinate {
         coordinates(&mut lines, &header, &mut triplets)?;
     } else {
@@ -155,7 +155,7 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     triplets.finish(header.layout.symmetry)
 }
 
-fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
+fn coordinates(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut TripletBuilder) -> Result<(), Error> {
     let mut count = 0;
     for line in lines.by_ref() {
         if line.text.trim_ascii().is_empty() || is_comment(&line) {
@@ -177,7 +177,7 @@ fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> R
     if count == header.entries { Ok(()) } else { Err(too_few(lines.location(), count, header.entries)) }
 }
 
-fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
+fn array(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut TripletBuilder) -> Result<(), Error> {
     let first = |column: usize| match header.layout.symmetry {
         Symmetry::General | Symmetry::Unsaid => 0,
         Symmetry::Symmetric => column,
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let error = read(text).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(error, Err((kind, location)), "{text}");
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_reads_back_to_the_last_bit() -> Result<(), Error> {
+    fn written_files_read_back_exactly() -> Result<(), Error> {
         let values = [1.0 / 3.0, f64::MIN_POSITIVE / 3.0, -f64::MAX, 1e22 + 2e6];
         let entries = values.iter().enumerate().map(|(row, &value)| (row, row / 2, value));
         for symmetry in [Symmetry::General, Symmetry::Symmetric] {

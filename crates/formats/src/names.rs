@@ -18,7 +18,7 @@ use std::path::Path;
 use crate::error::{Error, Kind, Location};
 use crate::file::{io, load};
 use crate::matrix::Matrix;
-use crate::text::{Line, Lines, integer, shown};
+use crate::text::{Line, Lines, integer, quoted};
 
 /// A file format for row names.
 pub struct NameFormat {
@@ -65,7 +65,7 @@ pub const TABLE: &[NameFormat] = &[
 /// format of [`TABLE`] recognizes the file.
 pub fn read(path: impl AsRef<Path>, rows: usize) -> Result<Vec<String>, Error> {
     let path = path.as_ref();
-    read_bytes(&load(path)?, rows).map_err(|error| error.of(path))
+    read_bytes(&load(path)?, rows).map_err(|error| error.with_path(path))
 }
 
 /// Reads names from a file in memory, like [`read`].
@@ -76,14 +76,15 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     let mut lines = Lines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let first = lines.expect_filled("names of rows")?;
     let format = TABLE.iter().find(|format| (format.sniff)(&first)).ok_or_else(|| {
-        let problem = format!("expected row names, found {}", shown(first.text));
+        let problem = format!("expected row names, found {}", quoted(first.text));
         let known = TABLE.iter().map(|format| format.summary).collect::<Vec<_>>().join("; ");
         Error::new(Kind::Format, first.location(), problem, format!("use one of these formats: {known}"))
     })?;
-    let mut names = Names { names: Vec::new(), rows };
-    for (at, line) in std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
+    let mut names = NameList { names: Vec::new(), rows };
+    for (index, line) in
+        std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
     {
-        if let Some((row, name)) = (format.line)(&line, at)? {
+        if let Some((row, name)) = (format.line)(&line, index)? {
             names.put(row, name, &line)?;
         }
     }
@@ -98,17 +99,17 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let names = matrix.names().ok_or_else(|| {
         let problem = "the rows of the matrix have no names".into();
-        Error::new(Kind::Names, Location::File, problem, "give it names first").of(path)
+        Error::new(Kind::Names, Location::File, problem, "give it names first").with_path(path)
     })?;
     let mut text = String::from("row,name\n");
-    for (at, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
-        text.push_str(&format!("{},{}\n", at + 1, quoted(name)));
+    for (index, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+        text.push_str(&format!("{},{}\n", index + 1, csv_field(name)));
     }
     std::fs::write(path, text).map_err(|error| io(path, &error))
 }
 
 /// Returns a name as a CSV field, in quotes if necessary.
-fn quoted(name: &str) -> String {
+fn csv_field(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.into() }
 }
 
@@ -121,12 +122,12 @@ pub(crate) fn direction(number: i64) -> String {
 }
 
 /// The names read so far.
-struct Names {
+struct NameList {
     names: Vec<String>,
     rows: usize,
 }
 
-impl Names {
+impl NameList {
     fn put(&mut self, row: usize, name: String, line: &Line) -> Result<(), Error> {
         let fault = |problem| {
             let remedy = "provide the file of row names that was written with the matrix";
@@ -169,12 +170,12 @@ impl Names {
     }
 }
 
-fn csv_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
-    if at == 0 {
+fn csv_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
+    if index == 0 {
         return Ok(None);
     }
-    let text = std::str::from_utf8(line.text).map_err(|_| line.malformed("`row,name` in UTF-8", &shown(line.text)))?;
-    let (row, name) = text.split_once(',').ok_or_else(|| line.malformed("`row,name`", &shown(line.text)))?;
+    let text = std::str::from_utf8(line.text).map_err(|_| line.malformed("`row,name` in UTF-8", &quoted(line.text)))?;
+    let (row, name) = text.split_once(',').ok_or_else(|| line.malformed("`row,name`", &quoted(line.text)))?;
     let name = name.trim();
     let name = match name.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')) {
         Some(inner) => inner.replace("\"\"", "\""),
@@ -189,10 +190,10 @@ fn dof(text: &[u8]) -> Option<(i64, i64)> {
     Some((integer(&text[..dot])?, integer(&text[dot + 1..])?))
 }
 
-fn dof_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+fn dof_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
     let text = line.text.trim_ascii();
-    let (node, number) = dof(text).ok_or_else(|| line.malformed("`node.direction`", &shown(text)))?;
-    Ok(Some((at, format!("{node}.{}", direction(number)))))
+    let (node, number) = dof(text).ok_or_else(|| line.malformed("`node.direction`", &quoted(text)))?;
+    Ok(Some((index, format!("{node}.{}", direction(number)))))
 }
 
 /// Returns equation, node and label of a line of HBMAT's mapping file.
@@ -211,12 +212,12 @@ fn mapping(line: &Line) -> Option<(usize, i64, String)> {
     Some((equation, integer(node)?, label))
 }
 
-fn mapping_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+fn mapping_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
     match mapping(line) {
         Some((equation, node, label)) => Ok(Some((equation, format!("{node}.{label}")))),
         // The column titles.
-        None if at == 0 => Ok(None),
-        None => Err(line.malformed("`equation node label`", &shown(line.text))),
+        None if index == 0 => Ok(None),
+        None => Err(line.malformed("`equation node label`", &quoted(line.text))),
     }
 }
 
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_list_of_names_is_refused() {
+    fn other_files_are_refused() {
         check("hello\n", 1, Err((Kind::Format, Location::Line(1))));
         check("", 1, Err((Kind::Truncated, Location::Line(1))));
     }

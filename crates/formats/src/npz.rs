@@ -6,13 +6,13 @@
 
 use std::borrow::Cow;
 
-use crate::bytes::{Bytes, Number, Order};
+use crate::bytes::{ByteCursor, ByteOrder, NumberType};
 use crate::error::{Error, Kind, Location};
 use crate::format::{Format, Item};
-use crate::inflate::{Limit, Wrapping, beginning, inflate};
-use crate::matrix::{Entry, Matrix, Symmetry, Triplets, compressed};
-use crate::npy::{self, Array};
-use crate::text::shown;
+use crate::inflate::{Container, DecompressionLimit, beginning, inflate};
+use crate::matrix::{Entry, Matrix, Symmetry, TripletBuilder, for_each_compressed};
+use crate::npy::{self, NpyArray};
+use crate::text::quoted;
 
 pub(crate) const FORMAT: Format = Format {
     name: "npz",
@@ -31,7 +31,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let members = members(bytes)?;
     let sparse = |name| members.iter().any(|member| member.name == name);
     if sparse("format") && sparse("shape") && sparse("data") {
-        let size = array(&find(&members, "shape")?.contents()?)?.numbers(Number::index)?;
+        let size = array(&find(&members, "shape")?.contents()?)?.numbers(NumberType::index)?;
         let [rows, columns] = size[..] else {
             let location = Location::Variable("shape".into());
             let problem = format!("the array `shape` has {} numbers instead of two", size.len());
@@ -46,19 +46,19 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 fn item(member: Member) -> Result<Item, Error> {
     let start = member.beginning();
     if !start.starts_with(npy::MAGIC) {
-        return Ok(Item::other(member.name.clone(), "not an array"));
+        return Ok(Item::not_a_matrix(member.name.clone(), "not an array"));
     }
-    let array = Array::new(&start).map_err(|error| error.at(Location::Variable(member.name.clone())))?;
+    let array = NpyArray::new(&start).map_err(|error| error.with_location(Location::Variable(member.name.clone())))?;
     Ok(match array.size() {
         Ok((rows, columns)) => {
             Item::new(member.name.clone(), rows, columns, move || self::array(&member.contents()?)?.matrix())
         }
-        Err(note) => Item::other(member.name.clone(), note),
+        Err(note) => Item::not_a_matrix(member.name.clone(), note),
     })
 }
 
-fn array(contents: &[u8]) -> Result<Array<'_>, Error> {
-    Array::new(contents)
+fn array(contents: &[u8]) -> Result<NpyArray<'_>, Error> {
+    NpyArray::new(contents)
 }
 
 fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>, Error> {
@@ -72,13 +72,15 @@ fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>,
 fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix, Error> {
     let part = |name: &str| -> Result<Cow<[u8]>, Error> { find(members, name)?.contents() };
     let indices = |name: &str| -> Result<Vec<usize>, Error> {
-        array(&part(name)?)?.numbers(Number::index).map_err(|error| error.at(Location::Variable(name.into())))
+        array(&part(name)?)?
+            .numbers(NumberType::index)
+            .map_err(|error| error.with_location(Location::Variable(name.into())))
     };
     let layout = part("format")?;
     let layout: Vec<u8> = array(&layout)?.text()?.iter().copied().filter(|&byte| byte != 0).collect();
     let data = part("data")?;
     let values = array(&data)?;
-    if values.element == npy::Element::Complex {
+    if values.element == npy::ElementType::Complex {
         let location = Location::Variable("data".into());
         return Err(Error::new(
             Kind::Complex,
@@ -87,13 +89,13 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
             "save its real part",
         ));
     }
-    let values = values.numbers(Number::real)?;
-    let mut triplets = Triplets::new(rows, columns, values.len(), Location::File)?;
+    let values = values.numbers(NumberType::real)?;
+    let mut triplets = TripletBuilder::new(rows, columns, values.len(), Location::File)?;
     match &layout[..] {
         b"csc" | b"csr" => {
             let (pointers, inner) = (indices("indptr")?, indices("indices")?);
             let outer = if layout == b"csc" { columns } else { rows };
-            compressed(&pointers, &inner, &values, outer, |outer, inner, value| {
+            for_each_compressed(&pointers, &inner, &values, outer, |outer, inner, value| {
                 let (row, column) = if layout == b"csc" { (inner, outer) } else { (outer, inner) };
                 triplets.push(row, column, value, Location::Variable("data".into()))
             })?;
@@ -119,7 +121,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
             }
         }
         other => {
-            let problem = format!("the matrix is stored as {}; supported are {LAYOUTS}", shown(other));
+            let problem = format!("the matrix is stored as {}; supported are {LAYOUTS}", quoted(other));
             let location = Location::Variable("format".into());
             return Err(Error::new(
                 Kind::Unsupported,
@@ -139,7 +141,7 @@ struct Member<'a> {
     deflated: bool,
     packed: &'a [u8],
     crc: u32,
-    limit: Limit,
+    limit: DecompressionLimit,
 }
 
 impl<'a> Member<'a> {
@@ -149,14 +151,14 @@ impl<'a> Member<'a> {
 
     fn beginning(&self) -> Cow<'a, [u8]> {
         match self.deflated {
-            true => Cow::Owned(beginning(self.packed, Wrapping::Bare, HEADER)),
+            true => Cow::Owned(beginning(self.packed, Container::Bare, HEADER)),
             false => Cow::Borrowed(&self.packed[..self.packed.len().min(HEADER)]),
         }
     }
 
     fn contents(&self) -> Result<Cow<'a, [u8]>, Error> {
         let contents = match self.deflated {
-            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, self.limit, &self.location())?),
+            true => Cow::Owned(inflate(self.packed, Container::Bare, self.limit, &self.location())?),
             false => Cow::Borrowed(self.packed),
         };
         let mut crc = flate2::Crc::new();
@@ -181,9 +183,9 @@ const IN_EXTRA: usize = u32::MAX as usize;
 
 /// Returns the members of a zip, by its central directory.
 fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
-    let mut zip = Bytes::new(bytes, Order::Little);
+    let mut zip = ByteCursor::new(bytes, ByteOrder::Little);
     zip.seek(directory(bytes)?)?;
-    let limit = Limit::of(bytes.len());
+    let limit = DecompressionLimit::for_file(bytes.len());
     let mut members = Vec::new();
     while zip.clone().u32().is_ok_and(|mark| mark == CENTRAL) {
         zip.skip(8);
@@ -206,7 +208,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
             let remedy = "write the file with numpy.savez or numpy.savez_compressed";
             return Err(Error::new(Kind::Unsupported, Location::Variable(name), problem, remedy));
         }
-        let mut data = Bytes::new(bytes, Order::Little);
+        let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         data.seek(local)?;
         if data.u32()? != LOCAL {
             return Err(data.malformed("the header of a member of a zip", "something else"));
@@ -221,14 +223,14 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
 
 /// Replaces sizes that need 64 bits by those of the extra field.
 fn sizes_64<const N: usize>(extra: &[u8], mut sizes: [usize; N]) -> Result<[usize; N], Error> {
-    let mut extra = Bytes::new(extra, Order::Little);
-    while extra.left() >= 4 {
+    let mut extra = ByteCursor::new(extra, ByteOrder::Little);
+    while extra.remaining() >= 4 {
         let (kind, length) = (extra.u16()?, usize::from(extra.u16()?));
-        let field = extra.take(length.min(extra.left()))?;
+        let field = extra.take(length.min(extra.remaining()))?;
         if kind == 1 {
-            let mut field = Bytes::new(field, Order::Little);
+            let mut field = ByteCursor::new(field, ByteOrder::Little);
             for size in sizes.iter_mut().filter(|size| **size == IN_EXTRA) {
-                *size = Number::U64.index(&mut field)?;
+                *size = NumberType::U64.index(&mut field)?;
             }
         }
     }
@@ -249,7 +251,7 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
             "the file is not complete; export or copy it again",
         )
     })?;
-    let mut zip = Bytes::new(bytes, Order::Little);
+    let mut zip = ByteCursor::new(bytes, ByteOrder::Little);
     zip.seek(end + 16)?;
     let start = zip.u32()? as usize;
     if start != IN_EXTRA {
@@ -260,13 +262,13 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
         return Ok(start);
     }
     zip.skip(4);
-    let record = Number::U64.index(&mut zip)?;
+    let record = NumberType::U64.index(&mut zip)?;
     zip.seek(record)?;
     if zip.u32()? != END_64 {
         return Err(zip.malformed("the 64-bit end record of a zip", "something else"));
     }
     zip.skip(44);
-    Number::U64.index(&mut zip)
+    NumberType::U64.index(&mut zip)
 }
 
 /// Returns a matrix as a file for SciPy's `load_npz`: compressed columns, both

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::constrained::CLAMPED;
+use crate::constrained::CONSTRAINED_DIAGONAL;
 use crate::matrix::Matrix;
 
 /// Number of rows and names that a report shows.
@@ -82,7 +82,7 @@ impl Report {
             zero_diagonal: where_is(|value| value == 0.0),
             negative_diagonal: where_is(|value| value < 0.0),
             empty: (0..matrix.rows()).filter(|&row| !filled[row]).collect(),
-            clamped: where_is(|value| value >= CLAMPED),
+            clamped: where_is(|value| value >= CONSTRAINED_DIAGONAL),
             names: matrix.names().map(|names| (names.iter().take(SHOWN).cloned().collect(), names.len())),
             origin: [origin.format, &origin.variable].map(str::trim).join(" ").trim().to_string(),
         }

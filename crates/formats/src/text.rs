@@ -39,7 +39,7 @@ impl<'a> Lines<'a> {
     }
 
     /// Returns the number of bytes not read yet.
-    pub fn left(&self) -> usize {
+    pub fn remaining(&self) -> usize {
         self.rest.len()
     }
 
@@ -102,24 +102,24 @@ impl<'a> Line<'a> {
     }
 
     pub fn real(&self, field: &[u8]) -> Result<f64, Error> {
-        real(field).ok_or_else(|| self.malformed("a number", &shown(field)))
+        real(field).ok_or_else(|| self.malformed("a number", &quoted(field)))
     }
 
     pub fn integer(&self, field: &[u8]) -> Result<i64, Error> {
-        integer(field).ok_or_else(|| self.malformed("a whole number", &shown(field)))
+        integer(field).ok_or_else(|| self.malformed("a whole number", &quoted(field)))
     }
 
     /// Reads a count or size, which is not negative.
     pub fn count(&self, field: &[u8]) -> Result<usize, Error> {
         let count = integer(field).and_then(|value| usize::try_from(value).ok());
-        count.ok_or_else(|| self.malformed("a count", &shown(field)))
+        count.ok_or_else(|| self.malformed("a count", &quoted(field)))
     }
 
     /// Reads a row or column, counted from one in the file and from zero in the result.
     pub fn index(&self, field: &[u8]) -> Result<usize, Error> {
         match integer(field).map(|value| usize::try_from(value - 1)) {
             Some(Ok(index)) => Ok(index),
-            _ => Err(self.malformed("a row or column from 1", &shown(field))),
+            _ => Err(self.malformed("a row or column from 1", &quoted(field))),
         }
     }
 
@@ -136,7 +136,7 @@ impl<'a> Line<'a> {
 
 /// Refuses a file that ends within a line, if it does not state its number of
 /// lines: the last number may lack digits.
-pub(crate) fn must_end_its_lines(bytes: &[u8]) -> Result<(), Error> {
+pub(crate) fn require_final_newline(bytes: &[u8]) -> Result<(), Error> {
     if bytes.last().is_none_or(|last| *last == b'\n') {
         return Ok(());
     }
@@ -156,7 +156,7 @@ pub(crate) fn truncated(location: Location, what: &str) -> Error {
 }
 
 /// Returns a field in the notation of a message.
-pub(crate) fn shown(field: &[u8]) -> String {
+pub(crate) fn quoted(field: &[u8]) -> String {
     let text = String::from_utf8_lossy(field);
     let mut short: String = text.chars().take(SHOWN).collect();
     if short.len() < text.len() {
