@@ -22,7 +22,7 @@
 
 use std::rc::Rc;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
@@ -216,7 +216,7 @@ fn read(block: &MatrixBlock) -> Result<Matrix, Error> {
 
 fn wrong_count(location: Location, expected: usize, found: &str) -> Error {
     let problem = format!("the matrix of this element must have {expected} numbers, but it has {found}");
-    Error::new(Kind::Count, location, problem, "export the file again")
+    Error::new(ErrorKind::Count, location, problem, "export the file again")
 }
 
 #[cfg(test)]
@@ -255,15 +255,15 @@ mod tests {
             assert_eq!(found, Err((kind, location)), "{text}");
         };
         let one = "*USER ELEMENT,NODES=1\n1,2\n*MATRIX,TYPE=MASS\n";
-        check(&format!("{one}1,2\n"), Kind::Count, Location::Line(4));
-        check(&format!("{one}1,2,3,4\n"), Kind::Count, Location::Line(4));
-        check(&format!("{one}1,x,3\n"), Kind::Malformed, Location::Line(4));
-        check("*USER ELEMENT\n1\n", Kind::Malformed, Location::Line(1));
-        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", Kind::Malformed, Location::Line(1));
-        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", Kind::Malformed, Location::Line(3));
-        check("*USER ELEMENT,NODES=1\n1\n0,1\n", Kind::Malformed, Location::Line(3));
-        check("*USER ELEMENT,NODES=1\n1\n , ,\n", Kind::Malformed, Location::Line(3));
-        check("*USER ELEMENT,NODES=1\n,\n", Kind::Malformed, Location::Line(2));
-        check("*USER ELEMENT,NODES=1\n1\n", Kind::Choice, Location::File);
+        check(&format!("{one}1,2\n"), ErrorKind::Count, Location::Line(4));
+        check(&format!("{one}1,2,3,4\n"), ErrorKind::Count, Location::Line(4));
+        check(&format!("{one}1,x,3\n"), ErrorKind::Malformed, Location::Line(4));
+        check("*USER ELEMENT\n1\n", ErrorKind::Malformed, Location::Line(1));
+        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", ErrorKind::Malformed, Location::Line(1));
+        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", ErrorKind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n0,1\n", ErrorKind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n , ,\n", ErrorKind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n,\n", ErrorKind::Malformed, Location::Line(2));
+        check("*USER ELEMENT,NODES=1\n1\n", ErrorKind::Selection, Location::File);
     }
 }

@@ -9,7 +9,7 @@
 
 use std::collections::HashMap;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
@@ -78,7 +78,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     if count == 0 {
         let problem = "the file has no entry; lines `node, dof, node, dof, value` are required".into();
-        return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
+        return Err(Error::new(ErrorKind::Truncated, Location::File, problem, "export it again"));
     }
     require_final_newline(bytes)?;
     require_single_matrix(bytes)?;
@@ -99,7 +99,7 @@ fn require_single_matrix(bytes: &[u8]) -> Result<(), Error> {
     };
     Lines::new(bytes).filter(begins).nth(1).map_or(Ok(()), |line| {
         let problem = "the file contains a second matrix, which begins here".into();
-        Err(Error::new(Kind::Unsupported, line.location(), problem, "write every matrix to a separate file"))
+        Err(Error::new(ErrorKind::Unsupported, line.location(), problem, "write every matrix to a separate file"))
     })
 }
 
@@ -113,7 +113,7 @@ fn read(bytes: &[u8], rows: &[NodeDof], places: &HashMap<NodeDof, usize>, count:
         Node::Number(number) => format!("{number}.{}", direction(*dof)),
         Node::Label(label) => format!("{}.{}", String::from_utf8_lossy(label), direction(*dof)),
     };
-    triplets.finish(Symmetry::Unsaid)?.with_names(rows.iter().map(name).collect())
+    triplets.finish(Symmetry::Unstated)?.with_names(rows.iter().map(name).collect())
 }
 
 #[cfg(test)]
@@ -149,12 +149,12 @@ mod tests {
         let check = |text, kind, location| {
             assert_eq!(read(text).map(|_| ()).map_err(|e| (e.kind, e.location)), Err((kind, location)), "{text}");
         };
-        check("", Kind::Truncated, Location::File);
-        check("1,1,1,1,1\n1,1,1,1\n", Kind::Malformed, Location::Line(2));
-        check("1,1,1,1,1\n1,1,1,1,1,1\n", Kind::Malformed, Location::Line(2));
-        check("1,x,1,1,1\n", Kind::Malformed, Location::Line(1));
+        check("", ErrorKind::Truncated, Location::File);
+        check("1,1,1,1,1\n1,1,1,1\n", ErrorKind::Malformed, Location::Line(2));
+        check("1,1,1,1,1\n1,1,1,1,1,1\n", ErrorKind::Malformed, Location::Line(2));
+        check("1,x,1,1,1\n", ErrorKind::Malformed, Location::Line(1));
         let two = "*MATRIX INPUT, NAME=K\n1,1,1,1,5\n*Matrix Input, NAME=M\n1,1,1,1,3\n";
-        check(two, Kind::Unsupported, Location::Line(3));
-        check("1,1,1,1,1e999\n", Kind::NotFinite, Location::Line(1));
+        check(two, ErrorKind::Unsupported, Location::Line(3));
+        check("1,1,1,1,1e999\n", ErrorKind::NotFinite, Location::Line(1));
     }
 }

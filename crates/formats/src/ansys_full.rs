@@ -12,7 +12,7 @@
 use std::rc::Rc;
 
 use crate::bytes::{ByteCursor, ByteOrder};
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
@@ -72,7 +72,7 @@ fn record<'a>(file: &mut ByteCursor<'a>) -> Result<(u32, ByteCursor<'a>), Error>
     if flags & PACKED != 0 {
         let problem = format!("the record is compressed (flags {flags:#x}), which is not supported");
         let remedy = "switch off compression with /FCOMP before the solution, or export with HBMAT";
-        return Err(Error::new(Kind::Unsupported, location.location(), problem, remedy));
+        return Err(Error::new(ErrorKind::Unsupported, location.location(), problem, remedy));
     }
     let data = file.take(words.saturating_mul(4))?;
     file.skip(4);
@@ -126,7 +126,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         return Err(file.malformed(&format!("a header of at least {} items", item::COUNT), header.len()));
     }
     let refuse = |problem: &str| {
-        Err(Error::new(Kind::Unsupported, file.location(), problem.into(), "export with HBMAT instead"))
+        Err(Error::new(ErrorKind::Unsupported, file.location(), problem.into(), "export with HBMAT instead"))
     };
     if header[item::ORIGIN] > 0 {
         return refuse("the file comes from the frontal solver, which is not supported");
@@ -193,7 +193,7 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
         if diagonal.len() != system.equations {
             let problem = format!("the file has {} masses for {} equations", diagonal.len(), system.equations);
             return Err(Error::new(
-                Kind::Count,
+                ErrorKind::Count,
                 location,
                 problem,
                 "switch off lumped masses (LUMPM), or export with HBMAT",
@@ -209,7 +209,12 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
             if columns.len() != values.len() {
                 let problem =
                     format!("the file has {} columns and {} values in row {}", columns.len(), values.len(), row + 1);
-                return Err(Error::new(Kind::Count, location.location(), problem, "the file is damaged; solve again"));
+                return Err(Error::new(
+                    ErrorKind::Count,
+                    location.location(),
+                    problem,
+                    "the file is damaged; solve again",
+                ));
             }
             for (column, value) in columns.into_iter().zip(values) {
                 let column = usize::try_from(column - 1).map_err(|_| location.malformed("a column from 1", column))?;
@@ -222,7 +227,7 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
         Some(names) => matrix.with_names(names.clone())?,
         None => matrix,
     };
-    matrix.without(&system.constrained)
+    matrix.without_rows(&system.constrained)
 }
 
 #[cfg(test)]
@@ -303,14 +308,14 @@ mod tests {
             let found = read_bytes(&file(change), None, Some("stiffness")).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind));
         };
-        check(|header| header[item::ORIGIN] = 4, Kind::Unsupported);
-        check(|header| header[item::UNSYMMETRIC] = 1, Kind::Unsupported);
-        check(|header| header[item::CONSTRAINTS] = 1, Kind::Unsupported);
-        check(|header| header[item::STIFFNESS + 1] = 1, Kind::Truncated);
-        check(|header| header[item::EQUATIONS] = 5, Kind::Malformed);
-        check(|header| header[item::EQUATIONS] = -5, Kind::Malformed);
+        check(|header| header[item::ORIGIN] = 4, ErrorKind::Unsupported);
+        check(|header| header[item::UNSYMMETRIC] = 1, ErrorKind::Unsupported);
+        check(|header| header[item::CONSTRAINTS] = 1, ErrorKind::Unsupported);
+        check(|header| header[item::STIFFNESS + 1] = 1, ErrorKind::Truncated);
+        check(|header| header[item::EQUATIONS] = 5, ErrorKind::Malformed);
+        check(|header| header[item::EQUATIONS] = -5, ErrorKind::Malformed);
         let mut packed = file(|_| ());
         packed[HEADER * 4 + 7] = 0xa0;
-        assert_eq!(read_bytes(&packed, None, None).map_err(|e| e.kind), Err(Kind::Unsupported));
+        assert_eq!(read_bytes(&packed, None, None).map_err(|e| e.kind), Err(ErrorKind::Unsupported));
     }
 }

@@ -1,6 +1,6 @@
 //! Cursor over binary data in either byte order, which never reads beyond the end.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
 /// Byte order of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl<'a> ByteCursor<'a> {
         let end = self.at.checked_add(count).filter(|&end| end <= self.all.len());
         let end = end.ok_or_else(|| {
             Error::new(
-                Kind::Truncated,
+                ErrorKind::Truncated,
                 self.location(),
                 format!("expected {count} more bytes, but the file ends after {}", self.remaining()),
                 "the file is not complete; export or copy it again",
@@ -83,7 +83,7 @@ impl<'a> ByteCursor<'a> {
     /// Creates an error for unexpected content at this location.
     pub fn malformed(&self, expected: &str, found: impl std::fmt::Display) -> Error {
         Error::new(
-            Kind::Malformed,
+            ErrorKind::Malformed,
             self.location(),
             format!("expected {expected}, found {found}"),
             "the file is damaged or has another format; export it again, or state its format",
@@ -160,10 +160,10 @@ mod tests {
         assert_eq!(ByteCursor::new(&bytes, ByteOrder::Big).u32()?, 256);
         let mut cursor = ByteCursor::new(&bytes, ByteOrder::Little);
         assert_eq!(cursor.u32()?, 65536);
-        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.location)), Err((Kind::Truncated, Location::Byte(4))));
+        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.location)), Err((ErrorKind::Truncated, Location::Byte(4))));
         assert_eq!(cursor.u8()?, 7);
-        assert_eq!(cursor.take(usize::MAX).map_err(|e| e.kind), Err(Kind::Truncated));
-        assert_eq!(cursor.seek(6).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(cursor.take(usize::MAX).map_err(|e| e.kind), Err(ErrorKind::Truncated));
+        assert_eq!(cursor.seek(6).map_err(|e| e.kind), Err(ErrorKind::Truncated));
         cursor.seek(4)?;
         assert_eq!(cursor.remaining(), 1);
         Ok(())

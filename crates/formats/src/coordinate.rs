@@ -7,7 +7,7 @@
 //! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus
 //! Analysis User's Guide, Generating matrices.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::first_line::{FirstLine, ambiguous, whole};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
@@ -42,13 +42,13 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         FirstLine::Sizes => {
             let problem = "the first line contains sizes, not an entry".into();
             let remedy = "omit the format, or state matrix-market";
-            return Err(Error::new(Kind::Malformed, Location::File, problem, remedy));
+            return Err(Error::new(ErrorKind::Malformed, Location::File, problem, remedy));
         }
     }
     if is_full_of_three(bytes) {
         let problem = "three lines of three integers may be entries or the rows of a full symmetric matrix";
         let remedy = "for entries, write the values with a decimal point (`1 1 2.`); for rows, write all numbers with one (`2. 1. 0.`)";
-        return Err(Error::new(Kind::Malformed, Location::File, problem.into(), remedy));
+        return Err(Error::new(ErrorKind::Malformed, Location::File, problem.into(), remedy));
     }
     let (mut size, mut count) = (0, 0);
     for entry in entries(bytes) {
@@ -58,7 +58,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     if count == 0 {
         let problem = "the file has no entry; lines `row column value` are required".into();
-        return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
+        return Err(Error::new(ErrorKind::Truncated, Location::File, problem, "export it again"));
     }
     require_final_newline(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
@@ -78,7 +78,7 @@ fn read(bytes: &[u8], size: usize, count: usize) -> Result<Matrix, Error> {
         let (row, column, value, line) = entry?;
         triplets.push(row, column, value, line.location())?;
     }
-    triplets.finish(Symmetry::Unsaid)
+    triplets.finish(Symmetry::Unstated)
 }
 
 #[cfg(test)]
@@ -104,14 +104,14 @@ mod tests {
                 read_bytes(text.as_bytes(), Some("coordinate"), None).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(error, Err((kind, location)), "{text}");
         };
-        check("", Kind::Truncated, Location::File);
-        check("1 1 1\n2 2\n", Kind::Malformed, Location::Line(2));
-        check("1 1 1\n2 x 1\n", Kind::Malformed, Location::Line(2));
-        check("1 1 1\n2 2 1.2", Kind::Truncated, Location::Line(2));
-        check("1 1 inf\n", Kind::NotFinite, Location::Line(1));
-        check("1 4000000000 1\n", Kind::TooLarge, Location::File);
+        check("", ErrorKind::Truncated, Location::File);
+        check("1 1 1\n2 2\n", ErrorKind::Malformed, Location::Line(2));
+        check("1 1 1\n2 x 1\n", ErrorKind::Malformed, Location::Line(2));
+        check("1 1 1\n2 2 1.2", ErrorKind::Truncated, Location::Line(2));
+        check("1 1 inf\n", ErrorKind::NotFinite, Location::Line(1));
+        check("1 4000000000 1\n", ErrorKind::TooLarge, Location::File);
         // Three such lines may also be a full symmetric matrix.
-        check("2 1 1\n1 2 1\n1 1 2\n", Kind::Malformed, Location::File);
-        check("1 1 1\n\n0 1 1\n", Kind::Malformed, Location::Line(3));
+        check("2 1 1\n1 2 1\n1 1 2\n", ErrorKind::Malformed, Location::File);
+        check("1 1 1\n\n0 1 1\n", ErrorKind::Malformed, Location::Line(3));
     }
 }

@@ -9,7 +9,7 @@
 //! Sizes are integers that no later index exceeds, and the stated number of lines follows them.
 //! Reading sizes as an entry would silently change the matrix.
 
-use crate::error::{Error, Kind};
+use crate::error::{Error, ErrorKind};
 use crate::text::{Line, Lines, integer, quoted};
 
 /// The meaning of the first line.
@@ -60,7 +60,7 @@ pub(crate) fn is_comment(line: &Line) -> bool {
 /// Creates the error for a first line that may be sizes or an entry.
 pub(crate) fn ambiguous(line: &Line) -> Error {
     Error::new(
-        Kind::Malformed,
+        ErrorKind::Malformed,
         line.location(),
         format!(
             "{} is either an entry, or the sizes of a Matrix Market file with a wrong number of entries",

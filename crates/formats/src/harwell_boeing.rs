@@ -12,7 +12,7 @@
 //! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection,
 //! TR/PA/92/86 (1992); ANSYS Mechanical APDL Command Reference, HBMAT.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::fortran::FortranFormat;
 use crate::matrix::{Matrix, Symmetry, TripletBuilder, for_each_compressed};
@@ -81,7 +81,7 @@ fn header(bytes: &[u8]) -> Result<HbHeader<'_>, Error> {
         FortranFormat::new(found).ok_or_else(|| {
             let problem = format!("{} is not a supported Fortran format for {what}", quoted(found.as_bytes()));
             let remedy = "use a format of integers or real numbers, such as (8I10), (1X,8I9) or (1P,4E20.12)";
-            Error::new(Kind::Malformed, line.location(), problem, remedy)
+            Error::new(ErrorKind::Malformed, line.location(), problem, remedy)
         })
     };
     let (pointers, indices) = (format("pointers")?, format("rows")?);
@@ -177,14 +177,14 @@ mod tests {
             let found = read_bytes(text.as_bytes(), Some("harwell-boeing"), None).map(|_| ());
             assert_eq!(found.map_err(|e| (e.kind, e.location)), Err((fault, location)), "{text}");
         };
-        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", Kind::Truncated, Location::Line(8));
-        check("RSA", FORMATS, "F\n  1  3  4\n", Kind::Malformed, Location::Line(6));
-        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), Kind::Count, Location::File);
-        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), Kind::Count, Location::File);
-        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), Kind::Malformed, Location::Line(6));
-        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, Kind::Malformed, Location::Line(4));
-        check("CSA", FORMATS, BODY, Kind::Complex, Location::File);
-        check("RSE", FORMATS, BODY, Kind::Unsupported, Location::File);
-        check("XYZ", FORMATS, BODY, Kind::Malformed, Location::Line(3));
+        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", ErrorKind::Truncated, Location::Line(8));
+        check("RSA", FORMATS, "F\n  1  3  4\n", ErrorKind::Malformed, Location::Line(6));
+        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), ErrorKind::Count, Location::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), ErrorKind::Count, Location::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), ErrorKind::Malformed, Location::Line(6));
+        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, ErrorKind::Malformed, Location::Line(4));
+        check("CSA", FORMATS, BODY, ErrorKind::Complex, Location::File);
+        check("RSE", FORMATS, BODY, ErrorKind::Unsupported, Location::File);
+        check("XYZ", FORMATS, BODY, ErrorKind::Malformed, Location::Line(3));
     }
 }

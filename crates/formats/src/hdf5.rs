@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::DecompressionLimit;
 use crate::matrix::{StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
@@ -67,7 +67,7 @@ fn catching_panics<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_p
     };
     let problem = format!("the HDF5 file cannot be read: {problem}");
     let remedy = "save or copy the file again; if this fails in MATLAB, save without -v7.3";
-    Err(Error::new(Kind::Malformed, location, problem, remedy))
+    Err(Error::new(ErrorKind::Malformed, location, problem, remedy))
 }
 
 /// A traversal of the groups of a file.
@@ -109,7 +109,7 @@ impl Traversal<'_, '_> {
             } else if let Some(rows) = attributes.get("MATLAB_sparse") {
                 let rows = whole(rows).ok_or_else(|| {
                     let problem = "the attribute MATLAB_sparse does not contain the number of rows".into();
-                    Error::new(Kind::Malformed, location(), problem, "save the file again")
+                    Error::new(ErrorKind::Malformed, location(), problem, "save the file again")
                 })?;
                 self.items.push(sparse_item(inner, full(&name), rows, self.limit)?);
             } else if depth > 0 {
@@ -161,7 +161,7 @@ fn dense_item(dataset: Dataset, name: String, limit: DecompressionLimit) -> Resu
         let values = numbers(&dataset, limit, &name, Dataset::read_f64)?;
         if rows.checked_mul(columns) != Some(values.len()) {
             let problem = format!("the dataset has {} numbers, but its size is {rows} x {columns}", values.len());
-            return Err(Error::new(Kind::Count, Location::Variable(name.clone()), problem, "save the file again"));
+            return Err(Error::new(ErrorKind::Count, Location::Variable(name.clone()), problem, "save the file again"));
         }
         let along = if matlab { StorageOrder::Columns } else { StorageOrder::Rows };
         from_dense((rows, columns), along, &Location::Variable(name.clone()), |at| Ok(values[at]))
@@ -188,7 +188,7 @@ fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
 fn too_large(location: Location) -> Error {
     let problem = "the dataset states more numbers than a file of this size can contain".into();
     Error::new(
-        Kind::TooLarge,
+        ErrorKind::TooLarge,
         location,
         problem,
         "save the file again; if its size is correct, save it without compression",
@@ -255,8 +255,8 @@ mod tests {
     #[test]
     fn a_panic_of_the_library_is_an_error() {
         let found = catching_panics::<()>(Location::Byte(3), || panic!("attempt to add with overflow, on purpose"));
-        assert_eq!(found.map_err(|error| (error.kind, error.location)), Err((Kind::Malformed, Location::Byte(3))));
+        assert_eq!(found.map_err(|error| (error.kind, error.location)), Err((ErrorKind::Malformed, Location::Byte(3))));
         let found = catching_panics(Location::File, || File::from_bytes(vec![0; 600])).map(|_| ());
-        assert_eq!(found.map_err(|error| error.kind), Err(Kind::Malformed));
+        assert_eq!(found.map_err(|error| error.kind), Err(ErrorKind::Malformed));
     }
 }

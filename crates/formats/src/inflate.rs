@@ -4,17 +4,17 @@ use std::io::Read;
 
 use flate2::read::{DeflateDecoder, ZlibDecoder};
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
-/// Maximum ratio of decompressed size to file size, beyond [`UNPACKED_ALWAYS`].
+/// Maximum ratio of decompressed size to file size, beyond [`MIN_DECOMPRESSED_LIMIT`].
 ///
 /// Deflate compresses up to 1030 bytes into one, which makes decompression bombs possible. A sparse
 /// stiffness matrix of a regular mesh, with repeated values, shrinks to a 25th. Parts of files,
 /// such as the equal values of a mass matrix, and full matrices of mostly zeros shrink to a 900th.
-pub const EXPANSION: usize = 100;
+pub const MAX_EXPANSION: usize = 100;
 
 /// Decompressed size in bytes that is always accepted: a full matrix of 5800 rows.
-pub const UNPACKED_ALWAYS: usize = 256 << 20;
+pub const MIN_DECOMPRESSED_LIMIT: usize = 256 << 20;
 
 /// Limit on the decompressed bytes of a file.
 #[derive(Clone, Copy)]
@@ -23,7 +23,7 @@ pub(crate) struct DecompressionLimit(usize);
 impl DecompressionLimit {
     /// Returns the limit for a file of `file` bytes.
     pub fn for_file(file: usize) -> Self {
-        Self(UNPACKED_ALWAYS.max(file.saturating_mul(EXPANSION)))
+        Self(MIN_DECOMPRESSED_LIMIT.max(file.saturating_mul(MAX_EXPANSION)))
     }
 
     /// Returns the limit in numbers of 8 bytes.
@@ -54,13 +54,13 @@ pub(crate) fn inflate(
     if bytes.len() > most {
         let problem =
             format!("{} compressed bytes expand to more than {most} bytes, the limit for this file", packed.len());
-        return fault(Kind::TooLarge, problem, "save it as a sparse matrix, or without compression");
+        return fault(ErrorKind::TooLarge, problem, "save it as a sparse matrix, or without compression");
     }
     match damage {
         None => Ok(bytes),
         Some(error) => {
             let problem = format!("the compressed part is damaged: {error}");
-            fault(Kind::Malformed, problem, "export or copy the file again")
+            fault(ErrorKind::Malformed, problem, "export or copy the file again")
         }
     }
 }
@@ -96,10 +96,10 @@ mod tests {
     #[test]
     fn decompression_bomb_is_refused() -> std::io::Result<()> {
         let limit = DecompressionLimit::for_file(1);
-        let bomb = pack(&vec![0; UNPACKED_ALWAYS + 1])?;
+        let bomb = pack(&vec![0; MIN_DECOMPRESSED_LIMIT + 1])?;
         assert!(bomb.len() < 300_000);
         let found = inflate(&bomb, Container::Zlib, limit, &Location::Byte(7)).map_err(|e| (e.kind, e.location));
-        assert_eq!(found, Err((Kind::TooLarge, Location::Byte(7))));
+        assert_eq!(found, Err((ErrorKind::TooLarge, Location::Byte(7))));
         assert_eq!(beginning(&bomb, Container::Zlib, 5), [0; 5]);
         Ok(())
     }
@@ -113,7 +113,7 @@ mod tests {
         );
         let short =
             inflate(&packed[..packed.len() - 6], Container::Zlib, DecompressionLimit::for_file(1), &Location::File);
-        assert_eq!(short.map_err(|e| e.kind), Err(Kind::Malformed));
+        assert_eq!(short.map_err(|e| e.kind), Err(ErrorKind::Malformed));
         Ok(())
     }
 }

@@ -19,7 +19,7 @@
 //! [`TABLE`] lists the formats, and [`names::TABLE`] the formats of row names.
 //!
 //! The reader does not trust sizes stated in a header: memory is bounded by the length of the
-//! file, see [`EXPANSION`] for compressed files.
+//! file, see [`MAX_EXPANSION`] for compressed files.
 
 mod abaqus_element;
 mod abaqus_input;
@@ -52,13 +52,13 @@ use std::path::Path;
 use file::{io, load};
 use format::Item;
 
-pub use constrained::{aligned, constrained};
-pub use error::{Error, Kind, Location};
-pub use file::LARGEST_FILE;
+pub use constrained::{align_rows, constrained_rows};
+pub use error::{Error, ErrorKind, Location};
+pub use file::MAX_FILE_BYTES;
 pub use format::{Format, Variable};
-pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
+pub use inflate::{MAX_EXPANSION, MIN_DECOMPRESSED_LIMIT};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
-pub use report::Report;
+pub use report::MatrixReport;
 
 /// All formats. The first format that recognizes the content reads the file.
 pub const TABLE: &[Format] = &[
@@ -85,7 +85,7 @@ pub const TABLE: &[Format] = &[
 /// required if the file contains several matrices.
 ///
 /// # Errors
-/// [`Error`] with file, location, problem and remedy; see [`Kind`].
+/// [`Error`] with file, location, problem and remedy; see [`ErrorKind`].
 pub fn read(path: impl AsRef<Path>, format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
     let path = path.as_ref();
     read_bytes(&load(path)?, format, name).map_err(|error| error.with_path(path))
@@ -136,7 +136,7 @@ pub fn list_bytes(bytes: &[u8], format: Option<&str>) -> Result<Vec<Variable>, E
 /// names to a separate file.
 ///
 /// # Errors
-/// [`Kind::Format`] for another extension, [`Kind::Io`].
+/// [`ErrorKind::Format`] for another extension, [`ErrorKind::Io`].
 pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
@@ -145,7 +145,7 @@ pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
         _ => {
             let problem = "the file extension is neither .mtx (Matrix Market) nor .npz (SciPy)".into();
             return Err(
-                Error::new(Kind::Format, Location::File, problem, "use one of these extensions").with_path(path)
+                Error::new(ErrorKind::Format, Location::File, problem, "use one of these extensions").with_path(path)
             );
         }
     };
@@ -160,7 +160,7 @@ fn without_bom(bytes: &[u8]) -> &[u8] {
 /// Returns the format with the given name, or the one that recognizes the content.
 fn find_format(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let names = || TABLE.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
-    let fault = |problem, remedy| Error::new(Kind::Format, Location::File, problem, remedy);
+    let fault = |problem, remedy| Error::new(ErrorKind::Format, Location::File, problem, remedy);
     if let Some(name) = name {
         let found = TABLE.iter().find(|format| format.name == name);
         return found.ok_or_else(|| fault(format!("there is no format `{name}`"), format!("use one of: {}", names())));
@@ -197,7 +197,7 @@ fn find_format(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Erro
 
 /// Returns the matrix with the given name, or the only one.
 fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> Result<&'i Item<'a>, Error> {
-    let fault = |problem: String, remedy: &str| Err(Error::new(Kind::Choice, Location::File, problem, remedy));
+    let fault = |problem: String, remedy: &str| Err(Error::new(ErrorKind::Selection, Location::File, problem, remedy));
     let there = || match items {
         [] => "nothing".to_string(),
         items => items.iter().map(|item| item.variable.to_string()).collect::<Vec<_>>().join(", "),
@@ -245,7 +245,7 @@ fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::new(
-        Kind::TooLarge,
+        ErrorKind::TooLarge,
         Location::File,
         format!("the file states {rows} rows and {columns} columns, too many for its {length} bytes"),
         "an index or a size in the file is damaged; export it again",

@@ -9,7 +9,7 @@
 use std::borrow::Cow;
 
 use crate::bytes::{ByteCursor, ByteOrder, NumberType};
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::{Container, DecompressionLimit, beginning, inflate};
 use crate::matrix::{Matrix, StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
@@ -196,7 +196,7 @@ fn variable(mut source: VariableBytes) -> Result<Vec<Item>, Error> {
 
 fn damaged(location: &Location) -> Error {
     let problem = "the beginning of a compressed variable is damaged".into();
-    Error::new(Kind::Malformed, location.clone(), problem, "save or copy the file again")
+    Error::new(ErrorKind::Malformed, location.clone(), problem, "save or copy the file again")
 }
 
 /// Replaces the location of an error, relative to a variable, by the location
@@ -319,7 +319,7 @@ fn matrix(bytes: &[u8], order: ByteOrder) -> Result<Matrix, Error> {
     let there = data.remaining() / number.size();
     if rows.checked_mul(columns) != Some(there) {
         let problem = format!("expected {rows} x {columns} numbers, found {there}");
-        return Err(Error::new(Kind::Count, Location::File, problem, "save or copy the file again"));
+        return Err(Error::new(ErrorKind::Count, Location::File, problem, "save or copy the file again"));
     }
     from_dense((rows, columns), StorageOrder::Columns, &Location::File, |at| {
         number.real(&mut data.ahead(at * number.size()))
@@ -386,18 +386,18 @@ mod tests {
             assert_eq!(found.map_err(|e| e.kind), Err(kind));
         };
         let double = |value: f64| tagged(9, &value.to_le_bytes());
-        check(variable(6, &[2, 1], "K", &[double(1.0)]), Kind::Count);
-        check(variable(6, &[-1, 1], "K", &[double(1.0)]), Kind::Malformed);
-        check(variable(6, &[1, 1], "K", &[double(f64::INFINITY)]), Kind::NotFinite);
-        check(variable(6 + 0x800, &[1, 1], "K", &[double(1.0)]), Kind::Complex);
-        check(variable(4, &[1, 1], "K", &[double(1.0)]), Kind::Unsupported);
-        check(variable(6, &[1, 1, 1], "K", &[double(1.0)]), Kind::Unsupported);
-        check(variable(6, &[2_000_000_000, 2_000_000_000], "K", &[double(1.0)]), Kind::TooLarge);
-        check(variable(6, &[1, 1], "K", &[]), Kind::Truncated);
+        check(variable(6, &[2, 1], "K", &[double(1.0)]), ErrorKind::Count);
+        check(variable(6, &[-1, 1], "K", &[double(1.0)]), ErrorKind::Malformed);
+        check(variable(6, &[1, 1], "K", &[double(f64::INFINITY)]), ErrorKind::NotFinite);
+        check(variable(6 + 0x800, &[1, 1], "K", &[double(1.0)]), ErrorKind::Complex);
+        check(variable(4, &[1, 1], "K", &[double(1.0)]), ErrorKind::Unsupported);
+        check(variable(6, &[1, 1, 1], "K", &[double(1.0)]), ErrorKind::Unsupported);
+        check(variable(6, &[2_000_000_000, 2_000_000_000], "K", &[double(1.0)]), ErrorKind::TooLarge);
+        check(variable(6, &[1, 1], "K", &[]), ErrorKind::Truncated);
         let sparse = [tagged(5, &words(&[0])), tagged(5, &words(&[0, 2])), double(1.0)];
-        check(variable(5, &[1, 1], "K", &sparse), Kind::Count);
+        check(variable(5, &[1, 1], "K", &sparse), ErrorKind::Count);
         let mut short = file(&[variable(6, &[1, 1], "K", &[double(1.0)])]);
         short.truncate(short.len() - 4);
-        assert_eq!(read_bytes(&short, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(read_bytes(&short, None, None).map_err(|e| e.kind), Err(ErrorKind::Truncated));
     }
 }

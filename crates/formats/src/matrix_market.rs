@@ -13,7 +13,7 @@
 //! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats:
 //! Initial Design, NISTIR 5935 (1996).
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::first_line::{FirstLine, ambiguous, is_comment};
 use crate::format::{Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
@@ -65,7 +65,7 @@ fn header(lines: &mut Lines) -> Result<MatrixMarketHeader, Error> {
     let mut layout = match banner(lines.rest()) {
         Some(line) => layout(&line)?,
         None => match FirstLine::classify(lines.rest()) {
-            FirstLine::Sizes => Layout { coordinate: true, pattern: false, symmetry: Symmetry::Unsaid },
+            FirstLine::Sizes => Layout { coordinate: true, pattern: false, symmetry: Symmetry::Unstated },
             FirstLine::Ambiguous(line) => return Err(ambiguous(&line)),
             FirstLine::Entry => {
                 let line = lines.expect_filled("the banner `%%MatrixMarket matrix …`")?;
@@ -86,7 +86,7 @@ fn header(lines: &mut Lines) -> Result<MatrixMarketHeader, Error> {
         let [rows, columns] = sizes.exactly("rows and columns")?;
         (sizes.count(rows)?, sizes.count(columns)?, None)
     };
-    if rows != columns && layout.symmetry == Symmetry::Unsaid {
+    if rows != columns && layout.symmetry == Symmetry::Unstated {
         layout.symmetry = Symmetry::General;
     }
     if layout.symmetry != Symmetry::General && rows != columns {
@@ -112,7 +112,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
         "pattern" if coordinate => true,
         "complex" => {
             return Err(Error::new(
-                Kind::Complex,
+                ErrorKind::Complex,
                 banner.location(),
                 "the matrix is complex, but it must be real".into(),
                 "write its real part; structural damping is not supported as a complex matrix",
@@ -134,7 +134,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
 fn stored(rows: usize, columns: usize, symmetry: Symmetry, line: &Line) -> Result<usize, Error> {
     let all = rows.checked_mul(columns).ok_or_else(|| line.malformed("a size that fits in a file", "a larger one"))?;
     Ok(match symmetry {
-        Symmetry::General | Symmetry::Unsaid => all,
+        Symmetry::General | Symmetry::Unstated => all,
         Symmetry::Symmetric => (all - rows) / 2 + rows,
         Symmetry::Skew => (all - rows) / 2,
     })
@@ -179,7 +179,7 @@ fn coordinates(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut Tr
 
 fn array(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut TripletBuilder) -> Result<(), Error> {
     let first = |column: usize| match header.layout.symmetry {
-        Symmetry::General | Symmetry::Unsaid => 0,
+        Symmetry::General | Symmetry::Unstated => 0,
         Symmetry::Symmetric => column,
         Symmetry::Skew => column + 1,
     };
@@ -204,7 +204,7 @@ fn array(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut TripletB
 
 fn too_many(location: Location, expected: usize) -> Error {
     Error::new(
-        Kind::Count,
+        ErrorKind::Count,
         location,
         format!("the file has more entries than the {expected} that the header states"),
         "correct the line of sizes, or export the file again",
@@ -213,7 +213,7 @@ fn too_many(location: Location, expected: usize) -> Error {
 
 fn too_few(location: Location, found: usize, expected: usize) -> Error {
     let error = truncated(location, &format!("entry {} of {expected}", found + 1));
-    Error { kind: Kind::Truncated, ..error }
+    Error { kind: ErrorKind::Truncated, ..error }
 }
 
 /// Returns a matrix as a file of coordinates.
@@ -321,7 +321,7 @@ mod tests {
         for text in [format!("3 3 6\n{CHAIN}"), format!("3 3 4\n{CHAIN}"), "2 2 1000\n2 1 -1000\n1 1 2000\n".into()] {
             for format in [None, Some("coordinate"), Some("matrix-market")] {
                 let error = read_bytes(text.as_bytes(), format, None).map(|_| ()).map_err(|e| (e.kind, e.location));
-                assert_eq!(error, Err((Kind::Malformed, Location::Line(1))), "{text}");
+                assert_eq!(error, Err((ErrorKind::Malformed, Location::Line(1))), "{text}");
             }
         }
         let stated = read_bytes(format!("3 3 5\n{CHAIN}").as_bytes(), Some("coordinate"), None).map(|_| ());
@@ -335,23 +335,27 @@ mod tests {
             assert_eq!(error, Err((kind, location)), "{text}");
         };
         let real = "%%MatrixMarket matrix coordinate real general\n";
-        check(&format!("{real}2 2 2\n1 1 1\n"), Kind::Truncated, Location::Line(3));
-        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), Kind::Count, Location::Line(4));
-        check(&format!("{real}2 2 1\n3 1 1\n"), Kind::Count, Location::Line(3));
-        check(&format!("{real}2 2 1\n0 1 1\n"), Kind::Malformed, Location::Line(3));
-        check(&format!("{real}2 2 1\n1 1 nan\n"), Kind::NotFinite, Location::Line(3));
-        check(&format!("{real}2 2 1\n1 1 1 0\n"), Kind::Malformed, Location::Line(3));
-        check(&format!("{real}2 2\n1 1 1\n"), Kind::Malformed, Location::Line(2));
-        check(real, Kind::Truncated, Location::Line(2));
-        check(&format!("{real}99999999999 1 0\n"), Kind::TooLarge, Location::File);
-        check("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n", Kind::Complex, Location::Line(1));
-        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", Kind::Malformed, Location::Line(1));
-        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", Kind::Malformed, Location::Line(2));
+        check(&format!("{real}2 2 2\n1 1 1\n"), ErrorKind::Truncated, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), ErrorKind::Count, Location::Line(4));
+        check(&format!("{real}2 2 1\n3 1 1\n"), ErrorKind::Count, Location::Line(3));
+        check(&format!("{real}2 2 1\n0 1 1\n"), ErrorKind::Malformed, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 nan\n"), ErrorKind::NotFinite, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1 0\n"), ErrorKind::Malformed, Location::Line(3));
+        check(&format!("{real}2 2\n1 1 1\n"), ErrorKind::Malformed, Location::Line(2));
+        check(real, ErrorKind::Truncated, Location::Line(2));
+        check(&format!("{real}99999999999 1 0\n"), ErrorKind::TooLarge, Location::File);
+        check(
+            "%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n",
+            ErrorKind::Complex,
+            Location::Line(1),
+        );
+        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", ErrorKind::Malformed, Location::Line(1));
+        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", ErrorKind::Malformed, Location::Line(2));
         // A header that claims more memory than there is.
-        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), Kind::Truncated, Location::Line(3));
+        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), ErrorKind::Truncated, Location::Line(3));
         let array = "%%MatrixMarket matrix array real general\n";
-        check(&format!("{array}4000000000 4000000000\n1\n"), Kind::TooLarge, Location::File);
-        check(&format!("{array}4000000000000 4000000000000\n1\n"), Kind::Malformed, Location::Line(2));
+        check(&format!("{array}4000000000 4000000000\n1\n"), ErrorKind::TooLarge, Location::File);
+        check(&format!("{array}4000000000000 4000000000000\n1\n"), ErrorKind::Malformed, Location::Line(2));
     }
 
     #[test]

@@ -15,7 +15,7 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::file::{io, load};
 use crate::matrix::Matrix;
 use crate::text::{Line, Lines, integer, quoted};
@@ -61,7 +61,7 @@ pub const TABLE: &[NameFormat] = &[
 /// Reads the names of `rows` rows. A row without a name gets an empty one.
 ///
 /// # Errors
-/// [`Kind::Names`] if the names do not match the rows, [`Kind::Format`] if no
+/// [`ErrorKind::Names`] if the names do not match the rows, [`ErrorKind::Format`] if no
 /// format of [`TABLE`] recognizes the file.
 pub fn read(path: impl AsRef<Path>, rows: usize) -> Result<Vec<String>, Error> {
     let path = path.as_ref();
@@ -78,7 +78,7 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     let format = TABLE.iter().find(|format| (format.sniff)(&first)).ok_or_else(|| {
         let problem = format!("expected row names, found {}", quoted(first.text));
         let known = TABLE.iter().map(|format| format.summary).collect::<Vec<_>>().join("; ");
-        Error::new(Kind::Format, first.location(), problem, format!("use one of these formats: {known}"))
+        Error::new(ErrorKind::Format, first.location(), problem, format!("use one of these formats: {known}"))
     })?;
     let mut names = NameList { names: Vec::new(), rows };
     for (index, line) in
@@ -94,12 +94,12 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
 /// Writes the row names of a matrix as CSV `row,name`.
 ///
 /// # Errors
-/// [`Kind::Names`] if the matrix has no names, [`Kind::Io`].
+/// [`ErrorKind::Names`] if the matrix has no names, [`ErrorKind::Io`].
 pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let names = matrix.names().ok_or_else(|| {
         let problem = "the rows of the matrix have no names".into();
-        Error::new(Kind::Names, Location::File, problem, "give it names first").with_path(path)
+        Error::new(ErrorKind::Names, Location::File, problem, "give it names first").with_path(path)
     })?;
     let mut text = String::from("row,name\n");
     for (index, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
@@ -131,7 +131,7 @@ impl NameList {
     fn put(&mut self, row: usize, name: String, line: &Line) -> Result<(), Error> {
         let fault = |problem| {
             let remedy = "provide the file of row names that was written with the matrix";
-            Err(Error::new(Kind::Names, line.location(), problem, remedy))
+            Err(Error::new(ErrorKind::Names, line.location(), problem, remedy))
         };
         if row >= self.rows {
             return fault(format!("the file names row {}, but the matrix has {} rows", row + 1, self.rows));
@@ -153,7 +153,7 @@ impl NameList {
         let named = self.names.iter().filter(|name| !name.is_empty()).count();
         if named != self.rows && !gaps {
             return Err(Error::new(
-                Kind::Names,
+                ErrorKind::Names,
                 Location::File,
                 format!("the file has {named} names for {} rows", self.rows),
                 "provide the file of row names that was written with the matrix",
@@ -163,7 +163,7 @@ impl NameList {
         order.sort_by(|a, b| self.names[*a].cmp(&self.names[*b]));
         if let Some(&[a, b]) = order.array_windows().find(|[a, b]| self.names[*a] == self.names[*b]) {
             let problem = format!("rows {} and {} have the same name `{}`", a + 1, b + 1, self.names[a]);
-            return Err(Error::new(Kind::Names, Location::File, problem, "give every row a unique name"));
+            return Err(Error::new(ErrorKind::Names, Location::File, problem, "give every row a unique name"));
         }
         self.names.resize(self.rows, String::new());
         Ok(self.names)
@@ -225,7 +225,7 @@ fn mapping_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
 mod tests {
     use super::*;
 
-    fn check(text: &str, rows: usize, expected: Result<&[&str], (Kind, Location)>) {
+    fn check(text: &str, rows: usize, expected: Result<&[&str], (ErrorKind, Location)>) {
         let found = read_bytes(text.as_bytes(), rows).map_err(|e| (e.kind, e.location));
         assert_eq!(found, expected.map(|names| names.iter().map(ToString::to_string).collect()), "{text}");
     }
@@ -234,20 +234,20 @@ mod tests {
     fn csv_may_leave_rows_without_a_name() {
         check("row,name\n3,tip\n1,\"a, \"\"b\"\"\"\n", 3, Ok(&["a, \"b\"", "", "tip"]));
         check("\u{feff}Row, Name\r\n1,x\r\n", 1, Ok(&["x"]));
-        check("row,name\n1,a\n1,b\n", 2, Err((Kind::Names, Location::Line(3))));
-        check("row,name\n3,a\n", 2, Err((Kind::Names, Location::Line(2))));
-        check("row,name\n0,a\n", 2, Err((Kind::Malformed, Location::Line(2))));
-        check("row,name\n1,\n", 2, Err((Kind::Names, Location::Line(2))));
-        check("row,name\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("row,name\n1,a\n1,b\n", 2, Err((ErrorKind::Names, Location::Line(3))));
+        check("row,name\n3,a\n", 2, Err((ErrorKind::Names, Location::Line(2))));
+        check("row,name\n0,a\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
+        check("row,name\n1,\n", 2, Err((ErrorKind::Names, Location::Line(2))));
+        check("row,name\nx\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
     }
 
     #[test]
     fn calculix_directions_are_no_decimals() {
         check("10.1\n10.10\n7.4\n", 3, Ok(&["10.x", "10.10", "7.rx"]));
-        check("10.1\n10.2\n", 3, Err((Kind::Names, Location::File)));
-        check("10.1\n10.2\n", 1, Err((Kind::Names, Location::Line(2))));
-        check("10.1\n10.2\n10.1\n", 3, Err((Kind::Names, Location::File)));
-        check("10.1\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("10.1\n10.2\n", 3, Err((ErrorKind::Names, Location::File)));
+        check("10.1\n10.2\n", 1, Err((ErrorKind::Names, Location::Line(2))));
+        check("10.1\n10.2\n10.1\n", 3, Err((ErrorKind::Names, Location::File)));
+        check("10.1\nx\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
     }
 
     #[test]
@@ -255,12 +255,12 @@ mod tests {
         let text = "   Matrix Eqn      Node      DOF\n       2         7     ROTZ\n       1         7     UX\n";
         check(text, 2, Ok(&["7.x", "7.rz"]));
         check("1 7 UX\n2 7 TEMP\n", 2, Ok(&["7.x", "7.TEMP"]));
-        check("1 7 UX\nmore\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("1 7 UX\nmore\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
     }
 
     #[test]
     fn other_files_are_refused() {
-        check("hello\n", 1, Err((Kind::Format, Location::Line(1))));
-        check("", 1, Err((Kind::Truncated, Location::Line(1))));
+        check("hello\n", 1, Err((ErrorKind::Format, Location::Line(1))));
+        check("", 1, Err((ErrorKind::Truncated, Location::Line(1))));
     }
 }

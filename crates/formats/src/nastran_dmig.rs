@@ -18,7 +18,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
@@ -153,7 +153,7 @@ fn entries(
 fn complex(name: &str, location: Location) -> Error {
     let problem = format!("the matrix {name} is complex, but it must be real");
     Error::new(
-        Kind::Complex,
+        ErrorKind::Complex,
         location,
         problem,
         "export the real stiffness; structural damping is a separate matrix, K4AAX",
@@ -297,16 +297,16 @@ mod tests {
         assert_eq!(listed, ["KAAX (2 x 2)", "C (complex)"]);
         assert_eq!(read_bytes(mixed.as_bytes(), None, Some("KAAX"))?.get(0, 0), 1e3);
         let named = read_bytes(mixed.as_bytes(), None, Some("C")).map(|_| ()).map_err(|e| (e.kind, e.location));
-        assert_eq!(named, Err((Kind::Complex, Location::Variable("C".into()))));
-        check("DMIG,C,0,6,4\n", Kind::Complex, Location::Variable("C".into()));
-        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", Kind::Complex, Location::Line(2));
-        check("DMIG,M,1,1,,1,1,2.0\n", Kind::Malformed, Location::Line(1));
-        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,x\n", Kind::Malformed, Location::Line(2));
-        check("DMIG,M,0,7,2\n", Kind::Malformed, Location::Line(1));
-        check("DMIG,M,0,9,2\nDMIG,M,-1,,,1,1,1.0\n", Kind::Malformed, Location::Line(2));
+        assert_eq!(named, Err((ErrorKind::Complex, Location::Variable("C".into()))));
+        check("DMIG,C,0,6,4\n", ErrorKind::Complex, Location::Variable("C".into()));
+        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", ErrorKind::Complex, Location::Line(2));
+        check("DMIG,M,1,1,,1,1,2.0\n", ErrorKind::Malformed, Location::Line(1));
+        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,x\n", ErrorKind::Malformed, Location::Line(2));
+        check("DMIG,M,0,7,2\n", ErrorKind::Malformed, Location::Line(1));
+        check("DMIG,M,0,9,2\nDMIG,M,-1,,,1,1,1.0\n", ErrorKind::Malformed, Location::Line(2));
         check(
             "DMIG,M,0,6,2\nDMIG,M,1,1,,2,1,1.0\nDMIG,M,2,1,,1,1,2.0\n",
-            Kind::NotSymmetric,
+            ErrorKind::NotSymmetric,
             Location::Variable("M".into()),
         );
         Ok(())

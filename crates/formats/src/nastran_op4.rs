@@ -10,7 +10,7 @@
 //! Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4, and Utility Guide.
 
 use crate::bytes::{ByteCursor, ByteOrder};
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::text::{Line, Lines, integer, quoted};
@@ -179,7 +179,7 @@ fn read_text(mut lines: Lines, header: &Op4Header, width: usize) -> Result<Matri
 
 fn wrong_count(line: &Line, words: usize, found: usize) -> Error {
     let problem = format!("the file states {words} words, but {found} numbers follow");
-    Error::new(Kind::Count, line.location(), problem, "the file is damaged; export it again")
+    Error::new(ErrorKind::Count, line.location(), problem, "the file is damaged; export it again")
 }
 
 /// Returns the first row, counted from zero, and the number of words of a string.
@@ -381,7 +381,7 @@ mod tests {
         assert_eq!(listed, ["3 x 2", "K (3 x 2)"]);
         assert_eq!(read_bytes(two.as_bytes(), None, Some("K"))?.get(1, 0), 1.5);
         let error = read_bytes(two.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.remedy));
-        assert!(error.is_err_and(|(kind, remedy)| kind == Kind::Choice && remedy.contains("export")));
+        assert!(error.is_err_and(|(kind, remedy)| kind == ErrorKind::Selection && remedy.contains("export")));
         // A row of a full matrix.
         let rows: String = ["2 1 1 2", "1 2 1 1", "1 1 2 1", "2 1 1 2"]
             .map(|row| row.split(' ').map(|word| format!("{word:>8}")).collect::<String>() + "\n")
@@ -397,17 +397,29 @@ mod tests {
                 read_bytes(text.as_bytes(), Some("nastran-op4"), None).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(found, Err((kind, location)), "{text}");
         };
-        check(DENSE.replace("       1       2       4", "       1       2       5"), Kind::Count, Location::Line(2));
-        check(DENSE.replace("       1       2       4", "       1       3       4"), Kind::Count, Location::Line(3));
         check(
-            DENSE.replace("       1       2       4", "       0       2       4"),
-            Kind::Malformed,
+            DENSE.replace("       1       2       4", "       1       2       5"),
+            ErrorKind::Count,
             Location::Line(2),
         );
-        check(DENSE.lines().take(3).map(|line| format!("{line}\n")).collect(), Kind::Truncated, Location::Line(4));
-        check(DENSE.replace("       2       2K", "       2       4K"), Kind::Complex, Location::Variable("K".into()));
-        check(DENSE.replace("2E23.16", "2X23.16"), Kind::Malformed, Location::Line(1));
-        check(SPARSE.replace("     327681", "     262145"), Kind::Count, Location::Line(3));
-        check(SPARSE.replace("     327681", "          1"), Kind::Malformed, Location::Line(3));
+        check(
+            DENSE.replace("       1       2       4", "       1       3       4"),
+            ErrorKind::Count,
+            Location::Line(3),
+        );
+        check(
+            DENSE.replace("       1       2       4", "       0       2       4"),
+            ErrorKind::Malformed,
+            Location::Line(2),
+        );
+        check(DENSE.lines().take(3).map(|line| format!("{line}\n")).collect(), ErrorKind::Truncated, Location::Line(4));
+        check(
+            DENSE.replace("       2       2K", "       2       4K"),
+            ErrorKind::Complex,
+            Location::Variable("K".into()),
+        );
+        check(DENSE.replace("2E23.16", "2X23.16"), ErrorKind::Malformed, Location::Line(1));
+        check(SPARSE.replace("     327681", "     262145"), ErrorKind::Count, Location::Line(3));
+        check(SPARSE.replace("     327681", "          1"), ErrorKind::Malformed, Location::Line(3));
     }
 }

@@ -6,7 +6,7 @@
 //! Source: NumPy Enhancement Proposal 1, A Simple File Format for NumPy Arrays.
 
 use crate::bytes::{ByteCursor, ByteOrder, NumberType};
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::matrix::{Matrix, StorageOrder, from_dense};
 use crate::text::quoted;
@@ -124,7 +124,7 @@ impl<'a> NpyArray<'a> {
         match count {
             Some(count) if count <= room => Ok(count),
             _ => Err(Error::new(
-                Kind::Truncated,
+                ErrorKind::Truncated,
                 self.data.location(),
                 format!("the header states the shape {:?}, but the file contains {room} numbers", self.shape),
                 "the file is not complete; export or copy it again",
@@ -134,7 +134,7 @@ impl<'a> NpyArray<'a> {
 
     pub fn matrix(self) -> Result<Matrix, Error> {
         let size = self.size().map_err(|note| {
-            let kind = if self.element == ElementType::Complex { Kind::Complex } else { Kind::Unsupported };
+            let kind = if self.element == ElementType::Complex { ErrorKind::Complex } else { ErrorKind::Unsupported };
             let remedy = "save a real array of two dimensions";
             Error::new(kind, Location::File, format!("this is not a real matrix: {note}"), remedy)
         });
@@ -248,14 +248,14 @@ mod tests {
             let found = read_bytes(&write(descr, shape, data), Some("npy"), None).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind), "{descr} {shape}");
         };
-        check("<f8", "(2, 3)", &doubles(&[1.0; 5]), Kind::Truncated);
-        check("<f8", "(1, 1)", &doubles(&[f64::NAN]), Kind::NotFinite);
-        check("<c16", "(1, 1)", &doubles(&[1.0; 2]), Kind::Complex);
-        check("<f8", "(1, 1, 1)", &doubles(&[1.0]), Kind::Unsupported);
-        check("|O", "(1, 1)", &doubles(&[1.0]), Kind::Unsupported);
-        check("<f8", "(99999999999, 99999999999)", &doubles(&[1.0]), Kind::TooLarge);
-        check("<f8", "(-1, 2)", &[], Kind::Malformed);
-        check("<f8", "2, 2", &[], Kind::Malformed);
-        assert_eq!(read_bytes(MAGIC, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        check("<f8", "(2, 3)", &doubles(&[1.0; 5]), ErrorKind::Truncated);
+        check("<f8", "(1, 1)", &doubles(&[f64::NAN]), ErrorKind::NotFinite);
+        check("<c16", "(1, 1)", &doubles(&[1.0; 2]), ErrorKind::Complex);
+        check("<f8", "(1, 1, 1)", &doubles(&[1.0]), ErrorKind::Unsupported);
+        check("|O", "(1, 1)", &doubles(&[1.0]), ErrorKind::Unsupported);
+        check("<f8", "(99999999999, 99999999999)", &doubles(&[1.0]), ErrorKind::TooLarge);
+        check("<f8", "(-1, 2)", &[], ErrorKind::Malformed);
+        check("<f8", "2, 2", &[], ErrorKind::Malformed);
+        assert_eq!(read_bytes(MAGIC, None, None).map_err(|e| e.kind), Err(ErrorKind::Truncated));
     }
 }

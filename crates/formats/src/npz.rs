@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 
 use crate::bytes::{ByteCursor, ByteOrder, NumberType};
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
 use crate::inflate::{Container, DecompressionLimit, beginning, inflate};
 use crate::matrix::{Entry, Matrix, Symmetry, TripletBuilder, for_each_compressed};
@@ -35,7 +35,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let [rows, columns] = size[..] else {
             let location = Location::Variable("shape".into());
             let problem = format!("the array `shape` has {} numbers instead of two", size.len());
-            return Err(Error::new(Kind::Unsupported, location, problem, "save a matrix of two dimensions"));
+            return Err(Error::new(ErrorKind::Unsupported, location, problem, "save a matrix of two dimensions"));
         };
         return Ok(vec![Item::new("", rows, columns, move || read_sparse(&members, rows, columns))]);
     }
@@ -64,7 +64,7 @@ fn array(contents: &[u8]) -> Result<NpyArray<'_>, Error> {
 fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>, Error> {
     members.iter().find(|member| member.name == name).ok_or_else(|| {
         let problem = format!("the sparse matrix has no array `{name}`");
-        Error::new(Kind::Malformed, Location::File, problem, "write the file with scipy.sparse.save_npz")
+        Error::new(ErrorKind::Malformed, Location::File, problem, "write the file with scipy.sparse.save_npz")
     })
 }
 
@@ -83,7 +83,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
     if values.element == npy::ElementType::Complex {
         let location = Location::Variable("data".into());
         return Err(Error::new(
-            Kind::Complex,
+            ErrorKind::Complex,
             location,
             "the matrix is complex, but it must be real".into(),
             "save its real part",
@@ -110,7 +110,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
                     values.len()
                 );
                 return Err(Error::new(
-                    Kind::Count,
+                    ErrorKind::Count,
                     Location::File,
                     problem,
                     "write the file again with scipy.sparse.save_npz",
@@ -124,7 +124,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
             let problem = format!("the matrix is stored as {}; supported are {LAYOUTS}", quoted(other));
             let location = Location::Variable("format".into());
             return Err(Error::new(
-                Kind::Unsupported,
+                ErrorKind::Unsupported,
                 location,
                 problem,
                 "save it as csc: save_npz(path, matrix.tocsc())",
@@ -167,7 +167,7 @@ impl<'a> Member<'a> {
             return Ok(contents);
         }
         let problem = "the checksum of the member differs from the one in the zip".into();
-        Err(Error::new(Kind::Malformed, self.location(), problem, "the file is damaged; copy or export it again"))
+        Err(Error::new(ErrorKind::Malformed, self.location(), problem, "the file is damaged; copy or export it again"))
     }
 }
 
@@ -206,7 +206,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
             let problem =
                 format!("the member is encrypted or compressed with method {method}; only deflate is supported");
             let remedy = "write the file with numpy.savez or numpy.savez_compressed";
-            return Err(Error::new(Kind::Unsupported, Location::Variable(name), problem, remedy));
+            return Err(Error::new(ErrorKind::Unsupported, Location::Variable(name), problem, remedy));
         }
         let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         data.seek(local)?;
@@ -245,7 +245,7 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
     let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
         let problem = "the zip has no central directory at its end".into();
         Error::new(
-            Kind::Truncated,
+            ErrorKind::Truncated,
             Location::Byte(bytes.len()),
             problem,
             "the file is not complete; export or copy it again",
@@ -279,7 +279,7 @@ pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
     let largest = i32::MAX as usize;
     if matrix.rows().max(matrix.columns()).max(entries.len()) > largest {
         let problem = format!("more than {largest} rows, columns or entries");
-        return Err(Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"));
+        return Err(Error::new(ErrorKind::TooLarge, Location::File, problem, "write it as Matrix Market"));
     }
     let mut pointers = vec![0_i32; matrix.columns() + 1];
     for e in &entries {
@@ -307,7 +307,7 @@ fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
     let small = |size: usize| {
         let problem = format!("{size} bytes exceed the limit of a 32-bit zip");
         u32::try_from(size)
-            .map_err(|_| Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"))
+            .map_err(|_| Error::new(ErrorKind::TooLarge, Location::File, problem, "write it as Matrix Market"))
     };
     for (name, contents) in parts {
         let name = format!("{name}.npy");
@@ -393,8 +393,8 @@ mod tests {
             several,
             Err("the file contains several matrices: K (1 x 1), M (2 x 1), note (text); select one by its name".into())
         );
-        assert_eq!(read_bytes(&file, None, Some("C")).map_err(|e| e.kind), Err(Kind::Choice));
-        assert_eq!(read_bytes(&file, None, Some("note")).map_err(|e| e.kind), Err(Kind::Unsupported));
+        assert_eq!(read_bytes(&file, None, Some("C")).map_err(|e| e.kind), Err(ErrorKind::Selection));
+        assert_eq!(read_bytes(&file, None, Some("note")).map_err(|e| e.kind), Err(ErrorKind::Unsupported));
         Ok(())
     }
 
@@ -407,14 +407,14 @@ mod tests {
             assert_eq!(found.map_err(|e| e.kind), Err(kind), "{pointers:?} {rows:?}");
             Ok(())
         };
-        check(&[0, 1, 2], &[1, 0], b"csc", Kind::Count)?;
-        check(&[0, 1, 1, 3], &[1, 0], b"csc", Kind::Count)?;
-        check(&[0, 2, 1, 2], &[1, 0], b"csc", Kind::Count)?;
-        check(&[1, 1, 1, 2], &[1, 0], b"csc", Kind::Count)?;
-        check(&[0, 1, 1, 2], &[2, 0], b"csc", Kind::Count)?;
-        check(&[0, 1, 1, 2], &[-1, 0], b"csc", Kind::Malformed)?;
-        check(&[0, 1, 1, 2], &[1, 0], b"dia", Kind::Unsupported)?;
-        check(&[0, 1, 1, 2], &[1, 0], b"coo", Kind::Malformed)?;
+        check(&[0, 1, 2], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 1, 1, 3], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 2, 1, 2], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[1, 1, 1, 2], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 1, 1, 2], &[2, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 1, 1, 2], &[-1, 0], b"csc", ErrorKind::Malformed)?;
+        check(&[0, 1, 1, 2], &[1, 0], b"dia", ErrorKind::Unsupported)?;
+        check(&[0, 1, 1, 2], &[1, 0], b"coo", ErrorKind::Malformed)?;
         Ok(())
     }
 
@@ -423,9 +423,9 @@ mod tests {
         let mut file = csc(&[0, 1, 1, 2], &[1, 0], &[5.0, 6.0], b"csc")?;
         let at = file.windows(8).position(|eight| eight == 6.0_f64.to_le_bytes()).unwrap_or_default();
         file[at] ^= 1;
-        assert_eq!(read_bytes(&file, None, None).map_err(|e| e.kind), Err(Kind::Malformed));
+        assert_eq!(read_bytes(&file, None, None).map_err(|e| e.kind), Err(ErrorKind::Malformed));
         let half = &file[..file.len() / 2];
-        assert_eq!(read_bytes(half, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(read_bytes(half, None, None).map_err(|e| e.kind), Err(ErrorKind::Truncated));
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Text files: numbered lines, fields, and numbers in Fortran notation.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
 /// Number of characters of a wrong field that a message shows.
 const SHOWN: usize = 40;
@@ -126,7 +126,7 @@ impl<'a> Line<'a> {
     /// Creates an error for unexpected content in this line.
     pub fn malformed(&self, expected: &str, found: &str) -> Error {
         Error::new(
-            Kind::Malformed,
+            ErrorKind::Malformed,
             self.location(),
             format!("expected {expected}, found {found}"),
             "the file is damaged or has another format; export it again, or state its format",
@@ -142,13 +142,13 @@ pub(crate) fn require_final_newline(bytes: &[u8]) -> Result<(), Error> {
     }
     let remedy = "if the file is not complete, export or copy it again; otherwise add a line break at its end";
     let location = Location::Line(Lines::new(bytes).count());
-    Err(Error::new(Kind::Truncated, location, "the file ends within a line".into(), remedy))
+    Err(Error::new(ErrorKind::Truncated, location, "the file ends within a line".into(), remedy))
 }
 
 /// Creates the error for a file that ends before `what`.
 pub(crate) fn truncated(location: Location, what: &str) -> Error {
     Error::new(
-        Kind::Truncated,
+        ErrorKind::Truncated,
         location,
         format!("the file ends before {what}"),
         "the file is not complete; export or copy it again",

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use peak_alloc::PeakAlloc;
-use stickslip_formats::{Matrix, Report, Symmetry, TABLE, list_bytes, names, read_bytes, write};
+use stickslip_formats::{Matrix, MatrixReport, Symmetry, TABLE, list_bytes, names, read_bytes, write};
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
@@ -113,7 +113,7 @@ fn read_all(bytes: &[u8], format: &str) -> usize {
         let matrix = read_bytes(bytes, Some(format), name).ok()?;
         assert!(matrix.entries().iter().all(|e| e.value.is_finite() && e.value != 0.0));
         assert!(matrix.entries().is_sorted_by(|a, b| (a.column, a.row) < (b.column, b.row)));
-        Some(Report::new(&matrix).to_string().len())
+        Some(MatrixReport::new(&matrix).to_string().len())
     });
     found.count()
 }
