@@ -21,8 +21,8 @@ const MERGED_GAP: usize = 8;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::banded::Banded;
-/// let mut matrix = Banded::new(3, 1);
+/// use stickslip_numerics::banded::BandedMatrix;
+/// let mut matrix = BandedMatrix::new(3, 1);
 /// for (i, j, value) in [(0, 1, 1.0), (1, 0, 2.0), (1, 2, 1.0), (2, 2, 4.0)] {
 ///     matrix.add(i, j, value);
 /// }
@@ -32,7 +32,7 @@ const MERGED_GAP: usize = 8;
 /// assert_eq!(x, [1.0, 2.0, 3.0]);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Banded {
+pub struct BandedMatrix {
     n: usize,
     half_bandwidth: usize,
     /// Columns factored before the trailing matrix is updated.
@@ -53,13 +53,13 @@ pub struct Banded {
     nonzero_runs: [Vec<Range<usize>>; 2],
 }
 
-impl Banded {
+impl BandedMatrix {
     /// Creates a zero matrix of `n` rows.
     pub fn new(n: usize, half_bandwidth: usize) -> Self {
-        let block = Banded::block(half_bandwidth);
+        let block = BandedMatrix::block(half_bandwidth);
         let width = 3 * half_bandwidth + 2 * block - 1;
         let rows = vec![0.0; n * width];
-        Banded {
+        BandedMatrix {
             n,
             half_bandwidth,
             block,
@@ -79,7 +79,7 @@ impl Banded {
 
     /// Returns the memory of a matrix of `n` rows, bytes.
     pub fn bytes(n: usize, half_bandwidth: usize) -> f64 {
-        8.0 * n as f64 * (3 * half_bandwidth + 2 * Banded::block(half_bandwidth) + 1) as f64
+        8.0 * n as f64 * (3 * half_bandwidth + 2 * BandedMatrix::block(half_bandwidth) + 1) as f64
     }
 
     /// Sets all entries to zero.
@@ -310,7 +310,7 @@ mod tests {
     fn blocks_solve_what_the_full_matrix_does() {
         for (n, half_bandwidth) in [(40, 7), (300, BLOCKED_FROM), (331, BLOCKED_FROM + 45), (150, 149), (97, 96)] {
             let stream = Stream::new(n as u64);
-            let (mut full, mut banded) = (vec![0.0; n * n], Banded::new(n, half_bandwidth));
+            let (mut full, mut banded) = (vec![0.0; n * n], BandedMatrix::new(n, half_bandwidth));
             for i in 0..n {
                 for j in i.saturating_sub(half_bandwidth)..=(i + half_bandwidth).min(n - 1) {
                     let value = if i == j || (i + 3 * j) % 5 == 0 || (40..75).contains(&i.abs_diff(j)) {

@@ -9,20 +9,20 @@ use num_complex::Complex64;
 
 /// A square complex matrix, stored for products with one vector.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pairs {
+pub struct ComplexGemv {
     n: usize,
     /// Column-major, `2 n × n`: pairs of real and imaginary parts.
     interleaved: Vec<f64>,
 }
 
-impl Pairs {
+impl ComplexGemv {
     /// Stores a column-major matrix, `n × n`.
     ///
     /// # Panics
     /// If `matrix` does not have n² entries.
     pub fn new(matrix: &[Complex64], n: usize) -> Self {
         assert_eq!(matrix.len(), n * n, "the matrix must be square");
-        Pairs { n, interleaved: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
+        ComplexGemv { n, interleaved: matrix.iter().flat_map(|a| [a.re, a.im]).collect() }
     }
 
     /// Returns the memory of the entries, bytes.
@@ -35,10 +35,10 @@ impl Pairs {
     /// # Example
     /// ```
     /// use num_complex::Complex64;
-    /// use stickslip_numerics::complex_gemv::Pairs;
+    /// use stickslip_numerics::complex_gemv::ComplexGemv;
     /// let (one, j) = (Complex64::ONE, Complex64::I);
     /// let mut v = [one, j];
-    /// Pairs::new(&[one, j, j, 2.0 * one], 2).apply(&mut v, &mut Vec::new());
+    /// ComplexGemv::new(&[one, j, j, 2.0 * one], 2).apply(&mut v, &mut Vec::new());
     /// assert_eq!(v, [0.0 * one, 3.0 * j]);
     /// ```
     ///
@@ -70,7 +70,7 @@ mod tests {
             let matrix: Vec<Complex64> = (0..n * n).map(entry).collect();
             let v: Vec<Complex64> = (0..n).map(|i| entry(i + 1000)).collect();
             let mut product = v.clone();
-            Pairs::new(&matrix, n).apply(&mut product, &mut Vec::new());
+            ComplexGemv::new(&matrix, n).apply(&mut product, &mut Vec::new());
             for (i, product) in product.iter().enumerate() {
                 let sum: Complex64 = (0..n).map(|k| matrix[k * n + i] * v[k]).sum();
                 assert!((product - sum).norm() < 1e-13 * n as f64, "{n}: {product} {sum}");

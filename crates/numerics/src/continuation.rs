@@ -10,7 +10,7 @@ use crate::dense;
 ///
 /// The unknowns and the range of the parameter should be of the order of one,
 /// because the arc length adds them.
-pub trait Equations {
+pub trait ParametricEquations {
     /// Returns the number of unknowns.
     fn size(&self) -> usize;
     /// Evaluates `F` and its derivatives with respect to x (row-major, size²)
@@ -29,7 +29,7 @@ pub trait Equations {
 
 /// Range, direction and step sizes of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Steps {
+pub struct ContinuationSettings {
     /// Least and largest value of the parameter.
     pub range: (f64, f64),
     /// +1 to start with a rising parameter, -1 with a falling one.
@@ -44,11 +44,11 @@ pub struct Steps {
     pub points: usize,
 }
 
-impl Steps {
+impl ContinuationSettings {
     /// Returns the steps from one value to another, with a step of at most
     /// `step` along the parameter.
     pub fn between(from: f64, to: f64, step: f64) -> Self {
-        Steps {
+        ContinuationSettings {
             range: (from.min(to), from.max(to)),
             direction: if to < from { -1.0 } else { 1.0 },
             unit: (to - from).abs(),
@@ -61,7 +61,7 @@ impl Steps {
 
 /// The reason why a branch ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum End {
+pub enum BranchEnd {
     /// The parameter has reached the border of its range: the last point is on it.
     Border,
     /// The maximum number of points is reached.
@@ -69,7 +69,7 @@ pub enum End {
     /// The corrector failed at the smallest step size.
     Stalled {
         /// Parameter at the last point.
-        at: f64,
+        parameter: f64,
     },
     /// The visitor ended the continuation.
     Stopped,
@@ -83,7 +83,7 @@ const ITERATIONS: usize = 20;
 /// A step with at most this number of corrector iterations makes the next step
 /// longer. See [`ITERATIONS`].
 const EASY_ITERATIONS: usize = 10;
-/// A step below the largest step size divided by this number calls [`Equations::leap`].
+/// A step below the largest step size divided by this number calls [`ParametricEquations::leap`].
 const JUMP_DIVISOR: f64 = 32.0;
 
 /// Follows the branch from `(x, p)`, which solves the equations.
@@ -93,9 +93,9 @@ const JUMP_DIVISOR: f64 = 32.0;
 /// # Example
 /// A circle, past its turning points:
 /// ```
-/// use stickslip_numerics::continuation::{End, Equations, Steps, trace};
+/// use stickslip_numerics::continuation::{BranchEnd, ContinuationSettings, ParametricEquations, trace};
 /// struct Circle;
-/// impl Equations for Circle {
+/// impl ParametricEquations for Circle {
 ///     fn size(&self) -> usize { 1 }
 ///     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
 ///         (f[0], by_x[0], by_p[0]) = (x[0] * x[0] + p * p - 1.0, 2.0 * x[0], 2.0 * p);
@@ -103,19 +103,19 @@ const JUMP_DIVISOR: f64 = 32.0;
 ///     }
 ///     fn tolerance(&self) -> f64 { 1e-12 }
 /// }
-/// let steps = Steps { unit: 1.0, points: 200, ..Steps::between(-2.0, 2.0, 0.1) };
+/// let steps = ContinuationSettings { unit: 1.0, points: 200, ..ContinuationSettings::between(-2.0, 2.0, 0.1) };
 /// let mut lowest = 1.0f64;
 /// let end = trace(&mut Circle, &[1.0], 0.0, steps, &mut |_, x, _| { lowest = lowest.min(x[0]); true });
-/// assert_eq!(end, End::Points);
+/// assert_eq!(end, BranchEnd::Points);
 /// assert!(lowest < -0.99);
 /// ```
-pub fn trace<E: Equations>(
+pub fn trace<E: ParametricEquations>(
     equations: &mut E,
     x: &[f64],
     p: f64,
-    steps: Steps,
+    steps: ContinuationSettings,
     visit: &mut dyn FnMut(&mut E, &[f64], f64) -> bool,
-) -> End {
+) -> BranchEnd {
     let n = equations.size();
     let mut corrector = Corrector::new(n);
     let (mut x, mut p) = (x.to_vec(), p);
@@ -123,7 +123,7 @@ pub fn trace<E: Equations>(
     tangent[n] = steps.direction;
     let mut step_size = 0.25 * steps.longest;
     if !visit(equations, &x, p) {
-        return End::Stopped;
+        return BranchEnd::Stopped;
     }
     let mut tangent_outdated = true;
     let mut direction = steps.direction;
@@ -179,32 +179,32 @@ pub fn trace<E: Equations>(
                     tangent.fill(0.0);
                     tangent[n] = direction;
                     if !visit(equations, &x, p) {
-                        return End::Stopped;
+                        return BranchEnd::Stopped;
                     }
                     if border {
-                        return End::Border;
+                        return BranchEnd::Border;
                     }
                     continue;
                 }
             }
             if step_size < steps.shortest {
-                return End::Stalled { at: p };
+                return BranchEnd::Stalled { parameter: p };
             }
             continue;
         };
         direction = if q < p { -1.0 } else { 1.0 };
         (x, p, tangent_outdated) = (next, q, true);
         if !visit(equations, &x, p) {
-            return End::Stopped;
+            return BranchEnd::Stopped;
         }
         if border.is_some() {
-            return End::Border;
+            return BranchEnd::Border;
         }
         if iterations <= EASY_ITERATIONS {
             step_size *= 1.5;
         }
     }
-    End::Points
+    BranchEnd::Points
 }
 
 /// A predicted point: unknowns and parameter.
@@ -243,7 +243,14 @@ impl Corrector {
 
     /// Computes the unit tangent in the direction of `tangent`. Leaves it
     /// unchanged if the point is singular.
-    fn tangent<E: Equations>(&mut self, equations: &mut E, x: &[f64], p: f64, unit: f64, tangent: &mut [f64]) {
+    fn tangent<E: ParametricEquations>(
+        &mut self,
+        equations: &mut E,
+        x: &[f64],
+        p: f64,
+        unit: f64,
+        tangent: &mut [f64],
+    ) {
         let n = self.n;
         if !equations.evaluate(x, p, &mut self.f, &mut self.by_x, &mut self.by_p) {
             return;
@@ -261,7 +268,7 @@ impl Corrector {
 
     /// Corrects by Newton's method on the plane orthogonal to `across`, or with the parameter
     /// fixed. Returns the number of iterations, or `None` if it fails.
-    fn correct<E: Equations>(
+    fn correct<E: ParametricEquations>(
         &mut self,
         equations: &mut E,
         x: &mut [f64],
@@ -314,7 +321,7 @@ mod tests {
     /// `x (1 - p) = 1`: a resonance without damping.
     struct Pole;
 
-    impl Equations for Pole {
+    impl ParametricEquations for Pole {
         fn size(&self) -> usize {
             1
         }
@@ -334,13 +341,13 @@ mod tests {
     #[test]
     fn branches_to_infinity_take_few_steps() {
         let (mut visited, mut farthest) = (0, 0.0f64);
-        let end = trace(&mut Pole, &[1.0], 0.0, Steps::between(0.0, 2.0, 0.2), &mut |_, x, p| {
+        let end = trace(&mut Pole, &[1.0], 0.0, ContinuationSettings::between(0.0, 2.0, 0.2), &mut |_, x, p| {
             visited += 1;
             farthest = farthest.max(x[0]);
             assert!((x[0] * (1.0 - p) - 1.0).abs() < 1e-6, "{x:?} {p}");
             x[0] < 1e6
         });
-        assert_eq!(end, End::Stopped);
+        assert_eq!(end, BranchEnd::Stopped);
         assert!(farthest >= 1e6 && visited < 400, "{farthest} {visited} {end:?}");
     }
 }

@@ -13,7 +13,7 @@
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
 use crate::eigen::symmetric_in_blocks;
-use crate::sparse::{Analysis, Matrix};
+use crate::sparse::{Matrix, SymbolicAnalysis};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
 use faer::{MatMut, Par, Spec};
@@ -166,7 +166,7 @@ fn is_positive_definite(matrix: &DMatrix<f64>, shift: f64) -> bool {
 /// assert_eq!(definite, [Some(true), Some(false), None]);
 /// ```
 pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
-    definite(matrix, Analysis::new)
+    definite(matrix, SymbolicAnalysis::new)
 }
 
 /// Tests a matrix like [`sparse_definite`], in the known elimination order of `analysis`.
@@ -176,11 +176,11 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
 ///
 /// # Panics
 /// If the matrix does not have the size of the matrices analysed.
-pub fn sparse_definite_in_order(matrix: &Matrix, analysis: &Analysis) -> Option<bool> {
+pub fn sparse_definite_in_order(matrix: &Matrix, analysis: &SymbolicAnalysis) -> Option<bool> {
     definite(matrix, |matrices| analysis.in_order(matrices))
 }
 
-fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> Analysis) -> Option<bool> {
+fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) -> Option<bool> {
     let n = matrix.n();
     // Larger than the threshold at which a sparse factor treats a pivot as rounding.
     let rounding = ROUNDING * n.max(16) as f64;
@@ -256,7 +256,7 @@ mod tests {
                 // is that of a matrix with other entries.
                 let [wide, none] = [9, 0].map(|far| (0..far.min(n - 1)).map(|i| (i, n - 1 - i, 1.0)));
                 for other in [wide, none] {
-                    let order = Analysis::new(&[&Matrix::from_triplets(n, other).unwrap()]);
+                    let order = SymbolicAnalysis::new(&[&Matrix::from_triplets(n, other).unwrap()]);
                     assert_eq!(sparse_definite_in_order(&matrix, &order), alone);
                 }
                 alone
@@ -273,7 +273,7 @@ mod tests {
     fn places_without_mass_in_the_order_of_the_structure() {
         let n = 60;
         let springs = (1..n).flat_map(|i| [(i, i - 1, -1.0), (i - 1, i, -1.0)]).chain((0..n).map(|i| (i, i, 2.0)));
-        let order = Analysis::new(&[&Matrix::from_triplets(n, springs).unwrap()]);
+        let order = SymbolicAnalysis::new(&[&Matrix::from_triplets(n, springs).unwrap()]);
         let masses = |last: f64| {
             let each = (0..n).filter(|i| i % 3 == 0).map(|i| (i, i, 1.0));
             let far = [(0, 57, 0.5), (57, 0, 0.5), (3, 3, last)];

@@ -180,7 +180,7 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
 /// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), true);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply_in_blocks<T: Number>(
+pub fn multiply_in_blocks<T: Scalar>(
     a: &[T],
     b: &[T],
     c: &mut [T],
@@ -242,18 +242,18 @@ pub fn solve_lower_in_blocks(lower: &[f64], n: usize, right: &mut [f64], transpo
 }
 
 /// The numbers of a matrix: real or complex.
-pub trait Number: ComplexField + Copy {
+pub trait Scalar: ComplexField + Copy {
     /// Returns true if the number is finite and not zero.
     fn is_pivot(self) -> bool;
 }
 
-impl Number for f64 {
+impl Scalar for f64 {
     fn is_pivot(self) -> bool {
         self != 0.0 && self.is_finite()
     }
 }
 
-impl Number for Complex64 {
+impl Scalar for Complex64 {
     fn is_pivot(self) -> bool {
         self != Complex64::ZERO && self.is_finite()
     }
@@ -274,7 +274,7 @@ impl Number for Complex64 {
 /// assert_eq!(x, [-j, 0.5 + 0.0 * j]);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Lu<T> {
+pub struct DenseLu<T> {
     n: usize,
     factors: Vec<T>,
     order: Vec<u32>,
@@ -282,9 +282,9 @@ pub struct Lu<T> {
 }
 
 /// The factorization of a complex matrix.
-pub type ComplexLu = Lu<Complex64>;
+pub type ComplexLu = DenseLu<Complex64>;
 
-impl<T: Number> Lu<T> {
+impl<T: Scalar> DenseLu<T> {
     /// Returns the memory of the factors, bytes.
     pub fn bytes(&self) -> usize {
         size_of::<T>() * self.factors.len()
@@ -301,7 +301,7 @@ impl<T: Number> Lu<T> {
         let mut factors = MatMut::from_column_major_slice_mut(&mut matrix, n, n);
         lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, MemStack::new(&mut memory), params);
         let weak = (0..n).find(|&k| !factors[(k, k)].is_pivot());
-        weak.map_or(Ok(Lu { n, factors: matrix, order, inverse }), Err)
+        weak.map_or(Ok(DenseLu { n, factors: matrix, order, inverse }), Err)
     }
 
     /// Solves in place for right sides of length n, stored consecutively.
@@ -314,7 +314,7 @@ impl<T: Number> Lu<T> {
         });
     }
 
-    /// Solves with the conjugate transpose of the matrix, like [`Lu::solve`].
+    /// Solves with the conjugate transpose of the matrix, like [`DenseLu::solve`].
     ///
     /// # Panics
     /// If the length of `right` is not a multiple of n.

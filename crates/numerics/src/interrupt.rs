@@ -1,8 +1,8 @@
 //! Interruption of long computations.
 //!
-//! A caller gives its thread a [`Stop`]. Loops call [`check`] between their
+//! A caller gives its thread a [`StopFlag`]. Loops call [`check`] between their
 //! steps, and the stack unwinds once the flag is set. A thread without a
-//! [`Stop`], which is the default, never unwinds. The unwinding discards the
+//! [`StopFlag`], which is the default, never unwinds. The unwinding discards the
 //! unfinished result, so callers must drop state that spans an interruption.
 
 use std::any::Any;
@@ -21,8 +21,8 @@ pub struct Interrupted;
 /// # Example
 /// ```
 /// use std::panic::{AssertUnwindSafe, catch_unwind};
-/// use stickslip_numerics::interrupt::{Interrupted, Stop, check};
-/// let stop = Stop::new();
+/// use stickslip_numerics::interrupt::{Interrupted, StopFlag, check};
+/// let stop = StopFlag::new();
 /// assert_eq!(stop.watch(|| { check(); 3 }), 3);
 /// stop.set();
 /// let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| check()))).unwrap_err();
@@ -30,7 +30,7 @@ pub struct Interrupted;
 /// check(); // the thread has no flag any more
 /// ```
 #[derive(Clone, Default)]
-pub struct Stop(Arc<Inner>);
+pub struct StopFlag(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
@@ -40,20 +40,20 @@ struct Inner {
 }
 
 thread_local! {
-    static THREAD_FLAG: RefCell<Option<Stop>> = const { RefCell::new(None) };
+    static THREAD_FLAG: RefCell<Option<StopFlag>> = const { RefCell::new(None) };
 }
 
-impl Stop {
+impl StopFlag {
     /// Creates a flag that is not set.
-    pub fn new() -> Stop {
-        Stop::default()
+    pub fn new() -> StopFlag {
+        StopFlag::default()
     }
 
     /// Creates a flag that is also set once `callback` returns true.
     ///
     /// Every check calls `callback`, on the thread that computes.
-    pub fn asking(callback: impl Fn() -> bool + Send + Sync + 'static) -> Stop {
-        Stop(Arc::new(Inner { set: AtomicBool::new(false), callback: Some(Box::new(callback)) }))
+    pub fn asking(callback: impl Fn() -> bool + Send + Sync + 'static) -> StopFlag {
+        StopFlag(Arc::new(Inner { set: AtomicBool::new(false), callback: Some(Box::new(callback)) }))
     }
 
     /// Sets the flag: the watched computations end at their next check.
@@ -77,7 +77,7 @@ impl Stop {
     }
 }
 
-impl fmt::Debug for Stop {
+impl fmt::Debug for StopFlag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Stop").field("set", &self.is_set()).finish_non_exhaustive()
     }
@@ -85,12 +85,12 @@ impl fmt::Debug for Stop {
 
 /// Sets or removes the flag of this thread, for threads that receive work from
 /// others. The flag stays until the next call.
-pub fn lend(stop: Option<Stop>) {
+pub fn lend(stop: Option<StopFlag>) {
     THREAD_FLAG.set(stop);
 }
 
 /// Restores the thread's former flag when dropped.
-struct FlagGuard(Option<Stop>);
+struct FlagGuard(Option<StopFlag>);
 
 impl Drop for FlagGuard {
     fn drop(&mut self) {
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_reason_ends_all_that_share_the_flag() {
-        let stop = Stop::new();
+        let stop = StopFlag::new();
         let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| throw(Box::new(7_u8))))).unwrap_err();
         assert_eq!(ended.downcast_ref(), Some(&7_u8));
         let other = stop.clone();
@@ -140,12 +140,12 @@ mod tests {
     fn callback_runs_until_it_returns_true() {
         let asked = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let count = asked.clone();
-        let stop = Stop::asking(move || count.fetch_add(1, Ordering::Relaxed) == 2);
+        let stop = StopFlag::asking(move || count.fetch_add(1, Ordering::Relaxed) == 2);
         let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| (0..9).for_each(|_| check()))));
         assert!(ended.is_err() && stop.is_set());
         assert_eq!(asked.load(Ordering::Relaxed), 3);
         // After the inner flag ends, the outer flag counts again.
-        let (outer, inner) = (Stop::new(), Stop::new());
+        let (outer, inner) = (StopFlag::new(), StopFlag::new());
         outer.watch(|| {
             inner.watch(|| ());
             outer.set();
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn threads_without_a_flag_continue() {
-        Stop::new().set();
+        StopFlag::new().set();
         check();
         throw(Box::new("nobody hears it"));
     }

@@ -18,7 +18,7 @@ use num_complex::Complex64;
 
 /// The modes of a system with unit mass matrix.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Modes {
+pub struct QuadraticModes {
     /// Exponents λ, one of every complex pair, rad/s.
     pub lambda: Vec<Complex64>,
     /// Columns φ times their weight (2 for a complex pair, 1 for a real mode), m × modes.
@@ -39,7 +39,7 @@ pub struct Modes {
 #[error(
     "two modes coincide at {lambda:.6} rad/s (critical damping); change the coefficient of one damper by a factor of 1.000001"
 )]
-pub struct Defective {
+pub struct DefectiveModes {
     /// Eigenvalue at which two modes coincide, rad/s.
     pub lambda: Complex64,
 }
@@ -61,23 +61,23 @@ const UNSYMMETRIC: f64 = 1e-12;
 /// Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
 const SCHUR_STEPS: usize = 40;
 
-impl Modes {
+impl QuadraticModes {
     /// Computes the modes of `q'' + C q' + K q`. Both matrices are m × m; K is
     /// symmetric, C may have a gyroscopic part.
     ///
     /// # Errors
-    /// [`Defective`] at (nearly) critical damping, or if the numbers are out of range.
+    /// [`DefectiveModes`] at (nearly) critical damping, or if the numbers are out of range.
     ///
     /// # Example
     /// ```
     /// use nalgebra::dmatrix;
-    /// use stickslip_numerics::quadratic_modes::Modes;
-    /// let modes = Modes::new(&dmatrix![0.02], &dmatrix![1.0]).unwrap();
+    /// use stickslip_numerics::quadratic_modes::QuadraticModes;
+    /// let modes = QuadraticModes::new(&dmatrix![0.02], &dmatrix![1.0]).unwrap();
     /// assert!((modes.lambda[0].re + 0.01).abs() < 1e-15);
     /// ```
-    pub fn new(damping: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<Modes, Defective> {
+    pub fn new(damping: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<QuadraticModes, DefectiveModes> {
         let m = damping.nrows();
-        let mut modes = Modes {
+        let mut modes = QuadraticModes {
             lambda: Vec::new(),
             shape: DMatrix::zeros(m, 0),
             from_displacement: DMatrix::zeros(0, m),
@@ -87,7 +87,7 @@ impl Modes {
         if m == 0 {
             return Ok(modes);
         }
-        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let undamped = eigen::symmetric((stiffness + stiffness.transpose()) * 0.5).ok_or(out_of_range)?;
         let basis = split_free(damping, &undamped, &mut modes.free).ok_or(out_of_range)?;
         let (c, k) = (basis.transpose() * damping * &basis, basis.transpose() * stiffness * &basis);
@@ -101,9 +101,9 @@ impl Modes {
     }
 
     /// Adds the modes of a coupled group of coordinates. The columns of `part` span the group.
-    fn add_group(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
+    fn add_group(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), DefectiveModes> {
         let r = c.nrows();
-        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let eigenvalues = if r == 1 { Some(quadratic_roots(c[0], k[0])) } else { companion_eigenvalues(c, k) };
         let eigenvalues =
             eigenvalues.filter(|all| all.iter().all(|l| l.re.is_finite() && l.im.is_finite())).ok_or(out_of_range)?;
@@ -129,7 +129,7 @@ impl Modes {
             }
             // A value has at most as many eigenvectors as there are coordinates.
             if members.len() > r {
-                return Err(Defective { lambda });
+                return Err(DefectiveModes { lambda });
             }
             // φ and ψ.
             let vectors = |lambda: Complex64| {
@@ -158,7 +158,7 @@ impl Modes {
             let values = eigen::singular(theta.clone()).ok_or(out_of_range)?.singular_values;
             let singular = values.min() <= DEFECTIVE * size;
             let inverse = if singular { None } else { theta.try_inverse() };
-            let Some(inverse) = inverse else { return Err(Defective { lambda }) };
+            let Some(inverse) = inverse else { return Err(DefectiveModes { lambda }) };
             let left = inverse * psi.transpose();
             let weight = if real { 1.0 } else { 2.0 };
             let lambda_c = DMatrix::from_diagonal_element(r, r, lambda) + &cc;
@@ -307,7 +307,7 @@ mod tests {
     /// The modal coordinates recover `q` and `q'` and satisfy the equation of the system.
     fn check(c: &DMatrix<f64>, k: &DMatrix<f64>, tolerance: f64) {
         let m = c.nrows();
-        let modes = Modes::new(c, k).unwrap();
+        let modes = QuadraticModes::new(c, k).unwrap();
         let count: usize = modes.lambda.iter().map(|l| if l.im == 0.0 { 1 } else { 2 }).sum();
         assert_eq!(count + 2 * modes.free.ncols(), 2 * m);
         let (q, v) = (DVector::from_fn(m, |i, _| 1.0 + i as f64), DVector::from_fn(m, |i, _| 0.3 - 0.2 * i as f64));
@@ -343,7 +343,7 @@ mod tests {
         let h = 0.5f64.sqrt();
         let turn = dmatrix![h, 0.0, h, 0.0; 0.0, h, 0.0, h; -h, 0.0, h, 0.0; 0.0, -h, 0.0, h];
         check(&(&turn * twice(&c) * turn.transpose()), &(&turn * twice(&k) * turn.transpose()), 1e-10);
-        assert!(Modes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
+        assert!(QuadraticModes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
     }
 
     /// A chain of many masses with dampers that couple all of its modes; then two such chains

@@ -8,7 +8,7 @@
 //! - `1` for constant forces, and `τ, τ²/2` for bodies that are free to move.
 //!
 //! Values, derivatives, integrals and bounds of such a signal have closed forms. A bound on the
-//! second derivative gives a step without any zero of the signal. [`Basis::first_zero`]
+//! second derivative gives a step without any zero of the signal. [`ExponentialBasis::first_zero`]
 //! advances by such steps and therefore misses no zero.
 
 use crate::quadrature;
@@ -19,7 +19,7 @@ use num_complex::Complex64;
 /// The order of the coefficients is: exponentials, resonant pairs, the
 /// constant, and `τ, τ²/2` if `drifts` is set.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Basis {
+pub struct ExponentialBasis {
     /// Exponents `s`, rad/s.
     pub exponents: Vec<Complex64>,
     /// Resonant pairs `(s, δ)`, rad/s.
@@ -56,7 +56,7 @@ pub enum FirstZero {
     /// No signal vanishes before the end.
     None,
     /// Signal `index` reaches zero at `time`.
-    At {
+    Found {
         /// Index of the signal.
         index: usize,
         /// Time of the zero, s.
@@ -69,7 +69,7 @@ pub enum FirstZero {
 
 /// The state of a monitored signal at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Begin {
+pub enum InitialSign {
     /// The signal is positive.
     Positive,
     /// The signal is zero and expected to rise. Its first nonzero derivative decides.
@@ -86,7 +86,7 @@ const TIME_RESOLUTION: f64 = 4e-16;
 /// bound. The solution that leads to it has rounding errors of about 1e-13.
 const ZERO_TOLERANCE: f64 = 1e-9;
 
-impl Basis {
+impl ExponentialBasis {
     /// Returns the number of coefficients of a signal.
     pub fn len(&self) -> usize {
         self.constant() + if self.drifts { 3 } else { 1 }
@@ -101,13 +101,13 @@ impl Basis {
         self.exponents.len() + self.resonant.len()
     }
 
-    /// Computes the basis functions at `time` into `out` (length [`Basis::len`]).
+    /// Computes the basis functions at `time` into `out` (length [`ExponentialBasis::len`]).
     #[inline]
     pub fn evaluate(&self, time: f64, out: &mut [Complex64]) {
         self.evaluate_and(time, out, |_, _| {});
     }
 
-    /// Computes the basis functions like [`Basis::evaluate`]. `size` receives
+    /// Computes the basis functions like [`ExponentialBasis::evaluate`]. `size` receives
     /// the magnitude of every exponential that decays or grows.
     #[inline]
     pub(crate) fn evaluate_and(&self, time: f64, out: &mut [Complex64], mut size: impl FnMut(usize, f64)) {
@@ -240,10 +240,16 @@ impl Basis {
     /// `g + g' h - max|g''| h²/2 > 0`, so no zero is missed. The value of the second derivative
     /// and a bound on the third may permit a longer step. Close to a simple zero the steps
     /// converge cubically, from the left. `scratch` is scratch memory.
-    pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
+    pub fn first_zero(
+        &self,
+        signals: &[Complex64],
+        begins: &[InitialSign],
+        end: f64,
+        scratch: &mut ZeroScratch,
+    ) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
-        let Scratch {
+        let ZeroScratch {
             values,
             magnitudes,
             exponent_magnitudes,
@@ -266,10 +272,10 @@ impl Basis {
         self.magnitudes(end, magnitudes);
         for k in 0..count {
             zero_free_until[k] = match begins[k] {
-                Begin::Positive => 0.0,
-                Begin::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
+                InitialSign::Positive => 0.0,
+                InitialSign::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
                     Some(until) => until,
-                    None => return FirstZero::At { index: k, time: 0.0 },
+                    None => return FirstZero::Found { index: k, time: 0.0 },
                 },
             };
         }
@@ -292,7 +298,7 @@ impl Basis {
                 let range = k * nb..(k + 1) * nb;
                 let g = real_dot(&signals[range.clone()], values);
                 if g <= 0.0 {
-                    return FirstZero::At { index: k, time };
+                    return FirstZero::Found { index: k, time };
                 }
                 let slope = real_dot(&first[range.clone()], values);
                 let bound = magnitude_bound(&second_weights[range.clone()], magnitudes);
@@ -319,12 +325,12 @@ impl Basis {
                 return FirstZero::None;
             }
             if converged {
-                return FirstZero::At { index: nearest, time: time + step };
+                return FirstZero::Found { index: nearest, time: time + step };
             }
             if step <= resolution {
                 let range = nearest * nb..(nearest + 1) * nb;
                 if real_dot(&first[range], values) <= 0.0 {
-                    return FirstZero::At { index: nearest, time };
+                    return FirstZero::Found { index: nearest, time };
                 }
                 step = resolution; // the signal touches zero and rises again
             }
@@ -373,7 +379,7 @@ impl Basis {
 /// With `e_b` the exponentials and the constant, the integrals `∫ e_b e_c dτ` and
 /// `∫ e_b e_c* dτ` serve all signals of a basis.
 #[derive(Debug, Clone, Default)]
-pub struct Products {
+pub struct ProductIntegrals {
     length: f64,
     /// Number of exponentials plus one for the constant.
     terms: usize,
@@ -383,10 +389,10 @@ pub struct Products {
     mixed: Vec<Complex64>,
 }
 
-impl Products {
+impl ProductIntegrals {
     /// Computes the integrals over `[0, length]`. `at_end` contains the basis
     /// functions at `length`.
-    pub fn new(basis: &Basis, at_end: &[Complex64], length: f64) -> Self {
+    pub fn new(basis: &ExponentialBasis, at_end: &[Complex64], length: f64) -> Self {
         let (e, zero, one) = (basis.exponents.len(), Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
         let terms = e + 1;
         let term = |b: usize| if b < e { (basis.exponents[b], at_end[b]) } else { (zero, one) };
@@ -403,11 +409,11 @@ impl Products {
                 mixed[c * terms + b] = value.conj();
             }
         }
-        Products { length, terms, plain, mixed }
+        ProductIntegrals { length, terms, plain, mixed }
     }
 
     /// Returns `∫ g h dτ`.
-    pub fn integral(&self, basis: &Basis, g: &[Complex64], h: &[Complex64]) -> f64 {
+    pub fn integral(&self, basis: &ExponentialBasis, g: &[Complex64], h: &[Complex64]) -> f64 {
         if !(basis.is_exponential(g) && basis.is_exponential(h)) {
             return quadrature((basis, g), (basis, h), self.length);
         }
@@ -445,7 +451,7 @@ pub struct FourierIntegrals {
 impl FourierIntegrals {
     /// Computes the integrals over `[0, length]` at `nu` (rad/s). `at_end`
     /// contains the basis functions at `length`.
-    pub fn new(basis: &Basis, at_end: &[Complex64], nu: f64, length: f64) -> Self {
+    pub fn new(basis: &ExponentialBasis, at_end: &[Complex64], nu: f64, length: f64) -> Self {
         let (sin, cos) = (nu * length).sin_cos();
         let (rate, turn) = (Complex64::new(0.0, -nu), Complex64::new(cos, -sin));
         let constant = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
@@ -457,9 +463,10 @@ impl FourierIntegrals {
     }
 
     /// Returns `∫ g e^{-jντ} dτ`.
-    pub fn integral(&self, basis: &Basis, g: &[Complex64]) -> Complex64 {
+    pub fn integral(&self, basis: &ExponentialBasis, g: &[Complex64]) -> Complex64 {
         if !basis.is_exponential(g) {
-            let probe = Basis { exponents: vec![Complex64::new(0.0, self.nu)], ..Basis::default() };
+            let probe =
+                ExponentialBasis { exponents: vec![Complex64::new(0.0, self.nu)], ..ExponentialBasis::default() };
             let part =
                 |turn: Complex64| quadrature((basis, g), (&probe, &[turn, Complex64::new(0.0, 0.0)]), self.length);
             // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
@@ -480,7 +487,11 @@ const NODES: [(f64, f64); 8] = quadrature::outwards(quadrature::EIGHT);
 const PANEL_PHASE: f64 = 1.0;
 
 /// Returns `∫ g h dτ` over `[0, length]` by Gauss-Legendre quadrature in panels.
-fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Complex64]), length: f64) -> f64 {
+fn quadrature(
+    (g_basis, g): (&ExponentialBasis, &[Complex64]),
+    (h_basis, h): (&ExponentialBasis, &[Complex64]),
+    length: f64,
+) -> f64 {
     let fastest = g_basis.exponents.iter().chain(&h_basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
     let panels = (2.0 * fastest * length / PANEL_PHASE).ceil().clamp(1.0, 1e5) as usize;
     let width = length / panels as f64;
@@ -530,9 +541,9 @@ pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
     coefficients.iter().zip(values).map(|(c, v)| c.re * v.re - c.im * v.im).sum()
 }
 
-/// Scratch memory of [`Basis::first_zero`], reused between calls.
+/// Scratch memory of [`ExponentialBasis::first_zero`], reused between calls.
 #[derive(Debug, Clone, Default)]
-pub struct Scratch {
+pub struct ZeroScratch {
     values: Vec<Complex64>,
     magnitudes: Vec<f64>,
     exponent_magnitudes: Vec<f64>,
@@ -544,7 +555,7 @@ pub struct Scratch {
     rising: [Vec<Complex64>; 2],
 }
 
-impl Scratch {
+impl ZeroScratch {
     fn prepare(&mut self, nb: usize, count: usize) {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
@@ -570,36 +581,37 @@ mod tests {
     /// 1.000001 - cos τ has no zero.
     #[test]
     fn narrow_dips_are_found_and_near_misses_are_not_zeros() {
-        let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
-        let mut scratch = Scratch::default();
+        let basis = ExponentialBasis { exponents: vec![c(0.0, 1.0)], ..ExponentialBasis::default() };
+        let mut scratch = ZeroScratch::default();
         let dip = [c(-1.0, 0.0), c(0.999, 0.0)];
         // At τ = 0 the signal is below zero, so it is shifted: g(τ) = 0.999 - cos(τ + 1).
         let shifted = [dip[0] * c(0.0, 1.0).exp(), dip[1]];
-        let FirstZero::At { time, .. } = basis.first_zero(&shifted, &[Begin::Positive], 10.0, &mut scratch) else {
+        let FirstZero::Found { time, .. } = basis.first_zero(&shifted, &[InitialSign::Positive], 10.0, &mut scratch)
+        else {
             panic!("a zero was missed");
         };
         assert!((time - (2.0 * std::f64::consts::PI - 1.0 - 0.999f64.acos())).abs() < 1e-14, "{time}");
         let near_miss = [dip[0], c(1.000_001, 0.0)];
-        assert_eq!(basis.first_zero(&near_miss, &[Begin::Positive], 100.0, &mut scratch), FirstZero::None);
+        assert_eq!(basis.first_zero(&near_miss, &[InitialSign::Positive], 100.0, &mut scratch), FirstZero::None);
     }
 
     /// A signal that starts at zero and rises has no zero there: 1 - cos τ
     /// starts with a zero value and a zero slope.
     #[test]
     fn a_start_at_zero_is_no_zero() {
-        let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
+        let basis = ExponentialBasis { exponents: vec![c(0.0, 1.0)], ..ExponentialBasis::default() };
         let g = [c(-1.0, 0.0), c(1.0, 0.0)];
-        let mut scratch = Scratch::default();
-        assert_eq!(basis.first_zero(&g, &[Begin::Zero], 6.0, &mut scratch), FirstZero::None);
+        let mut scratch = ZeroScratch::default();
+        assert_eq!(basis.first_zero(&g, &[InitialSign::Zero], 6.0, &mut scratch), FirstZero::None);
         let sine = [c(0.0, -1.0), c(0.0, 0.0)];
-        let FirstZero::At { time, .. } = basis.first_zero(&sine, &[Begin::Zero], 6.0, &mut scratch) else {
+        let FirstZero::Found { time, .. } = basis.first_zero(&sine, &[InitialSign::Zero], 6.0, &mut scratch) else {
             panic!("the zero at pi was missed");
         };
         assert!((time - std::f64::consts::PI).abs() < 1e-14);
         let falling = [c(1.0, 0.0), c(-1.0, 0.0)];
         assert_eq!(
-            basis.first_zero(&falling, &[Begin::Zero], 6.0, &mut scratch),
-            FirstZero::At { index: 0, time: 0.0 }
+            basis.first_zero(&falling, &[InitialSign::Zero], 6.0, &mut scratch),
+            FirstZero::Found { index: 0, time: 0.0 }
         );
     }
 
@@ -609,17 +621,17 @@ mod tests {
     fn integrals_agree_with_quadrature() {
         let (s, delta) = (c(-0.1, 2.0), c(0.1, 1e-7));
         let exponents = vec![s, s + delta, c(-30.0, 0.0)];
-        let basis = Basis { exponents, resonant: vec![(s, delta)], driven_by: vec![1], drifts: true };
+        let basis = ExponentialBasis { exponents, resonant: vec![(s, delta)], driven_by: vec![1], drifts: true };
         let zero = c(0.0, 0.0);
         let g = [c(1.0, 0.5), c(-0.3, 0.2), c(0.7, 0.0), zero, c(0.4, 0.0), zero, zero];
         let mut end = vec![zero; basis.len()];
         basis.evaluate(3.0, &mut end);
-        let exact = Products::new(&basis, &end, 3.0).integral(&basis, &g, &g);
+        let exact = ProductIntegrals::new(&basis, &end, 3.0).integral(&basis, &g, &g);
         let numeric = quadrature((&basis, &g), (&basis, &g), 3.0);
         assert!((exact - numeric).abs() < 1e-13 * exact.abs(), "{exact} {numeric}");
         let nu = 1.7;
         let of = FourierIntegrals::new(&basis, &end, nu, 3.0).integral(&basis, &g);
-        let probe = Basis { exponents: vec![c(0.0, nu)], ..Basis::default() };
+        let probe = ExponentialBasis { exponents: vec![c(0.0, nu)], ..ExponentialBasis::default() };
         let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero]), 3.0);
         assert!((of - c(part(c(1.0, 0.0)), -part(c(0.0, -1.0)))).norm() < 1e-13 * of.norm(), "{of}");
         // The derivative of every basis function, by differences.

@@ -6,7 +6,7 @@
 //! Subintervals that cannot extend the known range are skipped. If the curvature has one sign,
 //! Newton's method finds the single turning point. All other subintervals are halved.
 
-use crate::signal::{Basis, magnitude_bound, real_dot, size_of};
+use crate::signal::{ExponentialBasis, magnitude_bound, real_dot, size_of};
 use num_complex::Complex64;
 
 /// A mode below this fraction of a signal is rounding. It does not change an
@@ -26,7 +26,7 @@ const STEPS: usize = 60;
 
 /// The range of the values that signals are known to take.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub struct ValueRange {
     /// Least value.
     pub low: f64,
     /// Largest value.
@@ -35,10 +35,10 @@ pub struct Range {
     mirrored: bool,
 }
 
-impl Range {
+impl ValueRange {
     /// Creates an empty range. If `mirrored`, every value also adds its negative.
     pub fn new(mirrored: bool) -> Self {
-        Range { low: f64::INFINITY, high: f64::NEG_INFINITY, mirrored }
+        ValueRange { low: f64::INFINITY, high: f64::NEG_INFINITY, mirrored }
     }
 
     /// Extends the range by a value.
@@ -56,9 +56,9 @@ impl Range {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooFast;
 
-/// Scratch memory of [`Basis::extend`], reused between calls.
+/// Scratch memory of [`ExponentialBasis::extend`], reused between calls.
 #[derive(Debug, Clone, Default)]
-pub struct Extremes {
+pub struct RangeScratch {
     values: Vec<Complex64>,
     /// The signal without negligible modes, and its first two derivatives.
     slopes: [Vec<Complex64>; 3],
@@ -83,7 +83,7 @@ struct SignalSample {
     third: f64,
 }
 
-impl Extremes {
+impl RangeScratch {
     fn prepare(&mut self, nb: usize) {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
@@ -96,10 +96,14 @@ impl Extremes {
 
     /// Computes the derivatives of the signal without negligible modes, and their bounds.
     /// Returns the size of the signal's terms.
-    fn differentiate(&mut self, basis: &Basis, signal: &[Complex64], length: f64) -> f64 {
+    fn differentiate(&mut self, basis: &ExponentialBasis, signal: &[Complex64], length: f64) -> f64 {
         self.prepare(basis.len());
-        let Extremes {
-            slopes: [kept, first, second], magnitudes, exponent_magnitudes, sizes: [weights, third], ..
+        let RangeScratch {
+            slopes: [kept, first, second],
+            magnitudes,
+            exponent_magnitudes,
+            sizes: [weights, third],
+            ..
         } = self;
         basis.magnitudes(length, magnitudes);
         weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
@@ -118,8 +122,8 @@ impl Extremes {
         size
     }
 
-    fn sample(&mut self, basis: &Basis, signal: &[Complex64], time: f64) -> SignalSample {
-        let Extremes { values, slopes: [_, first, second], magnitudes, sizes: [weights, third], .. } = self;
+    fn sample(&mut self, basis: &ExponentialBasis, signal: &[Complex64], time: f64) -> SignalSample {
+        let RangeScratch { values, slopes: [_, first, second], magnitudes, sizes: [weights, third], .. } = self;
         basis.evaluate_and(time, values, |b, size| {
             if basis.exponents[b].re < 0.0 {
                 magnitudes[b] = size; // it decays from then on
@@ -139,7 +143,7 @@ impl Extremes {
     /// and a curvature of one sign.
     fn turning_value(
         &mut self,
-        basis: &Basis,
+        basis: &ExponentialBasis,
         signal: &[Complex64],
         [left, right]: [SignalSample; 2],
         rounding: f64,
@@ -197,7 +201,7 @@ fn upper_bound(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
     (left.0 + meet * (left.1 + 0.5 * curvature * meet)).max(left.0).max(right.0)
 }
 
-impl Basis {
+impl ExponentialBasis {
     /// Extends a range by the values of a signal over `[0, length]`. `at_end`
     /// contains the basis functions at `length`.
     ///
@@ -205,10 +209,10 @@ impl Basis {
     /// [`TooFast`] if the signal has too many turning points.
     pub fn extend(
         &self,
-        range: &mut Range,
+        range: &mut ValueRange,
         (signal, at_end): (&[Complex64], &[Complex64]),
         length: f64,
-        memory: &mut Extremes,
+        memory: &mut RangeScratch,
     ) -> Result<(), TooFast> {
         let rounding = ROUNDING * memory.differentiate(self, signal, length);
         let begin = memory.sample(self, signal, 0.0);
@@ -274,7 +278,7 @@ mod tests {
     fn ranges_hold_all_values_and_no_more() {
         let c = Complex64::new;
         let (random, mut drawn) = (Stream::new(7), 0);
-        let mut memory = Extremes::default();
+        let mut memory = RangeScratch::default();
         for case in 0..200 {
             let mut draw = |scale: f64| {
                 drawn += 1;
@@ -285,19 +289,19 @@ mod tests {
                 .to_vec();
             exponents[2] = exponents[0] + c(0.0, 1e-6);
             let resonant = vec![(exponents[0], c(0.0, 1e-6))];
-            let basis = Basis { resonant, driven_by: vec![2], exponents, drifts: case % 2 == 0 };
+            let basis = ExponentialBasis { resonant, driven_by: vec![2], exponents, drifts: case % 2 == 0 };
             let mut signal: Vec<Complex64> = (0..basis.len()).map(|_| c(draw(1.0), draw(1.0))).collect();
             signal[3] *= [0.0, 1e-3, 1e-17][case % 3];
             let length = 0.1 + draw(5.0).abs();
             let mut values = signal.clone();
-            let mut seen = Range::new(case % 2 == 0);
+            let mut seen = ValueRange::new(case % 2 == 0);
             const SAMPLES: usize = 20_000;
             for k in 0..=SAMPLES {
                 basis.evaluate(length * k as f64 / SAMPLES as f64, &mut values);
                 seen.take(real_dot(&signal, &values));
             }
             basis.evaluate(length, &mut values);
-            let mut range = Range::new(case % 2 == 0);
+            let mut range = ValueRange::new(case % 2 == 0);
             basis.extend(&mut range, (&signal, &values), length, &mut memory).unwrap();
             // At the nearest sample the signal is lower than its maximum by its curvature.
             let (digits, missed) = (1e-14, 10.0 * (length / SAMPLES as f64).powi(2));
@@ -310,14 +314,17 @@ mod tests {
     /// with a fast mode that is not.
     #[test]
     fn fast_modes_are_followed_only_where_they_count() {
-        let basis = Basis { exponents: vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, 1e9)], ..Basis::default() };
+        let basis = ExponentialBasis {
+            exponents: vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, 1e9)],
+            ..ExponentialBasis::default()
+        };
         let zero = Complex64::new(0.0, 0.0);
-        let mut memory = Extremes::default();
+        let mut memory = RangeScratch::default();
         let mut of = |amplitude: f64| {
             let signal = [Complex64::new(0.0, -1.0), Complex64::new(amplitude, 0.0), zero];
             let mut values = [zero; 3];
             basis.evaluate(100.0, &mut values);
-            let mut range = Range::new(false);
+            let mut range = ValueRange::new(false);
             basis.extend(&mut range, (&signal, &values), 100.0, &mut memory).map(|()| range)
         };
         let range = of(1e-17).unwrap();

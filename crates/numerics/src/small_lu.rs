@@ -6,8 +6,8 @@
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::small_lu::Lu;
-/// let mut lu = Lu::default();
+/// use stickslip_numerics::small_lu::SmallLu;
+/// let mut lu = SmallLu::default();
 /// lu.zeros(2).copy_from_slice(&[0.0, 2.0, 4.0, 1.0]);
 /// assert!(lu.factorise());
 /// let mut x = [2.0, 9.0];
@@ -15,15 +15,15 @@
 /// assert_eq!(x, [2.0, 1.0]);
 /// ```
 #[derive(Debug, Clone, Default)]
-pub struct Lu {
+pub struct SmallLu {
     n: usize,
     entries: Vec<f64>,
     /// The row exchanged with row k when column k was eliminated.
     pivots: Vec<usize>,
 }
 
-impl Lu {
-    /// Returns a zero matrix, row-major, for the caller to fill before [`Lu::factorise`].
+impl SmallLu {
+    /// Returns a zero matrix, row-major, for the caller to fill before [`SmallLu::factorise`].
     pub fn zeros(&mut self, n: usize) -> &mut [f64] {
         self.n = n;
         self.entries.clear();
@@ -135,7 +135,7 @@ mod tests {
     /// several matrices in the same memory.
     #[test]
     fn solves_what_was_multiplied() {
-        let mut lu = Lu::default();
+        let mut lu = SmallLu::default();
         for n in [0, 1, 2, 5, 23, 4] {
             let entry =
                 |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };

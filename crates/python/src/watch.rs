@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::time::{Duration, Instant};
-use stickslip_numerics::interrupt::{self, Interrupted, Stop};
+use stickslip_numerics::interrupt::{self, Interrupted, StopFlag};
 use stickslip_study::run::Context;
 
 /// Interval between progress reports, and between checks for Ctrl-C.
@@ -34,7 +34,7 @@ pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResu
     let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let (begun, looked) = (Instant::now(), AtomicU64::new(0));
     let kept = raised.clone();
-    let stop = Stop::asking(move || {
+    let stop = StopFlag::asking(move || {
         let now = begun.elapsed().as_millis() as u64;
         if now < looked.load(Ordering::Relaxed) + LOOK.as_millis() as u64 {
             return false;
@@ -51,7 +51,7 @@ pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResu
 
 /// Runs long `work` on a new thread, which Ctrl-C abandons if it cannot end at once.
 pub fn apart<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
-    let stop = Stop::new();
+    let stop = StopFlag::new();
     let (send, receive) = mpsc::channel();
     let watched = stop.clone();
     let spawned = std::thread::Builder::new().spawn(move || {
@@ -91,7 +91,7 @@ struct Lent {
     number: usize,
     pool: Option<rayon::ThreadPool>,
     /// Flag that ends their work.
-    stop: Stop,
+    stop: StopFlag,
 }
 
 impl Lent {
@@ -131,7 +131,7 @@ fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
             .build()
             .map_err(|cause| error::exception(py, "StickslipError", format!("no threads: {cause}")))?,
     };
-    let stop = Stop::new();
+    let stop = StopFlag::new();
     pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
     Ok(Lent { number, pool: Some(pool), stop })
 }

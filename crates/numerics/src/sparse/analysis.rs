@@ -1,6 +1,6 @@
 //! Symbolic analysis of sparse matrices, and the factors made from it.
 
-use super::factor::{ComplexFactor, Factor, Singular};
+use super::factor::{ComplexFactor, LdlFactor, Singular};
 use super::matrix::Matrix;
 use super::symbolic::Pattern;
 use num_complex::Complex64;
@@ -13,12 +13,12 @@ use std::sync::Arc;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::{Analysis, Matrix};
+/// use stickslip_numerics::sparse::{Matrix, SymbolicAnalysis};
 /// // three equal masses between walls, on four equal springs: ω² = 2 - √2, 2, 2 + √2
 /// let k = (0..3).flat_map(|i: usize| (0..3).map(move |l| (i, l, [2.0, -1.0, 0.0][i.abs_diff(l)])));
 /// let k = Matrix::from_triplets(3, k).unwrap();
 /// let m = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
-/// let analysis = Analysis::new(&[&k, &m]);
+/// let analysis = SymbolicAnalysis::new(&[&k, &m]);
 /// // the number of negative pivots is the number of eigenvalues below the shift
 /// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative(), 1);
 /// assert_eq!(analysis.factor(&[(1.0, &k), (-2.1, &m)]).unwrap().negative(), 2);
@@ -27,18 +27,18 @@ use std::sync::Arc;
 /// assert!((x[0] - 0.75).abs() < 1e-15, "{x:?}");
 /// ```
 #[derive(Debug, Clone)]
-pub struct Analysis {
+pub struct SymbolicAnalysis {
     pub(super) pattern: Arc<Pattern>,
 }
 
-impl Analysis {
+impl SymbolicAnalysis {
     /// Analyses matrices of one size. A pattern need not be symmetric: the
     /// mirrored entries are added.
     ///
     /// # Panics
     /// If the matrices differ in size, or if the entries of the factor exceed the 32-bit indices.
     pub fn new(matrices: &[&Matrix]) -> Self {
-        Analysis { pattern: Arc::new(Pattern::new(matrices)) }
+        SymbolicAnalysis { pattern: Arc::new(Pattern::new(matrices)) }
     }
 
     /// Analyses other matrices of the same size, with the elimination order of this analysis.
@@ -51,7 +51,7 @@ impl Analysis {
     /// exceed the 32-bit indices.
     #[must_use]
     pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
-        Analysis { pattern: Arc::new(self.pattern.with_order(matrices)) }
+        SymbolicAnalysis { pattern: Arc::new(self.pattern.with_order(matrices)) }
     }
 
     /// Returns the number of rows and columns.
@@ -81,8 +81,8 @@ impl Analysis {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn factor(&self, sum: &[(f64, &Matrix)]) -> Result<Factor, Singular> {
-        Factor::new(&self.pattern, sum, vec![])
+    pub fn factor(&self, sum: &[(f64, &Matrix)]) -> Result<LdlFactor, Singular> {
+        LdlFactor::new(&self.pattern, sum, vec![])
     }
 
     /// Factors a sum of matrices in complex numbers.

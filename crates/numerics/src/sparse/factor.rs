@@ -36,7 +36,7 @@ pub struct Singular {
 
 /// The factor `A = L D Lᵀ` of a real symmetric matrix.
 #[derive(Debug, Clone)]
-pub struct Factor {
+pub struct LdlFactor {
     pattern: Arc<Pattern>,
     ldl: LdlValues,
     negative: usize,
@@ -66,10 +66,10 @@ struct LdlValues {
     inverse: Vec<u32>,
 }
 
-impl Factor {
+impl LdlFactor {
     pub(super) fn new(pattern: &Arc<Pattern>, sum: &[(f64, &Matrix)], memory: Vec<f64>) -> Result<Self, Singular> {
         let empty = LdlValues { values: vec![], subdiagonal: vec![], order: vec![], inverse: vec![] };
-        let mut factor = Factor { pattern: pattern.clone(), ldl: empty, negative: 0 };
+        let mut factor = LdlFactor { pattern: pattern.clone(), ldl: empty, negative: 0 };
         if pattern.n == 0 {
             return Ok(factor);
         }
@@ -100,7 +100,7 @@ impl Factor {
     }
 
     /// Factors another sum of the analysed matrices in the memory of this factor, like
-    /// [`Analysis::factor`](super::Analysis::factor).
+    /// [`SymbolicAnalysis::factor`](super::SymbolicAnalysis::factor).
     ///
     /// Allocation takes a fifth of the time of a large factor.
     ///
@@ -110,7 +110,7 @@ impl Factor {
     /// # Panics
     /// If an entry lies outside the analysed pattern.
     pub fn again(self, sum: &[(f64, &Matrix)]) -> Result<Self, Singular> {
-        Factor::new(&self.pattern, sum, self.ldl.values)
+        LdlFactor::new(&self.pattern, sum, self.ldl.values)
     }
 
     /// Returns the number of rows and columns.
@@ -421,7 +421,7 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Analysis, Matrix};
+    use super::super::{Matrix, SymbolicAnalysis};
     use super::*;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
@@ -470,7 +470,7 @@ mod tests {
     fn the_frequencies_of_a_chain_are_counted() {
         for n in [1, 2, 3, 40, 257] {
             let (k, m) = (chain(n, true), identity(n));
-            let analysis = Analysis::new(&[&k, &m]);
+            let analysis = SymbolicAnalysis::new(&[&k, &m]);
             let frequency = |i: f64| 4.0 * (std::f64::consts::FRAC_PI_2 * i / (n + 1) as f64).sin().powi(2);
             for below in 0..=n {
                 let shift = frequency(below as f64 + 0.5);
@@ -485,7 +485,7 @@ mod tests {
     fn the_deflection_of_a_chain() {
         let n = 1000;
         let k = chain(n, true);
-        let factor = Analysis::new(&[&k]).factor(&[(1.0, &k)]).unwrap();
+        let factor = SymbolicAnalysis::new(&[&k]).factor(&[(1.0, &k)]).unwrap();
         assert_eq!(factor.negative(), 0);
         let mut x = vec![0.0; 2 * n];
         (x[0], x[n + 399]) = (1.0, 1.0);
@@ -512,7 +512,7 @@ mod tests {
                 entries.extend([(0, 0, 1.0), (first - 1, first - 1, -1.0), (first, first, -1.0)]);
             }
             let k = Matrix::from_triplets(n, entries.clone()).unwrap();
-            let analysis = Analysis::new(&[&k]);
+            let analysis = SymbolicAnalysis::new(&[&k]);
             let real = analysis.factor(&[(1.0, &k)]).unwrap_err();
             assert!(real.row >= first, "{real}");
             entries.push((n - 1, n - 1, 1e-10));
@@ -520,7 +520,7 @@ mod tests {
             assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative(), 0);
         }
         let empty_row = Matrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
-        let analysis = Analysis::new(&[&empty_row]);
+        let analysis = SymbolicAnalysis::new(&[&empty_row]);
         assert_eq!(analysis.factor(&[(1.0, &empty_row)]).unwrap_err(), Singular { row: 1 });
         let complex = analysis.factor_complex(&[(Complex64::new(0.0, 2.0), &empty_row)]);
         assert_eq!(complex.unwrap_err(), Singular { row: 1 });
@@ -537,7 +537,7 @@ mod tests {
             let spin = (0..if gyroscopic { n / 2 } else { 0 })
                 .flat_map(|i| [(2 * i, 2 * i + 1, 0.2), (2 * i + 1, 2 * i, -0.2)]);
             let c = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.01)).chain(spin)).unwrap();
-            let analysis = Analysis::new(&[&k, &m, &c]);
+            let analysis = SymbolicAnalysis::new(&[&k, &m, &c]);
             for omega in [0.0, 0.3, 1.1, 1.7] {
                 let sum = [(1.0, 0.0), (-omega * omega, 0.0), (0.0, omega)].map(|(re, im)| Complex64::new(re, im));
                 let factor = analysis.factor_complex(&[(sum[0], &k), (sum[1], &m), (sum[2], &c)]).unwrap();
@@ -563,7 +563,7 @@ mod tests {
         let n = 60;
         let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
         let matrix = Matrix::from_triplets(n, pairs).unwrap();
-        let factor = Analysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
+        let factor = SymbolicAnalysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
         assert_eq!(factor.negative(), n / 2);
         let mut x: Vec<f64> = (0..n).map(|i| i as f64).collect();
         factor.solve(&mut x);
@@ -573,7 +573,7 @@ mod tests {
     #[test]
     fn empty_matrix_has_a_factor() {
         let none = Matrix::from_triplets(0, []).unwrap();
-        let analysis = Analysis::new(&[&none]);
+        let analysis = SymbolicAnalysis::new(&[&none]);
         analysis.factor(&[(1.0, &none)]).unwrap().solve(&mut []);
         analysis.factor_complex(&[]).unwrap().solve(&mut []);
         assert_eq!(analysis.fill(), 0);
@@ -584,7 +584,7 @@ mod tests {
     fn same_bits_on_every_thread() {
         let solve = || {
             let (k, m) = (brick(7), identity(343));
-            let analysis = Analysis::new(&[&k, &m]);
+            let analysis = SymbolicAnalysis::new(&[&k, &m]);
             let mut x = vec![1.0; 343];
             analysis.factor(&[(1.0, &k), (-0.8, &m)]).unwrap().solve(&mut x);
             let mut z = vec![Complex64::new(1.0, 0.5); 343];
@@ -607,7 +607,7 @@ mod tests {
             let full = dense(&matrix);
             let eigenvalues = full.clone().symmetric_eigenvalues();
             prop_assume!(eigenvalues.iter().all(|e| e.abs() > 1e-3));
-            let analysis = Analysis::new(&[&matrix]);
+            let analysis = SymbolicAnalysis::new(&[&matrix]);
             let right = DVector::from_fn(30, |i, _| (i as f64).cos());
             let expected = full.lu().solve(&right).unwrap();
             if let Ok(factor) = analysis.factor(&[(1.0, &matrix)]) {

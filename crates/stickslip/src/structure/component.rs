@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definiteness::sparse_definite_in_order;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, multi_vector};
+use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, multi_vector};
 
 /// Matrices of a structure and the names of their rows.
 ///
@@ -244,7 +244,7 @@ impl Component {
     /// [`ReductionError::Modes`].
     pub fn frequencies(&self, count: usize) -> Result<Vec<f64>, ReductionError> {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
-        let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count))?;
+        let modes = NaturalModes::new(analysis, stiffness, mass, ModeSelection::Lowest(count))?;
         Ok(natural(&modes))
     }
 
@@ -274,7 +274,7 @@ impl Component {
         let Some(damping) = self.matrices().1.filter(|damping| damping.asymmetry(0.0).is_some()) else {
             return Ok(None);
         };
-        let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count.saturating_mul(4)))?;
+        let modes = NaturalModes::new(analysis, stiffness, mass, ModeSelection::Lowest(count.saturating_mul(4)))?;
         let products = multi_vector::products(self.dofs(), &modes.shapes, &damping.times_columns(&modes.shapes));
         let found = free_vibrations(&modes.values, &products);
         Ok(found.map(|found| found.iter().take(count).map(|one| one.omega).collect()))
@@ -612,7 +612,7 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
                 ReductionKind::Rubin => Free::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
-                ReductionKind::CraigBampton => whole.held(Wanted::Lowest(count))?,
+                ReductionKind::CraigBampton => whole.held(ModeSelection::Lowest(count))?,
             };
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
             Fewer { reduced, deviation, modes, up_to, serves }

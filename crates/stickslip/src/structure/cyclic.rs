@@ -13,7 +13,7 @@ use super::reduction::{Damping, ReductionError, Row, Whole};
 use super::sector::in_wave;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
-use stickslip_numerics::sparse::{Analysis, Matrix};
+use stickslip_numerics::sparse::{Matrix, SymbolicAnalysis};
 
 /// The coupling between the two sides of a sector.
 ///
@@ -384,7 +384,7 @@ impl CyclicSector {
         }
         let n = rows.len();
         let own = Matrix::from_triplets(n, own).map_err(|_| BladeError::NotHeld)?;
-        let analysis = Analysis::new(&[&own]);
+        let analysis = SymbolicAnalysis::new(&[&own]);
         let factor = analysis.factor(&[(1.0, &own)]).map_err(|_| BladeError::NotHeld)?;
         if factor.negative() > 0 || towards.is_empty() {
             return Err(BladeError::NotHeld);
@@ -420,7 +420,7 @@ pub(crate) struct Blade {
     own: Matrix,
     /// Row of the blade, remaining row outside the blade, stiffness.
     towards: Vec<(usize, usize, f64)>,
-    factor: stickslip_numerics::sparse::Factor,
+    factor: stickslip_numerics::sparse::LdlFactor,
 }
 
 impl Blade {

@@ -28,7 +28,7 @@ pub(crate) use uncoupled::UncoupledModes;
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
 use stickslip_numerics::definiteness::{is_semidefinite, semidefinite, sparse_definite};
-use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
+use stickslip_numerics::sparse::{Asymmetry, Matrix, MatrixError, SymbolicAnalysis};
 
 /// `M x'' + C x' + K x`, over the places that are free to move.
 ///
@@ -58,7 +58,7 @@ enum Form {
         stiffness: Matrix,
         /// Modal damping in addition to the damping matrix.
         modes: Option<DampedModes>,
-        analysis: OnceLock<Analysis>,
+        analysis: OnceLock<SymbolicAnalysis>,
         /// Full copy, created when a method first requests it.
         full: OnceLock<Arc<Matrices>>,
     },

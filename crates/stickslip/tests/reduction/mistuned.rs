@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
 use stickslip::model::{Around, Disk, DiskPart, Model, Place, Substructure, SubstructureDamping, System};
 use stickslip::structure::{Boundary, Component, Reduction, ReductionKind};
-use stickslip_numerics::sparse::{Analysis, Matrix};
+use stickslip_numerics::sparse::{Matrix, SymbolicAnalysis};
 
 /// Numbers of elements of a sector along the blade, across, and through the thickness.
 const ELEMENTS: [usize; 3] = [6, 2, 1];
@@ -122,7 +122,7 @@ fn matrices(system: &System) -> [Matrix; 2] {
 /// frequencies, rad/s.
 fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>>> {
     let [mass, stiffness] = matrices(system);
-    let analysis = Analysis::new(&[&stiffness, &mass]);
+    let analysis = SymbolicAnalysis::new(&[&stiffness, &mass]);
     let load = |place: usize| (1.3 * place as f64).cos();
     let one = |omega: &f64| {
         let sum = [(Complex::new(1.0, 2.0 * HALF_WIDTH), &stiffness), (Complex::new(-omega * omega, 0.0), &mass)];

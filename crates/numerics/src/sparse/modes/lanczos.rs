@@ -4,7 +4,7 @@
 use super::natural_modes::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::interrupt;
-use crate::sparse::{Factor, Matrix, multi_vector};
+use crate::sparse::{LdlFactor, Matrix, multi_vector};
 use nalgebra::DMatrix;
 
 /// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
@@ -33,7 +33,7 @@ pub(super) struct RitzPair {
 
 /// An M-orthonormal basis V, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
 pub(super) struct Lanczos<'a> {
-    factor: &'a Factor,
+    factor: &'a LdlFactor,
     mass: &'a Matrix,
     /// Largest entry of the mass matrix.
     max_mass_entry: f64,
@@ -53,7 +53,7 @@ pub(super) struct Lanczos<'a> {
 }
 
 impl<'a> Lanczos<'a> {
-    pub(super) fn new(factor: &'a Factor, mass: &'a Matrix, locked: &'a [f64]) -> Self {
+    pub(super) fn new(factor: &'a LdlFactor, mass: &'a Matrix, locked: &'a [f64]) -> Self {
         let n = mass.n();
         let coupling = DMatrix::zeros(0, 0);
         Lanczos {

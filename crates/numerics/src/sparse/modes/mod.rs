@@ -24,10 +24,10 @@
 mod lanczos;
 mod natural_modes;
 
-use super::{Analysis, Factor, Matrix, Singular};
+use super::{LdlFactor, Matrix, Singular, SymbolicAnalysis};
 use lanczos::{Lanczos, RitzPair};
 use natural_modes::BLOCK;
-pub use natural_modes::{Effort, ModesError, NaturalModes};
+pub use natural_modes::{ModesCost, ModesError, NaturalModes};
 
 /// Residual in the Lanczos process, relative to θ, at which a mode has
 /// converged. The error of the eigenvalue is about its square.
@@ -72,7 +72,7 @@ const ATTEMPTS: usize = 8;
 
 /// The modes to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wanted {
+pub enum ModeSelection {
     /// The given number of lowest modes, or all if there are fewer.
     Lowest(usize),
     /// All modes with an eigenvalue λ = ω² up to a bound.
@@ -98,14 +98,19 @@ impl NaturalModes {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+    /// use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, SymbolicAnalysis};
     /// // two equal masses connected by two parallel springs, without support: 0 and 4
     /// let k = Matrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
     /// let m = Matrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
-    /// let modes = NaturalModes::new(&Analysis::new(&[&k, &m]), &k, &m, Wanted::Lowest(2)).unwrap();
+    /// let modes = NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2)).unwrap();
     /// assert!(modes.values[0].abs() < 1e-12 && (modes.values[1] - 4.0).abs() < 1e-12);
     /// ```
-    pub fn new(analysis: &Analysis, stiffness: &Matrix, mass: &Matrix, wanted: Wanted) -> Result<Self, ModesError> {
+    pub fn new(
+        analysis: &SymbolicAnalysis,
+        stiffness: &Matrix,
+        mass: &Matrix,
+        wanted: ModeSelection,
+    ) -> Result<Self, ModesError> {
         if mass.n() == 0 {
             return Ok(NaturalModes::empty());
         }
@@ -127,10 +132,10 @@ fn typical_eigenvalue(stiffness: &Matrix, mass: &Matrix) -> f64 {
 
 /// A search in progress.
 struct Search<'a> {
-    analysis: &'a Analysis,
+    analysis: &'a SymbolicAnalysis,
     stiffness: &'a Matrix,
     mass: &'a Matrix,
-    wanted: Wanted,
+    wanted: ModeSelection,
     /// A typical `k_ii / m_ii`, rad²/s².
     scale: f64,
     found: NaturalModes,
@@ -161,10 +166,10 @@ impl Search<'_> {
         let least = LEAST_SHIFT * self.scale;
         // The magnitude of the first, negative shift.
         let mut first_shift = match self.wanted {
-            Wanted::Lowest(0) => return Ok(self.found),
-            Wanted::Lowest(_) => SHIFT * self.scale,
-            Wanted::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
-            Wanted::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
+            ModeSelection::Lowest(0) => return Ok(self.found),
+            ModeSelection::Lowest(_) => SHIFT * self.scale,
+            ModeSelection::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
+            ModeSelection::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
         };
         let (mut shift, mut factor) = self.first_factor(first_shift, None)?;
         let mut counted = 0;
@@ -187,11 +192,11 @@ impl Search<'_> {
             counted = factor.negative();
             let found = self.found.below(shift);
             let (enough, keep) = match self.wanted {
-                Wanted::Lowest(n) => (found >= n, n),
-                Wanted::UpTo { value, most } if counted > most => {
+                ModeSelection::Lowest(n) => (found >= n, n),
+                ModeSelection::UpTo { value, most } if counted > most => {
                     return Err(ModesError::TooMany { count: counted, below: shift.min(value), most });
                 }
-                Wanted::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
+                ModeSelection::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
             };
             if found == counted && (enough || exhausted) {
                 return self.checked(keep);
@@ -217,7 +222,7 @@ impl Search<'_> {
     }
 
     /// Factors at a shift, in the memory of the last factor.
-    fn factor(&mut self, shift: f64, last: Option<Factor>) -> Result<Factor, Singular> {
+    fn factor(&mut self, shift: f64, last: Option<LdlFactor>) -> Result<LdlFactor, Singular> {
         self.found.effort.factors += 1;
         let sum = [(1.0, self.stiffness), (-shift, self.mass)];
         match last {
@@ -227,7 +232,7 @@ impl Search<'_> {
     }
 
     /// Factors at the first, negative shift.
-    fn first_factor(&mut self, first_shift: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
+    fn first_factor(&mut self, first_shift: f64, last: Option<LdlFactor>) -> Result<(f64, LdlFactor), ModesError> {
         let factor = self.factor(-first_shift, last).map_err(ModesError::Massless)?;
         match factor.negative() {
             0 => Ok((-first_shift, factor)),
@@ -236,7 +241,7 @@ impl Search<'_> {
     }
 
     /// Factors at a shift, or slightly above it if the shift is an eigenvalue.
-    fn factor_near(&mut self, shift: f64, first_shift: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
+    fn factor_near(&mut self, shift: f64, first_shift: f64, last: LdlFactor) -> Result<(f64, LdlFactor), ModesError> {
         let (mut last, mut failed) = (Some(last), Singular { row: 0 });
         for attempt in 0..ATTEMPTS {
             let shift = shift + attempt as f64 * GAP * (shift.abs() + first_shift);
@@ -253,8 +258,8 @@ impl Search<'_> {
         let values = &self.found.values;
         // The bound needs this number of modes below it, and lies above `above`.
         let (below, above) = match self.wanted {
-            Wanted::Lowest(n) => (n.min(values.len()), f64::NEG_INFINITY),
-            Wanted::UpTo { value, .. } => match values.partition_point(|v| *v <= value) {
+            ModeSelection::Lowest(n) => (n.min(values.len()), f64::NEG_INFINITY),
+            ModeSelection::UpTo { value, .. } => match values.partition_point(|v| *v <= value) {
                 all if all == values.len() && !exhausted => (all, f64::NEG_INFINITY),
                 below => (below, value),
             },
@@ -271,12 +276,18 @@ impl Search<'_> {
     }
 
     /// Runs the Lanczos process at a shift with `counted` eigenvalues below it.
-    fn run_at(&self, shift: f64, factor: &Factor, counted: usize, first_shift: f64) -> Result<LanczosRun, ModesError> {
+    fn run_at(
+        &self,
+        shift: f64,
+        factor: &LdlFactor,
+        counted: usize,
+        first_shift: f64,
+    ) -> Result<LanczosRun, ModesError> {
         let mut lanczos = Lanczos::new(factor, self.mass, &self.found.shapes);
         let missing = counted.saturating_sub(self.found.below(shift));
         let wanted = match self.wanted {
-            Wanted::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
-            Wanted::UpTo { .. } => MAX_VECTORS,
+            ModeSelection::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
+            ModeSelection::UpTo { .. } => MAX_VECTORS,
         };
         let value = |pair: &RitzPair| shift + 1.0 / pair.theta;
         let (mut blocks, mut next) = (0, CHECK_INTERVAL);
@@ -296,8 +307,8 @@ impl Search<'_> {
             let near = &pairs[..nearest];
             let low = near.iter().filter(|pair| pair.theta < 0.0).count();
             let enough = match self.wanted {
-                Wanted::Lowest(_) => nearest >= wanted,
-                Wanted::UpTo { value: bound, .. } => {
+                ModeSelection::Lowest(_) => nearest >= wanted,
+                ModeSelection::UpTo { value: bound, .. } => {
                     self.found.values.last().is_some_and(|v| *v > bound) || near.iter().any(|pair| value(pair) > bound)
                 }
             };
@@ -330,8 +341,8 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    fn modes(k: &Matrix, m: &Matrix, wanted: Wanted) -> Result<NaturalModes, ModesError> {
-        NaturalModes::new(&Analysis::new(&[k, m]), k, m, wanted)
+    fn modes(k: &Matrix, m: &Matrix, wanted: ModeSelection) -> Result<NaturalModes, ModesError> {
+        NaturalModes::new(&SymbolicAnalysis::new(&[k, m]), k, m, wanted)
     }
 
     fn matrix(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
@@ -381,18 +392,18 @@ mod tests {
             let sine = |x: f64| 4.0 * x.sin().powi(2);
             let held = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0), (n - 1, n - 1)]));
             let expected: Vec<f64> = (1..=count).map(|i| sine(PI * i as f64 / (2 * n + 2) as f64)).collect();
-            check(&held, &m, &modes(&held, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            check(&held, &m, &modes(&held, &m, ModeSelection::Lowest(12)).unwrap(), &expected, 1e-14);
             if n == 1 {
                 continue;
             }
             let free = springs(n, (1..n).map(|i| (i - 1, i)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i as f64 / (2 * n) as f64)).collect();
-            let found = modes(&free, &m, Wanted::Lowest(12)).unwrap();
+            let found = modes(&free, &m, ModeSelection::Lowest(12)).unwrap();
             check(&free, &m, &found, &expected, 1e-14);
             assert_eq!(found.free(), 1);
             let ring = springs(n, (0..n).map(|i| (i, (i + 1) % n)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i.div_ceil(2) as f64 / n as f64)).collect();
-            check(&ring, &m, &modes(&ring, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            check(&ring, &m, &modes(&ring, &m, ModeSelection::Lowest(12)).unwrap(), &expected, 1e-14);
         }
     }
 
@@ -415,14 +426,14 @@ mod tests {
         };
         let expected: Vec<f64> = (0..30).map(value).collect();
         // The largest eigenvalue is 12 / h² = 2e6. Its rounding affects all others.
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected, 1e-9);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(30)).unwrap(), &expected, 1e-9);
         let bound = 0.5 * (expected[24] + expected[25]);
-        let up_to = modes(&k, &m, Wanted::UpTo { value: bound, most: 25 }).unwrap();
+        let up_to = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 25 }).unwrap();
         check(&k, &m, &up_to, &expected[..25], 1e-9);
-        let many = modes(&k, &m, Wanted::UpTo { value: bound, most: 24 });
+        let many = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 24 });
         assert_eq!(many.unwrap_err(), ModesError::TooMany { count: 25, below: bound, most: 24 });
-        assert_eq!(modes(&k, &m, Wanted::UpTo { value: 0.9 * expected[0], most: 9 }).unwrap().count(), 0);
-        assert_eq!(modes(&k, &m, Wanted::UpTo { value: -1.0, most: 9 }).unwrap().count(), 0);
+        assert_eq!(modes(&k, &m, ModeSelection::UpTo { value: 0.9 * expected[0], most: 9 }).unwrap().count(), 0);
+        assert_eq!(modes(&k, &m, ModeSelection::UpTo { value: -1.0, most: 9 }).unwrap().count(), 0);
     }
 
     /// Clusters of eigenvalues larger than a block, and an upper bound equal to an eigenvalue.
@@ -432,9 +443,9 @@ mod tests {
         let value = |i: usize| 1.0 + (i / 11) as f64;
         let (k, m) = (matrix(n, (0..n).map(|i| (i, i, 2.0 * value(i)))), matrix(n, (0..n).map(|i| (i, i, 2.0))));
         let expected: Vec<f64> = (0..n).map(value).collect();
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected[..30], 0.0);
-        check(&k, &m, &modes(&k, &m, Wanted::UpTo { value: 3.0, most: 99 }).unwrap(), &expected[..33], 0.0);
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(n + 5)).unwrap(), &expected, 0.0);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(30)).unwrap(), &expected[..30], 0.0);
+        check(&k, &m, &modes(&k, &m, ModeSelection::UpTo { value: 3.0, most: 99 }).unwrap(), &expected[..33], 0.0);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(n + 5)).unwrap(), &expected, 0.0);
     }
 
     /// Equal oscillators with weak coupling springs: all eigenvalues agree to 0.4 %,
@@ -446,10 +457,10 @@ mod tests {
         let k = matrix(n, links.chain((0..n).map(|i| (i, i, (1.0 + 2.0 * weak) * stiffness))));
         let cosine = |i: usize| (PI * i as f64 / (n + 1) as f64).cos();
         let expected: Vec<f64> = (1..=n).map(|i| stiffness * (1.0 + 2.0 * weak * (1.0 - cosine(i)))).collect();
-        check(&k, &identity(n), &modes(&k, &identity(n), Wanted::Lowest(6)).unwrap(), &expected[..6], 1e-8);
-        let bound = Wanted::UpTo { value: 1.1 * stiffness, most: n };
+        check(&k, &identity(n), &modes(&k, &identity(n), ModeSelection::Lowest(6)).unwrap(), &expected[..6], 1e-8);
+        let bound = ModeSelection::UpTo { value: 1.1 * stiffness, most: n };
         check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected, 1e-8);
-        let bound = Wanted::UpTo { value: 0.5 * (expected[29] + expected[30]), most: n };
+        let bound = ModeSelection::UpTo { value: 0.5 * (expected[29] + expected[30]), most: n };
         check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected[..30], 1e-8);
     }
 
@@ -460,11 +471,11 @@ mod tests {
         let (k, m) = (springs(n, (0..n).map(|i| (i, (i + 1) % n))), identity(n));
         let expected: Vec<f64> =
             (0..401usize).map(|i| 4.0 * (PI * i.div_ceil(2) as f64 / n as f64).sin().powi(2)).collect();
-        let found = modes(&k, &m, Wanted::Lowest(401)).unwrap();
+        let found = modes(&k, &m, ModeSelection::Lowest(401)).unwrap();
         check(&k, &m, &found, &expected, 1e-13);
         assert!(found.effort.factors > 2, "{:?}", found.effort);
         let bound = 0.5 * (expected[350] + expected[351]);
-        let found = modes(&k, &m, Wanted::UpTo { value: bound, most: 400 }).unwrap();
+        let found = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 400 }).unwrap();
         check(&k, &m, &found, &expected[..351], 1e-13);
     }
 
@@ -495,7 +506,7 @@ mod tests {
             [-13.0, -3.0, -22.0, 4.0],
         ];
         let (k, m) = (element(bending, h.powi(-3)), element(inertia, h / 420.0));
-        let found = modes(&k, &m, Wanted::Lowest(8)).unwrap();
+        let found = modes(&k, &m, ModeSelection::Lowest(8)).unwrap();
         assert_eq!(found.free(), 0);
         // Roots of cos β cosh β = -1, by Newton's method.
         for (i, value) in found.values.iter().enumerate() {
@@ -519,11 +530,11 @@ mod tests {
         let k = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0), (n - 1, n - 1)]));
         let m = matrix(n, (0..n).filter(|i| i % 2 == 1).map(|i| (i, i, 1.0)));
         let expected: Vec<f64> = (1..=100).map(|i| 2.0 * (PI * i as f64 / 202.0).sin().powi(2)).collect();
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(9)).unwrap(), &expected[..9], 1e-14);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(9)).unwrap(), &expected[..9], 1e-14);
         // No more modes than places with mass.
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(150)).unwrap(), &expected, 1e-14);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(150)).unwrap(), &expected, 1e-14);
         let none = matrix(n, []);
-        assert_eq!(modes(&k, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+        assert_eq!(modes(&k, &none, ModeSelection::Lowest(3)).unwrap().count(), 0);
     }
 
     #[test]
@@ -531,18 +542,18 @@ mod tests {
         let n = 30;
         let (free, m) = (springs(n, (1..n).map(|i| (i - 1, i))), identity(n));
         let unstable = matrix(n, free.entries().chain([(4, 4, -0.5)]));
-        for wanted in [Wanted::Lowest(2), Wanted::UpTo { value: 100.0, most: n }] {
+        for wanted in [ModeSelection::Lowest(2), ModeSelection::UpTo { value: 100.0, most: n }] {
             assert!(matches!(modes(&unstable, &m, wanted), Err(ModesError::Negative { count: 1, .. })), "{wanted:?}");
         }
         let massless = matrix(n, m.entries().filter(|(i, ..)| *i < n - 2));
         let loose = springs(n, (1..n - 2).map(|i| (i - 1, i)));
-        assert!(matches!(modes(&loose, &massless, Wanted::Lowest(2)), Err(ModesError::Massless(_))));
+        assert!(matches!(modes(&loose, &massless, ModeSelection::Lowest(2)), Err(ModesError::Massless(_))));
         let negative = matrix(n, m.entries().map(|(i, k, v)| (i, k, if i == 3 { -v } else { v })));
         let held = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0)]));
-        let wrong = modes(&held, &negative, Wanted::Lowest(2));
+        let wrong = modes(&held, &negative, ModeSelection::Lowest(2));
         assert!(matches!(wrong, Err(ModesError::NegativeMass | ModesError::Negative { .. })), "{wrong:?}");
         let none = matrix(0, []);
-        assert_eq!(modes(&none, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+        assert_eq!(modes(&none, &none, ModeSelection::Lowest(3)).unwrap().count(), 0);
     }
 
     /// Two sets of three masses. All modes fill the space, and further vectors are rounding:
@@ -556,7 +567,7 @@ mod tests {
             let both = (0..2).flat_map(|set| (0..9).map(move |at| (set, at / 3, at % 3)));
             let k = matrix(6, both.map(|(set, i, l)| (3 * set + i, 3 * set + l, k[i][l])));
             let m = matrix(6, (0..6).map(|i| (i, i, masses[i % 3])));
-            let found = modes(&k, &m, Wanted::Lowest(6)).unwrap();
+            let found = modes(&k, &m, ModeSelection::Lowest(6)).unwrap();
             assert_eq!(found.count(), 6, "{step}");
             assert!(found.values.chunks(2).all(|pair| (pair[1] / pair[0] - 1.0).abs() < 1e-9), "{:?}", found.values);
         }
@@ -566,7 +577,7 @@ mod tests {
     fn same_bits_on_every_thread() {
         let solve = || {
             let (k, m) = (springs(500, (0..500).map(|i| (i, (i + 1) % 500))), identity(500));
-            modes(&k, &m, Wanted::Lowest(21)).unwrap()
+            modes(&k, &m, ModeSelection::Lowest(21)).unwrap()
         };
         let here = solve();
         let there: Vec<_> = (0..3).map(|_| std::thread::spawn(solve)).collect();
@@ -602,7 +613,7 @@ mod tests {
             let all = |a: &DMatrix<f64>| matrix(size, (0..size * size).map(|at| (at / size, at % size, a[at])));
             let (k, m) = (all(&k), all(&m));
             for count in [1, rank, rank + 1, size + 3] {
-                let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
+                let found = modes(&k, &m, ModeSelection::Lowest(count)).unwrap();
                 prop_assert_eq!(found.count(), count.min(rank), "{:?} of {:?}", found.values, thetas);
                 for (value, theta) in found.values.iter().zip(&thetas) {
                     // The relative error of a mode grows with its eigenvalue
@@ -636,11 +647,11 @@ mod tests {
             let inverse = l.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
             let mut expected: Vec<f64> = (&inverse * dense(&k) * inverse.transpose()).symmetric_eigenvalues().iter().copied().collect();
             expected.sort_by(f64::total_cmp);
-            let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
+            let found = modes(&k, &m, ModeSelection::Lowest(count)).unwrap();
             check(&k, &m, &found, &expected[..count.min(n)], 1e-11 * expected[n - 1]);
             let bound = 0.5 * (expected[count.min(n) - 1] + expected.get(count).copied().unwrap_or(1e3 * expected[n - 1]));
             prop_assume!(expected.iter().all(|e| (e - bound).abs() > 1e-9 * expected[n - 1]));
-            let found = modes(&k, &m, Wanted::UpTo { value: bound, most: n }).unwrap();
+            let found = modes(&k, &m, ModeSelection::UpTo { value: bound, most: n }).unwrap();
             prop_assert_eq!(found.count(), count.min(n));
         }
     }

@@ -29,12 +29,12 @@ pub struct NaturalModes {
     /// A typical `k_ii / m_ii`, rad²/s². The rounding of λ is far below it.
     pub scale: f64,
     /// Cost of the search.
-    pub effort: Effort,
+    pub effort: ModesCost,
 }
 
 /// Cost of a search for modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Effort {
+pub struct ModesCost {
     /// Number of factorizations.
     pub factors: usize,
     /// Number of Lanczos vectors.
@@ -103,7 +103,7 @@ pub enum ModesError {
 
 impl NaturalModes {
     pub(super) fn empty() -> Self {
-        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, effort: Effort::default() }
+        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, effort: ModesCost::default() }
     }
 
     /// Returns the number of modes.

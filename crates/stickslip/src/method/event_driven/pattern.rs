@@ -16,15 +16,15 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense::multiply;
 use stickslip_numerics::eigen;
-use stickslip_numerics::quadratic_modes::{Defective, Modes};
-use stickslip_numerics::signal::Basis;
+use stickslip_numerics::quadratic_modes::{DefectiveModes, QuadraticModes};
+use stickslip_numerics::signal::ExponentialBasis;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Relative eigenvalue of the Delassus matrix below which directions of stuck sliders are
 /// redundant.
 const REDUNDANT: f64 = 1e-11;
-/// Relative eigenvalue below which a mode has frequency zero: the rounding of `Modes`.
+/// Relative eigenvalue below which a mode has frequency zero: the rounding of `QuadraticModes`.
 const STILL: f64 = 1e-13;
 /// Relative distance of a harmonic to a mode below which they are integrated as a resonant
 /// pair. At smaller distances, the ordinary particular solution would lose more than five
@@ -100,7 +100,7 @@ pub(crate) struct Beginning<'a> {
 /// Data of a pattern at one excitation frequency, shared by the segments of the motion.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Driven {
-    pub basis: Basis,
+    pub basis: ExponentialBasis,
     /// Number of exponents of the basis that are modes; those of the excitation follow.
     pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
@@ -130,12 +130,12 @@ impl Driven {
 }
 
 impl Pattern {
-    pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, Defective> {
+    pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, DefectiveModes> {
         let n = mechanics.n;
         let held: Vec<usize> =
             (0..stuck.len()).filter(|&s| stuck[s] && mechanics.parts[s].stiffness().is_none()).collect();
         let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.parts[held[s]].direction[i]);
-        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
             &held.iter().map(|&s| mechanics.parts[s].holds()).collect::<Vec<_>>(),
@@ -171,8 +171,10 @@ impl Pattern {
         }
 
         let basis = free_directions(&mechanics.mass, &w).ok_or(out_of_range)?;
-        let modes =
-            Modes::new(&(basis.transpose() * &mechanics.damping * &basis), &(basis.transpose() * &stiffness * &basis))?;
+        let modes = QuadraticModes::new(
+            &(basis.transpose() * &mechanics.damping * &basis),
+            &(basis.transpose() * &stiffness * &basis),
+        )?;
         let frozen = mechanics
             .parts
             .iter()

@@ -17,7 +17,7 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::continuation::Equations;
+use stickslip_numerics::continuation::ParametricEquations;
 
 /// Default number of harmonics, in units of the excitation's greatest common divisor.
 const HARMONICS: usize = 15;
@@ -202,7 +202,7 @@ impl<'a> BranchEquations<'a> {
     }
 }
 
-impl Equations for BranchEquations<'_> {
+impl ParametricEquations for BranchEquations<'_> {
     fn size(&self) -> usize {
         2 * self.motion.c.len()
     }

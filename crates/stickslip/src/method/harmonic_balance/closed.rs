@@ -20,7 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
-use stickslip_numerics::dense::{Lu, multiply_in_blocks};
+use stickslip_numerics::dense::{DenseLu, multiply_in_blocks};
 
 /// Receptance of the structure, relative to the compliance of a closed contact, up to which the
 /// structure is well supported. Two digits are lost at this value.
@@ -58,7 +58,7 @@ pub(super) struct Modes {
     structure: Arc<Uncoupled>,
     /// Modal stiffness of the closed contacts, `Φᵀ k Φ`.
     coupling: Vec<f64>,
-    factor: RefCell<Option<(f64, Arc<Lu<f64>>)>>,
+    factor: RefCell<Option<(f64, Arc<DenseLu<f64>>)>>,
 }
 
 impl Modes {
@@ -76,7 +76,7 @@ impl Modes {
     }
 
     /// Returns the factored modal stiffness. It is kept until the excitation frequency changes.
-    pub fn factor(&self, omega: f64) -> Result<Arc<Lu<f64>>, Resonant> {
+    pub fn factor(&self, omega: f64) -> Result<Arc<DenseLu<f64>>, Resonant> {
         let mut kept = self.factor.borrow_mut();
         if let Some((of, factor)) = &*kept
             && *of == omega
@@ -88,7 +88,7 @@ impl Modes {
         for (m, [mass, _, stiffness]) in self.structure.own().iter().enumerate() {
             matrix[m * n + m] += stiffness + (HOLD * omega).powi(2) * mass;
         }
-        let factor = Arc::new(Lu::new(matrix, n).map_err(|_| Resonant)?);
+        let factor = Arc::new(DenseLu::new(matrix, n).map_err(|_| Resonant)?);
         *kept = Some((omega, factor.clone()));
         Ok(factor)
     }

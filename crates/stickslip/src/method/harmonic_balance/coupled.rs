@@ -18,9 +18,9 @@ use super::rest::CACHED;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::complex_gemv::Pairs;
-use stickslip_numerics::dense::{ComplexLu, Lu, multiply_in_blocks};
-use stickslip_numerics::gmres::{Gmres, Limits};
+use stickslip_numerics::complex_gemv::ComplexGemv;
+use stickslip_numerics::dense::{ComplexLu, DenseLu, multiply_in_blocks};
+use stickslip_numerics::gmres::{Gmres, GmresLimits};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -118,7 +118,7 @@ impl Coupled {
         let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
         let (residual, finest) = (near.residual, if near.sketched { FINEST_OF_SKETCHES } else { 0.0 });
         let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED)).max(finest);
-        let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
+        let limits = GmresLimits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let Coupled { gmres, harmonics, split, above, force, moved, parts } = self;
@@ -130,7 +130,7 @@ impl Coupled {
             else {
                 break false;
             };
-            let most = if fresh { limits } else { Limits { products: STALE, vectors: STALE, ..limits } };
+            let most = if fresh { limits } else { GmresLimits { products: STALE, vectors: STALE, ..limits } };
             let outcome = gmres.solve(
                 step,
                 most,
@@ -291,7 +291,7 @@ impl Linear<'_> {
         let mut matrix = Vec::new();
         self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
         // row after row it is the transpose
-        let transposed = Lu::new(matrix, 2 * count * self.ports.count()).ok()?;
+        let transposed = DenseLu::new(matrix, 2 * count * self.ports.count()).ok()?;
         Some(Lowest { count, transposed })
     }
 
@@ -346,7 +346,7 @@ impl Linear<'_> {
 /// what a solution by triangles does, which are too short for blocks.
 #[derive(Debug, Clone)]
 enum Answer {
-    Inverse(Pairs),
+    Inverse(ComplexGemv),
     Factor(ComplexLu),
 }
 
@@ -358,7 +358,7 @@ impl Answer {
         let mut inverse = vec![ZERO; size * size];
         inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
         factor.solve(&mut inverse);
-        Answer::Inverse(Pairs::new(&inverse, size))
+        Answer::Inverse(ComplexGemv::new(&inverse, size))
     }
 
     fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
@@ -374,7 +374,7 @@ impl Answer {
 struct Lowest {
     count: usize,
     /// In units.
-    transposed: Lu<f64>,
+    transposed: DenseLu<f64>,
 }
 
 impl Lowest {
@@ -468,7 +468,7 @@ struct Split {
     /// What the other modes and springs in series add, S: the same for any stiffness of the joints.
     above: Arc<Vec<f64>>,
     /// `1 + S K`.
-    factor: Lu<f64>,
+    factor: DenseLu<f64>,
     /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
     pull: Vec<f64>,
     moved: Vec<f64>,
@@ -522,7 +522,7 @@ impl Split {
             }
         }
         (0..p).for_each(|q| matrix[q * p + q] += 1.0);
-        let factor = Lu::new(matrix, p).ok()?;
+        let factor = DenseLu::new(matrix, p).ok()?;
         let mut moved: Vec<f64> = low.iter().flat_map(|&m| column(m)).copied().collect();
         factor.solve(&mut moved);
         let l = low.len();

@@ -6,7 +6,7 @@
 //! the motion that it comes from.
 //! Source: Allgower and Georg, "Introduction to Numerical Continuation Methods" (2003), Ch. 3 (Moore-Penrose inverse).
 
-use stickslip_numerics::dense::Lu;
+use stickslip_numerics::dense::DenseLu;
 
 /// Change of equations by a step of one along a direction, both relative, below which that is open. Rounding leaves 1e-13; friction that is but 1e-4 of
 /// the forces tells the mixtures of two modes apart by 1e-6.
@@ -22,7 +22,7 @@ pub(super) fn open(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
     let sizes: Vec<f64> = (0..n).map(|column| size(column).max(f64::MIN_POSITIVE)).collect();
     let scaled: Vec<f64> = matrix[..n * n].iter().enumerate().map(|(at, value)| value / sizes[at % n]).collect();
     // row after row it is the transpose of what is read column by column
-    let Ok(factor) = Lu::new(scaled.clone(), n) else { return Vec::new() };
+    let Ok(factor) = DenseLu::new(scaled.clone(), n) else { return Vec::new() };
     // columns without a pattern
     let mut found: Vec<Vec<f64>> =
         (0..MOST.min(n)).map(|j| (0..n).map(|i| (1.0 + 7.0 * (i * MOST + j) as f64).sin()).collect()).collect();

@@ -5,8 +5,8 @@ use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::complex_gemv::Pairs;
-use stickslip_numerics::dense::{Lu, multiply_in_blocks};
+use stickslip_numerics::complex_gemv::ComplexGemv;
+use stickslip_numerics::dense::{DenseLu, multiply_in_blocks};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -26,7 +26,7 @@ pub(super) enum Receptance {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Formed {
     pub matrices: Vec<DMatrix<Complex64>>,
-    pairs: Vec<Pairs>,
+    pairs: Vec<ComplexGemv>,
     /// Forces of one harmonic, and numbers of its product.
     force: Vec<Complex64>,
     memory: Vec<f64>,
@@ -35,7 +35,8 @@ pub(super) struct Formed {
 impl Formed {
     pub fn new(matrices: Vec<DMatrix<Complex64>>) -> Self {
         let few = |matrix: &&DMatrix<Complex64>| (BLOCKED..=CACHED).contains(&matrix.nrows());
-        let pairs = matrices.iter().filter(few).map(|matrix| Pairs::new(matrix.as_slice(), matrix.nrows())).collect();
+        let pairs =
+            matrices.iter().filter(few).map(|matrix| ComplexGemv::new(matrix.as_slice(), matrix.nrows())).collect();
         Formed { matrices, pairs, ..Formed::default() }
     }
 
@@ -43,7 +44,7 @@ impl Formed {
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.matrices.iter().map(|matrix| size_of_val(matrix.as_slice())).sum::<usize>()
-            + self.pairs.iter().map(Pairs::bytes).sum::<usize>()
+            + self.pairs.iter().map(ComplexGemv::bytes).sum::<usize>()
     }
 
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
@@ -81,7 +82,7 @@ pub(super) struct Modal {
     pub rates: Vec<Complex64>,
     gains: Vec<Vec<Complex64>>,
     /// In place of the first of these, where the mean is that with closed contacts.
-    pub closed: Option<Arc<Lu<f64>>>,
+    pub closed: Option<Arc<DenseLu<f64>>>,
     /// Compliances in series with the axes, m/N.
     pub series: Vec<f64>,
     /// Of the mean motions along the axes by their own forces.

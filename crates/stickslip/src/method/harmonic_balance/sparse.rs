@@ -10,7 +10,7 @@ use super::hold::HOLD;
 use super::ports::Ports;
 use crate::model::System;
 use num_complex::Complex64;
-use stickslip_numerics::banded::{Banded, order};
+use stickslip_numerics::banded::{BandedMatrix, order};
 
 /// Degrees of freedom from which the banded form is thought of.
 const LARGE: usize = 16;
@@ -43,10 +43,10 @@ pub(super) struct Sparse {
     harmonics: Vec<f64>,
     omega: f64,
     /// Z per harmonic, factored.
-    factors: Vec<Banded>,
-    tangent: Banded,
+    factors: Vec<BandedMatrix>,
+    tangent: BandedMatrix,
     /// The structure at a real rate.
-    smooth: Banded,
+    smooth: BandedMatrix,
     right: Vec<f64>,
     whole: Vec<f64>,
 }
@@ -104,9 +104,9 @@ impl Sparse {
             springs: Vec::new(),
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
-            factors: vec![Banded::new(factor.0, factor.1); nh],
-            smooth: Banded::new(whole, band),
-            tangent: Banded::new(tangent.0, tangent.1),
+            factors: vec![BandedMatrix::new(factor.0, factor.1); nh],
+            smooth: BandedMatrix::new(whole, band),
+            tangent: BandedMatrix::new(tangent.0, tangent.1),
             right: vec![0.0; 2 * whole],
             whole: vec![0.0; 2 * whole * nh],
         })
@@ -115,7 +115,7 @@ impl Sparse {
     /// Memory of the same with so many harmonics, bytes.
     pub fn memory(&self, harmonics: usize) -> f64 {
         let (factor, tangent) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
-        harmonics as f64 * Banded::bytes(factor.0, factor.1) + Banded::bytes(tangent.0, tangent.1)
+        harmonics as f64 * BandedMatrix::bytes(factor.0, factor.1) + BandedMatrix::bytes(tangent.0, tangent.1)
     }
 
     /// Multiplications in the elimination of a step with so many harmonics.
@@ -335,7 +335,7 @@ impl Sparse {
     }
 
     /// Adds the structure's dynamic stiffness at all harmonics among the places that have a number.
-    pub fn add_structure(&self, number: impl Fn(usize) -> Option<usize>, matrix: &mut Banded) {
+    pub fn add_structure(&self, number: impl Fn(usize) -> Option<usize>, matrix: &mut BandedMatrix) {
         let size = self.unknowns();
         for &(i, l, entry) in &self.entries {
             let (Some(i), Some(l)) = (number(i), number(l)) else { continue };

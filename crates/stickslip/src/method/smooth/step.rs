@@ -12,7 +12,7 @@ use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
 use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
-use stickslip_numerics::small_lu::Lu;
+use stickslip_numerics::small_lu::SmallLu;
 use stickslip_numerics::small_matvec::{add, add_product, add_product_of_rows};
 
 /// The eliminated structure for one step size.
@@ -164,7 +164,7 @@ pub(crate) struct Step {
     /// Structural stage velocities without the imposed ones, axis by axis.
     moving: Vec<[f64; STAGES]>,
     residual: Vec<f64>,
-    lu: Lu,
+    lu: SmallLu,
     /// Scratch memory for a sensitivity: stage velocities and internal states, forces of the
     /// laws, end of the step.
     right: Vec<f64>,
@@ -209,7 +209,7 @@ impl Step {
             structural: vec![0.0; j],
             moving: vec![[0.0; STAGES]; j],
             residual: vec![0.0; unknowns],
-            lu: Lu::default(),
+            lu: SmallLu::default(),
             right: Vec::new(),
             answer: Vec::new(),
             carried: Vec::new(),
@@ -586,10 +586,10 @@ pub(crate) fn points(assembly: &Assembly) -> Vec<RatePoint> {
 #[derive(Debug, Clone)]
 struct Filter {
     /// Elimination of the internal states of every law.
-    states: Vec<Lu>,
+    states: Vec<SmallLu>,
     /// The matrix `T` of every law, directions × directions.
     answers: Vec<Vec<f64>>,
-    axes: Lu,
+    axes: SmallLu,
     rate: f64,
     z: Vec<f64>,
     b: DVector<f64>,
@@ -602,9 +602,9 @@ impl Filter {
     fn new(assembly: &Assembly) -> Self {
         let most = assembly.joints.iter().map(|joint| joint.states).max().unwrap_or(0);
         Filter {
-            states: vec![Lu::default(); assembly.joints.len()],
+            states: vec![SmallLu::default(); assembly.joints.len()],
             answers: assembly.joints.iter().map(|joint| vec![0.0; joint.directions * joint.directions]).collect(),
-            axes: Lu::default(),
+            axes: SmallLu::default(),
             rate: 1.0,
             z: vec![0.0; most],
             b: DVector::zeros(assembly.n),

@@ -14,7 +14,7 @@ use crate::structure::{Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
-use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, SymbolicAnalysis};
 use stickslip_numerics::tie_break::leading;
 
 /// The modes of one nodal diameter.
@@ -346,8 +346,8 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matr
     let mass = part(0, Vec::new())?;
     let (damping, stiffness) = (part(1, along(|link| link.damping))?, part(2, along(|link| link.stiffness))?);
     // free motions come on top of the requested elastic modes
-    let wanted = Wanted::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
-    let found = NaturalModes::new(&Analysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
+    let wanted = ModeSelection::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
+    let found = NaturalModes::new(&SymbolicAnalysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
     let free = found.free();
     let mode = |k: usize| {
         let (omega, shape) = (found.values[k].max(0.0).sqrt(), found.shape(k));

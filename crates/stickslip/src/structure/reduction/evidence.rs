@@ -12,7 +12,7 @@
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};
-use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes};
+use stickslip_numerics::sparse::{LdlFactor, Matrix, NaturalModes};
 
 /// Largest number of samples; each needs a factorization of the whole structure.
 const SAMPLES: usize = 9;
@@ -140,7 +140,7 @@ impl Reference {
 struct Factors<'a> {
     whole: &'a Whole,
     /// The last factor, whose memory the next one reuses.
-    last: Option<Factor>,
+    last: Option<LdlFactor>,
 }
 
 impl Factors<'_> {

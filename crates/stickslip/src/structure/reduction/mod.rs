@@ -51,9 +51,11 @@ pub use series::Series;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
-use stickslip_numerics::dense::{ComplexLu, Lu};
+use stickslip_numerics::dense::{ComplexLu, DenseLu};
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, multi_vector};
+use stickslip_numerics::sparse::{
+    Matrix, ModeSelection, ModesError, NaturalModes, Singular, SymbolicAnalysis, multi_vector,
+};
 
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
 pub type Row = Vec<(usize, f64)>;
@@ -148,7 +150,7 @@ pub struct Whole {
     pub(super) damping: Damping,
     pub(super) stiffness: Arc<Matrix>,
     ports: Vec<Row>,
-    pub(super) analysis: Arc<Analysis>,
+    pub(super) analysis: Arc<SymbolicAnalysis>,
 }
 
 /// The reason why a structure cannot be reduced.
@@ -295,7 +297,7 @@ impl Whole {
         }
         damping.check()?;
         let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
-        let analysis = Arc::new(Analysis::new(&analysed));
+        let analysis = Arc::new(SymbolicAnalysis::new(&analysed));
         Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
     }
 
@@ -341,7 +343,7 @@ impl Whole {
         if highest > 0.0 && omega > ABOVE_ALL * highest {
             return Err(ReductionError::AboveAll { omega, highest });
         }
-        let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
+        let wanted = ModeSelection::UpTo { value: omega * omega, most: MOST_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
     }
 
@@ -354,7 +356,7 @@ impl Whole {
             let must = "a whole number from 1 to 600";
             return Err(ReductionError::Number { what: "the number of modes", value: count as f64, must });
         }
-        Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
+        Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, ModeSelection::Lowest(count))?)
     }
 
     /// Computes the damping of [`Damping::Ratio`] over all degrees of freedom: `β K + U Uᵀ`.
@@ -544,7 +546,7 @@ impl Reduced {
         let n = self.dofs();
         let bare = (self.stiffness.iter().zip(self.mass.iter())).map(|(k, m)| k - omega * omega * m);
         if self.damping.iter().all(|c| *c == 0.0) {
-            Lu::new(bare.collect(), n)?.solve(forces.as_mut_slice());
+            DenseLu::new(bare.collect(), n)?.solve(forces.as_mut_slice());
             return Ok(forces.map(|v| Complex::new(v, 0.0)));
         }
         let damped = bare.zip(self.damping.iter()).map(|(re, c)| Complex::new(re, omega * c));

@@ -29,7 +29,7 @@ use crate::structure::{RingEntry, turn};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Analysis, Factor, Matrix, ModesError, multi_vector};
+use stickslip_numerics::sparse::{LdlFactor, Matrix, ModesError, SymbolicAnalysis, multi_vector};
 
 /// Multiples of the frequency of interest up to which modes of the tuned ring start the
 /// iteration. Modes above that frequency leave an almost static remainder to the residual
@@ -59,7 +59,7 @@ pub(in crate::structure) struct NominalRing {
     stiffness: Matrix,
     /// Stiffness of a sector per unit relative deviation of its blade.
     of_blade: Vec<(usize, usize, f64)>,
-    analysis: Analysis,
+    analysis: SymbolicAnalysis,
     /// Modes of the tuned ring up to the first of [`EXTENTS`], by columns.
     nominal: Vec<f64>,
     /// Observed displacements of every sector, one sector after the other.
@@ -73,9 +73,9 @@ pub(in crate::structure) struct Mixed {
     pub values: Vec<f64>,
     /// Shapes of unit mass over the coordinates of all sectors.
     pub shapes: Vec<f64>,
-    factor: Factor,
+    factor: LdlFactor,
     /// Factor at the highest frequency of interest.
-    at_highest: Factor,
+    at_highest: LdlFactor,
 }
 
 /// A ring in its own modes, each scaled to one metre at the place that moves most.
@@ -108,7 +108,7 @@ impl NominalRing {
         let (mass, stiffness) = (matrix(&sector.mass)?, matrix(&sector.stiffness)?);
         let damping = sector.damping.as_ref().map(|own| matrix(own)).transpose()?;
         let blades = all_blades(&of_blade, &vec![1.0; sectors], r)?;
-        let analysis = Analysis::new(&[&stiffness, &mass, &blades]);
+        let analysis = SymbolicAnalysis::new(&[&stiffness, &mass, &blades]);
         let mut seen = vec![Row::new(); sectors * sector.port_count];
         for (port, at, weight) in around(&sector.ports, [sector.port_count, r], sectors) {
             seen[port].push((at, weight));
@@ -258,7 +258,7 @@ impl NominalRing {
 
     /// Returns the relative error of a modal response under loads of random signs. Each place
     /// is scaled by its flexibility.
-    fn left_out(&self, (own, seen): (&[[f64; 2]], &DMatrix<f64>), flexibility: &[f64], at_highest: &Factor) -> f64 {
+    fn left_out(&self, (own, seen): (&[[f64; 2]], &DMatrix<f64>), flexibility: &[f64], at_highest: &LdlFactor) -> f64 {
         let scale = |place: usize| if flexibility[place] > 0.0 { flexibility[place].sqrt().recip() } else { 0.0 };
         let loads = DVector::from_fn(self.seen.len(), |place, _| sign(place) * scale(place));
         let mut moved = vec![0.0; self.mass.n()];

@@ -17,7 +17,7 @@
 //! augmentation methods for modal response analysis".
 
 use super::{AT_ONCE, ReductionError, Whole};
-use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, multi_vector};
+use stickslip_numerics::sparse::{LdlFactor, Matrix, NaturalModes, multi_vector};
 
 /// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
 /// `STEP`.
@@ -65,7 +65,7 @@ pub(super) fn basis(
 }
 
 /// Factors `K - σM`. At zero shift, it adds springs where the free motions are largest.
-fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
+fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(LdlFactor, f64), ReductionError> {
     if shift == 0.0 {
         let supports = supports(whole, modes)?;
         let sum: [(f64, &Matrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];

@@ -26,7 +26,7 @@ use crate::structure::{CyclicSector, RingEntry, turn};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{NaturalModes, Wanted, multi_vector};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, multi_vector};
 
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
 /// which a combination is dropped. They are tried in this sequence.
@@ -253,7 +253,7 @@ impl Waves<'_> {
                 ReductionKind::Rubin => Free::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
                 ReductionKind::CraigBampton => {
                     let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
-                    let wanted = Wanted::UpTo { value: omega * omega, most: super::MOST_MODES };
+                    let wanted = ModeSelection::UpTo { value: omega * omega, most: super::MOST_MODES };
                     Arc::unwrap_or_clone(wave.whole.held(wanted)?.basis)
                 }
             };

@@ -5,7 +5,7 @@ use super::{Port, StaticState};
 use crate::law::MOST_DIRECTIONS;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::fourier::Fourier;
+use stickslip_numerics::fourier::FourierPlan;
 
 pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -20,7 +20,7 @@ pub(in super::super) struct Alternation {
     /// Distance of the states of these from those a period later, relative to their size, at which they repeat.
     pub repeats: f64,
     pub harmonics: Vec<usize>,
-    pub fourier: Fourier,
+    pub fourier: FourierPlan,
     pairs: Vec<(usize, Complex64)>,
     /// A signal for whoever needs one.
     pub signal: Vec<f64>,
@@ -88,7 +88,7 @@ impl Alternation {
             static_share: 1.0,
             marched: 0,
             repeats: REPEATS,
-            fourier: Fourier::new(samples),
+            fourier: FourierPlan::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
             signal: zeros.clone(),
             force: three(),

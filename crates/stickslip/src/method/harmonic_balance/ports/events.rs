@@ -1,7 +1,7 @@
 //! What the march along a motion finds: its turning points, and the intervals between which a slider's force is linear in it.
 
 use num_complex::Complex64;
-use stickslip_numerics::fourier::Fourier;
+use stickslip_numerics::fourier::FourierPlan;
 
 /// A part of the period in which the force is `stiffness u + offset`.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,7 @@ pub(in super::super) struct Extreme {
 /// Where a motion is looked at to tell its turning points apart.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Grid {
-    pub(super) fourier: Fourier,
+    pub(super) fourier: FourierPlan,
     pub(super) pairs: Vec<(usize, Complex64)>,
     pub(super) value: Vec<f64>,
     pub(super) slope: Vec<f64>,
@@ -47,6 +47,11 @@ impl Grid {
     /// For harmonics up to `top`.
     pub fn new(top: usize) -> Self {
         let points = (POINTS * (top + 1)).next_power_of_two();
-        Grid { fourier: Fourier::new(points), pairs: Vec::new(), value: vec![0.0; points], slope: vec![0.0; points] }
+        Grid {
+            fourier: FourierPlan::new(points),
+            pairs: Vec::new(),
+            value: vec![0.0; points],
+            slope: vec![0.0; points],
+        }
     }
 }
