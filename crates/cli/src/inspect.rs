@@ -158,7 +158,7 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
         if matrix.rows() == matrix.columns() && matrix.rows() > 1 {
             let out = constrained_rows(&[&matrix], matrix.rows());
             if let Some(sparse) = converted(&matrix, &out)
-                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
+                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.max_abs()).is_none())
             {
                 let beside = if out.is_empty() { "" } else { ", but for rows without an entry or with 1e36" };
                 let _ = writeln!(text, "  {}{beside}", definite(&sparse));

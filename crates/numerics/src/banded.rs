@@ -261,10 +261,10 @@ fn runs(count: usize, taken: impl Fn(usize) -> bool, out: &mut Vec<Range<usize>>
 
 /// Returns an order of the nodes of a graph that places connected nodes close together.
 ///
-/// `order[node]` is the position of a node. `links` lists the connected pairs.
+/// The result contains the position of every node. `links` lists the connected pairs.
 ///
 /// Source: Cuthill and McKee (1969).
-pub fn order(nodes: usize, links: &[(usize, usize)]) -> Vec<usize> {
+pub fn cuthill_mckee(nodes: usize, links: &[(usize, usize)]) -> Vec<usize> {
     let mut neighbours = vec![Vec::new(); nodes];
     for &(a, b) in links {
         if a != b {

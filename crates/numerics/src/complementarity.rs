@@ -145,7 +145,7 @@ fn solve_inside(
             factor.solve(&weighted_rhs)
         }
         _ => {
-            let least = eigen::singular(scaled)
+            let least = eigen::svd(scaled)
                 .and_then(|svd| svd.solve(&weighted_rhs, RANK_TOLERANCE * svd.singular_values.amax()).ok());
             least.unwrap_or_else(|| DVector::zeros(inside.len()))
         }

@@ -22,7 +22,7 @@ pub trait ParametricEquations {
     ///
     /// It is called if short steps fail, at kinks that the corrector cannot
     /// pass. Returns false if it finds no solution.
-    fn leap(&mut self, _x: &mut [f64], _p: f64) -> bool {
+    fn jump_kink(&mut self, _x: &mut [f64], _p: f64) -> bool {
         false
     }
 }
@@ -37,9 +37,9 @@ pub struct ContinuationSettings {
     /// Unit of the parameter in the arc length.
     pub unit: f64,
     /// Largest step size, as arc length. It grows with the norm of the unknowns above one.
-    pub longest: f64,
+    pub largest_step: f64,
     /// Smallest step size, as arc length.
-    pub shortest: f64,
+    pub smallest_step: f64,
     /// Maximum number of points.
     pub points: usize,
 }
@@ -52,8 +52,8 @@ impl ContinuationSettings {
             range: (from.min(to), from.max(to)),
             direction: if to < from { -1.0 } else { 1.0 },
             unit: (to - from).abs(),
-            longest: step / (to - from).abs(),
-            shortest: 1e-9,
+            largest_step: step / (to - from).abs(),
+            smallest_step: 1e-9,
             points: 100_000,
         }
     }
@@ -83,7 +83,8 @@ const ITERATIONS: usize = 20;
 /// A step with at most this number of corrector iterations makes the next step
 /// longer. See [`ITERATIONS`].
 const EASY_ITERATIONS: usize = 10;
-/// A step below the largest step size divided by this number calls [`ParametricEquations::leap`].
+/// A step below the largest step size divided by this number calls
+/// [`ParametricEquations::jump_kink`].
 const JUMP_DIVISOR: f64 = 32.0;
 
 /// Follows the branch from `(x, p)`, which solves the equations.
@@ -121,7 +122,7 @@ pub fn trace<E: ParametricEquations>(
     let (mut x, mut p) = (x.to_vec(), p);
     let mut tangent = vec![0.0; n + 1];
     tangent[n] = steps.direction;
-    let mut step_size = 0.25 * steps.longest;
+    let mut step_size = 0.25 * steps.largest_step;
     if !visit(equations, &x, p) {
         return BranchEnd::Stopped;
     }
@@ -129,7 +130,7 @@ pub fn trace<E: ParametricEquations>(
     let mut direction = steps.direction;
     for _ in 1..steps.points {
         // The largest step size grows with the norm of x, so a branch to infinity takes few steps.
-        let longest = steps.longest * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
+        let longest = steps.largest_step * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
         step_size = step_size.min(longest);
         if tangent_outdated {
             corrector.tangent(equations, &x, p, steps.unit, &mut tangent);
@@ -171,11 +172,11 @@ pub fn trace<E: ParametricEquations>(
             step_size *= 0.5;
             if step_size < longest / JUMP_DIVISOR {
                 // Let the equations jump over the kink, by a fraction of the largest step size.
-                let q = (p + (4.0 / JUMP_DIVISOR) * steps.longest * steps.unit * direction).clamp(low, high);
+                let q = (p + (4.0 / JUMP_DIVISOR) * steps.largest_step * steps.unit * direction).clamp(low, high);
                 next.copy_from_slice(&x);
-                if q != p && equations.leap(&mut next, q) {
+                if q != p && equations.jump_kink(&mut next, q) {
                     let border = q == low || q == high;
-                    (x, p, tangent_outdated, step_size) = (next, q, true, 0.25 * steps.longest);
+                    (x, p, tangent_outdated, step_size) = (next, q, true, 0.25 * steps.largest_step);
                     tangent.fill(0.0);
                     tangent[n] = direction;
                     if !visit(equations, &x, p) {
@@ -187,7 +188,7 @@ pub fn trace<E: ParametricEquations>(
                     continue;
                 }
             }
-            if step_size < steps.shortest {
+            if step_size < steps.smallest_step {
                 return BranchEnd::Stalled { parameter: p };
             }
             continue;
@@ -332,7 +333,7 @@ mod tests {
             (f[0], by_x[0], by_p[0]) = (x[0] * (1.0 - p) - 1.0, 1.0 - p, -x[0]);
             true
         }
-        fn leap(&mut self, _: &mut [f64], _: f64) -> bool {
+        fn jump_kink(&mut self, _: &mut [f64], _: f64) -> bool {
             false
         }
     }

@@ -12,7 +12,7 @@
 //!
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
-use crate::eigen::symmetric_in_blocks;
+use crate::eigen::symmetric_blocked;
 use crate::sparse::{Matrix, SymbolicAnalysis};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
@@ -31,14 +31,14 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// use stickslip_numerics::definiteness::semidefinite;
-/// assert_eq!(semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0]), Some(1));
-/// assert_eq!(semidefinite(&dmatrix![1e9, 0.0; 0.0, -1e-3]), None);
+/// use stickslip_numerics::definiteness::semidefinite_rank;
+/// assert_eq!(semidefinite_rank(&dmatrix![2.0, -2.0; -2.0, 2.0]), Some(1));
+/// assert_eq!(semidefinite_rank(&dmatrix![1e9, 0.0; 0.0, -1e-3]), None);
 /// ```
-pub fn semidefinite(matrix: &DMatrix<f64>) -> Option<usize> {
+pub fn semidefinite_rank(matrix: &DMatrix<f64>) -> Option<usize> {
     rank_scaled(matrix).or_else(|| {
         let size = largest(matrix)?;
-        let (values, _) = symmetric_in_blocks(&(matrix / size))?;
+        let (values, _) = symmetric_blocked(&(matrix / size))?;
         let zero = ROUNDING * matrix.nrows() as f64;
         values.iter().all(|value| *value >= -zero).then(|| values.iter().filter(|value| **value > zero).count())
     })
@@ -89,7 +89,8 @@ fn rank_scaled(matrix: &DMatrix<f64>) -> Option<usize> {
     left.iter().all(|&i| left.iter().all(|&k| rest[(i, k)].abs() <= zero)).then_some(rank)
 }
 
-/// Returns true if a symmetric matrix is positive semidefinite, by the tests of [`semidefinite`].
+/// Returns true if a symmetric matrix is positive semidefinite, by the tests of
+/// [`semidefinite_rank`].
 ///
 /// It does not compute the rank, so semidefinite large matrices are factored in blocks too.
 ///
@@ -103,7 +104,7 @@ pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
     let n = matrix.nrows();
     let zero = ROUNDING * n as f64;
     if n < BLOCKED_FROM {
-        return semidefinite(matrix).is_some();
+        return semidefinite_rank(matrix).is_some();
     }
     scaled(matrix).is_some_and(|(rows, _)| is_positive_definite(&rows, zero))
         || largest(matrix).is_some_and(|size| is_positive_definite(&(matrix / size), zero))
@@ -176,8 +177,8 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
 ///
 /// # Panics
 /// If the matrix does not have the size of the matrices analysed.
-pub fn sparse_definite_in_order(matrix: &Matrix, analysis: &SymbolicAnalysis) -> Option<bool> {
-    definite(matrix, |matrices| analysis.in_order(matrices))
+pub fn sparse_definite_with_order(matrix: &Matrix, analysis: &SymbolicAnalysis) -> Option<bool> {
+    definite(matrix, |matrices| analysis.with_same_order(matrices))
 }
 
 fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) -> Option<bool> {
@@ -187,7 +188,7 @@ fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) 
     let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
     let analysis = analysis(&[matrix, &one]);
     let positive = |rows: &Matrix, shift: f64| {
-        analysis.factor(&[(1.0, rows), (shift, &one)]).is_ok_and(|factor| factor.negative() == 0)
+        analysis.factor(&[(1.0, rows), (shift, &one)]).is_ok_and(|factor| factor.negative_pivots() == 0)
     };
     if let Some(rows) = sparse_scaled(matrix).filter(|rows| rows.asymmetry(rounding).is_none()) {
         if (0..n).all(|i| matrix.get(i, i) > 0.0) && positive(&rows, -rounding) {
@@ -197,7 +198,7 @@ fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) 
             return Some(false);
         }
     }
-    let size = matrix.largest();
+    let size = matrix.max_abs();
     let whole = Matrix::from_triplets(n, matrix.entries().map(|(i, k, value)| (i, k, value / size))).ok()?;
     (whole.asymmetry(rounding).is_none() && positive(&whole, rounding)).then_some(false)
 }
@@ -243,10 +244,10 @@ mod tests {
     #[test]
     fn chains() {
         for n in [2, 5, 40, 200] {
-            assert_eq!(semidefinite(&chain(n, 0.3, [0.7, 0.0])), Some(n));
-            assert_eq!(semidefinite(&chain(n, 0.3, [0.0, 0.0])), Some(n - 1));
-            assert_eq!(semidefinite(&chain(n, 0.3, [0.7, -0.7])), None);
-            assert_eq!(semidefinite(&(chain(n, 0.3, [0.0, 0.0]) * -1.0)), None);
+            assert_eq!(semidefinite_rank(&chain(n, 0.3, [0.7, 0.0])), Some(n));
+            assert_eq!(semidefinite_rank(&chain(n, 0.3, [0.0, 0.0])), Some(n - 1));
+            assert_eq!(semidefinite_rank(&chain(n, 0.3, [0.7, -0.7])), None);
+            assert_eq!(semidefinite_rank(&(chain(n, 0.3, [0.0, 0.0]) * -1.0)), None);
             let sparse = |ends: [f64; 2]| {
                 let full = chain(n, 0.3, ends);
                 let all = (0..n * n).map(|at| (at / n, at % n, full[(at / n, at % n)]));
@@ -257,14 +258,14 @@ mod tests {
                 let [wide, none] = [9, 0].map(|far| (0..far.min(n - 1)).map(|i| (i, n - 1 - i, 1.0)));
                 for other in [wide, none] {
                     let order = SymbolicAnalysis::new(&[&Matrix::from_triplets(n, other).unwrap()]);
-                    assert_eq!(sparse_definite_in_order(&matrix, &order), alone);
+                    assert_eq!(sparse_definite_with_order(&matrix, &order), alone);
                 }
                 alone
             };
             assert_eq!([sparse([0.7, 0.0]), sparse([0.0, 0.0]), sparse([0.7, -0.7])], [Some(true), Some(false), None]);
         }
         // The ground spring is softer than the rounding of the stiff spring.
-        assert_eq!(semidefinite(&chain(2, 1e9, [1e-3, -2e-3])), None);
+        assert_eq!(semidefinite_rank(&chain(2, 1e9, [1e-3, -2e-3])), None);
     }
 
     /// Masses at some rows only, in the elimination order of a structure that connects all
@@ -281,7 +282,7 @@ mod tests {
         };
         for (last, expected) in [(1.0, Some(false)), (-1.0, Some(false)), (-2.0, None)] {
             let mass = masses(last);
-            assert_eq!([sparse_definite_in_order(&mass, &order), sparse_definite(&mass)], [expected; 2], "{last}");
+            assert_eq!([sparse_definite_with_order(&mass, &order), sparse_definite(&mass)], [expected; 2], "{last}");
         }
     }
 
@@ -300,7 +301,7 @@ mod tests {
                     (mass[(i, i + 1)], mass[(i + 1, i)]) = (3.0 * beside, 3.0 * beside);
                 }
                 assert_eq!(rank_scaled(&mass), None, "the rows by themselves say it is negative");
-                assert_eq!(semidefinite(&mass), expected.map(|rank: usize| rank * size / 2), "{beside} {own}");
+                assert_eq!(semidefinite_rank(&mass), expected.map(|rank: usize| rank * size / 2), "{beside} {own}");
                 assert_eq!(is_semidefinite(&mass), expected.is_some(), "{beside} {own}");
                 let all = (0..size * size).map(|at| (at / size, at % size, mass[at]));
                 let sparse = Matrix::from_triplets(size, all).unwrap();
@@ -312,13 +313,13 @@ mod tests {
     #[test]
     fn neither_symmetric_nor_finite() {
         use nalgebra::dmatrix;
-        assert_eq!(semidefinite(&dmatrix![1.0, 0.1; -0.1, 1.0]), None);
-        assert_eq!(semidefinite(&dmatrix![1.0, f64::NAN; f64::NAN, 1.0]), None);
-        assert_eq!(semidefinite(&dmatrix![f64::INFINITY]), None);
-        assert_eq!(semidefinite(&dmatrix![0.0, 1.0; 1.0, 0.0]), None);
-        assert_eq!(semidefinite(&dmatrix![1.0, 2.0; 2.0, 1.0]), None);
-        assert_eq!(semidefinite(&DMatrix::zeros(3, 3)), Some(0));
-        assert_eq!(semidefinite(&DMatrix::zeros(0, 0)), Some(0));
+        assert_eq!(semidefinite_rank(&dmatrix![1.0, 0.1; -0.1, 1.0]), None);
+        assert_eq!(semidefinite_rank(&dmatrix![1.0, f64::NAN; f64::NAN, 1.0]), None);
+        assert_eq!(semidefinite_rank(&dmatrix![f64::INFINITY]), None);
+        assert_eq!(semidefinite_rank(&dmatrix![0.0, 1.0; 1.0, 0.0]), None);
+        assert_eq!(semidefinite_rank(&dmatrix![1.0, 2.0; 2.0, 1.0]), None);
+        assert_eq!(semidefinite_rank(&DMatrix::zeros(3, 3)), Some(0));
+        assert_eq!(semidefinite_rank(&DMatrix::zeros(0, 0)), Some(0));
     }
 
     proptest! {
@@ -329,9 +330,9 @@ mod tests {
             let a = DMatrix::from_vec(6, 3, entries);
             let product = &a * a.transpose();
             prop_assume!(a.singular_values().min() > 1e-3);
-            prop_assert_eq!(semidefinite(&product), Some(3));
-            prop_assert_eq!(semidefinite(&(&product - DMatrix::identity(6, 6) * shift)), None);
-            prop_assert_eq!(semidefinite(&(&product + DMatrix::identity(6, 6) * shift)), Some(6));
+            prop_assert_eq!(semidefinite_rank(&product), Some(3));
+            prop_assert_eq!(semidefinite_rank(&(&product - DMatrix::identity(6, 6) * shift)), None);
+            prop_assert_eq!(semidefinite_rank(&(&product + DMatrix::identity(6, 6) * shift)), Some(6));
         }
     }
 
@@ -341,12 +342,12 @@ mod tests {
         let n = 3 * BLOCKED_FROM;
         for (ends, rank) in [([0.7, 0.0], Some(n)), ([0.0, 0.0], Some(n - 1)), ([0.7, -0.7], None)] {
             let chain = chain(n, 0.3, ends);
-            assert_eq!((semidefinite(&chain), is_semidefinite(&chain)), (rank, rank.is_some()), "{ends:?}");
+            assert_eq!((semidefinite_rank(&chain), is_semidefinite(&chain)), (rank, rank.is_some()), "{ends:?}");
         }
         let mut gap = chain(n, 0.3, [0.7, 0.0]);
         (0..n).for_each(|i| (gap[(i, 5)], gap[(5, i)]) = (0.0, 0.0));
-        assert_eq!((semidefinite(&gap), is_semidefinite(&gap)), (Some(n - 1), true));
+        assert_eq!((semidefinite_rank(&gap), is_semidefinite(&gap)), (Some(n - 1), true));
         gap[(5, 5)] = -1e-9;
-        assert_eq!((semidefinite(&gap), is_semidefinite(&gap)), (None, false));
+        assert_eq!((semidefinite_rank(&gap), is_semidefinite(&gap)), (None, false));
     }
 }

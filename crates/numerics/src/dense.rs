@@ -32,12 +32,12 @@ const BLOCKED_FROM: usize = 96;
 /// assert_eq!(b, [2.0, 1.0]);
 /// ```
 pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
-    solve_signed(matrix, n, right).is_some()
+    solve_with_determinant_sign(matrix, n, right).is_some()
 }
 
 /// Solves `A x = b` like [`solve`]. Returns the sign ±1 of the determinant of
 /// A, or `None` if [`solve`] returns false.
-pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+pub fn solve_with_determinant_sign(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     if n >= BLOCKED_FROM {
         return solve_blocked(&mut matrix[..n * n], n, &mut right[..n]);
     }
@@ -89,7 +89,7 @@ fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
     Some(exchanges)
 }
 
-/// Solves like [`solve_signed`], in blocks that stay in the cache.
+/// Solves like [`solve_with_determinant_sign`], in blocks that stay in the cache.
 ///
 /// `faer` reads the row-major memory by columns and therefore factors the transpose. The
 /// solution uses the transpose of these factors.
@@ -175,12 +175,12 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
 /// ```
 /// let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0]);
 /// let mut c = [0.0; 2];
-/// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), false);
+/// stickslip_numerics::dense::multiply_blocked(&a, &b, &mut c, (2, 2, 1), false);
 /// assert_eq!(c, [23.0, 34.0]);
-/// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), true);
+/// stickslip_numerics::dense::multiply_blocked(&a, &b, &mut c, (2, 2, 1), true);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply_in_blocks<T: Scalar>(
+pub fn multiply_blocked<T: Scalar>(
     a: &[T],
     b: &[T],
     c: &mut [T],
@@ -206,11 +206,11 @@ pub fn multiply_in_blocks<T: Scalar>(
 /// # Example
 /// ```
 /// let mut matrix = [4.0, 2.0, 2.0, 17.0];
-/// assert!(stickslip_numerics::dense::cholesky_in_blocks(&mut matrix, 2));
+/// assert!(stickslip_numerics::dense::cholesky_blocked(&mut matrix, 2));
 /// assert_eq!((matrix[0], matrix[1], matrix[3]), (2.0, 1.0, 4.0));
-/// assert!(!stickslip_numerics::dense::cholesky_in_blocks(&mut [1.0, 2.0, 2.0, 3.0], 2));
+/// assert!(!stickslip_numerics::dense::cholesky_blocked(&mut [1.0, 2.0, 2.0, 3.0], 2));
 /// ```
-pub fn cholesky_in_blocks(matrix: &mut [f64], n: usize) -> bool {
+pub fn cholesky_blocked(matrix: &mut [f64], n: usize) -> bool {
     let params = Spec::<LltParams, f64>::default();
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(n, Par::Seq, params));
     let lower = MatMut::from_column_major_slice_mut(&mut matrix[..n * n], n, n);
@@ -226,12 +226,12 @@ pub fn cholesky_in_blocks(matrix: &mut [f64], n: usize) -> bool {
 /// # Example
 /// ```
 /// let (lower, mut right) = ([2.0, 1.0, 0.0, 4.0], [2.0, 9.0]);
-/// stickslip_numerics::dense::solve_lower_in_blocks(&lower, 2, &mut right, false);
+/// stickslip_numerics::dense::solve_lower_blocked(&lower, 2, &mut right, false);
 /// assert_eq!(right, [1.0, 2.0]);
-/// stickslip_numerics::dense::solve_lower_in_blocks(&lower, 2, &mut right, true);
+/// stickslip_numerics::dense::solve_lower_blocked(&lower, 2, &mut right, true);
 /// assert_eq!(right, [0.25, 0.5]);
 /// ```
-pub fn solve_lower_in_blocks(lower: &[f64], n: usize, right: &mut [f64], transposed: bool) {
+pub fn solve_lower_blocked(lower: &[f64], n: usize, right: &mut [f64], transposed: bool) {
     let columns = right.len() / n.max(1);
     let lower = MatRef::from_column_major_slice(&lower[..n * n], n, n);
     let right = MatMut::from_column_major_slice_mut(&mut right[..n * columns], n, columns);
@@ -388,7 +388,7 @@ mod tests {
                 matrix[i * n + (i + 1) % n] = if i % 2 == 1 { -2.0 } else { 3.0 };
             }
             let sign = if (n - 1 + n / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
-            assert_eq!(solve_signed(&mut matrix, n, &mut vec![1.0; n]), Some(sign), "{n}");
+            assert_eq!(solve_with_determinant_sign(&mut matrix, n, &mut vec![1.0; n]), Some(sign), "{n}");
         }
         let mut singular = vec![1.0; 4];
         assert!(!solve(&mut singular, 2, &mut [1.0, 2.0]));

@@ -1,6 +1,6 @@
 //! Eigenvalues and singular values by iterations with a bounded number of steps.
 //!
-//! - [`symmetric`] and [`singular`]: nalgebra's decompositions with a bound on their iterations.
+//! - [`symmetric`] and [`svd`]: nalgebra's decompositions with a bound on their iterations.
 //! - [`eigenvalues`]: all eigenvalues of a general matrix, by deflation of exact
 //!   zeros, balancing, and QR iteration of the Hessenberg form with Wilkinson's
 //!   shift. A subdiagonal entry counts as zero relative to the *whole* matrix. The
@@ -12,7 +12,7 @@
 //! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and
 //! 10.5; Parlett and Reinsch (1969) for balancing.
 
-use crate::dense::{cholesky_in_blocks, solve_lower_in_blocks};
+use crate::dense::{cholesky_blocked, solve_lower_blocked};
 use crate::interrupt;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch};
@@ -51,7 +51,7 @@ const COMPETING: f64 = 0.9;
 /// finite or the iteration does not converge.
 pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     if matrix.nrows() >= BLOCKED_FROM {
-        let (values, eigenvectors) = symmetric_in_blocks(&matrix)?;
+        let (values, eigenvectors) = symmetric_blocked(&matrix)?;
         return Some(SymmetricEigen { eigenvalues: DVector::from_vec(values), eigenvectors });
     }
     let steps = STEPS * (matrix.nrows() + 1);
@@ -61,7 +61,7 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     if found.as_ref().is_some_and(|found| found.eigenvalues.iter().chain(&found.eigenvectors).all(|x| x.is_finite())) {
         return found;
     }
-    let (values, eigenvectors) = symmetric_in_blocks(&matrix)?;
+    let (values, eigenvectors) = symmetric_blocked(&matrix)?;
     Some(SymmetricEigen { eigenvalues: DVector::from_vec(values), eigenvectors })
 }
 
@@ -74,11 +74,11 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let (values, vectors) = stickslip_numerics::eigen::symmetric_in_blocks(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
+/// let (values, vectors) = stickslip_numerics::eigen::symmetric_blocked(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
 /// assert!((values[0] - 1.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
 /// assert!((vectors[(0, 1)] - vectors[(1, 1)]).abs() < 1e-14);
 /// ```
-pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+pub fn symmetric_blocked(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = matrix.nrows();
     if !finite(matrix) || matrix.ncols() != n {
         return None;
@@ -102,11 +102,11 @@ pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let (values, vectors) = stickslip_numerics::eigen::symmetric_pair(&dmatrix![3.0, 0.0; 0.0, 8.0], &dmatrix![1.0, 0.0; 0.0, 4.0]).unwrap();
+/// let (values, vectors) = stickslip_numerics::eigen::generalized_symmetric(&dmatrix![3.0, 0.0; 0.0, 8.0], &dmatrix![1.0, 0.0; 0.0, 4.0]).unwrap();
 /// assert!((values[0] - 2.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
 /// assert!((vectors[(1, 0)].abs() - 0.5).abs() < 1e-14 && vectors[(0, 0)].abs() < 1e-14);
 /// ```
-pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+pub fn generalized_symmetric(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = h.nrows();
     if n == 0 {
         return Some((Vec::new(), DMatrix::zeros(0, 0)));
@@ -115,14 +115,14 @@ pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, D
     let unit = h.diagonal().map(|v| 1.0 / v.sqrt());
     let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
     let mut lower = scaled(h);
-    if !cholesky_in_blocks(lower.as_mut_slice(), n) {
+    if !cholesky_blocked(lower.as_mut_slice(), n) {
         return None;
     }
     let solve = |mut right: DMatrix<f64>, transposed: bool| {
-        solve_lower_in_blocks(lower.as_slice(), n, right.as_mut_slice(), transposed);
+        solve_lower_blocked(lower.as_slice(), n, right.as_mut_slice(), transposed);
         right
     };
-    let (values, vectors) = symmetric_in_blocks(&solve(solve(scaled(a), false).transpose(), false))?;
+    let (values, vectors) = symmetric_blocked(&solve(solve(scaled(a), false).transpose(), false))?;
     let mut vectors = solve(vectors, true);
     for mut column in vectors.column_iter_mut() {
         column.component_mul_assign(&unit);
@@ -132,7 +132,7 @@ pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, D
 
 /// Returns the singular value decomposition, or `None` if the matrix is empty, an entry is not
 /// finite or the iteration does not converge.
-pub fn singular<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
+pub fn svd<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
     let steps = STEPS * (matrix.nrows().max(matrix.ncols()) + 1);
     let usable = !matrix.is_empty() && matrix.iter().all(|z| z.clone().modulus().is_finite());
     let found = usable.then(|| SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, steps))?;
@@ -515,8 +515,8 @@ mod tests {
         assert_eq!(eigenvalues(&dmatrix![f64::NAN, 0.0; 1.0, 2.0]), None);
         assert_eq!(largest_modulus(&dmatrix![f64::INFINITY]), None);
         assert!(symmetric(dmatrix![1.0, f64::NAN; f64::NAN, 1.0]).is_none());
-        assert!(singular(dmatrix![f64::INFINITY, 1.0; 0.0, 1.0]).is_none());
-        assert!(singular(DMatrix::<f64>::zeros(0, 0)).is_none());
+        assert!(svd(dmatrix![f64::INFINITY, 1.0; 0.0, 1.0]).is_none());
+        assert!(svd(DMatrix::<f64>::zeros(0, 0)).is_none());
         assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), Some(vec![]));
         assert_eq!(largest_modulus(&DMatrix::zeros(0, 0)), Some(0.0));
     }

@@ -15,7 +15,7 @@ pub struct GmresLimits {
     pub tolerance: f64,
     /// Number of basis vectors. After this number of products the iteration
     /// restarts from its current solution.
-    pub vectors: usize,
+    pub restart: usize,
     /// Maximum number of products. A final check of the residual may add one.
     pub products: usize,
 }
@@ -61,7 +61,7 @@ impl Gmres {
     /// use stickslip_numerics::gmres::{Gmres, GmresLimits};
     /// let mut x = [3.0, 4.0];
     /// let multiply = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 2.0 * v[1]]);
-    /// let limits = GmresLimits { tolerance: 1e-12, vectors: 5, products: 10 };
+    /// let limits = GmresLimits { tolerance: 1e-12, restart: 5, products: 10 };
     /// assert!(Gmres::default().solve(&mut x, limits, multiply, |_| ()).solved);
     /// assert!((x[0] - 1.0).abs() < 1e-12 && (x[1] - 2.0).abs() < 1e-12);
     /// ```
@@ -73,7 +73,7 @@ impl Gmres {
         mut precondition: impl FnMut(&mut [f64]),
     ) -> GmresOutcome {
         let n = x.len();
-        let most = limits.vectors.clamp(1, n.max(1));
+        let most = limits.restart.clamp(1, n.max(1));
         let rhs = x.to_vec();
         let size = norm(&rhs);
         x.fill(0.0);
@@ -249,28 +249,28 @@ mod tests {
     #[test]
     fn the_solution_is_found() {
         for n in [1, 5, 80] {
-            let whole = GmresLimits { tolerance: 1e-12, vectors: n, products: 2 * n + 2 };
+            let whole = GmresLimits { tolerance: 1e-12, restart: n, products: 2 * n + 2 };
             let (outcome, error) = solve(n, whole, false);
             assert!(outcome.solved && error < 1e-9, "{n}: {outcome:?} {error:.1e}");
         }
-        let limits = GmresLimits { tolerance: 1e-10, vectors: 60, products: 400 };
+        let limits = GmresLimits { tolerance: 1e-10, restart: 60, products: 400 };
         let (plain, error) = solve(80, limits, false);
         assert!(plain.solved && error < 1e-7, "{plain:?} {error:.1e}");
-        let (restarted, error) = solve(80, GmresLimits { vectors: 25, ..limits }, true);
+        let (restarted, error) = solve(80, GmresLimits { restart: 25, ..limits }, true);
         assert!(restarted.solved && error < 1e-7, "{restarted:?} {error:.1e}");
     }
 
     /// Without a solution, or with too few products, the outcome is not solved.
     #[test]
     fn unsolved_systems_are_reported() {
-        let limits = GmresLimits { tolerance: 1e-12, vectors: 10, products: 4 };
+        let limits = GmresLimits { tolerance: 1e-12, restart: 10, products: 4 };
         let (outcome, _) = solve(80, limits, false);
         assert!(!outcome.solved && outcome.products <= 5, "{outcome:?}");
         assert!(outcome.residual > 1e-12 && outcome.residual < 1.0);
         let mut x = [1.0, 1.0];
         let singular = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 0.0]);
         let outcome =
-            Gmres::default().solve(&mut x, GmresLimits { tolerance: 1e-9, vectors: 9, products: 30 }, singular, |_| ());
+            Gmres::default().solve(&mut x, GmresLimits { tolerance: 1e-9, restart: 9, products: 30 }, singular, |_| ());
         assert!(!outcome.solved && outcome.residual > 0.5, "{outcome:?}");
         let mut x = [1.0; 3];
         let none = Gmres::default().solve(&mut x, limits, |_, out| out.fill(f64::NAN), |_| ());

@@ -22,12 +22,12 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::golden_section::maximum;
+/// use stickslip_numerics::golden_section::golden_section;
 /// let close = |a: f64, b: f64| (b - a).abs() < 1e-6;
-/// let (at, height) = maximum((0.0, 3.0), close, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
+/// let (at, height) = golden_section((0.0, 3.0), close, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
 /// assert!((at - 2.0).abs() < 1e-6 && (height - 1.0).abs() < 1e-6);
 /// ```
-pub fn maximum<E>(
+pub fn golden_section<E>(
     ends: (f64, f64),
     close: impl Fn(f64, f64) -> bool,
     mut value: impl FnMut(f64) -> Result<f64, E>,
@@ -67,7 +67,7 @@ mod tests {
     const FLAT: f64 = 1e-7;
 
     fn found(ends: (f64, f64), f: impl Fn(f64) -> f64) -> (f64, f64) {
-        maximum(ends, |a, b| (b - a).abs() < 1e-9, |x| Ok::<_, ()>(f(x))).unwrap()
+        golden_section(ends, |a, b| (b - a).abs() < 1e-9, |x| Ok::<_, ()>(f(x))).unwrap()
     }
 
     #[test]
@@ -96,12 +96,12 @@ mod tests {
                     values += 1;
                     Ok::<_, ()>(x)
                 };
-                let (at, _) = maximum(ends, |_, _| false, counted).unwrap();
+                let (at, _) = golden_section(ends, |_, _| false, counted).unwrap();
                 let (low, high) = (ends.0.min(ends.1), ends.0.max(ends.1));
                 assert!((low..=high).contains(&at) && values < 12, "{ends:?}: {at} after {values}");
             }
         }
-        let (at, _) = maximum((0.0, 3.0), |_, _| false, |x: f64| Ok::<_, ()>(-(x - 2.0).abs())).unwrap();
+        let (at, _) = golden_section((0.0, 3.0), |_, _| false, |x: f64| Ok::<_, ()>(-(x - 2.0).abs())).unwrap();
         assert!((at - 2.0).abs() < 1e-14, "{at}");
     }
 
@@ -113,7 +113,7 @@ mod tests {
             Ok::<_, ()>(-x * x)
         };
         // 1/φ^20 = 6.6e-5 and 1/φ^21 = 4.1e-5 of the interval.
-        maximum((-1.0, 1.0), |a, b| b - a < 2.0 * 5e-5, value).unwrap();
+        golden_section((-1.0, 1.0), |a, b| b - a < 2.0 * 5e-5, value).unwrap();
         assert_eq!(places.len(), 2 + 21);
         assert!((places[1] - (5f64.sqrt() - 2.0)).abs() < 1e-15 && places[0] == -places[1], "{places:?}");
     }
@@ -127,6 +127,6 @@ mod tests {
             left -= 1;
             if left == 0 { Err("three are enough") } else { Ok(x) }
         };
-        assert_eq!(maximum((0.0, 1.0), |_, _| false, fails), Err("three are enough"));
+        assert_eq!(golden_section((0.0, 1.0), |_, _| false, fails), Err("three are enough"));
     }
 }

@@ -52,7 +52,7 @@ impl StopFlag {
     /// Creates a flag that is also set once `callback` returns true.
     ///
     /// Every check calls `callback`, on the thread that computes.
-    pub fn asking(callback: impl Fn() -> bool + Send + Sync + 'static) -> StopFlag {
+    pub fn with_callback(callback: impl Fn() -> bool + Send + Sync + 'static) -> StopFlag {
         StopFlag(Arc::new(Inner { set: AtomicBool::new(false), callback: Some(Box::new(callback)) }))
     }
 
@@ -85,7 +85,7 @@ impl fmt::Debug for StopFlag {
 
 /// Sets or removes the flag of this thread, for threads that receive work from
 /// others. The flag stays until the next call.
-pub fn lend(stop: Option<StopFlag>) {
+pub fn set_thread_flag(stop: Option<StopFlag>) {
     THREAD_FLAG.set(stop);
 }
 
@@ -140,7 +140,7 @@ mod tests {
     fn callback_runs_until_it_returns_true() {
         let asked = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let count = asked.clone();
-        let stop = StopFlag::asking(move || count.fetch_add(1, Ordering::Relaxed) == 2);
+        let stop = StopFlag::with_callback(move || count.fetch_add(1, Ordering::Relaxed) == 2);
         let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| (0..9).for_each(|_| check()))));
         assert!(ended.is_err() && stop.is_set());
         assert_eq!(asked.load(Ordering::Relaxed), 3);

@@ -40,7 +40,7 @@ pub(crate) fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Optio
 /// Computes the basis by the singular value decomposition.
 fn by_svd(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
-    let svd = eigen::singular(matrix.clone())?;
+    let svd = eigen::svd(matrix.clone())?;
     let v_t = svd.v_t.expect("asked for");
     let mut order: Vec<usize> = (0..r).collect();
     order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));

@@ -155,7 +155,7 @@ impl QuadraticModes {
                 theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             }
             let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
-            let values = eigen::singular(theta.clone()).ok_or(out_of_range)?.singular_values;
+            let values = eigen::svd(theta.clone()).ok_or(out_of_range)?.singular_values;
             let singular = values.min() <= DEFECTIVE * size;
             let inverse = if singular { None } else { theta.try_inverse() };
             let Some(inverse) = inverse else { return Err(DefectiveModes { lambda }) };
@@ -292,7 +292,7 @@ fn real_basis(columns: &DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
     let (r, count) = columns.shape();
     let parts =
         DMatrix::from_fn(r, 2 * count, |i, j| if j < count { columns[(i, j)].re } else { columns[(i, j - count)].im });
-    let svd = eigen::singular(parts)?;
+    let svd = eigen::svd(parts)?;
     let u = svd.u.expect("asked for");
     let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
     order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));

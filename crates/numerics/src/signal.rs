@@ -141,7 +141,7 @@ impl ExponentialBasis {
 
     /// Returns the value of a signal at `τ = 0`: the coefficients of the exponentials and of
     /// the constant. Resonant pairs contribute nothing.
-    pub fn beginning(&self, coefficients: &[Complex64]) -> f64 {
+    pub fn initial_value(&self, coefficients: &[Complex64]) -> f64 {
         coefficients[..self.exponents.len()].iter().map(|c| c.re).sum::<f64>() + coefficients[self.constant()].re
     }
 
@@ -196,7 +196,7 @@ impl ExponentialBasis {
     /// Computes the magnitudes of the exponents into `out`.
     pub(crate) fn exponent_magnitudes(&self, out: &mut [f64]) {
         let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
-        out.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
+        out.iter_mut().zip(every).for_each(|(speed, s)| *speed = magnitude(s));
     }
 
     /// Computes bounds on the magnitudes of the coefficients of a derivative into `out`.
@@ -266,7 +266,7 @@ impl ExponentialBasis {
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
             self.differentiate(&first[range.clone()], &mut second[range.clone()]);
             let (weights, signal) = (&mut second_weights[range.clone()], &second[range.clone()]);
-            weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
+            weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = magnitude(c));
             self.differentiate_sizes(weights, exponent_magnitudes, &mut third_weights[range]);
         }
         self.magnitudes(end, magnitudes);
@@ -351,14 +351,14 @@ impl ExponentialBasis {
                 self.differentiate(current, next);
                 std::mem::swap(current, next);
             }
-            let value = self.beginning(current);
-            let size: f64 = current[..=self.constant()].iter().map(size_of).sum();
+            let value = self.initial_value(current);
+            let size: f64 = current[..=self.constant()].iter().map(magnitude).sum();
             if value.abs() > ZERO_TOLERANCE * size {
                 if value < 0.0 {
                     return None;
                 }
                 self.differentiate(current, next);
-                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| size_of(c) * m).sum();
+                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| magnitude(c) * m).sum();
                 // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!
                 return Some(if bound == 0.0 { f64::INFINITY } else { 0.5 * f64::from(order + 1) * value / bound });
             }
@@ -481,7 +481,7 @@ impl FourierIntegrals {
 }
 
 /// Quadrature nodes and weights of a panel.
-const NODES: [(f64, f64); 8] = quadrature::outwards(quadrature::EIGHT);
+const NODES: [(f64, f64); 8] = quadrature::from_center(quadrature::GAUSS_8);
 /// Maximum phase of the fastest exponential in a panel of the quadrature, up to
 /// which the 8-point rule is exact to rounding.
 const PANEL_PHASE: f64 = 1.0;
@@ -531,7 +531,7 @@ pub(crate) fn magnitude_bound(weights: &[f64], magnitudes: &[f64]) -> f64 {
 /// Returns the magnitude of a coefficient. Overflow cannot occur here, so the
 /// slower `hypot` is not needed.
 #[inline]
-pub fn size_of(c: &Complex64) -> f64 {
+pub fn magnitude(c: &Complex64) -> f64 {
     c.norm_sqr().sqrt()
 }
 

@@ -6,7 +6,7 @@
 //! Subintervals that cannot extend the known range are skipped. If the curvature has one sign,
 //! Newton's method finds the single turning point. All other subintervals are halved.
 
-use crate::signal::{ExponentialBasis, magnitude_bound, real_dot, size_of};
+use crate::signal::{ExponentialBasis, magnitude, magnitude_bound, real_dot};
 use num_complex::Complex64;
 
 /// A mode below this fraction of a signal is rounding. It does not change an
@@ -43,7 +43,7 @@ impl ValueRange {
 
     /// Extends the range by a value.
     #[inline]
-    pub fn take(&mut self, value: f64) {
+    pub fn include(&mut self, value: f64) {
         (self.low, self.high) = (self.low.min(value), self.high.max(value));
         if self.mirrored {
             self.high = self.high.max(-self.low);
@@ -56,7 +56,7 @@ impl ValueRange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooFast;
 
-/// Scratch memory of [`ExponentialBasis::extend`], reused between calls.
+/// Scratch memory of [`ExponentialBasis::extend_range`], reused between calls.
 #[derive(Debug, Clone, Default)]
 pub struct RangeScratch {
     values: Vec<Complex64>,
@@ -106,7 +106,7 @@ impl RangeScratch {
             ..
         } = self;
         basis.magnitudes(length, magnitudes);
-        weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
+        weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = magnitude(c));
         let size = magnitude_bound(weights, magnitudes);
         kept.copy_from_slice(signal);
         for ((kept, weight), exponent) in kept.iter_mut().zip(&*weights).zip(&basis.exponents) {
@@ -116,7 +116,7 @@ impl RangeScratch {
         }
         basis.differentiate(kept, first);
         basis.differentiate(first, second);
-        weights.iter_mut().zip(&*second).for_each(|(weight, c)| *weight = size_of(c));
+        weights.iter_mut().zip(&*second).for_each(|(weight, c)| *weight = magnitude(c));
         basis.exponent_magnitudes(exponent_magnitudes);
         basis.differentiate_sizes(weights, exponent_magnitudes, third);
         size
@@ -207,7 +207,7 @@ impl ExponentialBasis {
     ///
     /// # Errors
     /// [`TooFast`] if the signal has too many turning points.
-    pub fn extend(
+    pub fn extend_range(
         &self,
         range: &mut ValueRange,
         (signal, at_end): (&[Complex64], &[Complex64]),
@@ -225,8 +225,8 @@ impl ExponentialBasis {
             second: 0.0,
             third: 0.0,
         };
-        range.take(begin.value);
-        range.take(end.value);
+        range.include(begin.value);
+        range.include(end.value);
         memory.intervals.push([begin, end]);
         let mut times = 0;
         while let Some([left, right]) = memory.intervals.pop() {
@@ -242,7 +242,7 @@ impl ExponentialBasis {
             if most < 0.0 || least > 0.0 {
                 if turned {
                     let value = memory.turning_value(self, signal, [left, right], rounding);
-                    range.take(value);
+                    range.include(value);
                 }
                 continue;
             }
@@ -259,7 +259,7 @@ impl ExponentialBasis {
                 return Err(TooFast);
             }
             let between = memory.sample(self, signal, time);
-            range.take(between.value);
+            range.include(between.value);
             memory.intervals.push([left, between]);
             memory.intervals.push([between, right]);
         }
@@ -298,11 +298,11 @@ mod tests {
             const SAMPLES: usize = 20_000;
             for k in 0..=SAMPLES {
                 basis.evaluate(length * k as f64 / SAMPLES as f64, &mut values);
-                seen.take(real_dot(&signal, &values));
+                seen.include(real_dot(&signal, &values));
             }
             basis.evaluate(length, &mut values);
             let mut range = ValueRange::new(case % 2 == 0);
-            basis.extend(&mut range, (&signal, &values), length, &mut memory).unwrap();
+            basis.extend_range(&mut range, (&signal, &values), length, &mut memory).unwrap();
             // At the nearest sample the signal is lower than its maximum by its curvature.
             let (digits, missed) = (1e-14, 10.0 * (length / SAMPLES as f64).powi(2));
             assert!(range.high >= seen.high - digits && range.high <= seen.high + missed, "{case}: {range:?} {seen:?}");
@@ -325,7 +325,7 @@ mod tests {
             let mut values = [zero; 3];
             basis.evaluate(100.0, &mut values);
             let mut range = ValueRange::new(false);
-            basis.extend(&mut range, (&signal, &values), 100.0, &mut memory).map(|()| range)
+            basis.extend_range(&mut range, (&signal, &values), 100.0, &mut memory).map(|()| range)
         };
         let range = of(1e-17).unwrap();
         assert!((range.high - 1.0).abs() < 1e-15 && (range.low + 1.0).abs() < 1e-15, "{range:?}");

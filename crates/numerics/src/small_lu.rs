@@ -9,7 +9,7 @@
 /// use stickslip_numerics::small_lu::SmallLu;
 /// let mut lu = SmallLu::default();
 /// lu.zeros(2).copy_from_slice(&[0.0, 2.0, 4.0, 1.0]);
-/// assert!(lu.factorise());
+/// assert!(lu.factor());
 /// let mut x = [2.0, 9.0];
 /// lu.solve(&mut x);
 /// assert_eq!(x, [2.0, 1.0]);
@@ -23,7 +23,7 @@ pub struct SmallLu {
 }
 
 impl SmallLu {
-    /// Returns a zero matrix, row-major, for the caller to fill before [`SmallLu::factorise`].
+    /// Returns a zero matrix, row-major, for the caller to fill before [`SmallLu::factor`].
     pub fn zeros(&mut self, n: usize) -> &mut [f64] {
         self.n = n;
         self.entries.clear();
@@ -37,7 +37,7 @@ impl SmallLu {
     }
 
     /// Factors the matrix in place. Returns false if a pivot is zero or not finite.
-    pub fn factorise(&mut self) -> bool {
+    pub fn factor(&mut self) -> bool {
         // Lengths known to the compiler: five stages of one axis, and of one axis with a state.
         match self.n {
             5 => self.eliminate(5),
@@ -141,7 +141,7 @@ mod tests {
                 |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
             let matrix = lu.zeros(n);
             (0..n * n).for_each(|at| matrix[at] = entry(at / n, at % n));
-            assert!(lu.factorise());
+            assert!(lu.factor());
             let mut rhs: Vec<f64> = (0..n).map(|i| (0..n).map(|k| entry(i, k) * (1.0 + k as f64)).sum()).collect();
             lu.solve(&mut rhs);
             for (i, x) in rhs.iter().enumerate() {
@@ -156,6 +156,6 @@ mod tests {
             }
         }
         lu.zeros(2).fill(1.0);
-        assert!(!lu.factorise());
+        assert!(!lu.factor());
     }
 }

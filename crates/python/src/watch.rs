@@ -132,7 +132,7 @@ fn lent(py: Python<'_>, threads: Option<usize>) -> PyResult<Lent> {
             .map_err(|cause| error::exception(py, "StickslipError", format!("no threads: {cause}")))?,
     };
     let stop = StopFlag::new();
-    pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
+    pool.broadcast(|_| interrupt::set_thread_flag(Some(stop.clone())));
     Ok(Lent { number, pool: Some(pool), stop })
 }
 

@@ -20,8 +20,8 @@ use std::sync::Arc;
 /// let m = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
 /// let analysis = SymbolicAnalysis::new(&[&k, &m]);
 /// // the number of negative pivots is the number of eigenvalues below the shift
-/// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative(), 1);
-/// assert_eq!(analysis.factor(&[(1.0, &k), (-2.1, &m)]).unwrap().negative(), 2);
+/// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative_pivots(), 1);
+/// assert_eq!(analysis.factor(&[(1.0, &k), (-2.1, &m)]).unwrap().negative_pivots(), 2);
 /// let mut x = [1.0, 0.0, 0.0];
 /// analysis.factor(&[(1.0, &k)]).unwrap().solve(&mut x);
 /// assert!((x[0] - 0.75).abs() < 1e-15, "{x:?}");
@@ -50,7 +50,7 @@ impl SymbolicAnalysis {
     /// If the matrices have another size, or if the entries of the factor
     /// exceed the 32-bit indices.
     #[must_use]
-    pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
+    pub fn with_same_order(&self, matrices: &[&Matrix]) -> Self {
         SymbolicAnalysis { pattern: Arc::new(self.pattern.with_order(matrices)) }
     }
 
@@ -60,7 +60,7 @@ impl SymbolicAnalysis {
     }
 
     /// Returns the number of entries of a real factor, eight bytes each.
-    pub fn fill(&self) -> usize {
+    pub fn factor_entries(&self) -> usize {
         if self.pattern.n == 0 { 0 } else { self.pattern.real().cholesky.len_val() }
     }
 

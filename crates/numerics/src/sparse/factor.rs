@@ -109,7 +109,7 @@ impl LdlFactor {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn again(self, sum: &[(f64, &Matrix)]) -> Result<Self, Singular> {
+    pub fn refactor(self, sum: &[(f64, &Matrix)]) -> Result<Self, Singular> {
         LdlFactor::new(&self.pattern, sum, self.ldl.values)
     }
 
@@ -162,7 +162,7 @@ impl LdlFactor {
     /// For `K - ω² M` with M positive definite it is the number of natural frequencies below ω.
     ///
     /// Source: Sylvester's law of inertia.
-    pub fn negative(&self) -> usize {
+    pub fn negative_pivots(&self) -> usize {
         self.negative
     }
 
@@ -475,7 +475,7 @@ mod tests {
             for below in 0..=n {
                 let shift = frequency(below as f64 + 0.5);
                 let factor = analysis.factor(&[(1.0, &k), (-shift, &m)]).unwrap();
-                assert_eq!(factor.negative(), below, "{n} masses, shift {shift}");
+                assert_eq!(factor.negative_pivots(), below, "{n} masses, shift {shift}");
             }
         }
     }
@@ -486,7 +486,7 @@ mod tests {
         let n = 1000;
         let k = chain(n, true);
         let factor = SymbolicAnalysis::new(&[&k]).factor(&[(1.0, &k)]).unwrap();
-        assert_eq!(factor.negative(), 0);
+        assert_eq!(factor.negative_pivots(), 0);
         let mut x = vec![0.0; 2 * n];
         (x[0], x[n + 399]) = (1.0, 1.0);
         factor.solve(&mut x);
@@ -517,7 +517,7 @@ mod tests {
             assert!(real.row >= first, "{real}");
             entries.push((n - 1, n - 1, 1e-10));
             let k = Matrix::from_triplets(n, entries).unwrap();
-            assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative(), 0);
+            assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative_pivots(), 0);
         }
         let empty_row = Matrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
         let analysis = SymbolicAnalysis::new(&[&empty_row]);
@@ -564,7 +564,7 @@ mod tests {
         let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
         let matrix = Matrix::from_triplets(n, pairs).unwrap();
         let factor = SymbolicAnalysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
-        assert_eq!(factor.negative(), n / 2);
+        assert_eq!(factor.negative_pivots(), n / 2);
         let mut x: Vec<f64> = (0..n).map(|i| i as f64).collect();
         factor.solve(&mut x);
         assert!((0..n).all(|i| (x[i] - 0.5 * (i ^ 1) as f64).abs() < 1e-14));
@@ -576,7 +576,7 @@ mod tests {
         let analysis = SymbolicAnalysis::new(&[&none]);
         analysis.factor(&[(1.0, &none)]).unwrap().solve(&mut []);
         analysis.factor_complex(&[]).unwrap().solve(&mut []);
-        assert_eq!(analysis.fill(), 0);
+        assert_eq!(analysis.factor_entries(), 0);
     }
 
     /// Same input, same bits, on any thread. One elimination order serves every shift.
@@ -611,7 +611,7 @@ mod tests {
             let right = DVector::from_fn(30, |i, _| (i as f64).cos());
             let expected = full.lu().solve(&right).unwrap();
             if let Ok(factor) = analysis.factor(&[(1.0, &matrix)]) {
-                prop_assert_eq!(factor.negative(), eigenvalues.iter().filter(|e| **e < 0.0).count());
+                prop_assert_eq!(factor.negative_pivots(), eigenvalues.iter().filter(|e| **e < 0.0).count());
             }
             let complex = analysis.factor_complex(&[(Complex64::new(0.0, 1.0), &matrix)]).unwrap();
             let mut z: Vec<Complex64> = right.iter().map(|r| Complex64::new(0.0, *r)).collect();

@@ -17,7 +17,7 @@ const MAX_SIZE: usize = i32::MAX as usize;
 /// // a spring between two masses, as its contributions to either mass
 /// let k = Matrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
 /// assert_eq!((k.get(0, 0), k.get(0, 1), k.entries().count()), (6.0, -5.0, 4));
-/// assert_eq!(k.times(&[1.0, 1.0]), [1.0, 0.0]);
+/// assert_eq!(k.multiply(&[1.0, 1.0]), [1.0, 0.0]);
 /// assert!(k.asymmetry(0.0).is_none());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -163,7 +163,7 @@ impl Matrix {
     }
 
     /// Returns the largest magnitude of an entry.
-    pub fn largest(&self) -> f64 {
+    pub fn max_abs(&self) -> f64 {
         self.values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
     }
 
@@ -187,7 +187,7 @@ impl Matrix {
     ///
     /// # Panics
     /// If `x` does not have n entries.
-    pub fn times(&self, x: &[f64]) -> Vec<f64> {
+    pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
         assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
         let mut product = vec![0.0; self.n];
         for (row, column, value) in self.entries() {
@@ -200,7 +200,7 @@ impl Matrix {
     ///
     /// # Panics
     /// If `x` does not have n entries.
-    pub fn times_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
+    pub fn multiply_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
         assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
         let mut product = vec![Complex64::new(0.0, 0.0); self.n];
         for (row, column, value) in self.entries() {
@@ -267,12 +267,12 @@ mod tests {
         assert_eq!(matrix, Matrix::from_triplets(n, all.iter().rev().copied()).unwrap());
         assert_eq!(matrix.len(), all.len());
         let x: Vec<f64> = (0..n).map(|i| 1.0 + i as f64).collect();
-        for (i, y) in matrix.times(&x).iter().enumerate() {
+        for (i, y) in matrix.multiply(&x).iter().enumerate() {
             let row: f64 = (0..n).filter(|k| (i * n + k) % 3 == 0).map(|k| value(i, k) * x[k]).sum();
             assert!((y - row).abs() < 1e-13, "{y} {row}");
         }
         let twisted: Vec<Complex64> = x.iter().map(|x| Complex64::new(*x, -2.0 * x)).collect();
-        for (z, y) in matrix.times_complex(&twisted).iter().zip(matrix.times(&x)) {
+        for (z, y) in matrix.multiply_complex(&twisted).iter().zip(matrix.multiply(&x)) {
             assert!((z - Complex64::new(y, -2.0 * y)).norm() < 1e-12);
         }
     }

@@ -13,10 +13,10 @@ use nalgebra::DMatrix;
 /// # Example
 /// ```
 /// use stickslip_numerics::sparse::multi_vector;
-/// let product = multi_vector::products(2, &[1.0, 2.0], &[3.0, 4.0, 5.0, 6.0]);
+/// let product = multi_vector::inner_products(2, &[1.0, 2.0], &[3.0, 4.0, 5.0, 6.0]);
 /// assert_eq!((product[(0, 0)], product[(0, 1)]), (11.0, 17.0));
 /// ```
-pub fn products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
+pub fn inner_products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
     let (rows, columns) = (count(n, v), count(n, w));
     let mut product = DMatrix::zeros(rows, columns);
     if rows * columns > 0 {
@@ -56,7 +56,7 @@ pub fn add(n: usize, w: &mut [f64], factor: f64, v: &[f64], s: &DMatrix<f64>) {
 ///
 /// # Panics
 /// Under the conditions of [`add`].
-pub fn combination(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
+pub fn combine(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
     let mut w = vec![0.0; n * s.ncols()];
     add(n, &mut w, 1.0, v, s);
     w
@@ -67,7 +67,7 @@ impl Matrix {
     ///
     /// # Panics
     /// If the length of `v` is not a multiple of n.
-    pub fn times_columns(&self, v: &[f64]) -> Vec<f64> {
+    pub fn multiply_columns(&self, v: &[f64]) -> Vec<f64> {
         let n = self.n();
         let all = count(n, v);
         let mut product = vec![0.0; n * all];
@@ -152,11 +152,11 @@ mod tests {
         let matrix = Matrix::from_triplets(n, entries).unwrap();
         for columns in 0..20 {
             let v: Vec<f64> = (0..n * columns).map(|i| noise(i + 100)).collect();
-            let together = matrix.times_columns(&v);
+            let together = matrix.multiply_columns(&v);
             for (v, w) in v.chunks_exact(n).zip(together.chunks_exact(n)) {
-                assert_eq!(matrix.times_columns(v), w);
+                assert_eq!(matrix.multiply_columns(v), w);
             }
         }
-        assert!(Matrix::from_triplets(0, []).unwrap().times_columns(&[]).is_empty());
+        assert!(Matrix::from_triplets(0, []).unwrap().multiply_columns(&[]).is_empty());
     }
 }

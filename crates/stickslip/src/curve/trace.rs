@@ -16,7 +16,7 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::convert::Infallible;
 use stickslip_numerics::continuation::{self, ContinuationSettings};
-use stickslip_numerics::golden_section::maximum;
+use stickslip_numerics::golden_section::golden_section;
 
 pub use stickslip_numerics::continuation::BranchEnd;
 
@@ -250,7 +250,7 @@ impl Trace<'_> {
             orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit))
         };
         let close = |a: f64, b: f64| (b - a).abs() <= LOCATED * (a.abs() + b.abs());
-        let Ok(found) = maximum((a, b), close, |value| Ok::<_, Infallible>(height(value)));
+        let Ok(found) = golden_section((a, b), close, |value| Ok::<_, Infallible>(height(value)));
         if found.1 > best.1 { found } else { best }
     }
 }

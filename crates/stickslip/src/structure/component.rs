@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use stickslip_numerics::definiteness::sparse_definite_in_order;
+use stickslip_numerics::definiteness::sparse_definite_with_order;
 use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, multi_vector};
 
 /// Matrices of a structure and the names of their rows.
@@ -196,7 +196,7 @@ impl Component {
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry are already checked
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
-        let definite = sparse_definite_in_order(&whole.mass, &whole.analysis);
+        let definite = sparse_definite_with_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
@@ -275,7 +275,8 @@ impl Component {
             return Ok(None);
         };
         let modes = NaturalModes::new(analysis, stiffness, mass, ModeSelection::Lowest(count.saturating_mul(4)))?;
-        let products = multi_vector::products(self.dofs(), &modes.shapes, &damping.times_columns(&modes.shapes));
+        let products =
+            multi_vector::inner_products(self.dofs(), &modes.shapes, &damping.multiply_columns(&modes.shapes));
         let found = free_vibrations(&modes.values, &products);
         Ok(found.map(|found| found.iter().take(count).map(|one| one.omega).collect()))
     }
@@ -298,7 +299,7 @@ impl Component {
     pub fn modes_below(&self, omega: f64) -> Option<usize> {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
         once(&self.0.counts, &omega, || {
-            analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative())
+            analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative_pivots())
         })
     }
 
@@ -385,7 +386,8 @@ impl Component {
         let r = reduced.dofs();
         let columns = kept.sector.whole_columns(&reduced.basis);
         let (mass, damping, stiffness) = self.matrices();
-        let project = |matrix: &Matrix| multi_vector::products(self.dofs(), &columns, &matrix.times_columns(&columns));
+        let project =
+            |matrix: &Matrix| multi_vector::inner_products(self.dofs(), &columns, &matrix.multiply_columns(&columns));
         // symmetric up to rounding
         let symmetric = |matrix: &Matrix| {
             let product = project(matrix);
@@ -581,7 +583,7 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 
 fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
     let Fewer { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
-    let (frequencies, free) = (natural(&modes), modes.free());
+    let (frequencies, free) = (natural(&modes), modes.rigid_body_count());
     let form = Form::Alone(Arc::new(reduced.in_metres()));
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }

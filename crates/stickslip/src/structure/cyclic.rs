@@ -386,7 +386,7 @@ impl CyclicSector {
         let own = Matrix::from_triplets(n, own).map_err(|_| BladeError::NotHeld)?;
         let analysis = SymbolicAnalysis::new(&[&own]);
         let factor = analysis.factor(&[(1.0, &own)]).map_err(|_| BladeError::NotHeld)?;
-        if factor.negative() > 0 || towards.is_empty() {
+        if factor.negative_pivots() > 0 || towards.is_empty() {
             return Err(BladeError::NotHeld);
         }
         Ok(Blade { at: inside.into_values().collect(), own, towards, factor })
@@ -453,7 +453,7 @@ impl Blade {
     /// forces on these rows.
     pub fn times(&self, displacements: &[f64]) -> Vec<f64> {
         let moved: Vec<f64> = self.at.iter().map(|at| displacements[*at]).collect();
-        let mut forces = self.own.times(&moved);
+        let mut forces = self.own.multiply(&moved);
         self.towards.iter().for_each(|(row, at, value)| forces[*row] += value * displacements[*at]);
         let mut all = vec![0.0; displacements.len()];
         self.at.iter().zip(&forces).for_each(|(at, force)| all[*at] = *force);
@@ -466,7 +466,7 @@ impl Blade {
     /// Returns `Vᵀ D V` over columns of length `n`, with the matrix `D` of [`Blade::entries`].
     pub fn along(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
         let forces: Vec<f64> = basis.chunks_exact(n).flat_map(|column| self.times(column)).collect();
-        let energy = stickslip_numerics::sparse::multi_vector::products(n, basis, &forces);
+        let energy = stickslip_numerics::sparse::multi_vector::inner_products(n, basis, &forces);
         let all = (0..energy.ncols()).flat_map(|k| (0..energy.nrows()).map(move |i| (i, k)));
         all.map(|(i, k)| (i, k, 0.5 * (energy[(i, k)] + energy[(k, i)]))).collect()
     }

@@ -27,7 +27,7 @@ pub(crate) use uncoupled::UncoupledModes;
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
-use stickslip_numerics::definiteness::{is_semidefinite, semidefinite, sparse_definite};
+use stickslip_numerics::definiteness::{is_semidefinite, semidefinite_rank, sparse_definite};
 use stickslip_numerics::sparse::{Asymmetry, Matrix, MatrixError, SymbolicAnalysis};
 
 /// `M x'' + C x' + K x`, over the places that are free to move.
@@ -250,7 +250,7 @@ impl Structure {
         };
         let largest = match &form {
             Form::Full(full) => full.stiffness.amax(),
-            Form::Sparse { stiffness, .. } => stiffness.largest(),
+            Form::Sparse { stiffness, .. } => stiffness.max_abs(),
         };
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
@@ -302,7 +302,7 @@ impl Structure {
                 if (negative || !is_diagonal) && sparse_definite(mass).is_none() {
                     return Err(StructureError::NegativeMass);
                 }
-                [mass, damping, stiffness].map(Matrix::largest)
+                [mass, damping, stiffness].map(Matrix::max_abs)
             }
         };
         Ok(Structure::kept(places, form, largest))
@@ -370,7 +370,7 @@ impl Structure {
     /// motion has kinetic energy.
     pub fn has_definite_mass(&self) -> bool {
         match &self.0.form {
-            Form::Full(full) => semidefinite(&full.mass) == Some(self.dofs()),
+            Form::Full(full) => semidefinite_rank(&full.mass) == Some(self.dofs()),
             Form::Sparse { mass, .. } => sparse_definite(mass) == Some(true),
         }
     }
@@ -437,7 +437,7 @@ impl Structure {
                 let matrices = [mass, &damping, stiffness];
                 let [Some(definite), Some(_), Some(_)] = matrices.map(sparse_definite) else { return false };
                 definite || {
-                    let share = |matrix: &Matrix| 1.0 / matrix.largest().max(f64::MIN_POSITIVE);
+                    let share = |matrix: &Matrix| 1.0 / matrix.max_abs().max(f64::MIN_POSITIVE);
                     let all = matrices
                         .into_iter()
                         .flat_map(|matrix| matrix.entries().map(move |(i, k, v)| (i, k, v * share(matrix))));
@@ -512,12 +512,12 @@ impl Matrices {
         if ![&damping, &self.stiffness].into_iter().all(is_semidefinite) {
             return false;
         }
-        let Some(rank) = semidefinite(&self.mass) else { return false };
+        let Some(rank) = semidefinite_rank(&self.mass) else { return false };
         let n = self.mass.nrows();
         rank == n || {
             // scaled by the largest entries, because the units differ
             let share = |matrix: &DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
-            semidefinite(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
+            semidefinite_rank(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
         }
     }
 }
@@ -542,7 +542,7 @@ fn symmetric(name: &'static str, matrix: Matrix) -> Result<Matrix, StructureErro
     if matrix.asymmetry(0.0).is_none() {
         return Ok(matrix);
     }
-    if let Some(Asymmetry { row, column, value, mirrored }) = matrix.asymmetry(SYMMETRIC * matrix.largest()) {
+    if let Some(Asymmetry { row, column, value, mirrored }) = matrix.asymmetry(SYMMETRIC * matrix.max_abs()) {
         return Err(StructureError::NotSymmetric { matrix: name, row: row + 1, column: column + 1, value, mirrored });
     }
     let halves = matrix.entries().flat_map(|(i, k, value)| [(i, k, 0.5 * value), (k, i, 0.5 * value)]);

@@ -162,5 +162,5 @@ pub fn mass_along(rows: &[String], mass: &Matrix, along: &str) -> Option<f64> {
     let moves = |name: &String| f64::from(name.rsplit_once('.').is_some_and(|(_, direction)| direction == along));
     let motion: Vec<f64> = rows.iter().map(moves).collect();
     let moved = motion.contains(&1.0);
-    moved.then(|| mass.times(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
+    moved.then(|| mass.multiply(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
 }

@@ -59,7 +59,7 @@ impl<'a> Lanczos<'a> {
         Lanczos {
             factor,
             mass,
-            max_mass_entry: mass.largest(),
+            max_mass_entry: mass.max_abs(),
             locked,
             n,
             basis: vec![],
@@ -89,7 +89,7 @@ impl<'a> Lanczos<'a> {
         let mut block = std::mem::take(&mut self.mass_times_basis);
         self.factor.solve(&mut block);
         let width = block.len() / n;
-        let mut forces = self.mass.times_columns(&block);
+        let mut forces = self.mass.multiply_columns(&block);
         let sizes = self.norms(&block, &forces)?;
         let coefficients = self.project_out(&mut block, &mut forces);
         for k in 0..width {
@@ -106,7 +106,7 @@ impl<'a> Lanczos<'a> {
 
     /// Returns `(K - σM)⁻¹ M V`.
     fn operator(&self, v: &[f64]) -> Vec<f64> {
-        let mut block = self.mass.times_columns(v);
+        let mut block = self.mass.multiply_columns(v);
         self.factor.solve(&mut block);
         block
     }
@@ -147,12 +147,12 @@ impl<'a> Lanczos<'a> {
             return coefficients;
         }
         for _ in 0..2 {
-            let known = multi_vector::products(n, self.locked, forces);
+            let known = multi_vector::inner_products(n, self.locked, forces);
             multi_vector::add(n, block, -1.0, self.locked, &known);
-            let along = multi_vector::products(n, &self.basis, forces);
+            let along = multi_vector::inner_products(n, &self.basis, forces);
             multi_vector::add(n, block, -1.0, &self.basis, &along);
             coefficients += along;
-            *forces = self.mass.times_columns(block);
+            *forces = self.mass.multiply_columns(block);
         }
         coefficients
     }
@@ -171,13 +171,13 @@ impl<'a> Lanczos<'a> {
             let mut along = DMatrix::zeros(self.size() - first, 1);
             let mut left = self.norm(&column, &force)?;
             for _ in 0..2 {
-                let part = multi_vector::products(n, &self.basis[first * n..], &force);
+                let part = multi_vector::inner_products(n, &self.basis[first * n..], &force);
                 multi_vector::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
                 multi_vector::add(n, &mut force, -1.0, &self.mass_times_basis[(first - self.expanded) * n..], &part);
                 along += part;
                 // The sign of a product that cancels to rounding is not reliable either.
                 if dot(&column, &force) < (RECOMPUTE_BELOW * left).powi(2) {
-                    force = self.mass.times_columns(&column);
+                    force = self.mass.multiply_columns(&column);
                 }
                 left = self.norm(&column, &force)?;
             }
@@ -208,12 +208,12 @@ impl<'a> Lanczos<'a> {
     /// fewer if the space is exhausted.
     fn add_random_vectors(&mut self, count: usize) -> Result<(), ModesError> {
         let mut start: Vec<f64> = (0..count * self.n).map(|_| self.random()).collect();
-        let mut forces = self.mass.times_columns(&start);
+        let mut forces = self.mass.multiply_columns(&start);
         // Project out the known vectors before the operator, which would amplify them.
         self.project_out(&mut start, &mut forces);
         start = forces;
         self.factor.solve(&mut start);
-        forces = self.mass.times_columns(&start);
+        forces = self.mass.multiply_columns(&start);
         let sizes = self.norms(&start, &forces)?;
         self.project_out(&mut start, &mut forces);
         self.orthonormalize(start, forces, &sizes)?;
@@ -260,17 +260,17 @@ impl<'a> Lanczos<'a> {
         }
         let failed = || ModesError::NotConverged { found: 0, counted: count, below: shift };
         let coefficients = DMatrix::from_fn(self.expanded, count, |i, k| pairs[k].vector[i]);
-        let ritz = multi_vector::combination(n, &self.basis[..self.expanded * n], &coefficients);
+        let ritz = multi_vector::combine(n, &self.basis[..self.expanded * n], &coefficients);
         let mut shapes = self.operator(&ritz);
         shapes.chunks_mut(n).zip(pairs).for_each(|(shape, pair)| scale(shape, 1.0 / pair.theta));
-        let mut forces = self.mass.times_columns(&shapes);
+        let mut forces = self.mass.multiply_columns(&shapes);
         if !self.locked.is_empty() {
-            let known = multi_vector::products(n, self.locked, &forces);
+            let known = multi_vector::inner_products(n, self.locked, &forces);
             multi_vector::add(n, &mut shapes, -1.0, self.locked, &known);
-            forces = self.mass.times_columns(&shapes);
+            forces = self.mass.multiply_columns(&shapes);
         }
-        let m = multi_vector::products(n, &shapes, &forces);
-        let k = multi_vector::products(n, &shapes, &stiffness.times_columns(&shapes));
+        let m = multi_vector::inner_products(n, &shapes, &forces);
+        let k = multi_vector::inner_products(n, &shapes, &stiffness.multiply_columns(&shapes));
         let inverse = m
             .clone()
             .cholesky()
@@ -280,7 +280,7 @@ impl<'a> Lanczos<'a> {
         // Relative to the shift, so that the rounding of modes far above does
         // not affect those near it.
         let eigen = eigen::symmetric(&inverse * (k - m * shift) * inverse.transpose()).ok_or_else(failed)?;
-        let shapes = multi_vector::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
+        let shapes = multi_vector::combine(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
         let values: Vec<f64> = eigen.eigenvalues.iter().map(|v| v + shift).collect();
         let mut off = self.operator(&shapes);
         for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
@@ -289,10 +289,10 @@ impl<'a> Lanczos<'a> {
         // K and M are diagonal in the space of the modes. The rounding of the factor inside
         // that space is therefore not an error of the modes.
         for modes in [self.locked, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
-            let inside = multi_vector::products(n, modes, &self.mass.times_columns(&off));
+            let inside = multi_vector::inner_products(n, modes, &self.mass.multiply_columns(&off));
             multi_vector::add(n, &mut off, -1.0, modes, &inside);
         }
-        let residuals = self.norms(&off, &self.mass.times_columns(&off))?;
+        let residuals = self.norms(&off, &self.mass.multiply_columns(&off))?;
         // A rigid-body mode not found yet may spoil others by the rounding of
         // the factor. A later run finds those.
         let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();

@@ -175,7 +175,7 @@ impl Search<'_> {
         let mut counted = 0;
         for _ in 0..MAX_RUNS {
             let run = self.run_at(shift, &factor, counted, first_shift)?;
-            self.found.effort.vectors += run.vectors;
+            self.found.cost.vectors += run.vectors;
             if let RunEnd::Slender(value) = run.end {
                 first_shift = value.max(least);
                 (shift, factor) = self.first_factor(first_shift, Some(factor))?;
@@ -183,13 +183,13 @@ impl Search<'_> {
             }
             if let RunEnd::Clustered(value) = run.end {
                 (shift, factor) = self.factor_near(value, first_shift, factor)?;
-                counted = factor.negative();
+                counted = factor.negative_pivots();
                 continue;
             }
             let (exhausted, more) = (matches!(run.end, RunEnd::Exhausted), run.modes.count());
             self.found.merge(self.mass.n(), run.modes);
             (shift, factor) = self.factor_near(self.complete_up_to(exhausted, first_shift), first_shift, factor)?;
-            counted = factor.negative();
+            counted = factor.negative_pivots();
             let found = self.found.below(shift);
             let (enough, keep) = match self.wanted {
                 ModeSelection::Lowest(n) => (found >= n, n),
@@ -223,10 +223,10 @@ impl Search<'_> {
 
     /// Factors at a shift, in the memory of the last factor.
     fn factor(&mut self, shift: f64, last: Option<LdlFactor>) -> Result<LdlFactor, Singular> {
-        self.found.effort.factors += 1;
+        self.found.cost.factors += 1;
         let sum = [(1.0, self.stiffness), (-shift, self.mass)];
         match last {
-            Some(last) => last.again(&sum),
+            Some(last) => last.refactor(&sum),
             None => self.analysis.factor(&sum),
         }
     }
@@ -234,7 +234,7 @@ impl Search<'_> {
     /// Factors at the first, negative shift.
     fn first_factor(&mut self, first_shift: f64, last: Option<LdlFactor>) -> Result<(f64, LdlFactor), ModesError> {
         let factor = self.factor(-first_shift, last).map_err(ModesError::Massless)?;
-        match factor.negative() {
+        match factor.negative_pivots() {
             0 => Ok((-first_shift, factor)),
             count => Err(ModesError::Negative { count, below: -first_shift }),
         }
@@ -370,12 +370,12 @@ mod tests {
         for (value, expected) in modes.values.iter().zip(expected) {
             assert!((value - expected).abs() <= 1e-11 * expected + rounding, "{value} instead of {expected}");
         }
-        let gram = multi_vector::products(n, &modes.shapes, &m.times_columns(&modes.shapes));
+        let gram = multi_vector::inner_products(n, &modes.shapes, &m.multiply_columns(&modes.shapes));
         assert!((gram - DMatrix::identity(modes.count(), modes.count())).amax() < 1e-10);
-        let (kx, mx) = (k.times_columns(&modes.shapes), m.times_columns(&modes.shapes));
+        let (kx, mx) = (k.multiply_columns(&modes.shapes), m.multiply_columns(&modes.shapes));
         for mode in 0..modes.count() {
             let length = modes.shape(mode).iter().map(|x| x * x).sum::<f64>().sqrt();
-            let size = k.largest() * length;
+            let size = k.max_abs() * length;
             let off =
                 (0..n).map(|i| (kx[mode * n + i] - modes.values[mode] * mx[mode * n + i]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-9 * size, "mode {mode}: {off:e} of {size:e}");
@@ -400,7 +400,7 @@ mod tests {
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i as f64 / (2 * n) as f64)).collect();
             let found = modes(&free, &m, ModeSelection::Lowest(12)).unwrap();
             check(&free, &m, &found, &expected, 1e-14);
-            assert_eq!(found.free(), 1);
+            assert_eq!(found.rigid_body_count(), 1);
             let ring = springs(n, (0..n).map(|i| (i, (i + 1) % n)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i.div_ceil(2) as f64 / n as f64)).collect();
             check(&ring, &m, &modes(&ring, &m, ModeSelection::Lowest(12)).unwrap(), &expected, 1e-14);
@@ -473,7 +473,7 @@ mod tests {
             (0..401usize).map(|i| 4.0 * (PI * i.div_ceil(2) as f64 / n as f64).sin().powi(2)).collect();
         let found = modes(&k, &m, ModeSelection::Lowest(401)).unwrap();
         check(&k, &m, &found, &expected, 1e-13);
-        assert!(found.effort.factors > 2, "{:?}", found.effort);
+        assert!(found.cost.factors > 2, "{:?}", found.cost);
         let bound = 0.5 * (expected[350] + expected[351]);
         let found = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 400 }).unwrap();
         check(&k, &m, &found, &expected[..351], 1e-13);
@@ -507,7 +507,7 @@ mod tests {
         ];
         let (k, m) = (element(bending, h.powi(-3)), element(inertia, h / 420.0));
         let found = modes(&k, &m, ModeSelection::Lowest(8)).unwrap();
-        assert_eq!(found.free(), 0);
+        assert_eq!(found.rigid_body_count(), 0);
         // Roots of cos β cosh β = -1, by Newton's method.
         for (i, value) in found.values.iter().enumerate() {
             let mut beta = (i as f64 + 0.5) * PI;

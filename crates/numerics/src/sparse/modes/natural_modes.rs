@@ -29,7 +29,7 @@ pub struct NaturalModes {
     /// A typical `k_ii / m_ii`, rad²/s². The rounding of λ is far below it.
     pub scale: f64,
     /// Cost of the search.
-    pub effort: ModesCost,
+    pub cost: ModesCost,
 }
 
 /// Cost of a search for modes.
@@ -103,7 +103,7 @@ pub enum ModesError {
 
 impl NaturalModes {
     pub(super) fn empty() -> Self {
-        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, effort: ModesCost::default() }
+        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, cost: ModesCost::default() }
     }
 
     /// Returns the number of modes.
@@ -113,7 +113,7 @@ impl NaturalModes {
 
     /// Returns the number of rigid-body modes: eigenvalues that are zero to the
     /// ten digits of a file, and far below the next.
-    pub fn free(&self) -> usize {
+    pub fn rigid_body_count(&self) -> usize {
         let values = &self.values;
         let separated = |k: &usize| *k == 0 || *k == values.len() || values[*k] > SEPARATION * values[*k - 1].abs();
         (0..=self.below(RIGID_BODY * self.scale)).rev().find(separated).unwrap_or(0)

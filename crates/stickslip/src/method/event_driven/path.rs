@@ -282,13 +282,13 @@ impl<'a> Measuring<'a> {
         let mut range = ValueRange::new(self.path.symmetry == Symmetry::HalfPeriod);
         // values known from all pieces reduce the search in each of them
         for (piece, coefficients) in self.pieces() {
-            range.take(piece.basis().beginning(&signal[coefficients]));
+            range.include(piece.basis().initial_value(&signal[coefficients]));
         }
         for (piece, coefficients) in self.pieces() {
             let Segment { start, length, at_end, .. } = &piece.segment;
             piece
                 .basis()
-                .extend(&mut range, (&signal[coefficients], at_end), *length, &mut memory)
+                .extend_range(&mut range, (&signal[coefficients], at_end), *length, &mut memory)
                 .map_err(|_| Breakdown::TooFast { time: *start })?;
         }
         Ok((range.low, range.high))
@@ -367,7 +367,7 @@ impl Signals for Measuring<'_> {
         let mut sum = 0.0;
         for (piece, range) in self.pieces() {
             let u = &u[range];
-            let travel = real_dot(u, &piece.segment.at_end) - piece.basis().beginning(u);
+            let travel = real_dot(u, &piece.segment.at_end) - piece.basis().initial_value(u);
             for share in self.path.of_joint(axis) {
                 let contact = piece.segment.contacts[share.part];
                 sum += contact.sign() * self.path.parts[share.part].limit() * share.of(contact) * travel;

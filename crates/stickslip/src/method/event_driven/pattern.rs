@@ -142,7 +142,7 @@ impl Pattern {
         )
         .ok_or(out_of_range)?;
         let redundant = !held.is_empty() && {
-            let values = eigen::singular(inverse_delassus.clone()).ok_or(out_of_range)?.singular_values;
+            let values = eigen::svd(inverse_delassus.clone()).ok_or(out_of_range)?.singular_values;
             let least = REDUNDANT * inverse_delassus.amax();
             values.iter().filter(|value| **value > least).count() < held.len()
         };

@@ -198,7 +198,7 @@ impl<'a> BranchEquations<'a> {
     /// Returns the orbit at `value` that the solver finds from the nearby point `x`.
     pub fn near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
         let mut x = x.to_vec();
-        self.leap(&mut x, value).then(|| self.orbit(&x, value))?
+        self.jump_kink(&mut x, value).then(|| self.orbit(&x, value))?
     }
 }
 
@@ -232,7 +232,7 @@ impl ParametricEquations for BranchEquations<'_> {
         true
     }
 
-    fn leap(&mut self, x: &mut [f64], p: f64) -> bool {
+    fn jump_kink(&mut self, x: &mut [f64], p: f64) -> bool {
         if !self.set(p) {
             return false;
         }

@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::complex_gemv::ComplexGemv;
-use stickslip_numerics::dense::{ComplexLu, DenseLu, multiply_in_blocks};
+use stickslip_numerics::dense::{ComplexLu, DenseLu, multiply_blocked};
 use stickslip_numerics::gmres::{Gmres, GmresLimits};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -118,7 +118,7 @@ impl Coupled {
         let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
         let (residual, finest) = (near.residual, if near.sketched { FINEST_OF_SKETCHES } else { 0.0 });
         let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED)).max(finest);
-        let limits = GmresLimits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
+        let limits = GmresLimits { tolerance: wanted, restart: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let Coupled { gmres, harmonics, split, above, force, moved, parts } = self;
@@ -130,7 +130,7 @@ impl Coupled {
             else {
                 break false;
             };
-            let most = if fresh { limits } else { GmresLimits { products: STALE, vectors: STALE, ..limits } };
+            let most = if fresh { limits } else { GmresLimits { products: STALE, restart: STALE, ..limits } };
             let outcome = gmres.solve(
                 step,
                 most,
@@ -196,7 +196,7 @@ impl Linear<'_> {
             }
             parts.resize(wide, 0.0);
             // row after row it is the transpose
-            multiply_in_blocks(v, self.tangent(p, port), parts, (1, wide, wide), false);
+            multiply_blocked(v, self.tangent(p, port), parts, (1, wide, wide), false);
             force.iter_mut().zip(parts.chunks_exact(2)).for_each(|(f, z)| *f = Complex64::new(z[0], z[1]) * unit);
         }
         receptance.apply(force, moved);
@@ -503,7 +503,7 @@ impl Split {
             let weighted: Vec<f64> =
                 high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own()[m][2])).collect();
             let mut sum = vec![0.0; p * p];
-            multiply_in_blocks(&weighted, &above, &mut sum, (p, high.len(), p), true);
+            multiply_blocked(&weighted, &above, &mut sum, (p, high.len(), p), true);
             (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);
             Arc::new(sum)
         });
@@ -527,7 +527,7 @@ impl Split {
         factor.solve(&mut moved);
         let l = low.len();
         let mut core = vec![0.0; l * l];
-        multiply_in_blocks(&pull, &moved, &mut core, (l, p, l), false);
+        multiply_blocked(&pull, &moved, &mut core, (l, p, l), false);
         let closed = modal.closed.is_some();
         Some(Split { bound, closed, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
     }
@@ -562,7 +562,7 @@ impl Split {
         self.factor.solve(&mut columns);
         if l > 0 {
             let mut pulled = vec![0.0; l * wide];
-            multiply_in_blocks(&self.pull, &columns, &mut pulled, (l, p, wide), false);
+            multiply_blocked(&self.pull, &columns, &mut pulled, (l, p, wide), false);
             for (k, factor) in self.harmonics.iter().enumerate() {
                 let (re, im) = pulled[2 * k * l..2 * (k + 1) * l].split_at_mut(l);
                 let mut modal: Vec<Complex64> = re.iter().zip(&*im).map(|(re, im)| Complex64::new(*re, *im)).collect();
@@ -572,7 +572,7 @@ impl Split {
                 }
             }
             let mut moved = vec![0.0; p * wide];
-            multiply_in_blocks(&self.moved, &pulled, &mut moved, (p, l, wide), false);
+            multiply_blocked(&self.moved, &pulled, &mut moved, (p, l, wide), false);
             columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
         }
         for (q, v) in v.chunks_exact_mut(wide).enumerate() {

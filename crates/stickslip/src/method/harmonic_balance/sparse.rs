@@ -10,7 +10,7 @@ use super::hold::HOLD;
 use super::ports::Ports;
 use crate::model::System;
 use num_complex::Complex64;
-use stickslip_numerics::banded::{BandedMatrix, order};
+use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
 
 /// Degrees of freedom from which the banded form is thought of.
 const LARGE: usize = 16;
@@ -87,7 +87,7 @@ impl Sparse {
             links.extend(touched.iter().flat_map(|a| touched.iter().map(|b| (*a, *b))));
         }
         let whole = n + unknown;
-        let position = order(whole, &links);
+        let position = cuthill_mckee(whole, &links);
         let band = links.iter().map(|&(a, b)| position[a].abs_diff(position[b])).max().unwrap_or(0);
         if is_dearer(whole, band) {
             return None;

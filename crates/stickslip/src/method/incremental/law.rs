@@ -361,7 +361,7 @@ impl Follower {
                 }
                 self.change[s] = from.z[s] + half * (self.before.rate[s] + self.after.rate[s]) - self.state[s];
             }
-            if !self.lu.factorise() {
+            if !self.lu.factor() {
                 return false;
             }
             if found {

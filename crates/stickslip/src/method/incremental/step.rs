@@ -161,7 +161,7 @@ impl Step {
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
             interrupt::check();
-            if !self.evaluate(assembly, eliminated, drive, (time, &state[n..2 * n])) || !self.lu.factorise() {
+            if !self.evaluate(assembly, eliminated, drive, (time, &state[n..2 * n])) || !self.lu.factor() {
                 return false;
             }
             if converged {

@@ -96,11 +96,11 @@ impl Whole {
     /// Returns independent combinations of columns.
     fn common(&self, vectors: &[f64], up_to: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.dofs();
-        let mut energies = multi_vector::products(n, vectors, &self.stiffness.times_columns(vectors));
+        let mut energies = multi_vector::inner_products(n, vectors, &self.stiffness.multiply_columns(vectors));
         // free motions have kinetic energy only
-        energies += multi_vector::products(n, vectors, &self.mass.times_columns(vectors)) * (up_to * up_to);
+        energies += multi_vector::inner_products(n, vectors, &self.mass.multiply_columns(vectors)) * (up_to * up_to);
         let all = energies.ncols();
         let weights = independent(&DMatrix::identity(all, all), &energies).ok_or(ReductionError::OutOfRange)?;
-        Ok(multi_vector::combination(n, vectors, &weights))
+        Ok(multi_vector::combine(n, vectors, &weights))
     }
 }

@@ -39,8 +39,8 @@ impl Whole {
         let mass = part(&self.mass).map_err(out_of_range)?;
         let analysis = SymbolicAnalysis::new(&[&stiffness, &mass]);
         let modes = NaturalModes::new(&analysis, &stiffness, &mass, wanted)?;
-        if modes.free() > 0 {
-            return Err(ReductionError::NotHeld { count: modes.free() });
+        if modes.rigid_body_count() > 0 {
+            return Err(ReductionError::NotHeld { count: modes.rigid_body_count() });
         }
         let (inner, outer) = (interior.len(), boundary.len());
         let mut answers = vec![0.0; inner * outer];

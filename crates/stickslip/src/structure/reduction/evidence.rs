@@ -182,7 +182,7 @@ impl Factors<'_> {
         }
         let sum = [(1.0, stiffness), (-omega * omega, mass)];
         let factor = match self.last.take() {
-            Some(last) => last.again(&sum),
+            Some(last) => last.refactor(&sum),
             None => whole.analysis.factor(&sum),
         };
         let factor = self.last.insert(factor.map_err(singular)?);

@@ -290,7 +290,7 @@ impl Whole {
                 return Err(ReductionError::Size { matrix: name, rows: matrix.n(), n });
             }
             if name != "damping"
-                && let Some(pair) = matrix.asymmetry(SYMMETRIC * matrix.largest())
+                && let Some(pair) = matrix.asymmetry(SYMMETRIC * matrix.max_abs())
             {
                 return Err(ReductionError::NotSymmetric { matrix: name, row: pair.row, column: pair.column });
             }
@@ -373,9 +373,10 @@ impl Whole {
         for (k, value) in modes.values.iter().enumerate() {
             let omega = value.max(0.0).sqrt();
             // a free motion has none, although rounding would give it some
-            let more = law.of_mode(omega).filter(|_| k >= modes.free()).map_or(0.0, |c| c - beta * omega * omega);
+            let more =
+                law.of_mode(omega).filter(|_| k >= modes.rigid_body_count()).map_or(0.0, |c| c - beta * omega * omega);
             if more > 0.0 {
-                columns.extend(self.mass.times(modes.shape(k)).iter().map(|u| more.sqrt() * u));
+                columns.extend(self.mass.multiply(modes.shape(k)).iter().map(|u| more.sqrt() * u));
             }
         }
         Ok((beta, columns))
@@ -420,7 +421,7 @@ impl Reduced {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
     fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
-        let square = |matrix: &Matrix| multi_vector::products(n, &basis, &matrix.times_columns(&basis));
+        let square = |matrix: &Matrix| multi_vector::inner_products(n, &basis, &matrix.multiply_columns(&basis));
         let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
         let own = match &whole.damping {
             Damping::Matrix(c) => Some(square(c)),
@@ -463,7 +464,7 @@ impl Reduced {
                 port
             } else {
                 let largest =
-                    most(&multi_vector::combination(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
+                    most(&multi_vector::combine(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
                 if port > UNSEEN * largest { port } else { largest }
             };
             if size == 0.0 {
@@ -492,7 +493,7 @@ impl Reduced {
 
     /// Returns all displacements of the whole structure, n × r.
     fn columns(&self) -> DMatrix<f64> {
-        DMatrix::from_vec(self.n, self.dofs(), multi_vector::combination(self.n, &self.basis, &self.weights))
+        DMatrix::from_vec(self.n, self.dofs(), multi_vector::combine(self.n, &self.basis, &self.weights))
     }
 
     /// Returns all displacements of the whole structure for coordinates `q`.
@@ -501,7 +502,7 @@ impl Reduced {
     /// If `q` does not have r entries.
     pub fn expand(&self, q: &[f64]) -> Vec<f64> {
         let weights = product(&self.weights, &DMatrix::from_column_slice(q.len(), 1, q));
-        multi_vector::combination(self.n, &self.basis, &weights)
+        multi_vector::combine(self.n, &self.basis, &weights)
     }
 
     /// Returns the natural frequencies of the reduced structure, rad/s, in ascending order.
@@ -526,7 +527,7 @@ impl Reduced {
             Complex::new(s - omega * omega * m, omega * c)
         };
         let free = ReductionError::Singular { omega, singular: Singular { row: 0 } };
-        let forces = multi_vector::products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
+        let forces = multi_vector::inner_products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
         let moved = if [&self.mass, &self.damping, &self.stiffness].into_iter().all(is_diagonal) {
             let own: Vec<Complex<f64>> = (0..self.dofs()).map(|i| at(i, i)).collect();
             if own.contains(&Complex::new(0.0, 0.0)) {
@@ -562,7 +563,7 @@ fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if a.is_empty() || b.is_empty() {
         return DMatrix::zeros(a.nrows(), b.ncols());
     }
-    DMatrix::from_vec(a.nrows(), b.ncols(), multi_vector::combination(a.nrows(), a.as_slice(), b))
+    DMatrix::from_vec(a.nrows(), b.ncols(), multi_vector::combine(a.nrows(), a.as_slice(), b))
 }
 
 fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
@@ -623,7 +624,7 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
     let shift = SHIFT * ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
-    let (thetas, mut shapes) = eigen::symmetric_pair(mass, &(stiffness + mass * shift))?;
+    let (thetas, mut shapes) = eigen::generalized_symmetric(mass, &(stiffness + mass * shift))?;
     let largest = thetas.iter().fold(0.0f64, |most, theta| most.max(theta.abs()));
     let massless = |theta: f64| theta <= MASSLESS * largest;
     let free = |value: f64| value.abs() <= FREE * shift;

@@ -126,8 +126,8 @@ impl NominalRing {
         let sum = [(1.0, &self.stiffness), (1.0, &blades), (shift, &self.mass)];
         let factor = self.analysis.factor(&sum);
         let factor = factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?;
-        if factor.negative() > 0 {
-            return Err(ModesError::Negative { count: factor.negative(), below: -shift }.into());
+        if factor.negative_pivots() > 0 {
+            return Err(ModesError::Negative { count: factor.negative_pivots(), below: -shift }.into());
         }
         let mut shapes = match extent > EXTENTS[0] {
             true => nominal_modes(&self.sector, self.sectors, extent * self.up_to)?,
@@ -135,20 +135,21 @@ impl NominalRing {
         };
         let (mut values, mut begun): (Vec<f64>, bool) = (Vec::new(), false);
         for _ in 0..STEPS {
-            let forces = self.mass.times_columns(&shapes);
+            let forces = self.mass.multiply_columns(&shapes);
             let mut moved = forces.clone();
             factor.solve(&mut moved);
-            let held = multi_vector::products(n, &moved, &forces);
-            let mass = multi_vector::products(n, &moved, &self.mass.times_columns(&moved));
+            let held = multi_vector::inner_products(n, &moved, &forces);
+            let mass = multi_vector::inner_products(n, &moved, &self.mass.multiply_columns(&moved));
             // the largest θ has the lowest frequency
-            let found = eigen::symmetric_pair(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
+            let found =
+                eigen::generalized_symmetric(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
             let rising: Vec<usize> = (0..found.0.len()).rev().collect();
             let thetas: Vec<f64> = rising.iter().map(|&k| found.0[k]).collect();
             let mut mixing = found.1.select_columns(&rising);
             for (mut column, theta) in mixing.column_iter_mut().zip(&thetas) {
                 column.unscale_mut(theta.sqrt());
             }
-            shapes = multi_vector::combination(n, &moved, &mixing);
+            shapes = multi_vector::combine(n, &moved, &mixing);
             let before = std::mem::replace(&mut values, thetas.iter().map(|theta| 1.0 / theta - shift).collect());
             let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= SETTLED * (now + shift);
             let inside = values.partition_point(|value| *value <= highest);
@@ -160,7 +161,7 @@ impl NominalRing {
             let at_highest = self.analysis.factor(&sum);
             let singular = |singular| ReductionError::Singular { omega: self.up_to, singular };
             let at_highest = at_highest.map_err(singular)?;
-            if at_highest.negative() == inside {
+            if at_highest.negative_pivots() == inside {
                 return Ok(Mixed { values, shapes, factor, at_highest });
             }
         }
@@ -197,13 +198,13 @@ impl NominalRing {
         let flexible = self.rows_of(&moved);
         let independent = independent(&flexible, &whole)?;
         // inertia of both, over vectors normalized in A
-        let heavy = self.mass.times_columns(&moved);
-        let mut coupling = product(&multi_vector::products(n, shapes, &heavy), &independent);
+        let heavy = self.mass.multiply_columns(&moved);
+        let mut coupling = product(&multi_vector::inner_products(n, shapes, &heavy), &independent);
         for (mut row, root) in coupling.row_iter_mut().zip(&root) {
             row.unscale_mut(*root);
         }
         let residual =
-            product(&independent.transpose(), &product(&multi_vector::products(n, &moved, &heavy), &independent));
+            product(&independent.transpose(), &product(&multi_vector::inner_products(n, &moved, &heavy), &independent));
         let all = low + independent.ncols();
         let inertia = DMatrix::from_fn(all, all, |i, k| match (i.min(k), i.max(k)) {
             (i, k) if k < low => {
@@ -216,7 +217,7 @@ impl NominalRing {
             (i, k) if i < low => coupling[(i, k - low)],
             (i, k) => 0.5 * (residual[(i - low, k - low)] + residual[(k - low, i - low)]),
         });
-        let (thetas, mixing) = eigen::symmetric_in_blocks(&inertia).ok_or(ReductionError::OutOfRange)?;
+        let (thetas, mixing) = eigen::symmetric_blocked(&inertia).ok_or(ReductionError::OutOfRange)?;
         let [of_modes, of_rest] = [mixing.rows(0, low), mixing.rows(low, all - low)].map(|rows| rows.into_owned());
         let seen_rest = product(&flexible, &independent);
         let mut seen = product(&seen_low, &of_modes) + product(&seen_rest, &of_rest);
@@ -244,13 +245,13 @@ impl NominalRing {
             for (mut row, root) in of_modes.row_iter_mut().zip(&root) {
                 row.unscale_mut(*root);
             }
-            let mut whole = multi_vector::combination(n, shapes, &of_modes);
+            let mut whole = multi_vector::combine(n, shapes, &of_modes);
             multi_vector::add(n, &mut whole, 1.0, &moved, &product(&independent, &of_rest));
             whole
                 .chunks_exact_mut(n.max(1))
                 .zip(&sizes)
                 .for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
-            multi_vector::products(n, &whole, &damping.times_columns(&whole))
+            multi_vector::inner_products(n, &whole, &damping.multiply_columns(&whole))
         });
         let kind = format!("modes of the mistuned ring; {}", self.sector.kind);
         Ok((RingModes { kind, own, damping, seen }, Deviation { error, omega: self.up_to }))

@@ -34,9 +34,9 @@ pub(super) fn basis(
 ) -> Result<(Vec<f64>, f64), ReductionError> {
     let (n, ports) = (whole.dofs(), whole.ports().len());
     let (factor, shift) = factor(whole, modes, shift)?;
-    let heavy = whole.mass.times_columns(&modes.shapes);
+    let heavy = whole.mass.multiply_columns(&modes.shapes);
     let clear = |some: &mut [f64]| {
-        let along = multi_vector::products(n, &heavy, some);
+        let along = multi_vector::inner_products(n, &heavy, some);
         multi_vector::add(n, some, -1.0, &modes.shapes, &along);
     };
     let mut basis = Vec::with_capacity(modes.shapes.len() + n * ports * order);
@@ -47,13 +47,13 @@ pub(super) fn basis(
             let mut some = match block.checked_sub(1) {
                 Some(last) => {
                     let at = modes.shapes.len() + last * ports * n;
-                    whole.mass.times_columns(&basis[at + numbers.start * n..at + numbers.end * n])
+                    whole.mass.multiply_columns(&basis[at + numbers.start * n..at + numbers.end * n])
                 }
                 None => whole.forces(numbers),
             };
             // removes the modal part of the forces, A F = (1 - M Φ Φᵀ) F, which makes them
             // self-equilibrated
-            let along = multi_vector::products(n, &modes.shapes, &some);
+            let along = multi_vector::inner_products(n, &modes.shapes, &some);
             multi_vector::add(n, &mut some, -1.0, &heavy, &along);
             factor.solve(&mut some);
             clear(&mut some);
@@ -89,7 +89,7 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(LdlFactor,
 fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);
-    let mut motions: Vec<Vec<f64>> = (0..modes.free()).map(|mode| modes.shape(mode).to_vec()).collect();
+    let mut motions: Vec<Vec<f64>> = (0..modes.rigid_body_count()).map(|mode| modes.shape(mode).to_vec()).collect();
     let mut springs = Vec::new();
     while !motions.is_empty() {
         let places = (0..motions.len()).flat_map(|k| (0..n).map(move |i| (k, i)));

@@ -126,7 +126,7 @@ impl Alternation {
         for (pair, value) in self.pairs.iter_mut().zip(c) {
             pair.1 = value * factor(pair.0);
         }
-        self.fourier.synthesise(&self.pairs, &mut self.signal);
+        self.fourier.synthesize(&self.pairs, &mut self.signal);
     }
 
     /// Where the joint of a port is before it vibrates: displacements (m) along its axes, and states.
@@ -139,7 +139,7 @@ impl Alternation {
     pub fn add_harmonics(&mut self, axis: usize, wanted: &[usize], mut add: impl FnMut(usize, Complex64)) {
         let n = self.samples();
         self.work.copy_from_slice(&self.force[axis]);
-        let sums = self.fourier.sums(&mut self.work);
+        let sums = self.fourier.transform(&mut self.work);
         for (k, &h) in wanted.iter().enumerate().filter(|(_, h)| 2 * **h < n) {
             add(k, sums[h] * 2.0 / n as f64);
         }
@@ -156,7 +156,7 @@ impl Alternation {
     /// Adds the harmonics of a signal, which is used up.
     pub fn add_signal(&mut self, signal: &mut [f64], to: &mut [Complex64]) {
         let n = self.samples();
-        let sums = self.fourier.sums(signal);
+        let sums = self.fourier.transform(signal);
         for (to, &h) in to.iter_mut().zip(&self.harmonics) {
             *to += sums[h] * share(h, n);
         }
@@ -177,7 +177,7 @@ impl Alternation {
         }
         let n = self.samples();
         self.work.copy_from_slice(&self.slopes[slope]);
-        let sums = self.fourier.sums(&mut self.work);
+        let sums = self.fourier.transform(&mut self.work);
         for (m, value) in self.spectra[to].iter_mut().enumerate() {
             *value = sums[m] / n as f64;
         }
