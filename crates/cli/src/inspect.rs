@@ -179,13 +179,13 @@ fn one(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<Name
 const SYMMETRIC: f64 = 1e-9;
 
 /// Returns a square matrix without some of its rows and columns.
-fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::Matrix> {
+fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::SparseMatrix> {
     let free = if out.is_empty() { Cow::Borrowed(matrix) } else { Cow::Owned(matrix.clone().without_rows(out).ok()?) };
     let entries = free.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value));
-    sparse::Matrix::from_triplets(free.rows(), entries).ok()
+    sparse::SparseMatrix::from_triplets(free.rows(), entries).ok()
 }
 
-fn definite(matrix: &sparse::Matrix) -> &'static str {
+fn definite(matrix: &sparse::SparseMatrix) -> &'static str {
     match sparse_definite(matrix) {
         Some(true) => "positive definite",
         Some(false) => "positive semidefinite: some motion has none of it",

@@ -81,7 +81,7 @@ struct Few {
     /// Additional keys of `[structure]`.
     keys: Vec<String>,
     /// Stiffness at the second speed, if rotation stiffens the structure.
-    there: Option<sparse::Matrix>,
+    there: Option<sparse::SparseMatrix>,
     /// Data of a disk sector.
     sector: Option<Sector>,
 }

@@ -13,7 +13,7 @@
 //! Source: Higham, "Accuracy and Stability of Numerical Algorithms" (2002), Sec. 10.3.
 
 use crate::eigen::symmetric_blocked;
-use crate::sparse::{Matrix, SymbolicAnalysis};
+use crate::sparse::{SparseMatrix, SymbolicAnalysis};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltParams, cholesky_in_place, cholesky_in_place_scratch};
 use faer::{MatMut, Par, Spec};
@@ -161,12 +161,12 @@ fn is_positive_definite(matrix: &DMatrix<f64>, shift: f64) -> bool {
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::{definiteness::sparse_definite, sparse::Matrix};
-/// let spring = |ground: f64| Matrix::from_triplets(2, [(0, 0, 2.0 + ground), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]);
+/// use stickslip_numerics::{definiteness::sparse_definite, sparse::SparseMatrix};
+/// let spring = |ground: f64| SparseMatrix::from_triplets(2, [(0, 0, 2.0 + ground), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]);
 /// let definite = [1.0, 0.0, -1.0].map(|ground| sparse_definite(&spring(ground).unwrap()));
 /// assert_eq!(definite, [Some(true), Some(false), None]);
 /// ```
-pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
+pub fn sparse_definite(matrix: &SparseMatrix) -> Option<bool> {
     definite(matrix, SymbolicAnalysis::new)
 }
 
@@ -177,17 +177,17 @@ pub fn sparse_definite(matrix: &Matrix) -> Option<bool> {
 ///
 /// # Panics
 /// If the matrix does not have the size of the matrices analysed.
-pub fn sparse_definite_with_order(matrix: &Matrix, analysis: &SymbolicAnalysis) -> Option<bool> {
+pub fn sparse_definite_with_order(matrix: &SparseMatrix, analysis: &SymbolicAnalysis) -> Option<bool> {
     definite(matrix, |matrices| analysis.with_same_order(matrices))
 }
 
-fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) -> Option<bool> {
+fn definite(matrix: &SparseMatrix, analysis: impl Fn(&[&SparseMatrix]) -> SymbolicAnalysis) -> Option<bool> {
     let n = matrix.n();
     // Larger than the threshold at which a sparse factor treats a pivot as rounding.
     let rounding = ROUNDING * n.max(16) as f64;
-    let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
+    let one = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).ok()?;
     let analysis = analysis(&[matrix, &one]);
-    let positive = |rows: &Matrix, shift: f64| {
+    let positive = |rows: &SparseMatrix, shift: f64| {
         analysis.factor(&[(1.0, rows), (shift, &one)]).is_ok_and(|factor| factor.negative_pivots() == 0)
     };
     if let Some(rows) = sparse_scaled(matrix).filter(|rows| rows.asymmetry(rounding).is_none()) {
@@ -199,7 +199,7 @@ fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) 
         }
     }
     let size = matrix.max_abs();
-    let whole = Matrix::from_triplets(n, matrix.entries().map(|(i, k, value)| (i, k, value / size))).ok()?;
+    let whole = SparseMatrix::from_triplets(n, matrix.entries().map(|(i, k, value)| (i, k, value / size))).ok()?;
     (whole.asymmetry(rounding).is_none() && positive(&whole, rounding)).then_some(false)
 }
 
@@ -208,7 +208,7 @@ fn definite(matrix: &Matrix, analysis: impl Fn(&[&Matrix]) -> SymbolicAnalysis) 
 ///
 /// Returns `None` if a diagonal entry is negative, or if a nonzero entry lies
 /// in the row or column of a zero diagonal entry.
-fn sparse_scaled(matrix: &Matrix) -> Option<Matrix> {
+fn sparse_scaled(matrix: &SparseMatrix) -> Option<SparseMatrix> {
     let n = matrix.n();
     let diagonal: Vec<f64> = (0..n).map(|i| matrix.get(i, i)).collect();
     let beside_zero = |(i, k, _): (usize, usize, f64)| i != k && (diagonal[i] == 0.0 || diagonal[k] == 0.0);
@@ -219,7 +219,7 @@ fn sparse_scaled(matrix: &Matrix) -> Option<Matrix> {
     let scale: Vec<f64> = diagonal.iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
     let scaled = matrix.entries().map(|(i, k, value)| (i, k, value / scale[i] / scale[k]));
     let empty = (0..n).filter(|i| diagonal[*i] == 0.0).map(|i| (i, i, 1.0));
-    Matrix::from_triplets(n, scaled.chain(empty)).ok()
+    SparseMatrix::from_triplets(n, scaled.chain(empty)).ok()
 }
 
 #[cfg(test)]
@@ -251,13 +251,13 @@ mod tests {
             let sparse = |ends: [f64; 2]| {
                 let full = chain(n, 0.3, ends);
                 let all = (0..n * n).map(|at| (at / n, at % n, full[(at / n, at % n)]));
-                let matrix = Matrix::from_triplets(n, all).unwrap();
+                let matrix = SparseMatrix::from_triplets(n, all).unwrap();
                 let alone = sparse_definite(&matrix);
                 // The elimination order does not change the result, even if it
                 // is that of a matrix with other entries.
                 let [wide, none] = [9, 0].map(|far| (0..far.min(n - 1)).map(|i| (i, n - 1 - i, 1.0)));
                 for other in [wide, none] {
-                    let order = SymbolicAnalysis::new(&[&Matrix::from_triplets(n, other).unwrap()]);
+                    let order = SymbolicAnalysis::new(&[&SparseMatrix::from_triplets(n, other).unwrap()]);
                     assert_eq!(sparse_definite_with_order(&matrix, &order), alone);
                 }
                 alone
@@ -274,11 +274,11 @@ mod tests {
     fn places_without_mass_in_the_order_of_the_structure() {
         let n = 60;
         let springs = (1..n).flat_map(|i| [(i, i - 1, -1.0), (i - 1, i, -1.0)]).chain((0..n).map(|i| (i, i, 2.0)));
-        let order = SymbolicAnalysis::new(&[&Matrix::from_triplets(n, springs).unwrap()]);
+        let order = SymbolicAnalysis::new(&[&SparseMatrix::from_triplets(n, springs).unwrap()]);
         let masses = |last: f64| {
             let each = (0..n).filter(|i| i % 3 == 0).map(|i| (i, i, 1.0));
             let far = [(0, 57, 0.5), (57, 0, 0.5), (3, 3, last)];
-            Matrix::from_triplets(n, each.chain(far)).unwrap()
+            SparseMatrix::from_triplets(n, each.chain(far)).unwrap()
         };
         for (last, expected) in [(1.0, Some(false)), (-1.0, Some(false)), (-2.0, None)] {
             let mass = masses(last);
@@ -304,7 +304,7 @@ mod tests {
                 assert_eq!(semidefinite_rank(&mass), expected.map(|rank: usize| rank * size / 2), "{beside} {own}");
                 assert_eq!(is_semidefinite(&mass), expected.is_some(), "{beside} {own}");
                 let all = (0..size * size).map(|at| (at / size, at % size, mass[at]));
-                let sparse = Matrix::from_triplets(size, all).unwrap();
+                let sparse = SparseMatrix::from_triplets(size, all).unwrap();
                 assert_eq!(sparse_definite(&sparse), expected.map(|_| false), "{beside} {own}");
             }
         }

@@ -1,7 +1,7 @@
 //! Symbolic analysis of sparse matrices, and the factors made from it.
 
 use super::factor::{ComplexFactor, LdlFactor, Singular};
-use super::matrix::Matrix;
+use super::matrix::SparseMatrix;
 use super::symbolic::Pattern;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -13,11 +13,11 @@ use std::sync::Arc;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::{Matrix, SymbolicAnalysis};
+/// use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 /// // three equal masses between walls, on four equal springs: ω² = 2 - √2, 2, 2 + √2
 /// let k = (0..3).flat_map(|i: usize| (0..3).map(move |l| (i, l, [2.0, -1.0, 0.0][i.abs_diff(l)])));
-/// let k = Matrix::from_triplets(3, k).unwrap();
-/// let m = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
+/// let k = SparseMatrix::from_triplets(3, k).unwrap();
+/// let m = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
 /// let analysis = SymbolicAnalysis::new(&[&k, &m]);
 /// // the number of negative pivots is the number of eigenvalues below the shift
 /// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative_pivots(), 1);
@@ -37,7 +37,7 @@ impl SymbolicAnalysis {
     ///
     /// # Panics
     /// If the matrices differ in size, or if the entries of the factor exceed the 32-bit indices.
-    pub fn new(matrices: &[&Matrix]) -> Self {
+    pub fn new(matrices: &[&SparseMatrix]) -> Self {
         SymbolicAnalysis { pattern: Arc::new(Pattern::new(matrices)) }
     }
 
@@ -50,7 +50,7 @@ impl SymbolicAnalysis {
     /// If the matrices have another size, or if the entries of the factor
     /// exceed the 32-bit indices.
     #[must_use]
-    pub fn with_same_order(&self, matrices: &[&Matrix]) -> Self {
+    pub fn with_same_order(&self, matrices: &[&SparseMatrix]) -> Self {
         SymbolicAnalysis { pattern: Arc::new(self.pattern.with_order(matrices)) }
     }
 
@@ -81,7 +81,7 @@ impl SymbolicAnalysis {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn factor(&self, sum: &[(f64, &Matrix)]) -> Result<LdlFactor, Singular> {
+    pub fn factor(&self, sum: &[(f64, &SparseMatrix)]) -> Result<LdlFactor, Singular> {
         LdlFactor::new(&self.pattern, sum, vec![])
     }
 
@@ -95,7 +95,7 @@ impl SymbolicAnalysis {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn factor_complex(&self, sum: &[(Complex64, &Matrix)]) -> Result<ComplexFactor, Singular> {
+    pub fn factor_complex(&self, sum: &[(Complex64, &SparseMatrix)]) -> Result<ComplexFactor, Singular> {
         ComplexFactor::new(&self.pattern, self.pattern.sum(sum))
     }
 }

@@ -17,8 +17,8 @@ impl LdlFactor {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{Matrix, SymbolicAnalysis};
-    /// let springs = Matrix::from_triplets(2, [(0, 0, 3.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)]).unwrap();
+    /// use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
+    /// let springs = SparseMatrix::from_triplets(2, [(0, 0, 3.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)]).unwrap();
     /// let factor = SymbolicAnalysis::new(&[&springs]).factor(&[(1.0, &springs)]).unwrap();
     /// let compliance = factor.compliance(&[vec![(1, 1.0)], vec![(0, 1.0), (1, -1.0)]]);
     /// assert!((compliance[(0, 0)] - 1.5).abs() < 1e-15 && (compliance[(0, 1)] + 1.0).abs() < 1e-15);
@@ -81,7 +81,7 @@ impl LdlFactor {
 
 #[cfg(test)]
 mod tests {
-    use crate::sparse::{Matrix, SymbolicAnalysis};
+    use crate::sparse::{SparseMatrix, SymbolicAnalysis};
     use nalgebra::DMatrix;
 
     /// Matrices with pivots of one and of two rows, compared with full solutions.
@@ -91,7 +91,7 @@ mod tests {
         let noise = |i: usize| ((i * 7919 + 13) as f64).sin();
         let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
         let chain = (1..n).flat_map(|i| [(i, i - 1, noise(i)), (i - 1, i, noise(i)), (i, i, 0.01 * noise(i + n))]);
-        let matrix = Matrix::from_triplets(n, pairs.chain(chain)).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, pairs.chain(chain)).unwrap();
         let factor = SymbolicAnalysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
         let forces: Vec<Vec<(usize, f64)>> =
             (0..7).map(|k| (0..=k % 3).map(|i| ((11 * k + 5 * i) % n, noise(k + i))).collect()).collect();

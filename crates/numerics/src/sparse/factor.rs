@@ -1,6 +1,6 @@
 //! Real and complex factors of sparse matrices, and their solutions.
 
-use super::matrix::Matrix;
+use super::matrix::SparseMatrix;
 use super::symbolic::{Pattern, Symbolic};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor::LbltParams;
@@ -67,7 +67,11 @@ struct LdlValues {
 }
 
 impl LdlFactor {
-    pub(super) fn new(pattern: &Arc<Pattern>, sum: &[(f64, &Matrix)], memory: Vec<f64>) -> Result<Self, Singular> {
+    pub(super) fn new(
+        pattern: &Arc<Pattern>,
+        sum: &[(f64, &SparseMatrix)],
+        memory: Vec<f64>,
+    ) -> Result<Self, Singular> {
         let empty = LdlValues { values: vec![], subdiagonal: vec![], order: vec![], inverse: vec![] };
         let mut factor = LdlFactor { pattern: pattern.clone(), ldl: empty, negative: 0 };
         if pattern.n == 0 {
@@ -109,7 +113,7 @@ impl LdlFactor {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn refactor(self, sum: &[(f64, &Matrix)]) -> Result<Self, Singular> {
+    pub fn refactor(self, sum: &[(f64, &SparseMatrix)]) -> Result<Self, Singular> {
         LdlFactor::new(&self.pattern, sum, self.ldl.values)
     }
 
@@ -421,25 +425,25 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Matrix, SymbolicAnalysis};
+    use super::super::{SparseMatrix, SymbolicAnalysis};
     use super::*;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
     /// Springs of stiffness one between neighbours and, if `held`, to walls at both ends.
-    fn chain(n: usize, held: bool) -> Matrix {
+    fn chain(n: usize, held: bool) -> SparseMatrix {
         let between = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
         let walls = [(0, 0, f64::from(u8::from(held))), (n - 1, n - 1, f64::from(u8::from(held)))];
-        Matrix::from_triplets(n, between.chain(walls)).unwrap()
+        SparseMatrix::from_triplets(n, between.chain(walls)).unwrap()
     }
 
-    fn identity(n: usize) -> Matrix {
-        Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap()
+    fn identity(n: usize) -> SparseMatrix {
+        SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap()
     }
 
     /// Springs between the neighbours of a cube of `side`³ nodes. One face is
     /// connected to the ground.
-    fn brick(side: usize) -> Matrix {
+    fn brick(side: usize) -> SparseMatrix {
         let at = |x: usize, y: usize, z: usize| (x * side + y) * side + z;
         let mut entries = Vec::new();
         for x in 0..side {
@@ -455,10 +459,10 @@ mod tests {
                 }
             }
         }
-        Matrix::from_triplets(side * side * side, entries).unwrap()
+        SparseMatrix::from_triplets(side * side * side, entries).unwrap()
     }
 
-    fn dense(matrix: &Matrix) -> DMatrix<f64> {
+    fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
         let mut full = DMatrix::zeros(matrix.n(), matrix.n());
         matrix.entries().for_each(|(i, k, value)| full[(i, k)] = value);
         full
@@ -511,15 +515,15 @@ mod tests {
             if first > 0 {
                 entries.extend([(0, 0, 1.0), (first - 1, first - 1, -1.0), (first, first, -1.0)]);
             }
-            let k = Matrix::from_triplets(n, entries.clone()).unwrap();
+            let k = SparseMatrix::from_triplets(n, entries.clone()).unwrap();
             let analysis = SymbolicAnalysis::new(&[&k]);
             let real = analysis.factor(&[(1.0, &k)]).unwrap_err();
             assert!(real.row >= first, "{real}");
             entries.push((n - 1, n - 1, 1e-10));
-            let k = Matrix::from_triplets(n, entries).unwrap();
+            let k = SparseMatrix::from_triplets(n, entries).unwrap();
             assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative_pivots(), 0);
         }
-        let empty_row = Matrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
+        let empty_row = SparseMatrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
         let analysis = SymbolicAnalysis::new(&[&empty_row]);
         assert_eq!(analysis.factor(&[(1.0, &empty_row)]).unwrap_err(), Singular { row: 1 });
         let complex = analysis.factor_complex(&[(Complex64::new(0.0, 2.0), &empty_row)]);
@@ -536,7 +540,7 @@ mod tests {
             let m = identity(n);
             let spin = (0..if gyroscopic { n / 2 } else { 0 })
                 .flat_map(|i| [(2 * i, 2 * i + 1, 0.2), (2 * i + 1, 2 * i, -0.2)]);
-            let c = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.01)).chain(spin)).unwrap();
+            let c = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 0.01)).chain(spin)).unwrap();
             let analysis = SymbolicAnalysis::new(&[&k, &m, &c]);
             for omega in [0.0, 0.3, 1.1, 1.7] {
                 let sum = [(1.0, 0.0), (-omega * omega, 0.0), (0.0, omega)].map(|(re, im)| Complex64::new(re, im));
@@ -545,7 +549,7 @@ mod tests {
                     (0..3 * n).map(|i| Complex64::new((i as f64).sin(), (2.0 * i as f64).cos())).collect();
                 let mut x = right.clone();
                 factor.solve(&mut x);
-                let complex = |a: &Matrix, factor: Complex64| dense(a).map(|v| factor * v);
+                let complex = |a: &SparseMatrix, factor: Complex64| dense(a).map(|v| factor * v);
                 let full = (complex(&k, sum[0]) + complex(&m, sum[1]) + complex(&c, sum[2])).lu();
                 for (x, right) in x.chunks(n).zip(right.chunks(n)) {
                     let expected = full.solve(&DVector::from_column_slice(right)).unwrap();
@@ -562,7 +566,7 @@ mod tests {
     fn zeros_on_the_diagonal() {
         let n = 60;
         let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
-        let matrix = Matrix::from_triplets(n, pairs).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, pairs).unwrap();
         let factor = SymbolicAnalysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
         assert_eq!(factor.negative_pivots(), n / 2);
         let mut x: Vec<f64> = (0..n).map(|i| i as f64).collect();
@@ -572,7 +576,7 @@ mod tests {
 
     #[test]
     fn empty_matrix_has_a_factor() {
-        let none = Matrix::from_triplets(0, []).unwrap();
+        let none = SparseMatrix::from_triplets(0, []).unwrap();
         let analysis = SymbolicAnalysis::new(&[&none]);
         analysis.factor(&[(1.0, &none)]).unwrap().solve(&mut []);
         analysis.factor_complex(&[]).unwrap().solve(&mut []);
@@ -603,7 +607,7 @@ mod tests {
         fn random_matrices(entries in proptest::collection::vec((0usize..30, 0usize..30, -1.0f64..1.0), 20..200)) {
             let both = entries.iter().flat_map(|&(i, k, v)| [(i, k, v), (k, i, v)]);
             let loose = (0..30).map(|i| (i, i, 0.3 * ((i * 7919 + 13) as f64).sin()));
-            let matrix = Matrix::from_triplets(30, both.chain(loose)).unwrap();
+            let matrix = SparseMatrix::from_triplets(30, both.chain(loose)).unwrap();
             let full = dense(&matrix);
             let eigenvalues = full.clone().symmetric_eigenvalues();
             prop_assume!(eigenvalues.iter().all(|e| e.abs() > 1e-3));

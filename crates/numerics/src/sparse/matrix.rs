@@ -13,15 +13,15 @@ const MAX_SIZE: usize = i32::MAX as usize;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::Matrix;
+/// use stickslip_numerics::sparse::SparseMatrix;
 /// // a spring between two masses, as its contributions to either mass
-/// let k = Matrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
+/// let k = SparseMatrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
 /// assert_eq!((k.get(0, 0), k.get(0, 1), k.entries().count()), (6.0, -5.0, 4));
 /// assert_eq!(k.multiply(&[1.0, 1.0]), [1.0, 0.0]);
 /// assert!(k.asymmetry(0.0).is_none());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Matrix {
+pub struct SparseMatrix {
     n: usize,
     /// Start of each column in `rows` and `values`, n + 1 numbers.
     pub(super) starts: Vec<u32>,
@@ -77,7 +77,7 @@ pub struct Asymmetry {
     pub mirrored: f64,
 }
 
-impl Matrix {
+impl SparseMatrix {
     /// Builds a matrix from entries (row, column, value), counted from 0, in any order.
     ///
     /// Entries at the same place are added in the order in which they come. Zeros are dropped.
@@ -119,7 +119,7 @@ impl Matrix {
         entries.iter().for_each(|&(column, ..)| starts[column as usize + 1] += 1);
         (0..n).for_each(|column| starts[column + 1] += starts[column]);
         let rows = entries.iter().map(|entry| entry.1).collect();
-        Ok(Matrix { n, starts, rows, values: entries.iter().map(|entry| entry.2).collect() })
+        Ok(SparseMatrix { n, starts, rows, values: entries.iter().map(|entry| entry.2).collect() })
     }
 
     /// Returns the number of rows and columns.
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn wrong_triplets_are_refused_with_their_place() {
-        let make = |entries: &[(usize, usize, f64)]| Matrix::from_triplets(2, entries.iter().copied());
+        let make = |entries: &[(usize, usize, f64)]| SparseMatrix::from_triplets(2, entries.iter().copied());
         assert_eq!(make(&[(2, 0, 1.0)]), Err(MatrixError::OutOfRange { row: 2, column: 0, n: 2 }));
         assert!(matches!(make(&[(0, 1, f64::NAN)]), Err(MatrixError::NotFinite { row: 0, column: 1, .. })));
         assert!(matches!(make(&[(0, 1, f64::MAX), (0, 1, f64::MAX)]), Err(MatrixError::NotFinite { .. })));
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(one_sided.asymmetry(2.0), None);
         // Above the diagonal only, below it only, and both.
         let sided = |entries: &[(usize, usize, f64)]| {
-            let matrix = Matrix::from_triplets(4, entries.iter().copied()).unwrap();
+            let matrix = SparseMatrix::from_triplets(4, entries.iter().copied()).unwrap();
             matrix.asymmetry(0.0).map(|pair| (pair.row, pair.column, pair.mirrored))
         };
         assert_eq!(sided(&[(0, 3, 1.0), (3, 0, 1.0), (1, 3, 2.0)]), Some((1, 3, 0.0)));
@@ -263,8 +263,8 @@ mod tests {
         let value = |i: usize, k: usize| ((i * 31 + k * 17 + 1) as f64).sin();
         let all: Vec<(usize, usize, f64)> =
             (0..n * n).filter(|at| at % 3 == 0).map(|at| (at / n, at % n, value(at / n, at % n))).collect();
-        let matrix = Matrix::from_triplets(n, all.iter().copied()).unwrap();
-        assert_eq!(matrix, Matrix::from_triplets(n, all.iter().rev().copied()).unwrap());
+        let matrix = SparseMatrix::from_triplets(n, all.iter().copied()).unwrap();
+        assert_eq!(matrix, SparseMatrix::from_triplets(n, all.iter().rev().copied()).unwrap());
         assert_eq!(matrix.len(), all.len());
         let x: Vec<f64> = (0..n).map(|i| 1.0 + i as f64).collect();
         for (i, y) in matrix.multiply(&x).iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Sparse matrices and their factors, for structures in which each degree of
 //! freedom is coupled to a few others.
 //!
-//! [`Matrix`] contains the entries. [`SymbolicAnalysis`] computes the elimination order (nested
-//! dissection) and the fill-in once for all matrices of a pattern. [`LdlFactor`] and
+//! [`SparseMatrix`] contains the entries. [`SymbolicAnalysis`] computes the elimination order
+//! (nested dissection) and the fill-in once for all matrices of a pattern. [`LdlFactor`] and
 //! [`ComplexFactor`] solve for many right sides. All computations run on the caller's thread,
 //! in an order that depends on the input alone: same input, same bits.
 //!
@@ -21,5 +21,5 @@ mod symbolic;
 
 pub use analysis::SymbolicAnalysis;
 pub use factor::{ComplexFactor, LdlFactor, Singular};
-pub use matrix::{Asymmetry, Matrix, MatrixError};
+pub use matrix::{Asymmetry, MatrixError, SparseMatrix};
 pub use modes::{ModeSelection, ModesCost, ModesError, NaturalModes};

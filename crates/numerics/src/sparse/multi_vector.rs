@@ -1,6 +1,6 @@
 //! Products with blocks of vectors, stored column by column in one slice.
 
-use super::matrix::Matrix;
+use super::matrix::SparseMatrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
@@ -62,7 +62,7 @@ pub fn combine(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
     w
 }
 
-impl Matrix {
+impl SparseMatrix {
     /// Returns `A V` of columns of length n.
     ///
     /// # Panics
@@ -149,7 +149,7 @@ mod tests {
         let n = 9;
         let noise = |i: usize| ((i * 7919 + 13) as f64).sin();
         let entries = (0..40).map(|i| ((i * 5) % n, (i * 7 + 3) % n, noise(i)));
-        let matrix = Matrix::from_triplets(n, entries).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, entries).unwrap();
         for columns in 0..20 {
             let v: Vec<f64> = (0..n * columns).map(|i| noise(i + 100)).collect();
             let together = matrix.multiply_columns(&v);
@@ -157,6 +157,6 @@ mod tests {
                 assert_eq!(matrix.multiply_columns(v), w);
             }
         }
-        assert!(Matrix::from_triplets(0, []).unwrap().multiply_columns(&[]).is_empty());
+        assert!(SparseMatrix::from_triplets(0, []).unwrap().multiply_columns(&[]).is_empty());
     }
 }

@@ -1,6 +1,6 @@
 //! Sparsity pattern of several matrices, their elimination order, and the symbolic factors.
 
-use super::matrix::Matrix;
+use super::matrix::SparseMatrix;
 use faer::Side;
 use faer::perm::PermRef;
 use faer::sparse::SymbolicSparseColMatRef;
@@ -38,7 +38,7 @@ pub(super) struct Symbolic {
 
 impl Pattern {
     /// Builds the pattern of matrices of one size, with mirrored entries added, and orders it.
-    pub fn new(matrices: &[&Matrix]) -> Self {
+    pub fn new(matrices: &[&SparseMatrix]) -> Self {
         let n = matrices.first().map_or(0, |matrix| matrix.n());
         let (starts, rows) = union(n, matrices);
         let order = order(n, &starts, &rows);
@@ -47,7 +47,7 @@ impl Pattern {
 
     /// Builds the pattern of other matrices with the order of this one,
     /// rearranged by their elimination tree.
-    pub fn with_order(&self, matrices: &[&Matrix]) -> Self {
+    pub fn with_order(&self, matrices: &[&SparseMatrix]) -> Self {
         Pattern::ordered(self.n, union(self.n, matrices), &self.order)
     }
 
@@ -60,7 +60,7 @@ impl Pattern {
     }
 
     /// Returns the entries of a sum, in the storage order of the pattern.
-    pub fn sum<T: Copy + Default + AddAssign + Mul<f64, Output = T>>(&self, sum: &[(T, &Matrix)]) -> Vec<T> {
+    pub fn sum<T: Copy + Default + AddAssign + Mul<f64, Output = T>>(&self, sum: &[(T, &SparseMatrix)]) -> Vec<T> {
         let mut values = vec![T::default(); self.rows.len()];
         for &(factor, matrix) in sum {
             assert_eq!(matrix.n(), self.n, "the matrices of a sum must have the size of the analysed matrices");
@@ -82,7 +82,7 @@ impl Pattern {
     }
 
     /// Returns the lower triangle of a sum, in the storage order of the real factor.
-    pub fn lower_sum(&self, sum: &[(f64, &Matrix)]) -> Vec<f64> {
+    pub fn lower_sum(&self, sum: &[(f64, &SparseMatrix)]) -> Vec<f64> {
         let symbolic = self.real();
         let mut values = vec![0.0; symbolic.rows.len()];
         for &(factor, matrix) in sum {
@@ -166,7 +166,7 @@ impl Pattern {
 
 /// Returns the union of the patterns, the mirrored patterns and the diagonal,
 /// by columns with rising rows.
-fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
+fn union(n: usize, matrices: &[&SparseMatrix]) -> (Vec<u32>, Vec<u32>) {
     assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum must have one size");
     let transposed: Vec<_> = matrices.iter().map(|matrix| transposed(n, &matrix.starts, &matrix.rows)).collect();
     let most = matrices.iter().map(|matrix| matrix.rows.len()).max().unwrap_or(0);
@@ -308,7 +308,7 @@ mod tests {
         let (wide, n) = (12, 3 * 12 * 12);
         let linked = |a: usize, b: usize| (a / wide).abs_diff(b / wide) <= 1 && (a % wide).abs_diff(b % wide) <= 1;
         let pairs = (0..n).flat_map(|i| (0..n).filter(move |k| linked(i / 3, k / 3)).map(move |k| (i, k, 1.0)));
-        let matrix = Matrix::from_triplets(n, pairs).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, pairs).unwrap();
         let pattern = Pattern::new(&[&matrix]);
         let mut sorted = pattern.order.clone();
         sorted.sort_unstable();
@@ -317,7 +317,7 @@ mod tests {
         // An order that follows the tree does not change.
         assert_eq!(postordered(&pattern.order, &pattern.starts, &pattern.rows), pattern.order);
         // A diagonal matrix has an elimination tree without edges, so the order does not change.
-        let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap();
+        let one = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap();
         assert_eq!(pattern.with_order(&[&one]).order, pattern.order);
     }
 }

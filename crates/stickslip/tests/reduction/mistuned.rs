@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
 use stickslip::model::{Around, Disk, DiskPart, Model, Place, Substructure, SubstructureDamping, System};
 use stickslip::structure::{Boundary, Component, Reduction, ReductionKind};
-use stickslip_numerics::sparse::{Matrix, SymbolicAnalysis};
+use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 
 /// Numbers of elements of a sector along the blade, across, and through the thickness.
 const ELEMENTS: [usize; 3] = [6, 2, 1];
@@ -111,10 +111,10 @@ fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
 }
 
 /// Returns mass and stiffness of a ring of many sectors.
-fn matrices(system: &System) -> [Matrix; 2] {
+fn matrices(system: &System) -> [SparseMatrix; 2] {
     [0, 2].map(|of| {
         let entries = system.structure().entries().map(|(i, k, values)| (i, k, values[of]));
-        Matrix::from_triplets(system.dofs(), entries).unwrap()
+        SparseMatrix::from_triplets(system.dofs(), entries).unwrap()
     })
 }
 

@@ -16,7 +16,7 @@ use crate::values::Given;
 use std::path::{Path, PathBuf};
 use stickslip::structure::{Component, StructureError};
 use stickslip_formats::{self as formats, names};
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 impl Reader {
     /// Reads the table and its matrices; `None` if a problem was found.
@@ -117,7 +117,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
         };
         let entries =
             matrix.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value * unit));
-        Matrix::from_triplets(kept.len(), entries).map_err(|error| problem(key, error.to_string()))
+        SparseMatrix::from_triplets(kept.len(), entries).map_err(|error| problem(key, error.to_string()))
     };
     let mut made = all.iter().map(|(key, read)| matrix(key, read));
     let mut next = || made.next().transpose();

@@ -4,7 +4,7 @@
 use super::natural_modes::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::interrupt;
-use crate::sparse::{LdlFactor, Matrix, multi_vector};
+use crate::sparse::{LdlFactor, SparseMatrix, multi_vector};
 use nalgebra::DMatrix;
 
 /// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
@@ -34,7 +34,7 @@ pub(super) struct RitzPair {
 /// An M-orthonormal basis V, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
 pub(super) struct Lanczos<'a> {
     factor: &'a LdlFactor,
-    mass: &'a Matrix,
+    mass: &'a SparseMatrix,
     /// Largest entry of the mass matrix.
     max_mass_entry: f64,
     locked: &'a [f64],
@@ -53,7 +53,7 @@ pub(super) struct Lanczos<'a> {
 }
 
 impl<'a> Lanczos<'a> {
-    pub(super) fn new(factor: &'a LdlFactor, mass: &'a Matrix, locked: &'a [f64]) -> Self {
+    pub(super) fn new(factor: &'a LdlFactor, mass: &'a SparseMatrix, locked: &'a [f64]) -> Self {
         let n = mass.n();
         let coupling = DMatrix::zeros(0, 0);
         Lanczos {
@@ -253,7 +253,12 @@ impl<'a> Lanczos<'a> {
 
     /// Computes modes from Ritz pairs: applies the operator once more and
     /// diagonalizes K and M in the resulting space.
-    pub(super) fn modes(&self, stiffness: &Matrix, shift: f64, pairs: &[RitzPair]) -> Result<NaturalModes, ModesError> {
+    pub(super) fn modes(
+        &self,
+        stiffness: &SparseMatrix,
+        shift: f64,
+        pairs: &[RitzPair],
+    ) -> Result<NaturalModes, ModesError> {
         let (n, count) = (self.n, pairs.len());
         if count == 0 {
             return Ok(NaturalModes::empty());

@@ -24,7 +24,7 @@
 mod lanczos;
 mod natural_modes;
 
-use super::{LdlFactor, Matrix, Singular, SymbolicAnalysis};
+use super::{LdlFactor, Singular, SparseMatrix, SymbolicAnalysis};
 use lanczos::{Lanczos, RitzPair};
 use natural_modes::BLOCK;
 pub use natural_modes::{ModesCost, ModesError, NaturalModes};
@@ -98,17 +98,17 @@ impl NaturalModes {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, SymbolicAnalysis};
+    /// use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
     /// // two equal masses connected by two parallel springs, without support: 0 and 4
-    /// let k = Matrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
-    /// let m = Matrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
+    /// let k = SparseMatrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
+    /// let m = SparseMatrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
     /// let modes = NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2)).unwrap();
     /// assert!(modes.values[0].abs() < 1e-12 && (modes.values[1] - 4.0).abs() < 1e-12);
     /// ```
     pub fn new(
         analysis: &SymbolicAnalysis,
-        stiffness: &Matrix,
-        mass: &Matrix,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
         wanted: ModeSelection,
     ) -> Result<Self, ModesError> {
         if mass.n() == 0 {
@@ -121,7 +121,7 @@ impl NaturalModes {
 }
 
 /// Returns the median of `k_ii / m_ii`, rad²/s², or one if no ratio is positive and finite.
-fn typical_eigenvalue(stiffness: &Matrix, mass: &Matrix) -> f64 {
+fn typical_eigenvalue(stiffness: &SparseMatrix, mass: &SparseMatrix) -> f64 {
     let mut ratios: Vec<f64> = (0..mass.n())
         .map(|i| stiffness.get(i, i) / mass.get(i, i))
         .filter(|ratio| ratio.is_finite() && *ratio > 0.0)
@@ -133,8 +133,8 @@ fn typical_eigenvalue(stiffness: &Matrix, mass: &Matrix) -> f64 {
 /// A search in progress.
 struct Search<'a> {
     analysis: &'a SymbolicAnalysis,
-    stiffness: &'a Matrix,
-    mass: &'a Matrix,
+    stiffness: &'a SparseMatrix,
+    mass: &'a SparseMatrix,
     wanted: ModeSelection,
     /// A typical `k_ii / m_ii`, rad²/s².
     scale: f64,
@@ -341,20 +341,20 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    fn modes(k: &Matrix, m: &Matrix, wanted: ModeSelection) -> Result<NaturalModes, ModesError> {
+    fn modes(k: &SparseMatrix, m: &SparseMatrix, wanted: ModeSelection) -> Result<NaturalModes, ModesError> {
         NaturalModes::new(&SymbolicAnalysis::new(&[k, m]), k, m, wanted)
     }
 
-    fn matrix(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
-        Matrix::from_triplets(n, entries).unwrap()
+    fn matrix(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> SparseMatrix {
+        SparseMatrix::from_triplets(n, entries).unwrap()
     }
 
-    fn identity(n: usize) -> Matrix {
+    fn identity(n: usize) -> SparseMatrix {
         matrix(n, (0..n).map(|i| (i, i, 1.0)))
     }
 
     /// Springs of stiffness one between i and k. A pair (i, i) is a spring to the ground.
-    fn springs(n: usize, between: impl IntoIterator<Item = (usize, usize)>) -> Matrix {
+    fn springs(n: usize, between: impl IntoIterator<Item = (usize, usize)>) -> SparseMatrix {
         let spring = |(i, k): (usize, usize)| match i == k {
             true => vec![(i, i, 1.0)],
             false => vec![(i, i, 1.0), (k, k, 1.0), (i, k, -1.0), (k, i, -1.0)],
@@ -364,7 +364,7 @@ mod tests {
 
     /// The eigenvalues agree with the expected ones to `tolerance` of the value plus
     /// `rounding`. The shapes are orthonormal and satisfy the equations.
-    fn check(k: &Matrix, m: &Matrix, modes: &NaturalModes, expected: &[f64], rounding: f64) {
+    fn check(k: &SparseMatrix, m: &SparseMatrix, modes: &NaturalModes, expected: &[f64], rounding: f64) {
         assert_eq!(modes.count(), expected.len(), "{:?}", modes.values);
         let n = k.n();
         for (value, expected) in modes.values.iter().zip(expected) {
@@ -642,7 +642,7 @@ mod tests {
             let k = matrix(n, links.iter().flat_map(spring));
             let coupled = links.iter().take(8).flat_map(|(i, k, v)| [(*i, *i, *v), (*k, *k, *v), (*i, *k, 0.5 * v), (*k, *i, 0.5 * v)]);
             let m = matrix(n, (0..n).map(|i| (i, i, masses[i])).chain(coupled));
-            let dense = |a: &Matrix| DMatrix::from_fn(n, n, |i, k| a.get(i, k));
+            let dense = |a: &SparseMatrix| DMatrix::from_fn(n, n, |i, k| a.get(i, k));
             let l = dense(&m).cholesky().unwrap().l();
             let inverse = l.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
             let mut expected: Vec<f64> = (&inverse * dense(&k) * inverse.transpose()).symmetric_eigenvalues().iter().copied().collect();

@@ -14,7 +14,7 @@ use crate::structure::{Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
-use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, SymbolicAnalysis};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
 use stickslip_numerics::tie_break::first_largest;
 
 /// The modes of one nodal diameter.
@@ -330,11 +330,11 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
 
 /// Returns the mass matrix and the lowest modes of a large structure, with both modes of each
 /// pair and their shapes.
-fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
+fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(SparseMatrix, Modes, DMatrix<f64>)> {
     let n = structure.dofs();
     let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
         let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
-        Matrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
+        SparseMatrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
     };
     let along = |value: fn(&Link) -> f64| {
         let entries = |link: &Link| {

@@ -12,7 +12,7 @@
 use super::free::independent;
 use super::{Deviation, Reduced, ReductionError, Reference, Whole};
 use nalgebra::DMatrix;
-use stickslip_numerics::sparse::{Matrix, multi_vector};
+use stickslip_numerics::sparse::{SparseMatrix, multi_vector};
 
 /// Values of s at which a basis is compared with the whole structure.
 const HELD: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
@@ -37,7 +37,7 @@ impl Whole {
     /// `reduce` returns a reduction and the frequency (rad/s) up to which it is intended.
     pub(in crate::structure) fn between(
         &self,
-        there: &Matrix,
+        there: &SparseMatrix,
         reduce: impl Fn(&Whole) -> Result<(Reduced, f64), ReductionError>,
         tolerance: f64,
     ) -> Result<Between, ReductionError> {
@@ -86,10 +86,11 @@ impl Whole {
     }
 
     /// Returns the structure with a fraction of the difference to another stiffness.
-    fn with_share(&self, there: &Matrix, share: f64) -> Result<Whole, ReductionError> {
+    fn with_share(&self, there: &SparseMatrix, share: f64) -> Result<Whole, ReductionError> {
         let own = self.stiffness.entries().map(|(row, column, value)| (row, column, (1.0 - share) * value));
         let other = there.entries().map(|(row, column, value)| (row, column, share * value));
-        let stiffness = Matrix::from_triplets(self.dofs(), own.chain(other)).map_err(|_| ReductionError::OutOfRange)?;
+        let stiffness =
+            SparseMatrix::from_triplets(self.dofs(), own.chain(other)).map_err(|_| ReductionError::OutOfRange)?;
         Whole::new((*self.mass).clone(), self.damping.clone(), stiffness, self.ports.clone())
     }
 

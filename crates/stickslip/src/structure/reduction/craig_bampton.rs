@@ -8,7 +8,7 @@
 //! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
 
 use super::{MOST_MODES, Reduced, ReductionError, Whole};
-use stickslip_numerics::sparse::{Matrix, ModeSelection, NaturalModes, SymbolicAnalysis};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
 
 impl Whole {
     /// Reduces the structure to the degrees of freedom of its ports and all fixed-interface
@@ -30,9 +30,9 @@ impl Whole {
         let interior: Vec<usize> = (0..n).filter(|i| boundary.binary_search(i).is_err()).collect();
         let mut row = vec![usize::MAX; n];
         interior.iter().enumerate().for_each(|(at, &i)| row[i] = at);
-        let part = |matrix: &Matrix| {
+        let part = |matrix: &SparseMatrix| {
             let inner = matrix.entries().filter(|(i, k, _)| row[*i] != usize::MAX && row[*k] != usize::MAX);
-            Matrix::from_triplets(interior.len(), inner.map(|(i, k, v)| (row[i], row[k], v)))
+            SparseMatrix::from_triplets(interior.len(), inner.map(|(i, k, v)| (row[i], row[k], v)))
         };
         let out_of_range = |_| ReductionError::OutOfRange;
         let stiffness = part(&self.stiffness).map_err(out_of_range)?;

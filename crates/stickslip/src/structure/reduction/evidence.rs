@@ -12,7 +12,7 @@
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};
-use stickslip_numerics::sparse::{LdlFactor, Matrix, NaturalModes};
+use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
 /// Largest number of samples; each needs a factorization of the whole structure.
 const SAMPLES: usize = 9;
@@ -164,7 +164,7 @@ impl Factors<'_> {
         together: Option<&DMatrix<f64>>,
     ) -> Result<DMatrix<Complex<f64>>, ReductionError> {
         let whole = self.whole;
-        let (mass, stiffness): (&Matrix, &Matrix) = (&whole.mass, &whole.stiffness);
+        let (mass, stiffness): (&SparseMatrix, &SparseMatrix) = (&whole.mass, &whole.stiffness);
         let singular = |singular| ReductionError::Singular { omega, singular };
         let see = |columns: usize, value: &dyn Fn(usize) -> Complex<f64>| {
             DMatrix::from_fn(whole.ports.len(), columns, |i, k| {

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::dense::{cholesky_blocked, solve_lower_blocked};
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, multi_vector};
+use stickslip_numerics::sparse::{NaturalModes, SparseMatrix, multi_vector};
 
 /// Relative stiffness below which residual vectors of unit size are linearly dependent. This
 /// occurs for ports that observe the same motion, up to rounding. A port whose residual
@@ -164,7 +164,7 @@ impl<'a> Free<'a> {
 }
 
 /// Returns `Bᵀ A B` of a symmetric matrix, computed in blocks of columns.
-fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
+fn square(matrix: &SparseMatrix, basis: &[f64]) -> DMatrix<f64> {
     let n = matrix.n().max(1);
     let all = basis.len() / n;
     let mut square = DMatrix::zeros(all, all);

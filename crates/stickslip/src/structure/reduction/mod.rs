@@ -54,7 +54,7 @@ use std::sync::Arc;
 use stickslip_numerics::dense::{ComplexLu, DenseLu};
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{
-    Matrix, ModeSelection, ModesError, NaturalModes, Singular, SymbolicAnalysis, multi_vector,
+    ModeSelection, ModesError, NaturalModes, Singular, SparseMatrix, SymbolicAnalysis, multi_vector,
 };
 
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
@@ -100,7 +100,7 @@ pub enum Damping {
         stiffness: f64,
     },
     /// `C`, kg/s; it may have a gyroscopic part.
-    Matrix(Matrix),
+    Matrix(SparseMatrix),
 }
 
 impl Damping {
@@ -146,9 +146,9 @@ impl Damping {
 /// A structure before its reduction, with its ports.
 #[derive(Debug, Clone)]
 pub struct Whole {
-    pub(super) mass: Arc<Matrix>,
+    pub(super) mass: Arc<SparseMatrix>,
     pub(super) damping: Damping,
-    pub(super) stiffness: Arc<Matrix>,
+    pub(super) stiffness: Arc<SparseMatrix>,
     ports: Vec<Row>,
     pub(super) analysis: Arc<SymbolicAnalysis>,
 }
@@ -273,12 +273,21 @@ impl Whole {
     /// # Errors
     /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a
     /// negative damping ratio.
-    pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
+    pub fn new(
+        mass: SparseMatrix,
+        damping: Damping,
+        stiffness: SparseMatrix,
+        ports: Vec<Row>,
+    ) -> Result<Self, ReductionError> {
         Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
     }
 
     /// Creates a structure without ports.
-    pub(super) fn unseen(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
+    pub(super) fn unseen(
+        mass: SparseMatrix,
+        damping: Damping,
+        stiffness: SparseMatrix,
+    ) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
             Damping::Matrix(c) => Some(c),
@@ -296,7 +305,7 @@ impl Whole {
             }
         }
         damping.check()?;
-        let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
+        let analysed: Vec<&SparseMatrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
         let analysis = Arc::new(SymbolicAnalysis::new(&analysed));
         Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
     }
@@ -421,7 +430,7 @@ impl Reduced {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
     fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
-        let square = |matrix: &Matrix| multi_vector::inner_products(n, &basis, &matrix.multiply_columns(&basis));
+        let square = |matrix: &SparseMatrix| multi_vector::inner_products(n, &basis, &matrix.multiply_columns(&basis));
         let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
         let own = match &whole.damping {
             Damping::Matrix(c) => Some(square(c)),

@@ -29,7 +29,7 @@ use crate::structure::{RingEntry, turn};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{LdlFactor, Matrix, ModesError, SymbolicAnalysis, multi_vector};
+use stickslip_numerics::sparse::{LdlFactor, ModesError, SparseMatrix, SymbolicAnalysis, multi_vector};
 
 /// Multiples of the frequency of interest up to which modes of the tuned ring start the
 /// iteration. Modes above that frequency leave an almost static remainder to the residual
@@ -54,9 +54,9 @@ pub(in crate::structure) struct NominalRing {
     sectors: usize,
     /// Highest frequency of interest, rad/s.
     up_to: f64,
-    mass: Matrix,
-    damping: Option<Matrix>,
-    stiffness: Matrix,
+    mass: SparseMatrix,
+    damping: Option<SparseMatrix>,
+    stiffness: SparseMatrix,
     /// Stiffness of a sector per unit relative deviation of its blade.
     of_blade: Vec<(usize, usize, f64)>,
     analysis: SymbolicAnalysis,
@@ -103,7 +103,7 @@ impl NominalRing {
         let r = sector.dofs();
         let ring = |entries: &[RingEntry]| around(entries, [r, r], sectors);
         let matrix = |entries: &[RingEntry]| {
-            Matrix::from_triplets(sectors * r, ring(entries)).map_err(|_| ReductionError::OutOfRange)
+            SparseMatrix::from_triplets(sectors * r, ring(entries)).map_err(|_| ReductionError::OutOfRange)
         };
         let (mass, stiffness) = (matrix(&sector.mass)?, matrix(&sector.stiffness)?);
         let damping = sector.damping.as_ref().map(|own| matrix(own)).transpose()?;
@@ -379,11 +379,15 @@ fn around(entries: &[RingEntry], [rows, of]: [usize; 2], sectors: usize) -> Vec<
 }
 
 /// Returns the change of stiffness due to the deviations of all blades.
-fn all_blades(of_blade: &[(usize, usize, f64)], deviations: &[f64], dofs: usize) -> Result<Matrix, ReductionError> {
+fn all_blades(
+    of_blade: &[(usize, usize, f64)],
+    deviations: &[f64],
+    dofs: usize,
+) -> Result<SparseMatrix, ReductionError> {
     let all = deviations.iter().enumerate().flat_map(|(s, deviation)| {
         of_blade.iter().map(move |&(row, column, value)| (s * dofs + row, s * dofs + column, deviation * value))
     });
-    Matrix::from_triplets(deviations.len() * dofs, all).map_err(|_| ReductionError::OutOfRange)
+    SparseMatrix::from_triplets(deviations.len() * dofs, all).map_err(|_| ReductionError::OutOfRange)
 }
 
 fn along(row: &Row, column: &[f64]) -> f64 {

@@ -17,7 +17,7 @@
 //! augmentation methods for modal response analysis".
 
 use super::{AT_ONCE, ReductionError, Whole};
-use stickslip_numerics::sparse::{LdlFactor, Matrix, NaturalModes, multi_vector};
+use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix, multi_vector};
 
 /// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
 /// `STEP`.
@@ -68,7 +68,7 @@ pub(super) fn basis(
 fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(LdlFactor, f64), ReductionError> {
     if shift == 0.0 {
         let supports = supports(whole, modes)?;
-        let sum: [(f64, &Matrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];
+        let sum: [(f64, &SparseMatrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];
         let factor = whole.analysis.factor(&sum);
         return Ok((factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?, 0.0));
     }
@@ -86,7 +86,7 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(LdlFactor,
 /// Returns springs that fix each free motion once. The first spring is at the degree of freedom
 /// that moves most. The next one is at that with the largest motion when the first is fixed,
 /// and so on.
-fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
+fn supports(whole: &Whole, modes: &NaturalModes) -> Result<SparseMatrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);
     let mut motions: Vec<Vec<f64>> = (0..modes.rigid_body_count()).map(|mode| modes.shape(mode).to_vec()).collect();
@@ -103,5 +103,5 @@ fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionErro
         // as stiff as its surroundings
         springs.push((at, at, stiffness.get(at, at).max(modes.scale * mass.get(at, at))));
     }
-    Matrix::from_triplets(n, springs).map_err(|_| ReductionError::OutOfRange)
+    SparseMatrix::from_triplets(n, springs).map_err(|_| ReductionError::OutOfRange)
 }
