@@ -30,12 +30,12 @@ fn main() {
     println!("{} degrees of freedom, {} entries", brick.dofs(), brick.stiffness.len());
     let mut clock = Clock::new();
     let analysis = SymbolicAnalysis::new(&[&brick.stiffness, &brick.mass]);
-    clock.tell(&format!("analysis ({} MB in a factor)", analysis.fill() / 125_000));
+    clock.tell(&format!("analysis ({} MB in a factor)", analysis.factor_entries() / 125_000));
     drop(analysis.factor(&[(1.0, &brick.stiffness)]).expect("the block is held"));
     clock.tell("factor");
     let modes =
         NaturalModes::new(&analysis, &brick.stiffness, &brick.mass, ModeSelection::Lowest(MODES)).expect("modes");
-    clock.tell(&format!("{MODES} modes, counted ({} factors, {} vectors)", modes.effort.factors, modes.effort.vectors));
+    clock.tell(&format!("{MODES} modes, counted ({} factors, {} vectors)", modes.cost.factors, modes.cost.vectors));
     drop(analysis);
 
     let up_to = modes.values[MODES - 1].sqrt();
