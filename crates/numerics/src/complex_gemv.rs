@@ -4,7 +4,7 @@
 //! `A Im(v)` are one real matrix times two vectors, and `A v = A Re(v) + j A Im(v)`. This takes
 //! half the time of a product in complex numbers.
 
-use crate::dense::multiply_blocked;
+use crate::dense::{ProductShape, Transpose, multiply_blocked};
 use num_complex::Complex64;
 
 /// A square complex matrix, stored for products with one vector.
@@ -51,7 +51,13 @@ impl ComplexGemv {
         let (parts, products) = scratch.split_at_mut(2 * n);
         let (re, im) = parts.split_at_mut(n);
         re.iter_mut().zip(im).zip(&*v).for_each(|((re, im), v)| (*re, *im) = (v.re, v.im));
-        multiply_blocked(&self.interleaved, parts, products, (2 * n, n, 2), false);
+        multiply_blocked(
+            &self.interleaved,
+            parts,
+            products,
+            ProductShape { rows: 2 * n, inner: n, columns: 2 },
+            Transpose::No,
+        );
         let (by_re, by_im) = products.split_at(2 * n);
         for (v, (by_re, by_im)) in v.iter_mut().zip(by_re.chunks_exact(2).zip(by_im.chunks_exact(2))) {
             *v = Complex64::new(by_re[0] - by_im[1], by_re[1] + by_im[0]);

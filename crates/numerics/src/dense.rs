@@ -117,6 +117,26 @@ fn solve_blocked(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64>
     right.iter().all(|x| x.is_finite()).then_some(sign)
 }
 
+/// The sizes of a product of matrices: `rows × inner` times `inner × columns`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProductShape {
+    /// Rows of the left factor and of the product.
+    pub rows: usize,
+    /// Columns of the left factor and rows of the right one.
+    pub inner: usize,
+    /// Columns of the right factor and of the product.
+    pub columns: usize,
+}
+
+/// Says whether a matrix is used as it is stored, or transposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transpose {
+    /// As it is stored.
+    No,
+    /// Transposed.
+    Yes,
+}
+
 /// Rows and columns of a tile of a product, whose sums are kept in registers.
 const TILE: usize = 4;
 
@@ -127,11 +147,14 @@ const TILE: usize = 4;
 ///
 /// # Example
 /// ```
+/// use stickslip_numerics::dense::{ProductShape, multiply};
 /// let mut c = [0.0; 2];
-/// stickslip_numerics::dense::multiply(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0], &mut c, (2, 2, 1));
+/// let shape = ProductShape { rows: 2, inner: 2, columns: 1 };
+/// multiply(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0], &mut c, shape);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (usize, usize, usize)) {
+pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], shape: ProductShape) {
+    let ProductShape { rows, inner, columns } = shape;
     if rows == 0 || columns == 0 {
         return;
     }
@@ -165,33 +188,30 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
     }
 }
 
-/// Computes `C = A B`, or `A Bᵀ` if `transposed`, of large real or complex column-major
+/// Computes `C = A B`, or `A Bᵀ` with [`Transpose::Yes`], of large real or complex column-major
 /// matrices, in blocks that stay in the cache.
 ///
-/// A is `rows × inner`. B is `inner × columns`, or `columns × inner` if `transposed`. The
+/// A is `rows × inner`. B is `inner × columns`, or `columns × inner` if it is transposed. The
 /// result has the same bits on every run, but may differ between processors.
 ///
 /// # Example
 /// ```
+/// use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 /// let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0]);
 /// let mut c = [0.0; 2];
-/// stickslip_numerics::dense::multiply_blocked(&a, &b, &mut c, (2, 2, 1), false);
+/// let shape = ProductShape { rows: 2, inner: 2, columns: 1 };
+/// multiply_blocked(&a, &b, &mut c, shape, Transpose::No);
 /// assert_eq!(c, [23.0, 34.0]);
-/// stickslip_numerics::dense::multiply_blocked(&a, &b, &mut c, (2, 2, 1), true);
+/// multiply_blocked(&a, &b, &mut c, shape, Transpose::Yes);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply_blocked<T: Scalar>(
-    a: &[T],
-    b: &[T],
-    c: &mut [T],
-    (rows, inner, columns): (usize, usize, usize),
-    transposed: bool,
-) {
+pub fn multiply_blocked<T: Scalar>(a: &[T], b: &[T], c: &mut [T], shape: ProductShape, transpose: Transpose) {
+    let ProductShape { rows, inner, columns } = shape;
     let a = MatRef::from_column_major_slice(&a[..rows * inner], rows, inner);
     let b = &b[..inner * columns];
-    let b = match transposed {
-        true => MatRef::from_column_major_slice(b, columns, inner).transpose(),
-        false => MatRef::from_column_major_slice(b, inner, columns),
+    let b = match transpose {
+        Transpose::Yes => MatRef::from_column_major_slice(b, columns, inner).transpose(),
+        Transpose::No => MatRef::from_column_major_slice(b, inner, columns),
     };
     let c = MatMut::from_column_major_slice_mut(&mut c[..rows * columns], rows, columns);
     matmul(c, Accum::Replace, a, b, one(), Par::Seq);
@@ -218,26 +238,28 @@ pub fn cholesky_blocked(matrix: &mut [f64], n: usize) -> bool {
         && (0..n).all(|k| matrix[k * n + k].is_finite())
 }
 
-/// Solves `L X = B`, or `Lᵀ X = B` if `transposed`, in place and in blocks that stay in the cache.
+/// Solves `L X = B`, or `Lᵀ X = B` with [`Transpose::Yes`], in place and in blocks that stay in
+/// the cache.
 ///
 /// L is the lower triangle of a column-major matrix `n × n`. `right` holds the
 /// columns of B, each of length n, and becomes X.
 ///
 /// # Example
 /// ```
+/// use stickslip_numerics::dense::{Transpose, solve_lower_blocked};
 /// let (lower, mut right) = ([2.0, 1.0, 0.0, 4.0], [2.0, 9.0]);
-/// stickslip_numerics::dense::solve_lower_blocked(&lower, 2, &mut right, false);
+/// solve_lower_blocked(&lower, 2, &mut right, Transpose::No);
 /// assert_eq!(right, [1.0, 2.0]);
-/// stickslip_numerics::dense::solve_lower_blocked(&lower, 2, &mut right, true);
+/// solve_lower_blocked(&lower, 2, &mut right, Transpose::Yes);
 /// assert_eq!(right, [0.25, 0.5]);
 /// ```
-pub fn solve_lower_blocked(lower: &[f64], n: usize, right: &mut [f64], transposed: bool) {
+pub fn solve_lower_blocked(lower: &[f64], n: usize, right: &mut [f64], transpose: Transpose) {
     let columns = right.len() / n.max(1);
     let lower = MatRef::from_column_major_slice(&lower[..n * n], n, n);
     let right = MatMut::from_column_major_slice_mut(&mut right[..n * columns], n, columns);
-    match transposed {
-        false => solve_lower_triangular_in_place(lower, right, Par::Seq),
-        true => solve_upper_triangular_in_place(lower.transpose(), right, Par::Seq),
+    match transpose {
+        Transpose::No => solve_lower_triangular_in_place(lower, right, Par::Seq),
+        Transpose::Yes => solve_upper_triangular_in_place(lower.transpose(), right, Par::Seq),
     }
 }
 
@@ -357,7 +379,7 @@ mod tests {
             let a: Vec<f64> = (0..rows * inner).map(entry).collect();
             let b: Vec<f64> = (0..inner * columns).map(|at| entry(at + 1000)).collect();
             let mut c = vec![f64::NAN; rows * columns];
-            multiply(&a, &b, &mut c, (rows, inner, columns));
+            multiply(&a, &b, &mut c, ProductShape { rows, inner, columns });
             for (at, c) in c.iter().enumerate() {
                 let (i, j) = (at % rows, at / rows);
                 let sum = (0..inner).fold(0.0, |sum, k| sum + a[k * rows + i] * b[j * inner + k]);

@@ -12,7 +12,7 @@
 //! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and
 //! 10.5; Parlett and Reinsch (1969) for balancing.
 
-use crate::dense::{cholesky_blocked, solve_lower_blocked};
+use crate::dense::{Transpose, cholesky_blocked, solve_lower_blocked};
 use crate::interrupt;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch};
@@ -118,12 +118,12 @@ pub fn generalized_symmetric(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<
     if !cholesky_blocked(lower.as_mut_slice(), n) {
         return None;
     }
-    let solve = |mut right: DMatrix<f64>, transposed: bool| {
-        solve_lower_blocked(lower.as_slice(), n, right.as_mut_slice(), transposed);
+    let solve = |mut right: DMatrix<f64>, transpose: Transpose| {
+        solve_lower_blocked(lower.as_slice(), n, right.as_mut_slice(), transpose);
         right
     };
-    let (values, vectors) = symmetric_blocked(&solve(solve(scaled(a), false).transpose(), false))?;
-    let mut vectors = solve(vectors, true);
+    let (values, vectors) = symmetric_blocked(&solve(solve(scaled(a), Transpose::No).transpose(), Transpose::No))?;
+    let mut vectors = solve(vectors, Transpose::Yes);
     for mut column in vectors.column_iter_mut() {
         column.component_mul_assign(&unit);
     }

@@ -6,7 +6,7 @@
 use super::{Matrices, Structure};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-use stickslip_numerics::dense::multiply_blocked;
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::eigen;
 
 /// Damping between modes that counts as rounding: relative to the damping of the two modes, and
@@ -71,7 +71,13 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let (values, shapes) = eigen::generalized_symmetric(mass, &(stiffness + mass * shift))?;
     let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
         let mut out = DMatrix::zeros(n, n);
-        multiply_blocked(a.as_slice(), b.as_slice(), out.as_mut_slice(), (n, n, n), false);
+        multiply_blocked(
+            a.as_slice(),
+            b.as_slice(),
+            out.as_mut_slice(),
+            ProductShape { rows: n, inner: n, columns: n },
+            Transpose::No,
+        );
         out
     };
     let modal = product(&shapes.transpose(), &product(damping, &shapes));

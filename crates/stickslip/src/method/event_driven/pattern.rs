@@ -14,7 +14,7 @@ use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use stickslip_numerics::dense::multiply;
+use stickslip_numerics::dense::{ProductShape, multiply};
 use stickslip_numerics::eigen;
 use stickslip_numerics::quadratic_modes::{DefectiveModes, QuadraticModes};
 use stickslip_numerics::signal::ExponentialBasis;
@@ -590,7 +590,7 @@ impl Pattern {
             }
         }
         work.product.resize(2 * n * states, 0.0);
-        multiply(&work.transition, &work.rows, &mut work.product, (2 * n, inner, states));
+        multiply(&work.transition, &work.rows, &mut work.product, ProductShape { rows: 2 * n, inner, columns: states });
         for (c, column) in sensitivity.as_mut_slice().chunks_exact_mut(states).enumerate() {
             let moved = &work.product[c * 2 * n..(c + 1) * 2 * n];
             let (motion, springs) = column.split_at_mut(2 * n);

@@ -20,7 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
-use stickslip_numerics::dense::{DenseLu, multiply_blocked};
+use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_blocked};
 
 /// Receptance of the structure, relative to the compliance of a closed contact, up to which the
 /// structure is well supported. Two digits are lost at this value.
@@ -71,7 +71,13 @@ impl Modes {
         // the columns of `at` are modes, so the first factor is transposed
         let rows: Vec<f64> =
             (0..p).flat_map(|q| (0..n).map(move |m| (q, m))).map(|(q, m)| weighted[m * p + q]).collect();
-        multiply_blocked(&rows, &structure.at, &mut coupling, (n, p, n), false);
+        multiply_blocked(
+            &rows,
+            &structure.at,
+            &mut coupling,
+            ProductShape { rows: n, inner: p, columns: n },
+            Transpose::No,
+        );
         Modes { structure: structure.clone(), coupling, factor: RefCell::default() }
     }
 
@@ -110,7 +116,7 @@ impl Modes {
         let mut moved: Vec<f64> = (0..p).flat_map(|q| (0..n).map(move |m| at[m * p + q])).collect();
         factor.solve(&mut moved);
         let mut product = vec![0.0; p * p];
-        multiply_blocked(at, &moved, &mut product, (p, n, p), false);
+        multiply_blocked(at, &moved, &mut product, ProductShape { rows: p, inner: n, columns: p }, Transpose::No);
         Ok(DMatrix::from_iterator(p, p, product.into_iter().map(|r| Complex64::new(r, 0.0))))
     }
 }

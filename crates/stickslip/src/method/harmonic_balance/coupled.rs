@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::complex_gemv::ComplexGemv;
-use stickslip_numerics::dense::{ComplexLu, DenseLu, multiply_blocked};
+use stickslip_numerics::dense::{ComplexLu, DenseLu, ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::gmres::{Gmres, GmresLimits};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -196,7 +196,13 @@ impl Linear<'_> {
             }
             parts.resize(wide, 0.0);
             // row after row it is the transpose
-            multiply_blocked(v, self.tangent(p, port), parts, (1, wide, wide), false);
+            multiply_blocked(
+                v,
+                self.tangent(p, port),
+                parts,
+                ProductShape { rows: 1, inner: wide, columns: wide },
+                Transpose::No,
+            );
             force.iter_mut().zip(parts.chunks_exact(2)).for_each(|(f, z)| *f = Complex64::new(z[0], z[1]) * unit);
         }
         receptance.apply(force, moved);
@@ -503,7 +509,13 @@ impl Split {
             let weighted: Vec<f64> =
                 high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own()[m][2])).collect();
             let mut sum = vec![0.0; p * p];
-            multiply_blocked(&weighted, &above, &mut sum, (p, high.len(), p), true);
+            multiply_blocked(
+                &weighted,
+                &above,
+                &mut sum,
+                ProductShape { rows: p, inner: high.len(), columns: p },
+                Transpose::Yes,
+            );
             (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);
             Arc::new(sum)
         });
@@ -527,7 +539,7 @@ impl Split {
         factor.solve(&mut moved);
         let l = low.len();
         let mut core = vec![0.0; l * l];
-        multiply_blocked(&pull, &moved, &mut core, (l, p, l), false);
+        multiply_blocked(&pull, &moved, &mut core, ProductShape { rows: l, inner: p, columns: l }, Transpose::No);
         let closed = modal.closed.is_some();
         Some(Split { bound, closed, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
     }
@@ -562,7 +574,13 @@ impl Split {
         self.factor.solve(&mut columns);
         if l > 0 {
             let mut pulled = vec![0.0; l * wide];
-            multiply_blocked(&self.pull, &columns, &mut pulled, (l, p, wide), false);
+            multiply_blocked(
+                &self.pull,
+                &columns,
+                &mut pulled,
+                ProductShape { rows: l, inner: p, columns: wide },
+                Transpose::No,
+            );
             for (k, factor) in self.harmonics.iter().enumerate() {
                 let (re, im) = pulled[2 * k * l..2 * (k + 1) * l].split_at_mut(l);
                 let mut modal: Vec<Complex64> = re.iter().zip(&*im).map(|(re, im)| Complex64::new(*re, *im)).collect();
@@ -572,7 +590,13 @@ impl Split {
                 }
             }
             let mut moved = vec![0.0; p * wide];
-            multiply_blocked(&self.moved, &pulled, &mut moved, (p, l, wide), false);
+            multiply_blocked(
+                &self.moved,
+                &pulled,
+                &mut moved,
+                ProductShape { rows: p, inner: l, columns: wide },
+                Transpose::No,
+            );
             columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
         }
         for (q, v) in v.chunks_exact_mut(wide).enumerate() {

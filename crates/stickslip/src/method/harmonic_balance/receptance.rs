@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::complex_gemv::ComplexGemv;
-use stickslip_numerics::dense::{DenseLu, multiply_blocked};
+use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_blocked};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -58,7 +58,13 @@ impl Formed {
                 pairs.apply(forces, &mut self.memory);
                 &*forces
             } else if axes >= BLOCKED {
-                multiply_blocked(matrix.as_slice(), forces, sum, (axes, axes, 1), false);
+                multiply_blocked(
+                    matrix.as_slice(),
+                    forces,
+                    sum,
+                    ProductShape { rows: axes, inner: axes, columns: 1 },
+                    Transpose::No,
+                );
                 &*sum
             } else {
                 // column by column, as the matrix lies in memory
@@ -127,7 +133,13 @@ impl Modal {
         self.forces.clear();
         self.forces.extend(force.iter().flat_map(|f| [f.re, f.im]));
         self.modal.resize(tall * n, 0.0);
-        multiply_blocked(&self.forces, &self.structure.at, &mut self.modal, (tall, p, n), false);
+        multiply_blocked(
+            &self.forces,
+            &self.structure.at,
+            &mut self.modal,
+            ProductShape { rows: tall, inner: p, columns: n },
+            Transpose::No,
+        );
         let coupled = usize::from(self.closed.is_some());
         if let Some(closed) = &self.closed {
             let mut mean: Vec<f64> = self.modal.chunks_exact(tall).map(|column| column[0]).collect();
@@ -141,7 +153,13 @@ impl Modal {
             }
         }
         self.moved.resize(tall * p, 0.0);
-        multiply_blocked(&self.modal, &self.structure.at, &mut self.moved, (tall, n, p), true);
+        multiply_blocked(
+            &self.modal,
+            &self.structure.at,
+            &mut self.moved,
+            ProductShape { rows: tall, inner: n, columns: p },
+            Transpose::Yes,
+        );
         for (at, (u, pair)) in moved.iter_mut().zip(self.moved.chunks_exact(2)).enumerate() {
             *u = Complex64::new(pair[0], pair[1]) + force[at] * self.series[at / nh];
         }

@@ -17,7 +17,7 @@
 use super::{AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual, symmetric};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
-use stickslip_numerics::dense::{cholesky_blocked, solve_lower_blocked};
+use stickslip_numerics::dense::{Transpose, cholesky_blocked, solve_lower_blocked};
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::{NaturalModes, SparseMatrix, multi_vector};
 
@@ -225,7 +225,7 @@ fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return None;
     }
     let mut inverse = DMatrix::identity(n, n);
-    solve_lower_blocked(lower.as_slice(), n, inverse.as_mut_slice(), true);
+    solve_lower_blocked(lower.as_slice(), n, inverse.as_mut_slice(), Transpose::Yes);
     (DEPENDENT * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
 }
 

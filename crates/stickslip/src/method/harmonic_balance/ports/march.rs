@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::ops::Range;
-use stickslip_numerics::dense::multiply_blocked;
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::interrupt;
 
 /// The same as [`REPEATS`] where they come no closer.
@@ -244,8 +244,8 @@ impl Alternation {
         if few {
             self.fill_projection(&mut memory.projection);
             memory.of_states.resize(wide * d * m, 0.0);
-            let sizes = (d * m, n, wide);
-            multiply_blocked(&memory.by_state, &memory.projection, &mut memory.of_states, sizes, true);
+            let shape = ProductShape { rows: d * m, inner: n, columns: wide };
+            multiply_blocked(&memory.by_state, &memory.projection, &mut memory.of_states, shape, Transpose::Yes);
         }
         // forces that see where the step ends alone have a slope at every sample
         let one = Complex64::new(1.0, 0.0);
@@ -267,8 +267,8 @@ impl Alternation {
                 if few {
                     // [sample][axis][column] times the waves of the harmonics
                     memory.spectrum.resize(own * tall * wide, 0.0);
-                    let sizes = (own * tall, n, wide);
-                    multiply_blocked(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
+                    let shape = ProductShape { rows: own * tall, inner: n, columns: wide };
+                    multiply_blocked(&memory.columns, &memory.projection, &mut memory.spectrum, shape, Transpose::Yes);
                     for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
                         for (a, values) in values.chunks_exact(tall).enumerate() {
                             let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
