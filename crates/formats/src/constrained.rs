@@ -28,7 +28,7 @@ pub(crate) const CONSTRAINED_DIAGONAL: f64 = 1e36;
 /// ```
 ///
 /// # Errors
-/// [`ErrorKind::Names`](crate::Kind::Names) if a row of `matrix` is missing in `first`.
+/// [`ErrorKind::Names`](crate::ErrorKind::Names) if a row of `matrix` is missing in `first`.
 pub fn align_rows(matrix: Matrix, first: &Matrix) -> Result<Matrix, Error> {
     match (first.names(), matrix.names()) {
         (Some(names), Some(own)) if names != own => matrix.reordered(names),

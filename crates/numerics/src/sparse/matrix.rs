@@ -9,7 +9,7 @@ const MAX_SIZE: usize = i32::MAX as usize;
 
 /// A square matrix of which only nonzero entries are stored, by columns with rising rows.
 ///
-/// A symmetric matrix stores both triangles; [`asymmetry`](Matrix::asymmetry) tests the symmetry.
+/// A symmetric matrix stores both triangles; [`asymmetry`](SparseMatrix::asymmetry) tests it.
 ///
 /// # Example
 /// ```
