@@ -16,7 +16,7 @@ use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::DecompressionLimit;
-use crate::matrix::{StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
+use crate::matrix::{DenseLayout, StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "hdf5",
@@ -163,8 +163,8 @@ fn dense_item(dataset: Dataset, name: String, limit: DecompressionLimit) -> Resu
             let problem = format!("the dataset has {} numbers, but its size is {rows} x {columns}", values.len());
             return Err(Error::new(ErrorKind::Count, Location::Variable(name.clone()), problem, "save the file again"));
         }
-        let along = if matlab { StorageOrder::Columns } else { StorageOrder::Rows };
-        from_dense((rows, columns), along, &Location::Variable(name.clone()), |at| Ok(values[at]))
+        let order = if matlab { StorageOrder::Columns } else { StorageOrder::Rows };
+        from_dense(DenseLayout { rows, columns, order }, &Location::Variable(name.clone()), |at| Ok(values[at]))
     }))
 }
 

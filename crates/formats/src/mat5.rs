@@ -12,7 +12,7 @@ use crate::bytes::{ByteCursor, ByteOrder, NumberType};
 use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
 use crate::inflate::{Container, DecompressionLimit, beginning, inflate};
-use crate::matrix::{Matrix, StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
+use crate::matrix::{DenseLayout, Matrix, StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matlab",
@@ -321,7 +321,7 @@ fn matrix(bytes: &[u8], order: ByteOrder) -> Result<Matrix, Error> {
         let problem = format!("expected {rows} x {columns} numbers, found {there}");
         return Err(Error::new(ErrorKind::Count, Location::File, problem, "save or copy the file again"));
     }
-    from_dense((rows, columns), StorageOrder::Columns, &Location::File, |at| {
+    from_dense(DenseLayout { rows, columns, order: StorageOrder::Columns }, &Location::File, |at| {
         number.real(&mut data.ahead(at * number.size()))
     })
 }

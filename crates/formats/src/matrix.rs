@@ -501,13 +501,21 @@ pub(crate) enum StorageOrder {
     Columns,
 }
 
+/// Sizes and storage order of a full matrix.
+#[derive(Clone, Copy)]
+pub(crate) struct DenseLayout {
+    pub rows: usize,
+    pub columns: usize,
+    pub order: StorageOrder,
+}
+
 /// Builds a matrix from a full one. `value` returns a number by its position in the file.
 pub(crate) fn from_dense(
-    (rows, columns): (usize, usize),
-    along: StorageOrder,
+    layout: DenseLayout,
     location: &Location,
     value: impl Fn(usize) -> Result<f64, Error>,
 ) -> Result<Matrix, Error> {
+    let DenseLayout { rows, columns, order } = layout;
     let count = rows.saturating_mul(columns);
     // Allocate for the nonzero values only: full matrices of structures are mostly zeros.
     let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
@@ -515,7 +523,7 @@ pub(crate) fn from_dense(
     // In the storage order of a matrix, so that the entries are sorted already.
     for column in 0..columns {
         for row in 0..rows {
-            let at = match along {
+            let at = match order {
                 StorageOrder::Rows => row * columns + column,
                 StorageOrder::Columns => column * rows + row,
             };

@@ -8,7 +8,7 @@
 use crate::bytes::{ByteCursor, ByteOrder, NumberType};
 use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::matrix::{Matrix, StorageOrder, from_dense};
+use crate::matrix::{DenseLayout, Matrix, StorageOrder, from_dense};
 use crate::text::quoted;
 
 pub(crate) const FORMAT: Format = Format {
@@ -138,14 +138,16 @@ impl<'a> NpyArray<'a> {
             let remedy = "save a real array of two dimensions";
             Error::new(kind, Location::File, format!("this is not a real matrix: {note}"), remedy)
         });
-        let size = size?;
+        let (rows, columns) = size?;
         let ElementType::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
         };
         // All numbers are in the file, so no position lies beyond the end.
         self.count(number)?;
-        let along = if self.fortran { StorageOrder::Columns } else { StorageOrder::Rows };
-        from_dense(size, along, &self.data.location(), |at| number.real(&mut self.data.ahead(at * number.size())))
+        let order = if self.fortran { StorageOrder::Columns } else { StorageOrder::Rows };
+        from_dense(DenseLayout { rows, columns, order }, &self.data.location(), |at| {
+            number.real(&mut self.data.ahead(at * number.size()))
+        })
     }
 }
 

@@ -36,7 +36,7 @@ pub struct GmresOutcome {
 #[derive(Debug, Clone, Default)]
 pub struct Gmres {
     basis: Vec<f64>,
-    /// Columns of the triangular factor, each of `vectors + 1` entries.
+    /// Columns of the triangular factor, each of `restart + 1` entries.
     triangle: Vec<f64>,
     rotations: Vec<(f64, f64)>,
     /// Right side of the least-squares problem; its last entry is the residual.
@@ -87,8 +87,11 @@ impl Gmres {
             let columns = self.cycle(
                 &residual,
                 left,
-                (most, limits.products - outcome.products),
-                limits.tolerance * size,
+                GmresLimits {
+                    tolerance: limits.tolerance * size,
+                    restart: most,
+                    products: limits.products - outcome.products,
+                },
                 &mut multiply,
                 &mut precondition,
             );
@@ -126,18 +129,19 @@ impl Gmres {
         }
     }
 
-    /// Runs one cycle from a residual. Returns the weights of its basis vectors.
+    /// Runs one cycle from a residual, up to an absolute `tolerance`. Returns the weights of its
+    /// basis vectors.
     fn cycle(
         &mut self,
         residual: &[f64],
         size: f64,
-        (vectors, products): (usize, usize),
-        goal: f64,
+        limits: GmresLimits,
         multiply: &mut impl FnMut(&[f64], &mut [f64]),
         precondition: &mut impl FnMut(&mut [f64]),
     ) -> Vec<f64> {
         let n = residual.len();
-        let tall = vectors + 1;
+        let GmresLimits { tolerance, restart, products } = limits;
+        let tall = restart + 1;
         self.basis.clear();
         self.basis.extend(residual.iter().map(|r| r / size));
         self.triangle.clear();
@@ -146,7 +150,7 @@ impl Gmres {
         self.rotated_rhs.push(size);
         self.product.resize(n, 0.0);
         let mut count = 0;
-        while count < vectors.min(products) {
+        while count < restart.min(products) {
             interrupt::check();
             self.sum.clear();
             self.sum.extend_from_slice(&self.basis[count * n..]);
@@ -179,7 +183,7 @@ impl Gmres {
             self.rotated_rhs[count] = c * left;
             self.rotated_rhs.push(-s * left);
             count += 1;
-            if (s * left).abs() <= goal || next <= BREAKDOWN * whole {
+            if (s * left).abs() <= tolerance || next <= BREAKDOWN * whole {
                 break;
             }
             self.basis.extend(self.product.iter().map(|p| p / next));

@@ -9,7 +9,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Returns the place and the value of the largest function value that the search evaluates.
 ///
-/// The search takes place between `ends`, in either order. It stops when `close`
+/// The search takes place between `ends`, in either order. It stops when `converged`
 /// accepts the two ends of the remaining interval, or when rounding leaves no
 /// number between them. Of equal values the first one evaluated counts. A
 /// function without a value at some place returns negative infinity there.
@@ -23,13 +23,13 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// # Example
 /// ```
 /// use stickslip_numerics::golden_section::golden_section;
-/// let close = |a: f64, b: f64| (b - a).abs() < 1e-6;
-/// let (at, height) = golden_section((0.0, 3.0), close, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
+/// let converged = |a: f64, b: f64| (b - a).abs() < 1e-6;
+/// let (at, height) = golden_section((0.0, 3.0), converged, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
 /// assert!((at - 2.0).abs() < 1e-6 && (height - 1.0).abs() < 1e-6);
 /// ```
 pub fn golden_section<E>(
     ends: (f64, f64),
-    close: impl Fn(f64, f64) -> bool,
+    converged: impl Fn(f64, f64) -> bool,
     mut value: impl FnMut(f64) -> Result<f64, E>,
 ) -> Result<(f64, f64), E> {
     let (mut a, mut b) = ends;
@@ -39,7 +39,7 @@ pub fn golden_section<E>(
     let distinct = |a: f64, left: f64, right: f64, b: f64| {
         (a < left && left < right && right < b) || (a > left && left > right && right > b)
     };
-    while distinct(a, left, right, b) && !close(a, b) {
+    while distinct(a, left, right, b) && !converged(a, b) {
         let candidate = if value_left >= value_right {
             (b, right, value_right) = (right, left, value_left);
             left = b - GOLDEN * (b - a);

@@ -28,6 +28,13 @@ pub(super) struct Pattern {
     unsymmetric: OnceLock<SymbolicLu<u32>>,
 }
 
+/// The rows of the entries of each column, rising.
+struct Columns {
+    /// Start of each column in `rows`, n + 1 numbers.
+    starts: Vec<u32>,
+    rows: Vec<u32>,
+}
+
 /// The lower triangle of the pattern and its symbolic factor.
 #[derive(Debug)]
 pub(super) struct Symbolic {
@@ -40,9 +47,9 @@ impl Pattern {
     /// Builds the pattern of matrices of one size, with mirrored entries added, and orders it.
     pub fn new(matrices: &[&SparseMatrix]) -> Self {
         let n = matrices.first().map_or(0, |matrix| matrix.n());
-        let (starts, rows) = union(n, matrices);
-        let order = order(n, &starts, &rows);
-        Pattern::ordered(n, (starts, rows), &order)
+        let union = union(n, matrices);
+        let order = order(n, &union.starts, &union.rows);
+        Pattern::ordered(n, union, &order)
     }
 
     /// Builds the pattern of other matrices with the order of this one,
@@ -51,7 +58,8 @@ impl Pattern {
         Pattern::ordered(self.n, union(self.n, matrices), &self.order)
     }
 
-    fn ordered(n: usize, (starts, rows): (Vec<u32>, Vec<u32>), order: &[u32]) -> Self {
+    fn ordered(n: usize, columns: Columns, order: &[u32]) -> Self {
+        let Columns { starts, rows } = columns;
         let order = postordered(order, &starts, &rows);
         let mut inverse = vec![0; n];
         order.iter().enumerate().for_each(|(at, &row)| inverse[row as usize] = at as u32);
@@ -107,11 +115,11 @@ impl Pattern {
     /// Returns the symbolic real factor.
     pub fn real(&self) -> &Symbolic {
         self.real.get_or_init(|| {
-            let mut lower = (vec![0], Vec::new());
+            let mut lower = Columns { starts: vec![0], rows: Vec::new() };
             for column in 0..self.n {
                 let rows = &self.rows[self.starts[column] as usize..self.starts[column + 1] as usize];
-                lower.1.extend(rows.iter().copied().filter(|row| *row as usize >= column));
-                lower.0.push(lower.1.len() as u32);
+                lower.rows.extend(rows.iter().copied().filter(|row| *row as usize >= column));
+                lower.starts.push(lower.rows.len() as u32);
             }
             self.symbolic(lower, &self.order, &self.inverse)
         })
@@ -123,16 +131,16 @@ impl Pattern {
     /// solution is the conjugate of the complex solution.
     pub fn complex(&self) -> &Symbolic {
         self.complex.get_or_init(|| {
-            let mut lower = (vec![0], Vec::new());
+            let mut lower = Columns { starts: vec![0], rows: Vec::new() };
             for column in 0..self.n {
                 let rows = &self.rows[self.starts[column] as usize..self.starts[column + 1] as usize];
                 for part in 0..2 {
                     for &row in rows.iter().filter(|row| **row as usize >= column) {
                         // On the diagonal the upper entry belongs to the other triangle.
                         let first = if row as usize == column { part } else { 0 };
-                        lower.1.extend((first..2).map(|other| 2 * row + other));
+                        lower.rows.extend((first..2).map(|other| 2 * row + other));
                     }
-                    lower.0.push(lower.1.len() as u32);
+                    lower.starts.push(lower.rows.len() as u32);
                 }
             }
             let double = |order: &[u32]| order.iter().flat_map(|row| [2 * row, 2 * row + 1]).collect::<Vec<u32>>();
@@ -140,7 +148,8 @@ impl Pattern {
         })
     }
 
-    fn symbolic(&self, (starts, rows): (Vec<u32>, Vec<u32>), order: &[u32], inverse: &[u32]) -> Symbolic {
+    fn symbolic(&self, columns: Columns, order: &[u32], inverse: &[u32]) -> Symbolic {
+        let Columns { starts, rows } = columns;
         let n = order.len();
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, inverse, n));
@@ -166,7 +175,7 @@ impl Pattern {
 
 /// Returns the union of the patterns, the mirrored patterns and the diagonal,
 /// by columns with rising rows.
-fn union(n: usize, matrices: &[&SparseMatrix]) -> (Vec<u32>, Vec<u32>) {
+fn union(n: usize, matrices: &[&SparseMatrix]) -> Columns {
     assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum must have one size");
     let transposed: Vec<_> = matrices.iter().map(|matrix| transposed(n, &matrix.starts, &matrix.rows)).collect();
     let most = matrices.iter().map(|matrix| matrix.rows.len()).max().unwrap_or(0);
@@ -192,7 +201,7 @@ fn union(n: usize, matrices: &[&SparseMatrix]) -> (Vec<u32>, Vec<u32>) {
         rows[first..].sort_unstable();
         starts.push(rows.len() as u32);
     }
-    (starts, rows)
+    Columns { starts, rows }
 }
 
 /// Returns the transposed pattern, by columns with rising rows.
