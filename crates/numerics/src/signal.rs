@@ -415,7 +415,7 @@ impl ProductIntegrals {
     /// Returns `∫ g h dτ`.
     pub fn integral(&self, basis: &ExponentialBasis, g: &[Complex64], h: &[Complex64]) -> f64 {
         if !(basis.is_exponential(g) && basis.is_exponential(h)) {
-            return quadrature((basis, g), (basis, h), self.length);
+            return quadrature(Signal { basis, coefficients: g }, Signal { basis, coefficients: h }, self.length);
         }
         let zero = Complex64::new(0.0, 0.0);
         let coefficient =
@@ -467,8 +467,11 @@ impl FourierIntegrals {
         if !basis.is_exponential(g) {
             let probe =
                 ExponentialBasis { exponents: vec![Complex64::new(0.0, self.nu)], ..ExponentialBasis::default() };
-            let part =
-                |turn: Complex64| quadrature((basis, g), (&probe, &[turn, Complex64::new(0.0, 0.0)]), self.length);
+            let part = |turn: Complex64| {
+                let wave = [turn, Complex64::new(0.0, 0.0)];
+                let signal = Signal { basis, coefficients: g };
+                quadrature(signal, Signal { basis: &probe, coefficients: &wave }, self.length)
+            };
             // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
             return Complex64::new(part(Complex64::new(1.0, 0.0)), -part(Complex64::new(0.0, -1.0)));
         }
@@ -486,25 +489,28 @@ const NODES: [(f64, f64); 8] = quadrature::from_center(quadrature::GAUSS_8);
 /// which the 8-point rule is exact to rounding.
 const PANEL_PHASE: f64 = 1.0;
 
+/// A signal with its basis.
+#[derive(Clone, Copy)]
+struct Signal<'a> {
+    basis: &'a ExponentialBasis,
+    coefficients: &'a [Complex64],
+}
+
 /// Returns `∫ g h dτ` over `[0, length]` by Gauss-Legendre quadrature in panels.
-fn quadrature(
-    (g_basis, g): (&ExponentialBasis, &[Complex64]),
-    (h_basis, h): (&ExponentialBasis, &[Complex64]),
-    length: f64,
-) -> f64 {
-    let fastest = g_basis.exponents.iter().chain(&h_basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
+fn quadrature(g: Signal, h: Signal, length: f64) -> f64 {
+    let fastest = g.basis.exponents.iter().chain(&h.basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
     let panels = (2.0 * fastest * length / PANEL_PHASE).ceil().clamp(1.0, 1e5) as usize;
     let width = length / panels as f64;
     let zero = Complex64::new(0.0, 0.0);
-    let (mut gv, mut hv) = (vec![zero; g_basis.len()], vec![zero; h_basis.len()]);
+    let (mut gv, mut hv) = (vec![zero; g.basis.len()], vec![zero; h.basis.len()]);
     let mut sum = 0.0;
     for panel in 0..panels {
         let middle = (panel as f64 + 0.5) * width;
         for (node, weight) in NODES {
             let time = middle + node * 0.5 * width;
-            g_basis.evaluate(time, &mut gv);
-            h_basis.evaluate(time, &mut hv);
-            sum += weight * real_dot(g, &gv) * real_dot(h, &hv);
+            g.basis.evaluate(time, &mut gv);
+            h.basis.evaluate(time, &mut hv);
+            sum += weight * real_dot(g.coefficients, &gv) * real_dot(h.coefficients, &hv);
         }
     }
     0.5 * width * sum
@@ -627,12 +633,13 @@ mod tests {
         let mut end = vec![zero; basis.len()];
         basis.evaluate(3.0, &mut end);
         let exact = ProductIntegrals::new(&basis, &end, 3.0).integral(&basis, &g, &g);
-        let numeric = quadrature((&basis, &g), (&basis, &g), 3.0);
+        let signal = Signal { basis: &basis, coefficients: &g };
+        let numeric = quadrature(signal, signal, 3.0);
         assert!((exact - numeric).abs() < 1e-13 * exact.abs(), "{exact} {numeric}");
         let nu = 1.7;
         let of = FourierIntegrals::new(&basis, &end, nu, 3.0).integral(&basis, &g);
         let probe = ExponentialBasis { exponents: vec![c(0.0, nu)], ..ExponentialBasis::default() };
-        let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero]), 3.0);
+        let part = |turn| quadrature(signal, Signal { basis: &probe, coefficients: &[turn, zero] }, 3.0);
         assert!((of - c(part(c(1.0, 0.0)), -part(c(0.0, -1.0)))).norm() < 1e-13 * of.norm(), "{of}");
         // The derivative of every basis function, by differences.
         for b in 0..basis.len() {

@@ -52,6 +52,17 @@ impl ValueRange {
     }
 }
 
+/// A signal over the time interval `[0, length]`.
+#[derive(Debug, Clone, Copy)]
+pub struct SignalSegment<'a> {
+    /// Coefficients of the signal.
+    pub coefficients: &'a [Complex64],
+    /// Basis functions at the end of the interval.
+    pub at_end: &'a [Complex64],
+    /// Length of the interval, s.
+    pub length: f64,
+}
+
 /// Error: the signal has too many turning points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooFast;
@@ -202,18 +213,17 @@ fn upper_bound(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
 }
 
 impl ExponentialBasis {
-    /// Extends a range by the values of a signal over `[0, length]`. `at_end`
-    /// contains the basis functions at `length`.
+    /// Extends a range by the values of a signal over a time interval.
     ///
     /// # Errors
     /// [`TooFast`] if the signal has too many turning points.
     pub fn extend_range(
         &self,
         range: &mut ValueRange,
-        (signal, at_end): (&[Complex64], &[Complex64]),
-        length: f64,
+        segment: SignalSegment,
         memory: &mut RangeScratch,
     ) -> Result<(), TooFast> {
+        let SignalSegment { coefficients: signal, at_end, length } = segment;
         let rounding = ROUNDING * memory.differentiate(self, signal, length);
         let begin = memory.sample(self, signal, 0.0);
         let [_, first, second] = &memory.slopes;
@@ -302,7 +312,9 @@ mod tests {
             }
             basis.evaluate(length, &mut values);
             let mut range = ValueRange::new(case % 2 == 0);
-            basis.extend_range(&mut range, (&signal, &values), length, &mut memory).unwrap();
+            basis
+                .extend_range(&mut range, SignalSegment { coefficients: &signal, at_end: &values, length }, &mut memory)
+                .unwrap();
             // At the nearest sample the signal is lower than its maximum by its curvature.
             let (digits, missed) = (1e-14, 10.0 * (length / SAMPLES as f64).powi(2));
             assert!(range.high >= seen.high - digits && range.high <= seen.high + missed, "{case}: {range:?} {seen:?}");
@@ -325,7 +337,8 @@ mod tests {
             let mut values = [zero; 3];
             basis.evaluate(100.0, &mut values);
             let mut range = ValueRange::new(false);
-            basis.extend_range(&mut range, (&signal, &values), 100.0, &mut memory).map(|()| range)
+            let segment = SignalSegment { coefficients: &signal, at_end: &values, length: 100.0 };
+            basis.extend_range(&mut range, segment, &mut memory).map(|()| range)
         };
         let range = of(1e-17).unwrap();
         assert!((range.high - 1.0).abs() < 1e-15 && (range.low + 1.0).abs() < 1e-15, "{range:?}");

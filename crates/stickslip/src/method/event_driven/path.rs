@@ -14,7 +14,7 @@ use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
 use stickslip_numerics::signal::{ExponentialBasis, FourierIntegrals, ProductIntegrals, real_dot};
-use stickslip_numerics::signal_range::{RangeScratch, ValueRange};
+use stickslip_numerics::signal_range::{RangeScratch, SignalSegment, ValueRange};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -286,9 +286,10 @@ impl<'a> Measuring<'a> {
         }
         for (piece, coefficients) in self.pieces() {
             let Segment { start, length, at_end, .. } = &piece.segment;
+            let segment = SignalSegment { coefficients: &signal[coefficients], at_end, length: *length };
             piece
                 .basis()
-                .extend_range(&mut range, (&signal[coefficients], at_end), *length, &mut memory)
+                .extend_range(&mut range, segment, &mut memory)
                 .map_err(|_| Breakdown::TooFast { time: *start })?;
         }
         Ok((range.low, range.high))
