@@ -31,7 +31,7 @@ pub struct FourierPlan {
 
 impl fmt::Debug for FourierPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Fourier").field("samples", &self.samples).finish_non_exhaustive()
+        f.debug_struct("FourierPlan").field("samples", &self.samples).finish_non_exhaustive()
     }
 }
 

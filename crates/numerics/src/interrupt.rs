@@ -79,7 +79,7 @@ impl StopFlag {
 
 impl fmt::Debug for StopFlag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Stop").field("set", &self.is_set()).finish_non_exhaustive()
+        f.debug_struct("StopFlag").field("set", &self.is_set()).finish_non_exhaustive()
     }
 }
 
