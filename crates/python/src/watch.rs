@@ -34,7 +34,7 @@ pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResu
     let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let (begun, looked) = (Instant::now(), AtomicU64::new(0));
     let kept = raised.clone();
-    let stop = StopFlag::asking(move || {
+    let stop = StopFlag::with_callback(move || {
         let now = begun.elapsed().as_millis() as u64;
         if now < looked.load(Ordering::Relaxed) + LOOK.as_millis() as u64 {
             return false;
