@@ -8,8 +8,8 @@ use std::fmt::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
-use stickslip_formats::{self as formats, Error, Kind, Matrix, Report, aligned, constrained, names};
-use stickslip_numerics::definite::sparse_definite;
+use stickslip_formats::{self as formats, Error, ErrorKind, Matrix, MatrixReport, align_rows, constrained_rows, names};
+use stickslip_numerics::definiteness::sparse_definite;
 use stickslip_numerics::sparse;
 use stickslip_study::summary::{DIRECTIONS, mass_along};
 use stickslip_study::unit_sets;
@@ -75,7 +75,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                 wrong |= !whole;
             }
             // Row names are in separate files.
-            Err(error) if error.kind == Kind::Format && format.is_none() => rows.push((file, error)),
+            Err(error) if error.kind == ErrorKind::Format && format.is_none() => rows.push((file, error)),
             Err(error) => {
                 complain!("error: {error}");
                 wrong = true;
@@ -94,13 +94,13 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
             }
             Err(other) => {
                 match (other.kind, count) {
-                    (Kind::Names, None) => complain!(
+                    (ErrorKind::Names, None) => complain!(
                         "error: {}: this file contains row names; give it together with the square matrix, as \
                          in `stickslip inspect MATRIX {}`",
                         file.display(),
                         file.display()
                     ),
-                    (Kind::Names, Some(_)) => complain!("error: {other}"),
+                    (ErrorKind::Names, Some(_)) => complain!("error: {other}"),
                     _ => complain!("error: {error}"),
                 }
                 wrong = true;
@@ -146,7 +146,7 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
             Err(error) if several => {
                 let _ = writeln!(text, "  {variable}: {error}");
                 // Other content of the file, such as a text, is not an error.
-                whole &= matches!(error.kind, Kind::Complex | Kind::Unsupported);
+                whole &= matches!(error.kind, ErrorKind::Complex | ErrorKind::Unsupported);
                 continue;
             }
             Err(error) => return Err(error),
@@ -154,13 +154,13 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
         if several {
             let _ = writeln!(text, "  {}", variable.name);
         }
-        for line in Report::new(&matrix).to_string().lines() {
+        for line in MatrixReport::new(&matrix).to_string().lines() {
             let _ = writeln!(text, "  {line}");
         }
         if matrix.rows() == matrix.columns() && matrix.rows() > 1 {
-            let out = constrained(&[&matrix], matrix.rows());
+            let out = constrained_rows(&[&matrix], matrix.rows());
             if let Some(sparse) = converted(&matrix, &out)
-                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.largest()).is_none())
+                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.max_abs()).is_none())
             {
                 let exception = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
                 let _ = writeln!(text, "  {}{exception}", definite(&sparse));
@@ -181,13 +181,13 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
 const SYMMETRIC: f64 = 1e-9;
 
 /// Returns a square matrix without some of its rows and columns.
-fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::Matrix> {
-    let free = if out.is_empty() { Cow::Borrowed(matrix) } else { Cow::Owned(matrix.clone().without(out).ok()?) };
+fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::SparseMatrix> {
+    let free = if out.is_empty() { Cow::Borrowed(matrix) } else { Cow::Owned(matrix.clone().without_rows(out).ok()?) };
     let entries = free.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value));
-    sparse::Matrix::from_triplets(free.rows(), entries).ok()
+    sparse::SparseMatrix::from_triplets(free.rows(), entries).ok()
 }
 
-fn definite(matrix: &sparse::Matrix) -> &'static str {
+fn definite(matrix: &sparse::SparseMatrix) -> &'static str {
     match sparse_definite(matrix) {
         Some(true) => "positive definite",
         Some(false) => "positive semidefinite: it is zero for some motion",
@@ -208,7 +208,7 @@ fn choose(square: &[NamedMatrix]) -> Result<(&NamedMatrix, &NamedMatrix, &'stati
         }
         ([], [mass], [a, b]) => (if a.role.is_none() { a } else { b }, *mass, "according to the name of the mass"),
         ([], [], [a, b]) => {
-            let larger = a.matrix.largest() >= b.matrix.largest();
+            let larger = a.matrix.max_abs() >= b.matrix.max_abs();
             let (stiffness, mass) = if larger { (a, b) } else { (b, a) };
             (stiffness, mass, "because the entries of the first are larger (the names do not show the roles)")
         }
@@ -244,17 +244,19 @@ impl Pair {
         row_names: Option<&[String]>,
     ) -> Result<Pair, String> {
         let of_mass = match mass.matrix.names() {
-            Some(_) => Cow::Owned(aligned(mass.matrix.clone(), &stiffness.matrix).map_err(|error| error.to_string())?),
+            Some(_) => {
+                Cow::Owned(align_rows(mass.matrix.clone(), &stiffness.matrix).map_err(|error| error.to_string())?)
+            }
             None => Cow::Borrowed(&mass.matrix),
         };
         let rows = stiffness.matrix.rows();
-        let of_damping = damping.and_then(|damping| aligned(damping.matrix.clone(), &stiffness.matrix).ok());
+        let of_damping = damping.and_then(|damping| align_rows(damping.matrix.clone(), &stiffness.matrix).ok());
         let of_damping = of_damping.filter(|damping| damping.rows() == rows);
         if of_mass.rows() != rows {
             let (stiffness, mass, other) = (&stiffness.name, &mass.name, of_mass.rows());
             return Err(format!("the stiffness {stiffness} has {rows} rows, but the mass {mass} has {other}"));
         }
-        let out = constrained(&[&stiffness.matrix, &of_mass], rows);
+        let out = constrained_rows(&[&stiffness.matrix, &of_mass], rows);
         let names = stiffness.matrix.names().or(of_mass.names()).or(row_names.filter(|names| names.len() == rows));
         if out.len() == rows {
             return Err("all rows are constrained".to_owned());

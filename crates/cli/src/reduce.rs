@@ -83,7 +83,7 @@ struct ReducedStructure {
     /// Additional keys of `[structure]`.
     keys: Vec<String>,
     /// Stiffness at the second speed, if rotation stiffens the structure.
-    second_stiffness: Option<sparse::Matrix>,
+    second_stiffness: Option<sparse::SparseMatrix>,
     /// Data of a disk sector.
     sector: Option<Sector>,
 }

@@ -22,11 +22,11 @@
 
 use std::rc::Rc;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
-use crate::text::{Line, Lines, integer, shown};
+use crate::text::{Line, Lines, integer, quoted};
 
 pub(crate) const FORMAT: Format = Format {
     name: "abaqus-element",
@@ -70,7 +70,7 @@ fn fields(text: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// An element whose lines are being read.
 #[derive(Default)]
-struct Element {
+struct UserElement {
     nodes: usize,
     general: bool,
     /// Node numbers, from the comment.
@@ -79,7 +79,7 @@ struct Element {
     dofs: Vec<(usize, Vec<i64>)>,
 }
 
-impl Element {
+impl UserElement {
     fn new(line: &Line) -> Result<Self, Error> {
         let text = keyword(line).unwrap_or_default();
         let nodes = parameter(&text, "NODES").and_then(|count| count.parse().ok()).filter(|&nodes| nodes <= ROWS);
@@ -96,7 +96,7 @@ impl Element {
         }
         match numbers.split_first().map(|(&position, dofs)| (usize::try_from(position), dofs)) {
             Some((Ok(position @ 1..), dofs @ [_, ..])) => self.dofs.push((position, dofs.to_vec())),
-            _ => return Err(line.malformed("the position of a node and its degrees of freedom", &shown(line.text))),
+            _ => return Err(line.malformed("the position of a node and its degrees of freedom", &quoted(line.text))),
         }
         Ok(())
     }
@@ -125,7 +125,7 @@ impl Element {
 }
 
 /// The numbers of a matrix: first line and layout.
-struct Block<'a> {
+struct MatrixBlock<'a> {
     lines: Lines<'a>,
     rows: usize,
     general: bool,
@@ -134,7 +134,7 @@ struct Block<'a> {
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let mut lines = Lines::new(bytes);
-    let mut element: Option<Element> = None;
+    let mut element: Option<UserElement> = None;
     let mut rows: Option<(Rc<Vec<String>>, usize)> = None;
     let mut items: Vec<Item> = Vec::new();
     let mut in_matrix = false;
@@ -146,7 +146,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
                 element.labels.extend(fields(&line.text[2..]).filter_map(integer));
             }
         } else if is_keyword(&line, "*USERELEMENT") {
-            (element, rows, in_matrix) = (Some(Element::new(&line)?), None, false);
+            (element, rows, in_matrix) = (Some(UserElement::new(&line)?), None, false);
         } else if let Some(element) = element.as_ref().filter(|_| is_keyword(&line, "*MATRIX")) {
             let (names, count) = match &rows {
                 Some(rows) => rows.clone(),
@@ -155,8 +155,8 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
                     rows.insert((Rc::new(names), count)).clone()
                 }
             };
-            let block = Block { lines: lines.clone(), rows: count, general: element.general, names };
-            let name = free_name(&line, &items);
+            let block = MatrixBlock { lines: lines.clone(), rows: count, general: element.general, names };
+            let name = unused_name(&line, &items);
             items.push(Item::new(name, count, count, move || read(&block)));
             in_matrix = true;
         } else if keyword(&line).is_some() {
@@ -169,7 +169,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 }
 
 /// Returns `stiffness`, or `stiffness 2` for the second stiffness of a file.
-fn free_name(line: &Line, items: &[Item]) -> String {
+fn unused_name(line: &Line, items: &[Item]) -> String {
     let text = keyword(line).unwrap_or_default();
     let kind = parameter(&text, "TYPE").unwrap_or("matrix").to_lowercase();
     let taken = |name: &str| items.iter().filter(|item| item.variable.name.split(' ').next() == Some(name)).count();
@@ -179,10 +179,10 @@ fn free_name(line: &Line, items: &[Item]) -> String {
     }
 }
 
-fn read(block: &Block) -> Result<Matrix, Error> {
-    let Block { rows, general, .. } = *block;
+fn read(block: &MatrixBlock) -> Result<Matrix, Error> {
+    let MatrixBlock { rows, general, .. } = *block;
     let expected = if general { rows * rows } else { rows * (rows + 1) / 2 };
-    let mut triplets = Triplets::new(rows, rows, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(rows, rows, 0, Location::File)?;
     let (mut row, mut column, mut count) = (0, 0, 0);
     let mut lines = block.lines.clone();
     for line in lines.by_ref() {
@@ -216,7 +216,7 @@ fn read(block: &Block) -> Result<Matrix, Error> {
 
 fn wrong_count(location: Location, expected: usize, found: &str) -> Error {
     let problem = format!("the matrix of this element must have {expected} numbers, but it has {found}");
-    Error::new(Kind::Count, location, problem, "export the file again")
+    Error::new(ErrorKind::Count, location, problem, "export the file again")
 }
 
 #[cfg(test)]
@@ -249,21 +249,21 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let found = read_bytes(text.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(found, Err((kind, location)), "{text}");
         };
         let one = "*USER ELEMENT,NODES=1\n1,2\n*MATRIX,TYPE=MASS\n";
-        check(&format!("{one}1,2\n"), Kind::Count, Location::Line(4));
-        check(&format!("{one}1,2,3,4\n"), Kind::Count, Location::Line(4));
-        check(&format!("{one}1,x,3\n"), Kind::Malformed, Location::Line(4));
-        check("*USER ELEMENT\n1\n", Kind::Malformed, Location::Line(1));
-        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", Kind::Malformed, Location::Line(1));
-        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", Kind::Malformed, Location::Line(3));
-        check("*USER ELEMENT,NODES=1\n1\n0,1\n", Kind::Malformed, Location::Line(3));
-        check("*USER ELEMENT,NODES=1\n1\n , ,\n", Kind::Malformed, Location::Line(3));
-        check("*USER ELEMENT,NODES=1\n,\n", Kind::Malformed, Location::Line(2));
-        check("*USER ELEMENT,NODES=1\n1\n", Kind::Choice, Location::File);
+        check(&format!("{one}1,2\n"), ErrorKind::Count, Location::Line(4));
+        check(&format!("{one}1,2,3,4\n"), ErrorKind::Count, Location::Line(4));
+        check(&format!("{one}1,x,3\n"), ErrorKind::Malformed, Location::Line(4));
+        check("*USER ELEMENT\n1\n", ErrorKind::Malformed, Location::Line(1));
+        check("*USER ELEMENT,NODES=999999999999\n1\n*MATRIX\n1\n", ErrorKind::Malformed, Location::Line(1));
+        check("*USER ELEMENT,NODES=1000000\n1,2\n*MATRIX\n1\n", ErrorKind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n0,1\n", ErrorKind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n1\n , ,\n", ErrorKind::Malformed, Location::Line(3));
+        check("*USER ELEMENT,NODES=1\n,\n", ErrorKind::Malformed, Location::Line(2));
+        check("*USER ELEMENT,NODES=1\n1\n", ErrorKind::Selection, Location::File);
     }
 }

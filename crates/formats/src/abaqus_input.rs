@@ -9,11 +9,11 @@
 
 use std::collections::HashMap;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
-use crate::text::{Line, Lines, integer, must_end_its_lines, real, shown};
+use crate::text::{Line, Lines, integer, quoted, real, require_final_newline};
 
 pub(crate) const FORMAT: Format = Format {
     name: "abaqus-matrix-input",
@@ -30,7 +30,7 @@ enum Node<'a> {
 }
 
 /// A row or column: a node and its degree of freedom.
-type Row<'a> = (Node<'a>, i64);
+type NodeDof<'a> = (Node<'a>, i64);
 
 fn fields<'a>(line: &Line<'a>) -> Option<[&'a [u8]; 5]> {
     let mut fields = [&[][..]; 5];
@@ -54,10 +54,10 @@ fn sniff(bytes: &[u8]) -> bool {
 }
 
 /// Returns row, column and value of every line.
-fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(Row<'_>, Row<'_>, f64, Line<'_>), Error>> {
+fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(NodeDof<'_>, NodeDof<'_>, f64, Line<'_>), Error>> {
     let row = |line: &Line, [node, dof]: [&'_ [u8]; 2]| line.integer(dof).map(|dof| (integer(node), dof));
     lines(bytes).map(move |line| {
-        let found = fields(&line).ok_or_else(|| line.malformed("`node, dof, node, dof, value`", &shown(line.text)))?;
+        let found = fields(&line).ok_or_else(|| line.malformed("`node, dof, node, dof, value`", &quoted(line.text)))?;
         let [row_node, row_dof, column_node, column_dof, value] = found;
         let node = |text, number: Option<i64>| number.map_or(Node::Label(text), Node::Number);
         let (row_number, row_dof) = row(&line, [row_node, row_dof])?;
@@ -68,7 +68,7 @@ fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(Row<'_>, Row<'_>, f64, 
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let mut places: HashMap<Row, usize> = HashMap::new();
+    let mut places: HashMap<NodeDof, usize> = HashMap::new();
     let mut count = 0;
     for entry in entries(bytes) {
         let (row, column, ..) = entry?;
@@ -78,11 +78,11 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     if count == 0 {
         let problem = "the file has no entry; lines `node, dof, node, dof, value` are required".into();
-        return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
+        return Err(Error::new(ErrorKind::Truncated, Location::File, problem, "export it again"));
     }
-    must_end_its_lines(bytes)?;
-    must_be_one(bytes)?;
-    let mut rows: Vec<Row> = places.keys().copied().collect();
+    require_final_newline(bytes)?;
+    require_single_matrix(bytes)?;
+    let mut rows: Vec<NodeDof> = places.keys().copied().collect();
     rows.sort_unstable();
     for (at, row) in rows.iter().enumerate() {
         places.insert(*row, at);
@@ -92,28 +92,28 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 }
 
 /// Refuses a second `*MATRIX INPUT`, because its entries would be added to those of the first.
-fn must_be_one(bytes: &[u8]) -> Result<(), Error> {
+fn require_single_matrix(bytes: &[u8]) -> Result<(), Error> {
     let begins = |line: &Line| {
         let keyword: Vec<u8> = line.text.iter().filter(|byte| !byte.is_ascii_whitespace()).take(12).copied().collect();
         keyword.eq_ignore_ascii_case(b"*MATRIXINPUT")
     };
     Lines::new(bytes).filter(begins).nth(1).map_or(Ok(()), |line| {
         let problem = "the file contains a second matrix, which begins here".into();
-        Err(Error::new(Kind::Unsupported, line.location(), problem, "write every matrix to a separate file"))
+        Err(Error::new(ErrorKind::Unsupported, line.location(), problem, "write every matrix to a separate file"))
     })
 }
 
-fn read(bytes: &[u8], rows: &[Row], places: &HashMap<Row, usize>, count: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(rows.len(), rows.len(), count, Location::File)?;
+fn read(bytes: &[u8], rows: &[NodeDof], places: &HashMap<NodeDof, usize>, count: usize) -> Result<Matrix, Error> {
+    let mut triplets = TripletBuilder::new(rows.len(), rows.len(), count, Location::File)?;
     for entry in entries(bytes) {
         let (row, column, value, line) = entry?;
         triplets.push(places[&row], places[&column], value, line.location())?;
     }
-    let name = |(node, dof): &Row| match node {
+    let name = |(node, dof): &NodeDof| match node {
         Node::Number(number) => format!("{number}.{}", direction(*dof)),
         Node::Label(label) => format!("{}.{}", String::from_utf8_lossy(label), direction(*dof)),
     };
-    triplets.finish(Symmetry::Unsaid)?.with_names(rows.iter().map(name).collect())
+    triplets.finish(Symmetry::Unstated)?.with_names(rows.iter().map(name).collect())
 }
 
 #[cfg(test)]
@@ -145,16 +145,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text, kind, location| {
             assert_eq!(read(text).map(|_| ()).map_err(|e| (e.kind, e.location)), Err((kind, location)), "{text}");
         };
-        check("", Kind::Truncated, Location::File);
-        check("1,1,1,1,1\n1,1,1,1\n", Kind::Malformed, Location::Line(2));
-        check("1,1,1,1,1\n1,1,1,1,1,1\n", Kind::Malformed, Location::Line(2));
-        check("1,x,1,1,1\n", Kind::Malformed, Location::Line(1));
+        check("", ErrorKind::Truncated, Location::File);
+        check("1,1,1,1,1\n1,1,1,1\n", ErrorKind::Malformed, Location::Line(2));
+        check("1,1,1,1,1\n1,1,1,1,1,1\n", ErrorKind::Malformed, Location::Line(2));
+        check("1,x,1,1,1\n", ErrorKind::Malformed, Location::Line(1));
         let two = "*MATRIX INPUT, NAME=K\n1,1,1,1,5\n*Matrix Input, NAME=M\n1,1,1,1,3\n";
-        check(two, Kind::Unsupported, Location::Line(3));
-        check("1,1,1,1,1e999\n", Kind::NotFinite, Location::Line(1));
+        check(two, ErrorKind::Unsupported, Location::Line(3));
+        check("1,1,1,1,1e999\n", ErrorKind::NotFinite, Location::Line(1));
     }
 }

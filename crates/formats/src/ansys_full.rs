@@ -11,10 +11,10 @@
 
 use std::rc::Rc;
 
-use crate::bytes::{Bytes, Order};
-use crate::error::{Error, Kind, Location};
+use crate::bytes::{ByteCursor, ByteOrder};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
 
 pub(crate) const FORMAT: Format = Format {
@@ -51,63 +51,63 @@ mod item {
 }
 
 /// Returns the byte order, if the file has a standard header of a full file.
-fn order(bytes: &[u8]) -> Option<Order> {
-    [Order::Little, Order::Big].into_iter().find(|&order| {
-        let mut words = Bytes::new(bytes, order);
+fn order(bytes: &[u8]) -> Option<ByteOrder> {
+    [ByteOrder::Little, ByteOrder::Big].into_iter().find(|&order| {
+        let mut words = ByteCursor::new(bytes, order);
         let mut word = || words.u32().ok();
         (word(), word().is_some(), word()) == (Some(STANDARD), true, Some(FULL))
     })
 }
 
 /// Moves to a word of the file.
-fn seek(file: &mut Bytes, word: usize) -> Result<(), Error> {
+fn seek(file: &mut ByteCursor, word: usize) -> Result<(), Error> {
     file.seek(word.saturating_mul(4))
 }
 
 /// Reads the next record: its flags and its data.
-fn record<'a>(file: &mut Bytes<'a>) -> Result<(u32, Bytes<'a>), Error> {
+fn record<'a>(file: &mut ByteCursor<'a>) -> Result<(u32, ByteCursor<'a>), Error> {
     let location = file.clone();
     let words = file.u32()? as usize;
     let flags = file.u32()?;
     if flags & PACKED != 0 {
         let problem = format!("the record is compressed (flags {flags:#x}), which is not supported");
         let remedy = "switch off compression with /FCOMP before the solution, or export with HBMAT";
-        return Err(Error::new(Kind::Unsupported, location.location(), problem, remedy));
+        return Err(Error::new(ErrorKind::Unsupported, location.location(), problem, remedy));
     }
     let data = file.take(words.saturating_mul(4))?;
     file.skip(4);
-    Ok((flags, Bytes::new(data, file.order)))
+    Ok((flags, ByteCursor::new(data, file.order)))
 }
 
 /// Reads the next record as integers.
-fn integers(file: &mut Bytes) -> Result<Vec<i64>, Error> {
+fn integers(file: &mut ByteCursor) -> Result<Vec<i64>, Error> {
     let location = file.clone();
     let (flags, mut data) = record(file)?;
     if flags & INTEGERS == 0 {
         return Err(location.malformed("a record of whole numbers", format!("one with flags {flags:#x}")));
     }
     match flags & SHORT {
-        0 => (0..data.left() / 4).map(|_| data.i32().map(i64::from)).collect(),
-        _ => (0..data.left() / 2).map(|_| data.i16().map(i64::from)).collect(),
+        0 => (0..data.remaining() / 4).map(|_| data.i32().map(i64::from)).collect(),
+        _ => (0..data.remaining() / 2).map(|_| data.i16().map(i64::from)).collect(),
     }
 }
 
 /// Reads the next record as real numbers.
-fn reals(file: &mut Bytes) -> Result<Vec<f64>, Error> {
+fn reals(file: &mut ByteCursor) -> Result<Vec<f64>, Error> {
     let location = file.clone();
     let (flags, mut data) = record(file)?;
     if flags & INTEGERS != 0 {
         return Err(location.malformed("a record of real numbers", format!("one with flags {flags:#x}")));
     }
     match flags & SHORT {
-        0 => (0..data.left() / 8).map(|_| data.f64()).collect(),
-        _ => (0..data.left() / 4).map(|_| data.f32().map(f64::from)).collect(),
+        0 => (0..data.remaining() / 8).map(|_| data.f64()).collect(),
+        _ => (0..data.remaining() / 4).map(|_| data.f32().map(f64::from)).collect(),
     }
 }
 
 /// The data that the matrices of a file share.
 struct System<'a> {
-    file: Bytes<'a>,
+    file: ByteCursor<'a>,
     /// Number of equations in the file, including the constrained ones.
     equations: usize,
     /// The constrained equations.
@@ -118,15 +118,15 @@ struct System<'a> {
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let order = order(bytes).unwrap_or(Order::Little);
-    let mut file = Bytes::new(bytes, order);
+    let order = order(bytes).unwrap_or(ByteOrder::Little);
+    let mut file = ByteCursor::new(bytes, order);
     seek(&mut file, HEADER)?;
     let header = integers(&mut file)?;
     if header.len() < item::COUNT {
         return Err(file.malformed(&format!("a header of at least {} items", item::COUNT), header.len()));
     }
     let refuse = |problem: &str| {
-        Err(Error::new(Kind::Unsupported, file.location(), problem.into(), "export with HBMAT instead"))
+        Err(Error::new(ErrorKind::Unsupported, file.location(), problem.into(), "export with HBMAT instead"))
     };
     if header[item::ORIGIN] > 0 {
         return refuse("the file comes from the frontal solver, which is not supported");
@@ -186,14 +186,14 @@ fn names_of(labels: &[i64], nodes: &[i64], counts: &[i64], dofs: &[i64]) -> Opti
 fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
     let mut file = system.file.clone();
     seek(&mut file, start)?;
-    let mut triplets = Triplets::new(system.equations, system.equations, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(system.equations, system.equations, 0, Location::File)?;
     if name == "mass" && system.lumped {
         let location = file.location();
         let diagonal = reals(&mut file)?;
         if diagonal.len() != system.equations {
             let problem = format!("the file has {} masses for {} equations", diagonal.len(), system.equations);
             return Err(Error::new(
-                Kind::Count,
+                ErrorKind::Count,
                 location,
                 problem,
                 "switch off lumped masses (LUMPM), or export with HBMAT",
@@ -209,7 +209,12 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
             if columns.len() != values.len() {
                 let problem =
                     format!("the file has {} columns and {} values in row {}", columns.len(), values.len(), row + 1);
-                return Err(Error::new(Kind::Count, location.location(), problem, "the file is damaged; solve again"));
+                return Err(Error::new(
+                    ErrorKind::Count,
+                    location.location(),
+                    problem,
+                    "the file is damaged; solve again",
+                ));
             }
             for (column, value) in columns.into_iter().zip(values) {
                 let column = usize::try_from(column - 1).map_err(|_| location.malformed("a column from 1", column))?;
@@ -222,7 +227,7 @@ fn read(system: &System, name: &str, start: usize) -> Result<Matrix, Error> {
         Some(names) => matrix.with_names(names.clone())?,
         None => matrix,
     };
-    matrix.without(&system.constrained)
+    matrix.without_rows(&system.constrained)
 }
 
 #[cfg(test)]
@@ -298,19 +303,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_said() {
+    fn unsupported_files_are_refused() {
         let check = |change: fn(&mut [i32]), kind| {
             let found = read_bytes(&file(change), None, Some("stiffness")).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind));
         };
-        check(|header| header[item::ORIGIN] = 4, Kind::Unsupported);
-        check(|header| header[item::UNSYMMETRIC] = 1, Kind::Unsupported);
-        check(|header| header[item::CONSTRAINTS] = 1, Kind::Unsupported);
-        check(|header| header[item::STIFFNESS + 1] = 1, Kind::Truncated);
-        check(|header| header[item::EQUATIONS] = 5, Kind::Malformed);
-        check(|header| header[item::EQUATIONS] = -5, Kind::Malformed);
+        check(|header| header[item::ORIGIN] = 4, ErrorKind::Unsupported);
+        check(|header| header[item::UNSYMMETRIC] = 1, ErrorKind::Unsupported);
+        check(|header| header[item::CONSTRAINTS] = 1, ErrorKind::Unsupported);
+        check(|header| header[item::STIFFNESS + 1] = 1, ErrorKind::Truncated);
+        check(|header| header[item::EQUATIONS] = 5, ErrorKind::Malformed);
+        check(|header| header[item::EQUATIONS] = -5, ErrorKind::Malformed);
         let mut packed = file(|_| ());
         packed[HEADER * 4 + 7] = 0xa0;
-        assert_eq!(read_bytes(&packed, None, None).map_err(|e| e.kind), Err(Kind::Unsupported));
+        assert_eq!(read_bytes(&packed, None, None).map_err(|e| e.kind), Err(ErrorKind::Unsupported));
     }
 }

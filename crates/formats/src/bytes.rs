@@ -1,20 +1,20 @@
 //! Cursor over binary data in either byte order, which never reads beyond the end.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
 /// Byte order of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Order {
+pub(crate) enum ByteOrder {
     Little,
     Big,
 }
 
 /// A cursor over binary data.
 #[derive(Clone)]
-pub(crate) struct Bytes<'a> {
+pub(crate) struct ByteCursor<'a> {
     all: &'a [u8],
     at: usize,
-    pub order: Order,
+    pub order: ByteOrder,
 }
 
 macro_rules! number {
@@ -23,15 +23,15 @@ macro_rules! number {
             let mut bytes = [0; size_of::<$type>()];
             bytes.copy_from_slice(self.take(size_of::<$type>())?);
             Ok(match self.order {
-                Order::Little => <$type>::from_le_bytes(bytes),
-                Order::Big => <$type>::from_be_bytes(bytes),
+                ByteOrder::Little => <$type>::from_le_bytes(bytes),
+                ByteOrder::Big => <$type>::from_be_bytes(bytes),
             })
         }
     )*};
 }
 
-impl<'a> Bytes<'a> {
-    pub fn new(all: &'a [u8], order: Order) -> Self {
+impl<'a> ByteCursor<'a> {
+    pub fn new(all: &'a [u8], order: ByteOrder) -> Self {
         Self { all, at: 0, order }
     }
 
@@ -42,9 +42,9 @@ impl<'a> Bytes<'a> {
         let end = self.at.checked_add(count).filter(|&end| end <= self.all.len());
         let end = end.ok_or_else(|| {
             Error::new(
-                Kind::Truncated,
+                ErrorKind::Truncated,
                 self.location(),
-                format!("expected {count} more bytes, but the file ends after {}", self.left()),
+                format!("expected {count} more bytes, but the file ends after {}", self.remaining()),
                 "the file is not complete; export or copy it again",
             )
         })?;
@@ -72,7 +72,7 @@ impl<'a> Bytes<'a> {
     }
 
     /// Returns the number of bytes not read yet.
-    pub fn left(&self) -> usize {
+    pub fn remaining(&self) -> usize {
         self.all.len() - self.at
     }
 
@@ -83,7 +83,7 @@ impl<'a> Bytes<'a> {
     /// Creates an error for unexpected content at this location.
     pub fn malformed(&self, expected: &str, found: impl std::fmt::Display) -> Error {
         Error::new(
-            Kind::Malformed,
+            ErrorKind::Malformed,
             self.location(),
             format!("expected {expected}, found {found}"),
             "the file is damaged or has another format; export it again, or state its format",
@@ -93,7 +93,7 @@ impl<'a> Bytes<'a> {
 
 /// Types of numbers in binary files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Number {
+pub(crate) enum NumberType {
     I8,
     U8,
     I16,
@@ -106,7 +106,7 @@ pub(crate) enum Number {
     F64,
 }
 
-impl Number {
+impl NumberType {
     pub fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -117,7 +117,7 @@ impl Number {
     }
 
     /// Reads the next number as a real number; integers are exact up to 2^53.
-    pub fn real(self, bytes: &mut Bytes) -> Result<f64, Error> {
+    pub fn real(self, bytes: &mut ByteCursor) -> Result<f64, Error> {
         Ok(match self {
             Self::I8 => bytes.i8()?.into(),
             Self::U8 => bytes.u8()?.into(),
@@ -133,7 +133,7 @@ impl Number {
     }
 
     /// Reads the next number as an index or count from zero.
-    pub fn index(self, bytes: &mut Bytes) -> Result<usize, Error> {
+    pub fn index(self, bytes: &mut ByteCursor) -> Result<usize, Error> {
         let before = bytes.clone();
         let value = match self {
             Self::I8 => bytes.i8()?.into(),
@@ -157,22 +157,22 @@ mod tests {
     #[test]
     fn a_cursor_reads_both_orders_and_stops_at_the_end() -> Result<(), Error> {
         let bytes = [0, 0, 1, 0, 7];
-        assert_eq!(Bytes::new(&bytes, Order::Big).u32()?, 256);
-        let mut cursor = Bytes::new(&bytes, Order::Little);
+        assert_eq!(ByteCursor::new(&bytes, ByteOrder::Big).u32()?, 256);
+        let mut cursor = ByteCursor::new(&bytes, ByteOrder::Little);
         assert_eq!(cursor.u32()?, 65536);
-        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.location)), Err((Kind::Truncated, Location::Byte(4))));
+        assert_eq!(cursor.u16().map_err(|e| (e.kind, e.location)), Err((ErrorKind::Truncated, Location::Byte(4))));
         assert_eq!(cursor.u8()?, 7);
-        assert_eq!(cursor.take(usize::MAX).map_err(|e| e.kind), Err(Kind::Truncated));
-        assert_eq!(cursor.seek(6).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(cursor.take(usize::MAX).map_err(|e| e.kind), Err(ErrorKind::Truncated));
+        assert_eq!(cursor.seek(6).map_err(|e| e.kind), Err(ErrorKind::Truncated));
         cursor.seek(4)?;
-        assert_eq!(cursor.left(), 1);
+        assert_eq!(cursor.remaining(), 1);
         Ok(())
     }
 
     #[test]
     fn a_negative_index_is_refused_where_it_stands() {
         let bytes = [255; 8];
-        let found = Number::I64.index(&mut Bytes::new(&bytes, Order::Little));
+        let found = NumberType::I64.index(&mut ByteCursor::new(&bytes, ByteOrder::Little));
         assert_eq!(found.map_err(|e| e.location), Err(Location::Byte(0)));
     }
 }

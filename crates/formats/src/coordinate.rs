@@ -7,11 +7,11 @@
 //! Source: CalculiX CrunchiX manual, `*FREQUENCY, SOLVER=MATRIXSTORAGE`; Abaqus
 //! Analysis User's Guide, Generating matrices.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
+use crate::first_line::{FirstLine, ambiguous, whole};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::sizes::{FirstLine, unclear, whole};
-use crate::text::{Line, Lines, integer, must_end_its_lines, real};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, integer, real, require_final_newline};
 
 pub(crate) const FORMAT: Format = Format {
     name: "coordinate",
@@ -36,19 +36,19 @@ fn entries(bytes: &[u8]) -> impl Iterator<Item = Result<(usize, usize, f64, Line
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    match FirstLine::of(bytes) {
+    match FirstLine::classify(bytes) {
         FirstLine::Entry => {}
-        FirstLine::Unclear(line) => return Err(unclear(&line)),
+        FirstLine::Ambiguous(line) => return Err(ambiguous(&line)),
         FirstLine::Sizes => {
             let problem = "the first line contains sizes, not an entry".into();
             let remedy = "omit the format, or state matrix-market";
-            return Err(Error::new(Kind::Malformed, Location::File, problem, remedy));
+            return Err(Error::new(ErrorKind::Malformed, Location::File, problem, remedy));
         }
     }
     if is_full_of_three(bytes) {
         let problem = "three lines of three integers may be entries or the rows of a full symmetric matrix";
         let remedy = "for entries, write the values with a decimal point (`1 1 2.`); for rows, write all numbers with one (`2. 1. 0.`)";
-        return Err(Error::new(Kind::Malformed, Location::File, problem.into(), remedy));
+        return Err(Error::new(ErrorKind::Malformed, Location::File, problem.into(), remedy));
     }
     let (mut size, mut count) = (0, 0);
     for entry in entries(bytes) {
@@ -58,9 +58,9 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     }
     if count == 0 {
         let problem = "the file has no entry; lines `row column value` are required".into();
-        return Err(Error::new(Kind::Truncated, Location::File, problem, "export it again"));
+        return Err(Error::new(ErrorKind::Truncated, Location::File, problem, "export it again"));
     }
-    must_end_its_lines(bytes)?;
+    require_final_newline(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size, count))])
 }
 
@@ -73,12 +73,12 @@ fn is_full_of_three(bytes: &[u8]) -> bool {
 }
 
 fn read(bytes: &[u8], size: usize, count: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(size, size, count, Location::File)?;
+    let mut triplets = TripletBuilder::new(size, size, count, Location::File)?;
     for entry in entries(bytes) {
         let (row, column, value, line) = entry?;
         triplets.push(row, column, value, line.location())?;
     }
-    triplets.finish(Symmetry::Unsaid)
+    triplets.finish(Symmetry::Unstated)
 }
 
 #[cfg(test)]
@@ -98,20 +98,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let error =
                 read_bytes(text.as_bytes(), Some("coordinate"), None).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(error, Err((kind, location)), "{text}");
         };
-        check("", Kind::Truncated, Location::File);
-        check("1 1 1\n2 2\n", Kind::Malformed, Location::Line(2));
-        check("1 1 1\n2 x 1\n", Kind::Malformed, Location::Line(2));
-        check("1 1 1\n2 2 1.2", Kind::Truncated, Location::Line(2));
-        check("1 1 inf\n", Kind::NotFinite, Location::Line(1));
-        check("1 4000000000 1\n", Kind::TooLarge, Location::File);
+        check("", ErrorKind::Truncated, Location::File);
+        check("1 1 1\n2 2\n", ErrorKind::Malformed, Location::Line(2));
+        check("1 1 1\n2 x 1\n", ErrorKind::Malformed, Location::Line(2));
+        check("1 1 1\n2 2 1.2", ErrorKind::Truncated, Location::Line(2));
+        check("1 1 inf\n", ErrorKind::NotFinite, Location::Line(1));
+        check("1 4000000000 1\n", ErrorKind::TooLarge, Location::File);
         // Three such lines may also be a full symmetric matrix.
-        check("2 1 1\n1 2 1\n1 1 2\n", Kind::Malformed, Location::File);
-        check("1 1 1\n\n0 1 1\n", Kind::Malformed, Location::Line(3));
+        check("2 1 1\n1 2 1\n1 1 2\n", ErrorKind::Malformed, Location::File);
+        check("1 1 1\n\n0 1 1\n", ErrorKind::Malformed, Location::Line(3));
     }
 }

@@ -9,10 +9,10 @@
 //! or `%`. The matrix must be square. A line of sizes or column numbers, or a
 //! column of row numbers, would make it rectangular and is refused.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::text::{Line, Lines, integer, must_end_its_lines, real};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, integer, real, require_final_newline};
 
 pub(crate) const FORMAT: Format = Format {
     name: "dense-text",
@@ -48,25 +48,25 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         if size > 0 && here != columns {
             let remedy = "write all numbers of every row; put sizes and titles in comments";
             let problem = format!("this row has {here} numbers, but the rows before have {columns}");
-            return Err(Error::new(Kind::Malformed, line.location(), problem, remedy));
+            return Err(Error::new(ErrorKind::Malformed, line.location(), problem, remedy));
         }
         (size, columns) = (size + 1, here);
     }
     let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, Location::File, problem, remedy));
     if size == 0 {
-        return fault(Kind::Truncated, "the file has no row of numbers".into(), "export it again");
+        return fault(ErrorKind::Truncated, "the file has no row of numbers".into(), "export it again");
     }
     if size != columns {
         let problem = format!("the file has {size} rows of {columns} numbers, but the matrix must be square");
         let remedy = "export a square matrix, without a line of sizes or column numbers and without row numbers";
-        return fault(Kind::NotSquare, problem, remedy);
+        return fault(ErrorKind::NotSquare, problem, remedy);
     }
     if columns == 3 && rows(bytes).all(|line| has_indices(&line)) {
         let problem = "the three lines may be full rows or entries `row column value`".into();
         let remedy = "for full rows, write all numbers with a decimal point; for entries, remove comments and commas";
-        return fault(Kind::Malformed, problem, remedy);
+        return fault(ErrorKind::Malformed, problem, remedy);
     }
-    must_end_its_lines(bytes)?;
+    require_final_newline(bytes)?;
     Ok(vec![Item::new("", size, size, move || read(bytes, size))])
 }
 
@@ -76,7 +76,7 @@ fn has_indices(line: &Line) -> bool {
 }
 
 fn read(bytes: &[u8], size: usize) -> Result<Matrix, Error> {
-    let mut triplets = Triplets::new(size, size, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(size, size, 0, Location::File)?;
     for (row, line) in rows(bytes).enumerate() {
         for (column, field) in fields(&line).enumerate() {
             triplets.push(row, column, line.real(field)?, line.location())?;
@@ -117,25 +117,25 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_square_of_numbers_is_refused_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let found = read_bytes(text.as_bytes(), Some("dense-text"), None).map(|_| ());
             assert_eq!(found.map_err(|e| (e.kind, e.location)), Err((kind, location)), "{text}");
         };
-        check("# nothing\n", Kind::Truncated, Location::File);
-        check("2 1\n1 2\n3 4\n", Kind::NotSquare, Location::File);
+        check("# nothing\n", ErrorKind::Truncated, Location::File);
+        check("2 1\n1 2\n3 4\n", ErrorKind::NotSquare, Location::File);
         // With sizes, column numbers or row numbers.
-        check("2 2\n2.5 1\n1 2\n", Kind::NotSquare, Location::File);
-        check("3\n1 2 3\n2 4 5\n3 5 6\n", Kind::Malformed, Location::Line(2));
-        check("0,1\n2,1\n1,2\n", Kind::NotSquare, Location::File);
-        check("0,2,1\n1,1,2\n", Kind::NotSquare, Location::File);
-        check(",0,1\n0,2,1\n1,1,2\n", Kind::Malformed, Location::Line(1));
-        check("1 2\n3 x\n", Kind::Malformed, Location::Line(2));
-        check("1,5;2,5\n2,5;1,5\n", Kind::Malformed, Location::Line(1));
-        check("1 2\n3 nan\n", Kind::NotFinite, Location::Line(2));
-        check("1 2\n3 4.2", Kind::Truncated, Location::Line(2));
+        check("2 2\n2.5 1\n1 2\n", ErrorKind::NotSquare, Location::File);
+        check("3\n1 2 3\n2 4 5\n3 5 6\n", ErrorKind::Malformed, Location::Line(2));
+        check("0,1\n2,1\n1,2\n", ErrorKind::NotSquare, Location::File);
+        check("0,2,1\n1,1,2\n", ErrorKind::NotSquare, Location::File);
+        check(",0,1\n0,2,1\n1,1,2\n", ErrorKind::Malformed, Location::Line(1));
+        check("1 2\n3 x\n", ErrorKind::Malformed, Location::Line(2));
+        check("1,5;2,5\n2,5;1,5\n", ErrorKind::Malformed, Location::Line(1));
+        check("1 2\n3 nan\n", ErrorKind::NotFinite, Location::Line(2));
+        check("1 2\n3 4.2", ErrorKind::Truncated, Location::Line(2));
         // Entries of Octave's sparse text, or rows.
-        check("# type: sparse matrix\n1 1 2\n2 2 3\n3 3 4\n", Kind::Malformed, Location::File);
-        check("1,1,2\n2,2,3\n3,3,4\n", Kind::Malformed, Location::File);
+        check("# type: sparse matrix\n1 1 2\n2 2 3\n3 3 4\n", ErrorKind::Malformed, Location::File);
+        check("1,1,2\n2,2,3\n3,3,4\n", ErrorKind::Malformed, Location::File);
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[error("{}{problem}; {remedy}", Prefix(.path.as_deref(), .location))]
 pub struct Error {
     /// The kind of the failure.
-    pub kind: Kind,
+    pub kind: ErrorKind,
     /// The file, if it is known.
     pub path: Option<PathBuf>,
     /// The location in the file.
@@ -21,18 +21,18 @@ pub struct Error {
 
 impl Error {
     /// Creates an error without a path.
-    pub(crate) fn new(kind: Kind, location: Location, problem: String, remedy: impl Into<String>) -> Self {
+    pub(crate) fn new(kind: ErrorKind, location: Location, problem: String, remedy: impl Into<String>) -> Self {
         Self { kind, path: None, location, problem, remedy: remedy.into() }
     }
 
     /// Returns the error with a path, if it has none yet.
-    pub(crate) fn of(mut self, path: &Path) -> Self {
+    pub(crate) fn with_path(mut self, path: &Path) -> Self {
         self.path.get_or_insert_with(|| path.to_path_buf());
         self
     }
 
     /// Returns the error with a location, if it has none yet.
-    pub(crate) fn at(mut self, location: Location) -> Self {
+    pub(crate) fn with_location(mut self, location: Location) -> Self {
         if self.location == Location::File {
             self.location = location;
         }
@@ -43,7 +43,7 @@ impl Error {
 /// Kinds of failures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Kind {
+pub enum ErrorKind {
     /// The system could not read or write the file.
     Io,
     /// No format recognizes the content, or no format has the given name.
@@ -63,7 +63,7 @@ pub enum Kind {
     /// The content is valid in the format, but the reader does not support it.
     Unsupported,
     /// No matrix has the given name, or the name of one of several matrices is missing.
-    Choice,
+    Selection,
     /// Row names do not match the matrix.
     Names,
     /// A square matrix is required.
@@ -118,13 +118,17 @@ mod tests {
 
     #[test]
     fn a_message_says_file_place_problem_and_remedy() {
-        let error =
-            Error::new(Kind::Count, Location::Line(3), "two numbers, three were expected".into(), "export it again");
+        let error = Error::new(
+            ErrorKind::Count,
+            Location::Line(3),
+            "two numbers, three were expected".into(),
+            "export it again",
+        );
         assert_eq!(error.to_string(), "line 3: two numbers, three were expected; export it again");
-        let error = error.of(Path::new("blade.mtx"));
+        let error = error.with_path(Path::new("blade.mtx"));
         assert_eq!(error.to_string(), "blade.mtx, line 3: two numbers, three were expected; export it again");
-        let whole = Error::new(Kind::Io, Location::File, "no such file".into(), "check the path");
-        assert_eq!(whole.clone().of(Path::new("a")).to_string(), "a: no such file; check the path");
+        let whole = Error::new(ErrorKind::Io, Location::File, "no such file".into(), "check the path");
+        assert_eq!(whole.clone().with_path(Path::new("a")).to_string(), "a: no such file; check the path");
         assert_eq!(whole.to_string(), "no such file; check the path");
     }
 }

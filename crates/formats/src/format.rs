@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::matrix::Matrix;
 
 /// A file format for matrices.
@@ -37,11 +37,11 @@ impl<'a> Item<'a> {
     }
 
     /// Creates an item that is not a real matrix. `note` describes it.
-    pub fn other(name: impl Into<String>, note: impl Into<String>) -> Self {
+    pub fn not_a_matrix(name: impl Into<String>, note: impl Into<String>) -> Self {
         let (name, note) = (name.into(), note.into());
         let (kind, remedy) = match note == COMPLEX {
-            true => (Kind::Complex, "save its real part, or select another matrix"),
-            false => (Kind::Unsupported, "select another matrix"),
+            true => (ErrorKind::Complex, "save its real part, or select another matrix"),
+            false => (ErrorKind::Unsupported, "select another matrix"),
         };
         let location = if name.is_empty() { Location::File } else { Location::Variable(name.clone()) };
         let error = Error::new(kind, location, format!("this is not a real matrix: {note}"), remedy);

@@ -8,11 +8,11 @@
 use std::str::from_utf8;
 
 use crate::error::Error;
-use crate::text::{Line, Lines, shown};
+use crate::text::{Line, Lines, quoted};
 
 /// An edit descriptor, with repetitions expanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Edit {
+enum EditDescriptor {
     /// A number in the next `width` characters. `decimals` is the number of
     /// digits after an implied decimal point.
     Field { width: usize, decimals: usize },
@@ -28,10 +28,10 @@ enum Edit {
 
 /// A format description.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Fixed {
-    edits: Vec<Edit>,
+pub(crate) struct FortranFormat {
+    edits: Vec<EditDescriptor>,
     /// Index of the edit at which the format restarts.
-    again: usize,
+    restart: usize,
 }
 
 /// A field of a line.
@@ -45,16 +45,16 @@ pub(crate) struct Field<'a> {
 /// Maximum value of columns, repetitions and fields. Larger values indicate another format.
 const MOST: usize = 10_000;
 
-impl Fixed {
+impl FortranFormat {
     /// Parses a format. Returns `None` if the text is not a format of numbers.
     pub fn new(text: &str) -> Option<Self> {
         let text: Vec<u8> = text.to_uppercase().bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
-        let mut parser = Parser { rest: text.strip_prefix(b"(")?, again: 0 };
+        let mut parser = Parser { rest: text.strip_prefix(b"(")?, restart: 0 };
         let mut edits = Vec::new();
         parser.list(&mut edits, 0)?;
-        let again = parser.again;
-        let has_field = edits[again..].iter().any(|edit| matches!(edit, Edit::Field { .. }));
-        (parser.rest.is_empty() && has_field).then_some(Self { edits, again })
+        let restart = parser.restart;
+        let has_field = edits[restart..].iter().any(|edit| matches!(edit, EditDescriptor::Field { .. }));
+        (parser.rest.is_empty() && has_field).then_some(Self { edits, restart })
     }
 
     /// Reads `count` fields from the necessary number of lines.
@@ -66,11 +66,11 @@ impl Fixed {
         mut read: impl FnMut(Field<'a>) -> Result<T, Error>,
     ) -> Result<Vec<T>, Error> {
         // A field has at least a digit and a separator or line end.
-        let mut found = Vec::with_capacity(count.min(lines.left() / 2 + 1));
+        let mut found = Vec::with_capacity(count.min(lines.remaining() / 2 + 1));
         let (mut line, mut column, mut scale, mut next) = (None, 0_usize, 0, 0);
         while found.len() < count {
             let Some(edit) = self.edits.get(next) else {
-                (line, next) = (None, self.again);
+                (line, next) = (None, self.restart);
                 continue;
             };
             let current = match line {
@@ -81,7 +81,7 @@ impl Fixed {
                 }
             };
             match *edit {
-                Edit::Field { width, decimals } => {
+                EditDescriptor::Field { width, decimals } => {
                     let text = current.columns(column, column + width);
                     if text.is_empty() {
                         let columns = format!("nothing in columns {} to {}", column + 1, column + width);
@@ -90,10 +90,10 @@ impl Fixed {
                     found.push(read(Field { line: current, text, decimals, scale })?);
                     column += width;
                 }
-                Edit::Skip(by) => column = column.saturating_add_signed(by),
-                Edit::Column(at) => column = at,
-                Edit::Scale(power) => scale = power,
-                Edit::Line => line = None,
+                EditDescriptor::Skip(by) => column = column.saturating_add_signed(by),
+                EditDescriptor::Column(at) => column = at,
+                EditDescriptor::Scale(power) => scale = power,
+                EditDescriptor::Line => line = None,
             }
             next += 1;
         }
@@ -107,7 +107,7 @@ impl Field<'_> {
         let value = self.line.real(self.text)?;
         if self.decimals > 0 && value != 0.0 && value.is_finite() && !self.text.contains(&b'.') {
             // Fortran places the decimal point before the last digits, other programs after them.
-            return Err(self.line.malformed("a number with a decimal point", &shown(self.text)));
+            return Err(self.line.malformed("a number with a decimal point", &quoted(self.text)));
         }
         let is_exponent = |(at, byte): (usize, &u8)| byte.is_ascii_alphabetic() || (at > 0 && b"+-".contains(byte));
         match self.text.iter().enumerate().any(is_exponent) {
@@ -121,17 +121,17 @@ impl Field<'_> {
 struct Parser<'t> {
     rest: &'t [u8],
     /// Start of the last top-level group.
-    again: usize,
+    restart: usize,
 }
 
 impl Parser<'_> {
     /// Parses a list up to its closing parenthesis.
-    fn list(&mut self, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
+    fn list(&mut self, edits: &mut Vec<EditDescriptor>, depth: usize) -> Option<()> {
         loop {
             match self.letter()? {
                 b')' => return Some(()),
                 b',' => {}
-                b'/' => edits.push(Edit::Line),
+                b'/' => edits.push(EditDescriptor::Line),
                 first => self.item(first, edits, depth)?,
             }
             if edits.len() > MOST {
@@ -141,7 +141,7 @@ impl Parser<'_> {
     }
 
     /// Parses an item with the given first character.
-    fn item(&mut self, first: u8, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
+    fn item(&mut self, first: u8, edits: &mut Vec<EditDescriptor>, depth: usize) -> Option<()> {
         let negative = first == b'-';
         let (count, letter) = match first {
             b'+' | b'-' => (Some(self.number()?), self.letter()?),
@@ -154,7 +154,7 @@ impl Parser<'_> {
         match letter {
             b'P' => {
                 let power = i32::try_from(count?).ok()?;
-                edits.push(Edit::Scale(if negative { -power } else { power }));
+                edits.push(EditDescriptor::Scale(if negative { -power } else { power }));
                 return Some(());
             }
             _ if negative || count == Some(0) => return None,
@@ -163,11 +163,11 @@ impl Parser<'_> {
         let count = count.unwrap_or(1);
         match letter {
             b'(' if depth < 8 => self.group(count, edits, depth)?,
-            b'X' => edits.push(Edit::Skip(count as isize)),
+            b'X' => edits.push(EditDescriptor::Skip(count as isize)),
             b'T' => edits.push(match self.rest.first()? {
-                b'L' => Edit::Skip(-(self.number_behind()? as isize)),
-                b'R' => Edit::Skip(self.number_behind()? as isize),
-                _ => Edit::Column(self.number()?.checked_sub(1)?),
+                b'L' => EditDescriptor::Skip(-(self.number_behind()? as isize)),
+                b'R' => EditDescriptor::Skip(self.number_behind()? as isize),
+                _ => EditDescriptor::Column(self.number()?.checked_sub(1)?),
             }),
             // Control of signs and blanks, which does not change the reading of numbers.
             b'S' | b'B' => self.skip(b"PSNZ"),
@@ -181,10 +181,10 @@ impl Parser<'_> {
     }
 
     /// Parses a group and repeats it `count` times.
-    fn group(&mut self, count: usize, edits: &mut Vec<Edit>, depth: usize) -> Option<()> {
+    fn group(&mut self, count: usize, edits: &mut Vec<EditDescriptor>, depth: usize) -> Option<()> {
         let start = edits.len();
         if depth == 0 {
-            self.again = start;
+            self.restart = start;
         }
         self.list(edits, depth + 1)?;
         let group = edits[start..].to_vec();
@@ -196,7 +196,7 @@ impl Parser<'_> {
     }
 
     /// Parses `w`, `w.d` or `w.dEe` after the letter of a field.
-    fn field(&mut self, letter: u8) -> Option<Edit> {
+    fn field(&mut self, letter: u8) -> Option<EditDescriptor> {
         if letter == b'E' {
             self.skip(b"SNX");
         }
@@ -208,7 +208,7 @@ impl Parser<'_> {
                 self.number_behind()?;
             }
         }
-        Some(Edit::Field { width, decimals: if letter == b'I' { 0 } else { decimals } })
+        Some(EditDescriptor::Field { width, decimals: if letter == b'I' { 0 } else { decimals } })
     }
 
     fn letter(&mut self) -> Option<u8> {
@@ -251,17 +251,17 @@ mod tests {
     use super::*;
 
     fn reals(format: &str, text: &str, count: usize) -> Result<Vec<f64>, Error> {
-        let fixed = Fixed::new(format).unwrap_or_else(|| panic!("{format}"));
+        let fixed = FortranFormat::new(format).unwrap_or_else(|| panic!("{format}"));
         fixed.read(&mut Lines::new(text.as_bytes()), count, "a number", |field| field.real())
     }
 
     #[test]
     fn formats_of_one_kind_of_field() {
         let check = |text: &str, expected: Option<(usize, usize)>| {
-            let fields = Fixed::new(text).map(|fixed| {
+            let fields = FortranFormat::new(text).map(|fixed| {
                 let widths: Vec<usize> = (fixed.edits.iter())
                     .filter_map(|edit| match edit {
-                        Edit::Field { width, .. } => Some(*width),
+                        EditDescriptor::Field { width, .. } => Some(*width),
                         _ => None,
                     })
                     .collect();

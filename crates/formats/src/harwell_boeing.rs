@@ -12,11 +12,11 @@
 //! Source: Duff, Grimes, Lewis, Users' Guide for the Harwell-Boeing Sparse Matrix Collection,
 //! TR/PA/92/86 (1992); ANSYS Mechanical APDL Command Reference, HBMAT.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::fortran::Fixed;
-use crate::matrix::{Matrix, Symmetry, Triplets, compressed};
-use crate::text::{Lines, shown};
+use crate::fortran::FortranFormat;
+use crate::matrix::{Matrix, Symmetry, TripletBuilder, for_each_compressed};
+use crate::text::{Lines, quoted};
 
 pub(crate) const FORMAT: Format = Format {
     name: "harwell-boeing",
@@ -44,18 +44,18 @@ fn type_of(word: &[u8]) -> Option<[u8; 3]> {
 }
 
 /// The header, with the lines after it.
-struct Header<'a> {
+struct HbHeader<'a> {
     rows: usize,
     columns: usize,
     entries: usize,
     kind: [u8; 3],
-    pointers: Fixed,
-    indices: Fixed,
-    values: Fixed,
+    pointers: FortranFormat,
+    indices: FortranFormat,
+    values: FortranFormat,
     lines: Lines<'a>,
 }
 
-fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
+fn header(bytes: &[u8]) -> Result<HbHeader<'_>, Error> {
     let mut lines = Lines::new(bytes);
     lines.expect("a title")?;
     let cards = lines.expect("the numbers of lines")?;
@@ -64,9 +64,9 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     let sizes = lines.expect("type and size")?;
     let words: Vec<_> = sizes.words().collect();
     let [kind, rows, columns, entries, ..] = words[..] else {
-        return Err(sizes.malformed("type, rows, columns and number of entries", &shown(sizes.text)));
+        return Err(sizes.malformed("type, rows, columns and number of entries", &quoted(sizes.text)));
     };
-    let kind = type_of(kind).ok_or_else(|| sizes.malformed("a type such as RSA", &shown(kind)))?;
+    let kind = type_of(kind).ok_or_else(|| sizes.malformed("a type such as RSA", &quoted(kind)))?;
     let (rows, columns, entries) = (sizes.count(rows)?, sizes.count(columns)?, sizes.count(entries)?);
     let line = lines.expect("the formats")?;
     let text = String::from_utf8_lossy(line.text).into_owned();
@@ -78,10 +78,10 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     let mut formats = text.split_inclusive(closes).map(str::trim);
     let mut format = |what: &str| {
         let found = formats.next().unwrap_or_default();
-        Fixed::new(found).ok_or_else(|| {
-            let problem = format!("{} is not a supported Fortran format for {what}", shown(found.as_bytes()));
+        FortranFormat::new(found).ok_or_else(|| {
+            let problem = format!("{} is not a supported Fortran format for {what}", quoted(found.as_bytes()));
             let remedy = "use a format of integers or real numbers, such as (8I10), (1X,8I9) or (1P,4E20.12)";
-            Error::new(Kind::Malformed, line.location(), problem, remedy)
+            Error::new(ErrorKind::Malformed, line.location(), problem, remedy)
         })
     };
     let (pointers, indices) = (format("pointers")?, format("rows")?);
@@ -89,20 +89,20 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, Error> {
     if right_sides > 0 {
         lines.expect("the line of right-hand sides")?;
     }
-    Ok(Header { rows, columns, entries, kind, pointers, indices, values, lines })
+    Ok(HbHeader { rows, columns, entries, kind, pointers, indices, values, lines })
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let header = header(bytes)?;
     Ok(vec![match header.kind {
-        [b'C', ..] => Item::other("", COMPLEX),
-        [_, _, b'E'] => Item::other("", "a matrix of unassembled elements"),
+        [b'C', ..] => Item::not_a_matrix("", COMPLEX),
+        [_, _, b'E'] => Item::not_a_matrix("", "a matrix of unassembled elements"),
         _ => Item::new("", header.rows, header.columns, move || read(bytes)),
     }])
 }
 
 fn read(bytes: &[u8]) -> Result<Matrix, Error> {
-    let Header { rows, columns, entries, kind, pointers, indices, values, mut lines } = header(bytes)?;
+    let HbHeader { rows, columns, entries, kind, pointers, indices, values, mut lines } = header(bytes)?;
     let count = columns.saturating_add(1);
     let pointers =
         pointers.read(&mut lines, count, "a pointer for every column", |field| field.line.index(field.text))?;
@@ -117,8 +117,8 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
         b'Z' => Symmetry::Skew,
         _ => Symmetry::General,
     };
-    let mut triplets = Triplets::new(rows, columns, indices.len(), Location::File)?;
-    compressed(&pointers, &indices, &values, columns, |column, row, value| {
+    let mut triplets = TripletBuilder::new(rows, columns, indices.len(), Location::File)?;
+    for_each_compressed(&pointers, &indices, &values, columns, |column, row, value| {
         triplets.push(row, column, value, Location::File)
     })?;
     triplets.finish(symmetry)
@@ -171,20 +171,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |kind: &str, formats: &str, body: &str, fault, location| {
             let text = file(kind, formats, body);
             let found = read_bytes(text.as_bytes(), Some("harwell-boeing"), None).map(|_| ());
             assert_eq!(found.map_err(|e| (e.kind, e.location)), Err((fault, location)), "{text}");
         };
-        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", Kind::Truncated, Location::Line(8));
-        check("RSA", FORMATS, "F\n  1  3  4\n", Kind::Malformed, Location::Line(6));
-        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), Kind::Count, Location::File);
-        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), Kind::Count, Location::File);
-        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), Kind::Malformed, Location::Line(6));
-        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, Kind::Malformed, Location::Line(4));
-        check("CSA", FORMATS, BODY, Kind::Complex, Location::File);
-        check("RSE", FORMATS, BODY, Kind::Unsupported, Location::File);
-        check("XYZ", FORMATS, BODY, Kind::Malformed, Location::Line(3));
+        check("RSA", FORMATS, "F\n  1  3  4  5\n  1  3  2  3\n", ErrorKind::Truncated, Location::Line(8));
+        check("RSA", FORMATS, "F\n  1  3  4\n", ErrorKind::Malformed, Location::Line(6));
+        check("RSA", FORMATS, &BODY.replace("1  3  2  3", "1  3  2  9"), ErrorKind::Count, Location::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "1  3  2  5"), ErrorKind::Count, Location::File);
+        check("RSA", FORMATS, &BODY.replace("1  3  4  5", "0  3  4  5"), ErrorKind::Malformed, Location::Line(6));
+        check("RSA", "(8I3)           (8I3)           (2A20.12)", BODY, ErrorKind::Malformed, Location::Line(4));
+        check("CSA", FORMATS, BODY, ErrorKind::Complex, Location::File);
+        check("RSE", FORMATS, BODY, ErrorKind::Unsupported, Location::File);
+        check("XYZ", FORMATS, BODY, ErrorKind::Malformed, Location::Line(3));
     }
 }

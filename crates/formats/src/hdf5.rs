@@ -13,10 +13,10 @@ use std::rc::Rc;
 
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::inflate::Limit;
-use crate::matrix::{Along, Symmetry, Triplets, compressed, dense};
+use crate::inflate::DecompressionLimit;
+use crate::matrix::{DenseLayout, StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "hdf5",
@@ -34,7 +34,7 @@ const DEPTH: usize = 8;
 
 /// Count of numbers that any dataset may have, stored or not, and any chunk.
 /// Chunks of h5py are not larger.
-const FEW: u64 = 1 << 17;
+const MIN_NUMBER_LIMIT: u64 = 1 << 17;
 
 /// Maximum number of bytes that deflate packs into one.
 const DEFLATE: u64 = 1032;
@@ -46,16 +46,17 @@ const MEMBERS: usize = 10_000;
 const GROUPS: usize = 1000;
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let file = guarded(Location::File, || File::from_bytes(bytes.to_vec()))?;
+    let file = catching_panics(Location::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
     let root = Rc::new(file.root());
-    Walk { limit: Limit::of(bytes.len()), groups: 0, items: &mut items }.through(&root, "", DEPTH)?;
+    Traversal { limit: DecompressionLimit::for_file(bytes.len()), groups: 0, items: &mut items }
+        .visit_group(&root, "", DEPTH)?;
     Ok(items)
 }
 
 /// Calls the crate `hdf5-pure`, and converts its errors and panics. For damaged files it adds
 /// numbers without a check (0.47, positions of chunks) and may panic.
-fn guarded<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
+fn catching_panics<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
     // The data it was working on is dropped with the error, so no inconsistent
     // state remains visible.
     let answer = catch_unwind(AssertUnwindSafe(ask));
@@ -66,53 +67,53 @@ fn guarded<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Err
     };
     let problem = format!("the HDF5 file cannot be read: {problem}");
     let remedy = "save or copy the file again; if this fails in MATLAB, save without -v7.3";
-    Err(Error::new(Kind::Malformed, location, problem, remedy))
+    Err(Error::new(ErrorKind::Malformed, location, problem, remedy))
 }
 
 /// A traversal of the groups of a file.
-struct Walk<'w, 'a> {
-    limit: Limit,
+struct Traversal<'w, 'a> {
+    limit: DecompressionLimit,
     /// Number of groups visited so far.
     groups: usize,
     items: &'w mut Vec<Item<'a>>,
 }
 
-impl Walk<'_, '_> {
+impl Traversal<'_, '_> {
     /// Adds the contents of a group and of its subgroups.
-    fn through(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
+    fn visit_group(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
         self.groups += 1;
         let here = || Location::Variable(path.to_string());
         // MATLAB stores the parts of cells and objects in the groups `#refs#` and `#subsystem#`.
         let own = |name: &String| !name.starts_with('#');
         let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
-        for name in guarded(here(), || group.datasets())?.into_iter().filter(own) {
+        for name in catching_panics(here(), || group.datasets())?.into_iter().filter(own) {
             if self.items.len() >= MEMBERS || self.groups >= GROUPS {
                 return Ok(());
             }
-            let dataset = guarded(Location::Variable(full(&name)), || group.dataset(&name))?;
+            let dataset = catching_panics(Location::Variable(full(&name)), || group.dataset(&name))?;
             self.items.push(dense_item(dataset, full(&name), self.limit)?);
         }
-        for name in guarded(here(), || group.groups())?.into_iter().filter(own) {
+        for name in catching_panics(here(), || group.groups())?.into_iter().filter(own) {
             if self.items.len() >= MEMBERS || self.groups >= GROUPS {
                 return Ok(());
             }
             let location = || Location::Variable(full(&name));
-            let inner = Rc::new(guarded(location(), || group.group(&name))?);
-            let attributes = guarded(location(), || inner.attrs())?;
+            let inner = Rc::new(catching_panics(location(), || group.group(&name))?);
+            let attributes = catching_panics(location(), || inner.attrs())?;
             if attributes.contains_key("OCTAVE_NEW_FORMAT") {
                 // Octave transposes its matrices without marking them.
-                self.items.push(Item::other(
+                self.items.push(Item::not_a_matrix(
                     full(&name),
                     "a matrix in the form of Octave's `save -hdf5`, which is not supported (use `save -v7`)",
                 ));
             } else if let Some(rows) = attributes.get("MATLAB_sparse") {
                 let rows = whole(rows).ok_or_else(|| {
                     let problem = "the attribute MATLAB_sparse does not contain the number of rows".into();
-                    Error::new(Kind::Malformed, location(), problem, "save the file again")
+                    Error::new(ErrorKind::Malformed, location(), problem, "save the file again")
                 })?;
                 self.items.push(sparse_item(inner, full(&name), rows, self.limit)?);
             } else if depth > 0 {
-                self.through(&inner, &full(&name), depth - 1)?;
+                self.visit_group(&inner, &full(&name), depth - 1)?;
             }
         }
         Ok(())
@@ -132,9 +133,9 @@ fn whole(value: &AttrValue) -> Option<usize> {
     }
 }
 
-fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'static>, Error> {
+fn dense_item(dataset: Dataset, name: String, limit: DecompressionLimit) -> Result<Item<'static>, Error> {
     let location = Location::Variable(name.clone());
-    let note = match guarded(location.clone(), || dataset.dtype())? {
+    let note = match catching_panics(location.clone(), || dataset.dtype())? {
         DType::Compound(fields) if fields.iter().any(|(field, _)| field == "imag" || field == "i") => Some(COMPLEX),
         DType::F32 | DType::F64 => None,
         DType::I8 | DType::I16 | DType::I32 | DType::I64 | DType::U8 | DType::U16 | DType::U32 | DType::U64 => None,
@@ -142,10 +143,10 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
         DType::ObjectReference => Some("a cell array or an object"),
         _ => Some("data of a non-numeric type"),
     };
-    let attributes = guarded(location.clone(), || dataset.attrs())?;
-    let note = note.or_else(|| of_matlab(&attributes));
+    let attributes = catching_panics(location.clone(), || dataset.attrs())?;
+    let note = note.or_else(|| matlab_note(&attributes));
     if let Some(note) = note {
-        return Ok(Item::other(name, note));
+        return Ok(Item::not_a_matrix(name, note));
     }
     let matlab = attributes.contains_key("MATLAB_class");
     let shape = sizes(&dataset, &location)?;
@@ -154,21 +155,21 @@ fn dense_item(dataset: Dataset, name: String, limit: Limit) -> Result<Item<'stat
         [rows] => (rows, 1),
         [columns, rows] if matlab => (rows, columns),
         [rows, columns] => (rows, columns),
-        _ => return Ok(Item::other(name, format!("an array of {} dimensions", shape.len()))),
+        _ => return Ok(Item::not_a_matrix(name, format!("an array of {} dimensions", shape.len()))),
     };
     Ok(Item::new(name.clone(), rows, columns, move || {
         let values = numbers(&dataset, limit, &name, Dataset::read_f64)?;
         if rows.checked_mul(columns) != Some(values.len()) {
             let problem = format!("the dataset has {} numbers, but its size is {rows} x {columns}", values.len());
-            return Err(Error::new(Kind::Count, Location::Variable(name.clone()), problem, "save the file again"));
+            return Err(Error::new(ErrorKind::Count, Location::Variable(name.clone()), problem, "save the file again"));
         }
-        let along = if matlab { Along::Columns } else { Along::Rows };
-        dense((rows, columns), along, &Location::Variable(name.clone()), |at| Ok(values[at]))
+        let order = if matlab { StorageOrder::Columns } else { StorageOrder::Rows };
+        from_dense(DenseLayout { rows, columns, order }, &Location::Variable(name.clone()), |at| Ok(values[at]))
     }))
 }
 
 /// Returns MATLAB's description of a dataset that is not a matrix.
-fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
+fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
     if attributes.contains_key("MATLAB_empty") {
         return Some("empty");
     }
@@ -180,14 +181,14 @@ fn of_matlab(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
 }
 
 fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
-    let shape = guarded(location.clone(), || dataset.shape())?;
+    let shape = catching_panics(location.clone(), || dataset.shape())?;
     shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(location.clone()))
 }
 
 fn too_large(location: Location) -> Error {
     let problem = "the dataset states more numbers than a file of this size can contain".into();
     Error::new(
-        Kind::TooLarge,
+        ErrorKind::TooLarge,
         location,
         problem,
         "save the file again; if its size is correct, save it without compression",
@@ -197,33 +198,36 @@ fn too_large(location: Location) -> Error {
 /// Reads all numbers of a dataset.
 fn numbers<T>(
     dataset: &Dataset,
-    limit: Limit,
+    limit: DecompressionLimit,
     name: &str,
     read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
 ) -> Result<Vec<T>, Error> {
     let location = Location::Variable(name.to_string());
     // A chunk is decompressed as a whole, even if the dataset ends within it.
-    let chunk = guarded(location.clone(), || dataset.chunk_shape())?.unwrap_or_default();
+    let chunk = catching_panics(location.clone(), || dataset.chunk_shape())?.unwrap_or_default();
     let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
-    let shape = guarded(location.clone(), || dataset.shape())?;
+    let shape = catching_panics(location.clone(), || dataset.shape())?;
     // The stored size of a dataset in chunks. The index of some kinds of chunks cannot be queried.
     let stored = match chunk[..] {
         [] => None,
-        _ => guarded(location.clone(), || dataset.chunks())
+        _ => catching_panics(location.clone(), || dataset.chunks())
             .ok()
             .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
     };
-    let room = stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE)).max(FEW).min(limit.numbers());
+    let room = stored
+        .map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE))
+        .max(MIN_NUMBER_LIMIT)
+        .min(limit.numbers());
     let count = product(&shape).filter(|&count| count <= room);
-    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(FEW))) {
+    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(MIN_NUMBER_LIMIT))) {
         return Err(too_large(location));
     }
-    guarded(location, || read(dataset))
+    catching_panics(location, || read(dataset))
 }
 
-fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: Limit) -> Result<Item<'static>, Error> {
+fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: DecompressionLimit) -> Result<Item<'static>, Error> {
     let location = Location::Variable(name.clone());
-    let part = move |part: &str| guarded(location.clone(), || group.dataset(part));
+    let part = move |part: &str| catching_panics(location.clone(), || group.dataset(part));
     let pointers = sizes(&part("jc")?, &Location::Variable(name.clone()))?;
     let columns = pointers.first().copied().unwrap_or_default().saturating_sub(1);
     Ok(Item::new(name.clone(), rows, columns, move || {
@@ -232,11 +236,11 @@ fn sparse_item(group: Rc<Group>, name: String, rows: usize, limit: Limit) -> Res
             Ok(found.into_iter().map(|index| usize::try_from(index).unwrap_or(usize::MAX)).collect())
         };
         let pointers = whole("jc")?;
-        let mut triplets = Triplets::new(rows, columns, 0, Location::File)?;
+        let mut triplets = TripletBuilder::new(rows, columns, 0, Location::File)?;
         // A matrix without entries has neither rows nor values.
         if pointers.last().is_some_and(|&count| count > 0) {
             let (inner, values) = (whole("ir")?, numbers(&part("data")?, limit, &name, Dataset::read_f64)?);
-            compressed(&pointers, &inner, &values, columns, |column, row, value| {
+            for_each_compressed(&pointers, &inner, &values, columns, |column, row, value| {
                 triplets.push(row, column, value, Location::Variable(name.clone()))
             })?;
         }
@@ -250,9 +254,9 @@ mod tests {
 
     #[test]
     fn a_panic_of_the_library_is_an_error() {
-        let found = guarded::<()>(Location::Byte(3), || panic!("attempt to add with overflow, on purpose"));
-        assert_eq!(found.map_err(|error| (error.kind, error.location)), Err((Kind::Malformed, Location::Byte(3))));
-        let found = guarded(Location::File, || File::from_bytes(vec![0; 600])).map(|_| ());
-        assert_eq!(found.map_err(|error| error.kind), Err(Kind::Malformed));
+        let found = catching_panics::<()>(Location::Byte(3), || panic!("attempt to add with overflow, on purpose"));
+        assert_eq!(found.map_err(|error| (error.kind, error.location)), Err((ErrorKind::Malformed, Location::Byte(3))));
+        let found = catching_panics(Location::File, || File::from_bytes(vec![0; 600])).map(|_| ());
+        assert_eq!(found.map_err(|error| error.kind), Err(ErrorKind::Malformed));
     }
 }

@@ -4,26 +4,26 @@ use std::io::Read;
 
 use flate2::read::{DeflateDecoder, ZlibDecoder};
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
-/// Maximum ratio of decompressed size to file size, beyond [`UNPACKED_ALWAYS`].
+/// Maximum ratio of decompressed size to file size, beyond [`MIN_DECOMPRESSED_LIMIT`].
 ///
 /// Deflate compresses up to 1030 bytes into one, which makes decompression bombs possible. A sparse
 /// stiffness matrix of a regular mesh, with repeated values, shrinks to a 25th. Parts of files,
 /// such as the equal values of a mass matrix, and full matrices of mostly zeros shrink to a 900th.
-pub const EXPANSION: usize = 100;
+pub const MAX_EXPANSION: usize = 100;
 
 /// Decompressed size in bytes that is always accepted: a full matrix of 5800 rows.
-pub const UNPACKED_ALWAYS: usize = 256 << 20;
+pub const MIN_DECOMPRESSED_LIMIT: usize = 256 << 20;
 
 /// Limit on the decompressed bytes of a file.
 #[derive(Clone, Copy)]
-pub(crate) struct Limit(usize);
+pub(crate) struct DecompressionLimit(usize);
 
-impl Limit {
+impl DecompressionLimit {
     /// Returns the limit for a file of `file` bytes.
-    pub fn of(file: usize) -> Self {
-        Self(UNPACKED_ALWAYS.max(file.saturating_mul(EXPANSION)))
+    pub fn for_file(file: usize) -> Self {
+        Self(MIN_DECOMPRESSED_LIMIT.max(file.saturating_mul(MAX_EXPANSION)))
     }
 
     /// Returns the limit in numbers of 8 bytes.
@@ -34,7 +34,7 @@ impl Limit {
 
 /// The two containers of deflate.
 #[derive(Clone, Copy)]
-pub(crate) enum Wrapping {
+pub(crate) enum Container {
     /// With header and checksum, in MATLAB files.
     Zlib,
     /// Without header, in zip files.
@@ -42,35 +42,40 @@ pub(crate) enum Wrapping {
 }
 
 /// Decompresses all of `packed`.
-pub(crate) fn inflate(packed: &[u8], wrapping: Wrapping, limit: Limit, location: &Location) -> Result<Vec<u8>, Error> {
+pub(crate) fn inflate(
+    packed: &[u8],
+    container: Container,
+    limit: DecompressionLimit,
+    location: &Location,
+) -> Result<Vec<u8>, Error> {
     let most = limit.0;
-    let (bytes, damage) = up_to(packed, wrapping, most + 1);
+    let (bytes, damage) = up_to(packed, container, most + 1);
     let fault = |kind, problem: String, remedy: &str| Err(Error::new(kind, location.clone(), problem, remedy));
     if bytes.len() > most {
         let problem =
             format!("{} compressed bytes expand to more than {most} bytes, the limit for this file", packed.len());
-        return fault(Kind::TooLarge, problem, "save it as a sparse matrix, or without compression");
+        return fault(ErrorKind::TooLarge, problem, "save it as a sparse matrix, or without compression");
     }
     match damage {
         None => Ok(bytes),
         Some(error) => {
             let problem = format!("the compressed part is damaged: {error}");
-            fault(Kind::Malformed, problem, "export or copy the file again")
+            fault(ErrorKind::Malformed, problem, "export or copy the file again")
         }
     }
 }
 
 /// Returns the first `count` decompressed bytes, fewer if the data ends or is damaged.
-pub(crate) fn beginning(packed: &[u8], wrapping: Wrapping, count: usize) -> Vec<u8> {
-    up_to(packed, wrapping, count).0
+pub(crate) fn beginning(packed: &[u8], container: Container, count: usize) -> Vec<u8> {
+    up_to(packed, container, count).0
 }
 
-fn up_to(packed: &[u8], wrapping: Wrapping, count: usize) -> (Vec<u8>, Option<std::io::Error>) {
+fn up_to(packed: &[u8], container: Container, count: usize) -> (Vec<u8>, Option<std::io::Error>) {
     let mut bytes = Vec::new();
     let most = count as u64;
-    let end = match wrapping {
-        Wrapping::Zlib => ZlibDecoder::new(packed).take(most).read_to_end(&mut bytes),
-        Wrapping::Bare => DeflateDecoder::new(packed).take(most).read_to_end(&mut bytes),
+    let end = match container {
+        Container::Zlib => ZlibDecoder::new(packed).take(most).read_to_end(&mut bytes),
+        Container::Bare => DeflateDecoder::new(packed).take(most).read_to_end(&mut bytes),
     };
     (bytes, end.err())
 }
@@ -89,25 +94,26 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_stops_early() -> std::io::Result<()> {
-        let limit = Limit::of(1);
-        let bomb = pack(&vec![0; UNPACKED_ALWAYS + 1])?;
+    fn decompression_bomb_is_refused() -> std::io::Result<()> {
+        let limit = DecompressionLimit::for_file(1);
+        let bomb = pack(&vec![0; MIN_DECOMPRESSED_LIMIT + 1])?;
         assert!(bomb.len() < 300_000);
-        let found = inflate(&bomb, Wrapping::Zlib, limit, &Location::Byte(7)).map_err(|e| (e.kind, e.location));
-        assert_eq!(found, Err((Kind::TooLarge, Location::Byte(7))));
-        assert_eq!(beginning(&bomb, Wrapping::Zlib, 5), [0; 5]);
+        let found = inflate(&bomb, Container::Zlib, limit, &Location::Byte(7)).map_err(|e| (e.kind, e.location));
+        assert_eq!(found, Err((ErrorKind::TooLarge, Location::Byte(7))));
+        assert_eq!(beginning(&bomb, Container::Zlib, 5), [0; 5]);
         Ok(())
     }
 
     #[test]
-    fn what_is_damaged_or_short_is_refused() -> std::io::Result<()> {
+    fn damaged_data_is_refused() -> std::io::Result<()> {
         let packed = pack(b"a text that is packed")?;
         assert_eq!(
-            inflate(&packed, Wrapping::Zlib, Limit::of(1), &Location::File).as_deref(),
+            inflate(&packed, Container::Zlib, DecompressionLimit::for_file(1), &Location::File).as_deref(),
             Ok(&b"a text that is packed"[..])
         );
-        let short = inflate(&packed[..packed.len() - 6], Wrapping::Zlib, Limit::of(1), &Location::File);
-        assert_eq!(short.map_err(|e| e.kind), Err(Kind::Malformed));
+        let short =
+            inflate(&packed[..packed.len() - 6], Container::Zlib, DecompressionLimit::for_file(1), &Location::File);
+        assert_eq!(short.map_err(|e| e.kind), Err(ErrorKind::Malformed));
         Ok(())
     }
 }

@@ -19,7 +19,7 @@
 //! [`TABLE`] lists the formats, and [`names::TABLE`] the formats of row names.
 //!
 //! The reader does not trust sizes stated in a header: memory is bounded by the length of the
-//! file, see [`EXPANSION`] for compressed files.
+//! file, see [`MAX_EXPANSION`] for compressed files.
 
 mod abaqus_element;
 mod abaqus_input;
@@ -30,6 +30,7 @@ mod coordinate;
 mod dense;
 mod error;
 mod file;
+mod first_line;
 mod format;
 mod fortran;
 mod harwell_boeing;
@@ -44,7 +45,6 @@ mod nastran_op4;
 mod npy;
 mod npz;
 mod report;
-mod sizes;
 mod text;
 
 use std::path::Path;
@@ -52,13 +52,13 @@ use std::path::Path;
 use file::{io, load};
 use format::Item;
 
-pub use constrained::{aligned, constrained};
-pub use error::{Error, Kind, Location};
-pub use file::LARGEST_FILE;
+pub use constrained::{align_rows, constrained_rows};
+pub use error::{Error, ErrorKind, Location};
+pub use file::MAX_FILE_BYTES;
 pub use format::{Format, Variable};
-pub use inflate::{EXPANSION, UNPACKED_ALWAYS};
+pub use inflate::{MAX_EXPANSION, MIN_DECOMPRESSED_LIMIT};
 pub use matrix::{Entry, Matrix, Origin, Symmetry};
-pub use report::Report;
+pub use report::MatrixReport;
 
 /// All formats. The first format that recognizes the content reads the file.
 pub const TABLE: &[Format] = &[
@@ -85,10 +85,10 @@ pub const TABLE: &[Format] = &[
 /// required if the file contains several matrices.
 ///
 /// # Errors
-/// [`Error`] with file, location, problem and remedy; see [`Kind`].
+/// [`Error`] with file, location, problem and remedy; see [`ErrorKind`].
 pub fn read(path: impl AsRef<Path>, format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
     let path = path.as_ref();
-    read_bytes(&load(path)?, format, name).map_err(|error| error.of(path))
+    read_bytes(&load(path)?, format, name).map_err(|error| error.with_path(path))
 }
 
 /// Reads one matrix from a file in memory, like [`read`].
@@ -96,14 +96,14 @@ pub fn read(path: impl AsRef<Path>, format: Option<&str>, name: Option<&str>) ->
 /// # Errors
 /// Like [`read`], without the path.
 pub fn read_bytes(bytes: &[u8], format: Option<&str>, name: Option<&str>) -> Result<Matrix, Error> {
-    let bytes = unmarked(bytes);
-    let format = find(bytes, format)?;
+    let bytes = without_bom(bytes);
+    let format = find_format(bytes, format)?;
     let items = (format.open)(bytes)?;
-    let item = pick(format, &items, name)?;
+    let item = select(format, &items, name)?;
     check_size(item.variable.rows, item.variable.columns, bytes.len())?;
     let mut matrix = (item.read)().map_err(|error| match item.variable.name.as_str() {
         "" => error,
-        name => error.at(Location::Variable(name.to_string())),
+        name => error.with_location(Location::Variable(name.to_string())),
     })?;
     check_size(matrix.rows(), matrix.columns(), bytes.len())?;
     matrix.set_origin(format.name, &item.variable.name);
@@ -116,7 +116,7 @@ pub fn read_bytes(bytes: &[u8], format: Option<&str>, name: Option<&str>) -> Res
 /// Like [`read`].
 pub fn list(path: impl AsRef<Path>, format: Option<&str>) -> Result<Vec<Variable>, Error> {
     let path = path.as_ref();
-    list_bytes(&load(path)?, format).map_err(|error| error.of(path))
+    list_bytes(&load(path)?, format).map_err(|error| error.with_path(path))
 }
 
 /// Lists the contents of a file in memory, like [`list`].
@@ -124,8 +124,8 @@ pub fn list(path: impl AsRef<Path>, format: Option<&str>) -> Result<Vec<Variable
 /// # Errors
 /// Like [`list`], without the path.
 pub fn list_bytes(bytes: &[u8], format: Option<&str>) -> Result<Vec<Variable>, Error> {
-    let bytes = unmarked(bytes);
-    let items = (find(bytes, format)?.open)(bytes)?;
+    let bytes = without_bom(bytes);
+    let items = (find_format(bytes, format)?.open)(bytes)?;
     Ok(items.into_iter().map(|item| item.variable).collect())
 }
 
@@ -136,29 +136,31 @@ pub fn list_bytes(bytes: &[u8], format: Option<&str>) -> Result<Vec<Variable>, E
 /// names to a separate file.
 ///
 /// # Errors
-/// [`Kind::Format`] for another extension, [`Kind::Io`].
+/// [`ErrorKind::Format`] for another extension, [`ErrorKind::Io`].
 pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
         Some("mtx") => matrix_market::write(matrix),
-        Some("npz") => npz::write(matrix).map_err(|error| error.of(path))?,
+        Some("npz") => npz::write(matrix).map_err(|error| error.with_path(path))?,
         _ => {
             let problem = "the file extension is neither .mtx (Matrix Market) nor .npz (SciPy)".into();
-            return Err(Error::new(Kind::Format, Location::File, problem, "use one of these extensions").of(path));
+            return Err(
+                Error::new(ErrorKind::Format, Location::File, problem, "use one of these extensions").with_path(path)
+            );
         }
     };
     std::fs::write(path, bytes).map_err(|error| io(path, &error))
 }
 
 /// Returns the content without the UTF-8 byte order mark that some editors write.
-fn unmarked(bytes: &[u8]) -> &[u8] {
+fn without_bom(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
 /// Returns the format with the given name, or the one that recognizes the content.
-fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
+fn find_format(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
     let names = || TABLE.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
-    let fault = |problem, remedy| Error::new(Kind::Format, Location::File, problem, remedy);
+    let fault = |problem, remedy| Error::new(ErrorKind::Format, Location::File, problem, remedy);
     if let Some(name) = name {
         let found = TABLE.iter().find(|format| format.name == name);
         return found.ok_or_else(|| fault(format!("there is no format `{name}`"), format!("use one of: {}", names())));
@@ -194,8 +196,8 @@ fn find(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Error> {
 }
 
 /// Returns the matrix with the given name, or the only one.
-fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> Result<&'i Item<'a>, Error> {
-    let fault = |problem: String, remedy: &str| Err(Error::new(Kind::Choice, Location::File, problem, remedy));
+fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> Result<&'i Item<'a>, Error> {
+    let fault = |problem: String, remedy: &str| Err(Error::new(ErrorKind::Selection, Location::File, problem, remedy));
     let there = || match items {
         [] => "nothing".to_string(),
         items => items.iter().map(|item| item.variable.to_string()).collect::<Vec<_>>().join(", "),
@@ -227,7 +229,7 @@ fn pick<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) -> R
 
 /// Number of rows or columns that is always accepted. Larger numbers must
 /// satisfy [`ROWS_PER_BYTE`].
-const ROWS_ALWAYS: usize = 1 << 20;
+const MIN_ROW_LIMIT: usize = 1 << 20;
 
 /// Maximum number of rows or columns per byte of a file.
 ///
@@ -238,12 +240,12 @@ const ROWS_PER_BYTE: usize = 1;
 /// Rejects sizes that a file of this length cannot fill, because users allocate
 /// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
-    let most = ROWS_ALWAYS.max(length.saturating_mul(ROWS_PER_BYTE));
+    let most = MIN_ROW_LIMIT.max(length.saturating_mul(ROWS_PER_BYTE));
     if rows.max(columns) <= most {
         return Ok(());
     }
     Err(Error::new(
-        Kind::TooLarge,
+        ErrorKind::TooLarge,
         Location::File,
         format!("the file states {rows} rows and {columns} columns, too many for its {length} bytes"),
         "an index or a size in the file is damaged; export it again",

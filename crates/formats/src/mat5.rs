@@ -8,11 +8,11 @@
 
 use std::borrow::Cow;
 
-use crate::bytes::{Bytes, Number, Order};
-use crate::error::{Error, Kind, Location};
+use crate::bytes::{ByteCursor, ByteOrder, NumberType};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::inflate::{Limit, Wrapping, beginning, inflate};
-use crate::matrix::{Along, Matrix, Symmetry, Triplets, compressed, dense};
+use crate::inflate::{Container, DecompressionLimit, beginning, inflate};
+use crate::matrix::{DenseLayout, Matrix, StorageOrder, Symmetry, TripletBuilder, for_each_compressed, from_dense};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matlab",
@@ -39,11 +39,11 @@ const STRUCTURE: u8 = 2;
 const SPARSE: u8 = 5;
 
 /// Returns the byte order, if the file has a header of version 5.
-fn order(bytes: &[u8]) -> Option<Order> {
+fn order(bytes: &[u8]) -> Option<ByteOrder> {
     let [major_or_minor @ .., a, b] = bytes.get(HEADER - 4..HEADER)? else { return None };
     match (major_or_minor, [*a, *b]) {
-        ([_, 1], [b'I', b'M']) => Some(Order::Little),
-        ([1, _], [b'M', b'I']) => Some(Order::Big),
+        ([_, 1], [b'I', b'M']) => Some(ByteOrder::Little),
+        ([1, _], [b'M', b'I']) => Some(ByteOrder::Big),
         _ => None,
     }
 }
@@ -66,14 +66,14 @@ pub(crate) fn is_version_4(bytes: &[u8]) -> bool {
 }
 
 /// An element: its type and its bytes.
-struct Element<'a> {
+struct MatElement<'a> {
     kind: u32,
     data: &'a [u8],
     location: Location,
 }
 
 /// Reads the next element and moves the cursor after it.
-fn element<'a>(bytes: &mut Bytes<'a>) -> Result<Element<'a>, Error> {
+fn element<'a>(bytes: &mut ByteCursor<'a>) -> Result<MatElement<'a>, Error> {
     let location = bytes.location();
     let kind = bytes.u32()?;
     // A small element stores its length in the upper half of its type, and its
@@ -82,30 +82,30 @@ fn element<'a>(bytes: &mut Bytes<'a>) -> Result<Element<'a>, Error> {
         let length = (kind >> 16) as usize;
         let data = bytes.take(4)?;
         let data = data.get(..length).ok_or_else(|| bytes.malformed("a small element of at most 4 bytes", length))?;
-        return Ok(Element { kind: kind & 0xffff, data, location });
+        return Ok(MatElement { kind: kind & 0xffff, data, location });
     }
     let length = bytes.u32()? as usize;
     let data = bytes.take(length)?;
     if kind != COMPRESSED {
         bytes.skip(length.next_multiple_of(8) - length);
     }
-    Ok(Element { kind, data, location })
+    Ok(MatElement { kind, data, location })
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let order =
-        order(bytes).ok_or_else(|| Bytes::new(bytes, Order::Little).malformed("the header of MATLAB 5", "none"))?;
-    let mut file = Bytes::new(bytes, order);
+    let order = order(bytes)
+        .ok_or_else(|| ByteCursor::new(bytes, ByteOrder::Little).malformed("the header of MATLAB 5", "none"))?;
+    let mut file = ByteCursor::new(bytes, order);
     file.skip(HEADER);
-    let limit = Limit::of(bytes.len());
+    let limit = DecompressionLimit::for_file(bytes.len());
     let mut items = Vec::new();
-    while file.left() >= 8 {
-        let Element { kind, data, location } = element(&mut file)?;
+    while file.remaining() >= 8 {
+        let MatElement { kind, data, location } = element(&mut file)?;
         let found = match kind {
-            MATRIX => variable(Source { data: Cow::Borrowed(data), packed: None, order, location }),
+            MATRIX => variable(VariableBytes { data: Cow::Borrowed(data), packed: None, order, location }),
             COMPRESSED => {
-                let start = beginning(data, Wrapping::Zlib, BEGINNING);
-                variable(Source { data: start.into(), packed: Some((data, limit)), order, location })
+                let start = beginning(data, Container::Zlib, BEGINNING);
+                variable(VariableBytes { data: start.into(), packed: Some((data, limit)), order, location })
             }
             _ => continue,
         };
@@ -117,18 +117,18 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 /// The bytes of a variable. For a compressed variable, `data` is the beginning
 /// and `packed` the whole.
 #[derive(Clone)]
-struct Source<'a> {
+struct VariableBytes<'a> {
     data: Cow<'a, [u8]>,
-    packed: Option<(&'a [u8], Limit)>,
-    order: Order,
+    packed: Option<(&'a [u8], DecompressionLimit)>,
+    order: ByteOrder,
     location: Location,
 }
 
-impl<'a> Source<'a> {
+impl<'a> VariableBytes<'a> {
     /// Returns all bytes of the variable, after the tag.
     fn whole(&self) -> Result<Cow<'_, [u8]>, Error> {
         let Some((packed, limit)) = self.packed else { return Ok(Cow::Borrowed(&self.data)) };
-        let mut all = inflate(packed, Wrapping::Zlib, limit, &self.location)?;
+        let mut all = inflate(packed, Container::Zlib, limit, &self.location)?;
         // Drop the tag of the inner matrix element.
         all.drain(..all.len().min(8));
         Ok(Cow::Owned(all))
@@ -136,7 +136,7 @@ impl<'a> Source<'a> {
 }
 
 /// The header of a variable.
-struct Head {
+struct VariableHeader {
     class: u8,
     complex: bool,
     rows: usize,
@@ -145,22 +145,22 @@ struct Head {
     name: String,
 }
 
-fn head(parts: &mut Bytes) -> Result<Head, Error> {
+fn head(parts: &mut ByteCursor) -> Result<VariableHeader, Error> {
     let flags = element(parts)?;
     let [class, bits] = match (parts.order, flags.data) {
-        (Order::Little, [class, bits, ..]) => [*class, *bits],
-        (Order::Big, [_, _, bits, class, ..]) => [*class, *bits],
+        (ByteOrder::Little, [class, bits, ..]) => [*class, *bits],
+        (ByteOrder::Big, [_, _, bits, class, ..]) => [*class, *bits],
         _ => return Err(parts.malformed("the flags of a variable", "less")),
     };
     let sizes = element(parts)?;
-    let mut cursor = Bytes::new(sizes.data, parts.order);
+    let mut cursor = ByteCursor::new(sizes.data, parts.order);
     let sizes: Vec<usize> =
-        (0..sizes.data.len() / 4).map(|_| Number::I32.index(&mut cursor)).collect::<Result<_, _>>()?;
+        (0..sizes.data.len() / 4).map(|_| NumberType::I32.index(&mut cursor)).collect::<Result<_, _>>()?;
     let name = String::from_utf8_lossy(element(parts)?.data).into_owned();
     let [rows, columns, ..] = sizes[..] else {
         return Err(parts.malformed("at least two dimensions", sizes.len()));
     };
-    Ok(Head { class, complex: bits & 8 != 0, rows, columns, dimensions: sizes.len(), name })
+    Ok(VariableHeader { class, complex: bits & 8 != 0, rows, columns, dimensions: sizes.len(), name })
 }
 
 /// Returns the description of a class that is not a matrix.
@@ -177,9 +177,9 @@ fn class_name(class: u8) -> Option<&'static str> {
 }
 
 /// Returns the items of one variable: itself, or the matrices of a structure.
-fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
+fn variable(mut source: VariableBytes) -> Result<Vec<Item>, Error> {
     if source.packed.is_some() {
-        let mut inside = Bytes::new(&source.data, source.order);
+        let mut inside = ByteCursor::new(&source.data, source.order);
         let kind = inside.u32().map_err(|_| damaged(&source.location))?;
         if kind != MATRIX {
             return Err(damaged(&source.location));
@@ -187,7 +187,7 @@ fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
         let rest = source.data.get(8..).unwrap_or_default().to_vec();
         source.data = rest.into();
     }
-    let head = head(&mut Bytes::new(&source.data, source.order)).map_err(|error| error_in(error, &source))?;
+    let head = head(&mut ByteCursor::new(&source.data, source.order)).map_err(|error| error_in(error, &source))?;
     if head.class == STRUCTURE {
         return structure(&source, &head.name, DEPTH);
     }
@@ -196,25 +196,25 @@ fn variable(mut source: Source) -> Result<Vec<Item>, Error> {
 
 fn damaged(location: &Location) -> Error {
     let problem = "the beginning of a compressed variable is damaged".into();
-    Error::new(Kind::Malformed, location.clone(), problem, "save or copy the file again")
+    Error::new(ErrorKind::Malformed, location.clone(), problem, "save or copy the file again")
 }
 
 /// Replaces the location of an error, relative to a variable, by the location
 /// of the variable in the file.
-fn error_in(error: Error, source: &Source) -> Error {
+fn error_in(error: Error, source: &VariableBytes) -> Error {
     Error { location: source.location.clone(), ..error }
 }
 
-fn item(source: Source, head: Head) -> Item {
+fn item(source: VariableBytes, head: VariableHeader) -> Item {
     let name = head.name.clone();
     if let Some(note) = class_name(head.class) {
-        return Item::other(name, note);
+        return Item::not_a_matrix(name, note);
     }
     if head.complex {
-        return Item::other(name, COMPLEX);
+        return Item::not_a_matrix(name, COMPLEX);
     }
     if head.dimensions != 2 {
-        return Item::other(name, format!("an array of {} dimensions", head.dimensions));
+        return Item::not_a_matrix(name, format!("an array of {} dimensions", head.dimensions));
     }
     Item::new(name, head.rows, head.columns, move || {
         let bytes = source.whole()?;
@@ -226,16 +226,16 @@ fn item(source: Source, head: Head) -> Item {
 }
 
 /// Returns the matrices of a structure of one element, as `name.field`.
-fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<Item<'a>>, Error> {
+fn structure<'a>(source: &VariableBytes<'a>, name: &str, depth: usize) -> Result<Vec<Item<'a>>, Error> {
     let whole = source.whole()?;
-    let mut parts = Bytes::new(&whole, source.order);
+    let mut parts = ByteCursor::new(&whole, source.order);
     let head = head(&mut parts).map_err(|error| error_in(error, source))?;
     if (head.rows, head.columns, head.dimensions) != (1, 1, 2) || depth == 0 {
-        return Ok(vec![Item::other(name, "an array of structures")]);
+        return Ok(vec![Item::not_a_matrix(name, "an array of structures")]);
     }
     let fields = (|| -> Result<_, Error> {
         let length = element(&mut parts)?;
-        let length = Number::I32.index(&mut Bytes::new(length.data, source.order))?;
+        let length = NumberType::I32.index(&mut ByteCursor::new(length.data, source.order))?;
         let names = element(&mut parts)?.data;
         if length == 0 {
             return Ok(Vec::new());
@@ -251,73 +251,79 @@ fn structure<'a>(source: &Source<'a>, name: &str, depth: usize) -> Result<Vec<It
     for (field, found) in fields.map_err(|error| error_in(error, source))? {
         let name = format!("{name}.{field}");
         if found.kind != MATRIX || found.data.is_empty() {
-            items.push(Item::other(name, "empty"));
+            items.push(Item::not_a_matrix(name, "empty"));
             continue;
         }
         // The item owns the decompressed bytes of its structure.
-        let inner = Source {
+        let inner = VariableBytes {
             data: found.data.to_vec().into(),
             packed: None,
             order: source.order,
             location: source.location.clone(),
         };
-        let head = self::head(&mut Bytes::new(&inner.data, inner.order)).map_err(|error| error_in(error, source))?;
+        let head =
+            self::head(&mut ByteCursor::new(&inner.data, inner.order)).map_err(|error| error_in(error, source))?;
         if head.class == STRUCTURE {
             items.extend(structure(&inner, &name, depth - 1)?);
         } else {
-            items.push(item(inner, Head { name, ..head }));
+            items.push(item(inner, VariableHeader { name, ..head }));
         }
     }
     Ok(items)
 }
 
 /// Returns the number type of an element.
-fn number(kind: u32) -> Option<Number> {
+fn number(kind: u32) -> Option<NumberType> {
     Some(match kind {
-        1 => Number::I8,
-        2 => Number::U8,
-        3 => Number::I16,
-        4 => Number::U16,
-        5 => Number::I32,
-        6 => Number::U32,
-        7 => Number::F32,
-        9 => Number::F64,
-        12 => Number::I64,
-        13 => Number::U64,
+        1 => NumberType::I8,
+        2 => NumberType::U8,
+        3 => NumberType::I16,
+        4 => NumberType::U16,
+        5 => NumberType::I32,
+        6 => NumberType::U32,
+        7 => NumberType::F32,
+        9 => NumberType::F64,
+        12 => NumberType::I64,
+        13 => NumberType::U64,
         _ => return None,
     })
 }
 
 /// Reads all numbers of the next element.
-fn numbers<T>(parts: &mut Bytes, read: impl Fn(Number, &mut Bytes) -> Result<T, Error>) -> Result<Vec<T>, Error> {
-    let Element { kind, data, .. } = element(parts)?;
+fn numbers<T>(
+    parts: &mut ByteCursor,
+    read: impl Fn(NumberType, &mut ByteCursor) -> Result<T, Error>,
+) -> Result<Vec<T>, Error> {
+    let MatElement { kind, data, .. } = element(parts)?;
     let number = number(kind).ok_or_else(|| parts.malformed("numbers", format!("an element of type {kind}")))?;
-    let mut data = Bytes::new(data, parts.order);
-    (0..data.left() / number.size()).map(|_| read(number, &mut data)).collect()
+    let mut data = ByteCursor::new(data, parts.order);
+    (0..data.remaining() / number.size()).map(|_| read(number, &mut data)).collect()
 }
 
-fn matrix(bytes: &[u8], order: Order) -> Result<Matrix, Error> {
-    let mut parts = Bytes::new(bytes, order);
-    let Head { class, rows, columns, .. } = head(&mut parts)?;
+fn matrix(bytes: &[u8], order: ByteOrder) -> Result<Matrix, Error> {
+    let mut parts = ByteCursor::new(bytes, order);
+    let VariableHeader { class, rows, columns, .. } = head(&mut parts)?;
     if class == SPARSE {
-        let inner = numbers(&mut parts, Number::index)?;
-        let pointers = numbers(&mut parts, Number::index)?;
-        let values = numbers(&mut parts, Number::real)?;
-        let mut triplets = Triplets::new(rows, columns, values.len(), Location::File)?;
-        compressed(&pointers, &inner, &values, columns, |column, row, value| {
+        let inner = numbers(&mut parts, NumberType::index)?;
+        let pointers = numbers(&mut parts, NumberType::index)?;
+        let values = numbers(&mut parts, NumberType::real)?;
+        let mut triplets = TripletBuilder::new(rows, columns, values.len(), Location::File)?;
+        for_each_compressed(&pointers, &inner, &values, columns, |column, row, value| {
             triplets.push(row, column, value, Location::File)
         })?;
         return triplets.finish(Symmetry::General);
     }
-    let Element { kind, data, .. } = element(&mut parts)?;
+    let MatElement { kind, data, .. } = element(&mut parts)?;
     let number = number(kind).ok_or_else(|| parts.malformed("numbers", format!("an element of type {kind}")))?;
-    let data = Bytes::new(data, order);
-    let there = data.left() / number.size();
+    let data = ByteCursor::new(data, order);
+    let there = data.remaining() / number.size();
     if rows.checked_mul(columns) != Some(there) {
         let problem = format!("expected {rows} x {columns} numbers, found {there}");
-        return Err(Error::new(Kind::Count, Location::File, problem, "save or copy the file again"));
+        return Err(Error::new(ErrorKind::Count, Location::File, problem, "save or copy the file again"));
     }
-    dense((rows, columns), Along::Columns, &Location::File, |at| number.real(&mut data.ahead(at * number.size())))
+    from_dense(DenseLayout { rows, columns, order: StorageOrder::Columns }, &Location::File, |at| {
+        number.real(&mut data.ahead(at * number.size()))
+    })
 }
 
 #[cfg(test)]
@@ -374,24 +380,24 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn errors_state_their_kind() {
         let check = |variable: Vec<u8>, kind| {
             let found = read_bytes(&file(&[variable]), None, Some("K")).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind));
         };
         let double = |value: f64| tagged(9, &value.to_le_bytes());
-        check(variable(6, &[2, 1], "K", &[double(1.0)]), Kind::Count);
-        check(variable(6, &[-1, 1], "K", &[double(1.0)]), Kind::Malformed);
-        check(variable(6, &[1, 1], "K", &[double(f64::INFINITY)]), Kind::NotFinite);
-        check(variable(6 + 0x800, &[1, 1], "K", &[double(1.0)]), Kind::Complex);
-        check(variable(4, &[1, 1], "K", &[double(1.0)]), Kind::Unsupported);
-        check(variable(6, &[1, 1, 1], "K", &[double(1.0)]), Kind::Unsupported);
-        check(variable(6, &[2_000_000_000, 2_000_000_000], "K", &[double(1.0)]), Kind::TooLarge);
-        check(variable(6, &[1, 1], "K", &[]), Kind::Truncated);
+        check(variable(6, &[2, 1], "K", &[double(1.0)]), ErrorKind::Count);
+        check(variable(6, &[-1, 1], "K", &[double(1.0)]), ErrorKind::Malformed);
+        check(variable(6, &[1, 1], "K", &[double(f64::INFINITY)]), ErrorKind::NotFinite);
+        check(variable(6 + 0x800, &[1, 1], "K", &[double(1.0)]), ErrorKind::Complex);
+        check(variable(4, &[1, 1], "K", &[double(1.0)]), ErrorKind::Unsupported);
+        check(variable(6, &[1, 1, 1], "K", &[double(1.0)]), ErrorKind::Unsupported);
+        check(variable(6, &[2_000_000_000, 2_000_000_000], "K", &[double(1.0)]), ErrorKind::TooLarge);
+        check(variable(6, &[1, 1], "K", &[]), ErrorKind::Truncated);
         let sparse = [tagged(5, &words(&[0])), tagged(5, &words(&[0, 2])), double(1.0)];
-        check(variable(5, &[1, 1], "K", &sparse), Kind::Count);
+        check(variable(5, &[1, 1], "K", &sparse), ErrorKind::Count);
         let mut short = file(&[variable(6, &[1, 1], "K", &[double(1.0)])]);
         short.truncate(short.len() - 4);
-        assert_eq!(read_bytes(&short, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(read_bytes(&short, None, None).map_err(|e| e.kind), Err(ErrorKind::Truncated));
     }
 }

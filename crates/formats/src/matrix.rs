@@ -3,7 +3,7 @@
 //! Every position has at most one entry, which is finite and not zero. A symmetric matrix stores
 //! its lower triangle only. Two files of one matrix in two formats therefore give equal matrices.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
 /// A number of a matrix with its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub enum Symmetry {
     Skew,
     /// The file does not state it: one triangle if no off-diagonal entry has
     /// its mirrored entry, else both.
-    Unsaid,
+    Unstated,
 }
 
 /// The origin of a matrix.
@@ -76,7 +76,7 @@ impl Matrix {
         symmetry: Symmetry,
         entries: impl IntoIterator<Item = (usize, usize, f64)>,
     ) -> Result<Self, Error> {
-        let mut triplets = Triplets::new(rows, columns, 0, Location::File)?;
+        let mut triplets = TripletBuilder::new(rows, columns, 0, Location::File)?;
         for (row, column, value) in entries {
             triplets.push(row, column, value, Location::File)?;
         }
@@ -147,7 +147,7 @@ impl Matrix {
     }
 
     /// Returns the largest absolute value, or zero without entries.
-    pub fn largest(&self) -> f64 {
+    pub fn max_abs(&self) -> f64 {
         self.entries.iter().map(|e| e.value.abs()).fold(0.0, f64::max)
     }
 
@@ -157,13 +157,13 @@ impl Matrix {
     /// zero if both triangles come from the same numbers, and 1e-9 for files of ten digits.
     ///
     /// # Errors
-    /// [`Kind::NotSquare`] and [`Kind::NotSymmetric`].
+    /// [`ErrorKind::NotSquare`] and [`ErrorKind::NotSymmetric`].
     pub fn into_symmetric(self, tolerance: f64) -> Result<Self, Error> {
-        self.must_be_square()?;
-        let (asymmetry, largest) = (self.asymmetry(), self.largest());
+        self.require_square()?;
+        let (asymmetry, largest) = (self.asymmetry(), self.max_abs());
         if asymmetry > tolerance * largest {
             return Err(Error::new(
-                Kind::NotSymmetric,
+                ErrorKind::NotSymmetric,
                 Location::File,
                 format!(
                     "the matrix is not symmetric: its triangles differ by {asymmetry:e}, and its largest value is {largest:e}"
@@ -196,13 +196,13 @@ impl Matrix {
     /// Refuses a matrix that is not square.
     ///
     /// # Errors
-    /// [`Kind::NotSquare`].
-    pub fn must_be_square(&self) -> Result<(), Error> {
+    /// [`ErrorKind::NotSquare`].
+    pub fn require_square(&self) -> Result<(), Error> {
         if self.rows == self.columns {
             return Ok(());
         }
         Err(Error::new(
-            Kind::NotSquare,
+            ErrorKind::NotSquare,
             Location::File,
             format!("the matrix has {} rows and {} columns; it must be square", self.rows, self.columns),
             "select the stiffness, mass or damping matrix",
@@ -212,7 +212,7 @@ impl Matrix {
     /// Returns the matrix with names for its rows, and for its columns if it is square.
     ///
     /// # Errors
-    /// [`Kind::Names`] if the number of names differs from the number of rows,
+    /// [`ErrorKind::Names`] if the number of names differs from the number of rows,
     /// or if a name occurs twice.
     pub fn with_names(mut self, names: Vec<String>) -> Result<Self, Error> {
         check_names(&names, self.rows)?;
@@ -226,7 +226,7 @@ impl Matrix {
     /// lack the rotations of its stiffness matrix.
     ///
     /// # Errors
-    /// [`Kind::Names`] if the matrix has no names, if one of its names is
+    /// [`ErrorKind::Names`] if the matrix has no names, if one of its names is
     /// missing in `names`, or if `names` contains a name twice.
     ///
     /// # Example
@@ -235,18 +235,18 @@ impl Matrix {
     ///
     /// let name = |name: &str| name.to_string();
     /// let mass = Matrix::new(1, 1, Symmetry::Symmetric, [(0, 0, 3.0)])?.with_names(vec![name("7.x")])?;
-    /// let mass = mass.in_order_of(&[name("5.x"), name("7.x")])?;
+    /// let mass = mass.reordered(&[name("5.x"), name("7.x")])?;
     /// assert_eq!((mass.rows(), mass.get(1, 1)), (2, 3.0));
     /// # Ok::<(), stickslip_formats::Error>(())
     /// ```
-    pub fn in_order_of(self, names: &[String]) -> Result<Self, Error> {
-        self.must_be_square()?;
+    pub fn reordered(self, names: &[String]) -> Result<Self, Error> {
+        self.require_square()?;
         check_names(names, names.len())?;
         let places: std::collections::BTreeMap<&str, usize> =
             names.iter().enumerate().map(|(location, name)| (name.as_str(), location)).collect();
         let own = self.names.as_deref().ok_or_else(|| {
             Error::new(
-                Kind::Names,
+                ErrorKind::Names,
                 Location::File,
                 "the rows of the matrix have no names".into(),
                 "provide the file of row names that belongs to the matrix",
@@ -255,7 +255,7 @@ impl Matrix {
         let place_of = |row: u32| {
             places.get(own[row as usize].as_str()).copied().ok_or_else(|| {
                 Error::new(
-                    Kind::Names,
+                    ErrorKind::Names,
                     Location::File,
                     format!(
                         "row `{}` of the matrix is not among the {} given row names",
@@ -267,7 +267,7 @@ impl Matrix {
             })
         };
         let symmetry = if self.symmetric { Symmetry::Symmetric } else { Symmetry::General };
-        let mut triplets = Triplets::new(names.len(), names.len(), self.entries.len(), Location::File)?;
+        let mut triplets = TripletBuilder::new(names.len(), names.len(), self.entries.len(), Location::File)?;
         for e in &self.entries {
             triplets.push(place_of(e.row)?, place_of(e.column)?, e.value, Location::File)?;
         }
@@ -281,9 +281,9 @@ impl Matrix {
     /// columns, such as constrained ones.
     ///
     /// # Errors
-    /// [`Kind::NotSquare`].
-    pub fn without(mut self, rows: &[usize]) -> Result<Self, Error> {
-        self.must_be_square()?;
+    /// [`ErrorKind::NotSquare`].
+    pub fn without_rows(mut self, rows: &[usize]) -> Result<Self, Error> {
+        self.require_square()?;
         let mut left = vec![true; self.rows];
         for &row in rows {
             if let Some(left) = left.get_mut(row) {
@@ -311,7 +311,7 @@ impl Matrix {
     }
 
     /// Returns true if both triangles are present and equal to the last bit.
-    fn equals_its_transpose(&self) -> bool {
+    fn is_exactly_symmetric(&self) -> bool {
         if self.rows != self.columns {
             return false;
         }
@@ -342,7 +342,7 @@ impl Matrix {
     }
 
     /// Returns true if any off-diagonal entry has its mirrored entry.
-    fn has_mirror_images(&self) -> bool {
+    fn has_mirrored_entries(&self) -> bool {
         let mirror = |e: &Entry| self.entries.binary_search_by_key(&(e.row, e.column), |e| (e.column, e.row)).is_ok();
         self.entries.iter().any(|e| e.row != e.column && mirror(e))
     }
@@ -357,7 +357,7 @@ impl Matrix {
 fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
     let fault = |problem| {
         Err(Error::new(
-            Kind::Names,
+            ErrorKind::Names,
             Location::File,
             problem,
             "provide the file of row names that was written with the matrix",
@@ -375,20 +375,20 @@ fn check_names(names: &[String], rows: usize) -> Result<(), Error> {
 }
 
 /// Entries of a file that become a matrix.
-pub(crate) struct Triplets {
+pub(crate) struct TripletBuilder {
     rows: usize,
     columns: usize,
     entries: Vec<Entry>,
     zeros: usize,
 }
 
-impl Triplets {
+impl TripletBuilder {
     /// Creates a list with room for `expected` entries. The size of the file
     /// must bound this number, not its header.
     pub fn new(rows: usize, columns: usize, expected: usize, location: Location) -> Result<Self, Error> {
         if rows.max(columns) > u32::MAX as usize {
             return Err(Error::new(
-                Kind::TooLarge,
+                ErrorKind::TooLarge,
                 location,
                 format!("the matrix has {rows} rows and {columns} columns; at most {} of each are supported", u32::MAX),
                 "check the size in the header of the file",
@@ -401,7 +401,7 @@ impl Triplets {
     pub fn push(&mut self, row: usize, column: usize, value: f64, location: Location) -> Result<(), Error> {
         if row >= self.rows || column >= self.columns {
             return Err(Error::new(
-                Kind::Count,
+                ErrorKind::Count,
                 location,
                 format!(
                     "the entry in row {}, column {} lies outside the matrix of {} rows and {} columns",
@@ -415,7 +415,7 @@ impl Triplets {
         }
         if !value.is_finite() {
             return Err(Error::new(
-                Kind::NotFinite,
+                ErrorKind::NotFinite,
                 location,
                 format!("the value in row {}, column {} is {value}", row + 1, column + 1),
                 "all numbers must be finite; check the model for elements without material or with negative volume",
@@ -435,7 +435,7 @@ impl Triplets {
         let square = matches!(symmetry, Symmetry::Symmetric | Symmetry::Skew);
         if square && self.rows != self.columns {
             return Err(Error::new(
-                Kind::NotSquare,
+                ErrorKind::NotSquare,
                 Location::File,
                 format!("the header states a symmetric matrix with {} rows and {} columns", self.rows, self.columns),
                 "the header is damaged; export the file again",
@@ -444,7 +444,7 @@ impl Triplets {
         if symmetry == Symmetry::Skew {
             self.add_negative()?;
         }
-        sum_equal(&mut self.entries)?;
+        sum_duplicates(&mut self.entries)?;
         let mut matrix = Matrix {
             rows: self.rows,
             columns: self.columns,
@@ -453,13 +453,13 @@ impl Triplets {
             names: None,
             origin: Origin { zeros: self.zeros, ..Origin::default() },
         };
-        if matches!(symmetry, Symmetry::Symmetric | Symmetry::Unsaid) && !matrix.has_mirror_images() {
+        if matches!(symmetry, Symmetry::Symmetric | Symmetry::Unstated) && !matrix.has_mirrored_entries() {
             for e in &mut matrix.entries {
                 (e.row, e.column) = (e.row.max(e.column), e.row.min(e.column));
             }
-            sum_equal(&mut matrix.entries)?;
+            sum_duplicates(&mut matrix.entries)?;
             matrix.symmetric = true;
-        } else if matrix.equals_its_transpose() {
+        } else if matrix.is_exactly_symmetric() {
             matrix.entries.retain(|e| e.row >= e.column);
             matrix.symmetric = true;
         } else if symmetry == Symmetry::Symmetric {
@@ -471,14 +471,14 @@ impl Triplets {
     }
 }
 
-impl Triplets {
+impl TripletBuilder {
     /// Adds the other triangle of a skew-symmetric matrix.
     fn add_negative(&mut self) -> Result<(), Error> {
         let lower = self.entries.iter().any(|e| e.row > e.column);
         let upper = self.entries.iter().any(|e| e.row < e.column);
         if (lower && upper) || self.entries.iter().any(|e| e.row == e.column) {
             return Err(Error::new(
-                Kind::NotSymmetric,
+                ErrorKind::NotSymmetric,
                 Location::File,
                 "the skew-symmetric matrix has entries in both triangles or on its diagonal".into(),
                 "store one triangle only",
@@ -496,28 +496,36 @@ impl Triplets {
 
 /// Storage order of a full matrix.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Along {
+pub(crate) enum StorageOrder {
     Rows,
     Columns,
 }
 
+/// Sizes and storage order of a full matrix.
+#[derive(Clone, Copy)]
+pub(crate) struct DenseLayout {
+    pub rows: usize,
+    pub columns: usize,
+    pub order: StorageOrder,
+}
+
 /// Builds a matrix from a full one. `value` returns a number by its position in the file.
-pub(crate) fn dense(
-    (rows, columns): (usize, usize),
-    along: Along,
+pub(crate) fn from_dense(
+    layout: DenseLayout,
     location: &Location,
     value: impl Fn(usize) -> Result<f64, Error>,
 ) -> Result<Matrix, Error> {
+    let DenseLayout { rows, columns, order } = layout;
     let count = rows.saturating_mul(columns);
     // Allocate for the nonzero values only: full matrices of structures are mostly zeros.
     let filled = (0..count).map(&value).filter(|value| value.as_ref().is_ok_and(|&value| value != 0.0)).count();
-    let mut triplets = Triplets::new(rows, columns, filled, location.clone())?;
+    let mut triplets = TripletBuilder::new(rows, columns, filled, location.clone())?;
     // In the storage order of a matrix, so that the entries are sorted already.
     for column in 0..columns {
         for row in 0..rows {
-            let at = match along {
-                Along::Rows => row * columns + column,
-                Along::Columns => column * rows + row,
+            let at = match order {
+                StorageOrder::Rows => row * columns + column,
+                StorageOrder::Columns => column * rows + row,
             };
             triplets.push(row, column, value(at)?, location.clone())?;
         }
@@ -527,14 +535,15 @@ pub(crate) fn dense(
 
 /// Calls `push` for the entries of a matrix in compressed column (or row)
 /// storage. `pointers` are the starts of the columns (rows).
-pub(crate) fn compressed(
+pub(crate) fn for_each_compressed(
     pointers: &[usize],
     inner: &[usize],
     values: &[f64],
     outer: usize,
     mut push: impl FnMut(usize, usize, f64) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let fault = |problem| Err(Error::new(Kind::Count, Location::File, problem, "the file is damaged; export it again"));
+    let fault =
+        |problem| Err(Error::new(ErrorKind::Count, Location::File, problem, "the file is damaged; export it again"));
     if Some(pointers.len()) != outer.checked_add(1) {
         return fault(format!(
             "the file has {} pointers for {outer} columns or rows; it must have one more pointer than columns or rows",
@@ -559,7 +568,7 @@ pub(crate) fn compressed(
 }
 
 /// Sorts the entries and sums those at one position, in file order.
-fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
+fn sum_duplicates(entries: &mut Vec<Entry>) -> Result<(), Error> {
     let key = |e: &Entry| (e.column, e.row);
     if !entries.is_sorted_by_key(key) {
         entries.sort_by_key(key);
@@ -575,7 +584,7 @@ fn sum_equal(entries: &mut Vec<Entry>) -> Result<(), Error> {
     match entries.iter().find(|e| !e.value.is_finite()) {
         None => Ok(()),
         Some(e) => Err(Error::new(
-            Kind::NotFinite,
+            ErrorKind::NotFinite,
             Location::File,
             format!("the sum of the entries in row {}, column {} is {}", e.row + 1, e.column + 1, e.value),
             "all numbers must be finite; check the units",
@@ -588,7 +597,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stands_twice_is_summed_and_what_cancels_is_gone() -> Result<(), Error> {
+    fn duplicates_are_summed_and_zeros_dropped() -> Result<(), Error> {
         let entries = [(1, 0, 2.0), (0, 0, 1.0), (1, 0, 0.5), (0, 1, 4.0), (0, 1, -4.0), (1, 1, 0.0)];
         let matrix = Matrix::new(2, 2, Symmetry::General, entries)?;
         let expected = [Entry { row: 0, column: 0, value: 1.0 }, Entry { row: 1, column: 0, value: 2.5 }];
@@ -634,9 +643,9 @@ mod tests {
     fn triangles_that_differ_are_refused_or_averaged() -> Result<(), Error> {
         let entries = [(0, 1, 2.0), (1, 0, 2.0 + 1e-9), (1, 1, 4.0)];
         let refused = Matrix::new(2, 2, Symmetry::Symmetric, entries).map(|_| ()).map_err(|e| e.kind);
-        assert_eq!(refused, Err(Kind::NotSymmetric));
+        assert_eq!(refused, Err(ErrorKind::NotSymmetric));
         let general = Matrix::new(2, 2, Symmetry::General, entries)?;
-        assert_eq!(general.clone().into_symmetric(1e-10).map_err(|e| e.kind), Err(Kind::NotSymmetric));
+        assert_eq!(general.clone().into_symmetric(1e-10).map_err(|e| e.kind), Err(ErrorKind::NotSymmetric));
         let mean = general.into_symmetric(1e-9)?;
         assert_eq!(mean.get(0, 1), 0.5 * 2.0 + 0.5 * (2.0 + 1e-9));
         Ok(())
@@ -656,12 +665,12 @@ mod tests {
     fn one_triangle_in_any_order_is_symmetric() -> Result<(), Error> {
         // In a file with another node order: (0, 1) and (2, 1), but no mirrored entry.
         let entries = [(0, 1, 2.0), (2, 1, 3.0), (0, 0, 1.0)];
-        for symmetry in [Symmetry::Symmetric, Symmetry::Unsaid] {
+        for symmetry in [Symmetry::Symmetric, Symmetry::Unstated] {
             let matrix = Matrix::new(3, 3, symmetry, entries)?;
             assert!(matrix.is_symmetric());
             assert_eq!((matrix.get(1, 0), matrix.get(1, 2)), (2.0, 3.0));
         }
-        let both = Matrix::new(3, 3, Symmetry::Unsaid, [(0, 1, 2.0), (1, 0, 2.5)])?;
+        let both = Matrix::new(3, 3, Symmetry::Unstated, [(0, 1, 2.0), (1, 0, 2.5)])?;
         assert!(!both.is_symmetric());
         Ok(())
     }
@@ -670,7 +679,7 @@ mod tests {
     fn rows_can_be_left_out_with_their_names() -> Result<(), Error> {
         let names = ["a", "b", "c"].map(String::from).to_vec();
         let matrix = Matrix::new(3, 3, Symmetry::Symmetric, [(0, 0, 1.0), (2, 0, 2.0), (1, 1, 1e36), (2, 1, 4.0)])?;
-        let left = matrix.with_names(names)?.without(&[1])?;
+        let left = matrix.with_names(names)?.without_rows(&[1])?;
         assert_eq!((left.rows(), left.get(1, 0), left.entries().len()), (2, 2.0, 2));
         assert_eq!(left.names(), Some(&["a", "c"].map(String::from)[..]));
         Ok(())
@@ -681,7 +690,7 @@ mod tests {
         let skew = Matrix::new(2, 2, Symmetry::Skew, [(1, 0, 3.0)])?;
         assert!(!skew.is_symmetric());
         assert_eq!((skew.get(1, 0), skew.get(0, 1)), (3.0, -3.0));
-        assert_eq!(Matrix::new(2, 2, Symmetry::Skew, [(0, 0, 3.0)]).map_err(|e| e.kind), Err(Kind::NotSymmetric));
+        assert_eq!(Matrix::new(2, 2, Symmetry::Skew, [(0, 0, 3.0)]).map_err(|e| e.kind), Err(ErrorKind::NotSymmetric));
         Ok(())
     }
 
@@ -690,28 +699,28 @@ mod tests {
         let check = |entry, kind| {
             assert_eq!(Matrix::new(2, 3, Symmetry::General, [entry]).map_err(|e| e.kind), Err(kind));
         };
-        check((2, 0, 1.0), Kind::Count);
-        check((0, 3, 1.0), Kind::Count);
-        check((0, 0, f64::NAN), Kind::NotFinite);
-        check((0, 0, f64::NEG_INFINITY), Kind::NotFinite);
+        check((2, 0, 1.0), ErrorKind::Count);
+        check((0, 3, 1.0), ErrorKind::Count);
+        check((0, 0, f64::NAN), ErrorKind::NotFinite);
+        check((0, 0, f64::NEG_INFINITY), ErrorKind::NotFinite);
         let huge = Matrix::new(2, 2, Symmetry::General, [(0, 0, f64::MAX), (0, 0, f64::MAX)]);
-        assert_eq!(huge.map_err(|e| e.kind), Err(Kind::NotFinite));
-        assert_eq!(Matrix::new(2, 3, Symmetry::Symmetric, []).map_err(|e| e.kind), Err(Kind::NotSquare));
-        assert_eq!(Matrix::new(1 << 40, 3, Symmetry::General, []).map_err(|e| e.kind), Err(Kind::TooLarge));
+        assert_eq!(huge.map_err(|e| e.kind), Err(ErrorKind::NotFinite));
+        assert_eq!(Matrix::new(2, 3, Symmetry::Symmetric, []).map_err(|e| e.kind), Err(ErrorKind::NotSquare));
+        assert_eq!(Matrix::new(1 << 40, 3, Symmetry::General, []).map_err(|e| e.kind), Err(ErrorKind::TooLarge));
     }
 
     #[test]
     fn names_must_match_the_rows() -> Result<(), Error> {
         let matrix = || Matrix::new(2, 2, Symmetry::General, [(0, 1, 1.0)]);
         let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
-        assert_eq!(matrix()?.with_names(names(&["a"])).map_err(|e| e.kind), Err(Kind::Names));
-        assert_eq!(matrix()?.with_names(names(&["a", "a"])).map_err(|e| e.kind), Err(Kind::Names));
+        assert_eq!(matrix()?.with_names(names(&["a"])).map_err(|e| e.kind), Err(ErrorKind::Names));
+        assert_eq!(matrix()?.with_names(names(&["a", "a"])).map_err(|e| e.kind), Err(ErrorKind::Names));
         assert!(matrix()?.with_names(names(&["", ""])).is_ok());
         let named = matrix()?.with_names(names(&["a", "b"]))?;
-        let moved = named.clone().in_order_of(&names(&["b", "c", "a"]))?;
+        let moved = named.clone().reordered(&names(&["b", "c", "a"]))?;
         assert_eq!((moved.rows(), moved.get(2, 0)), (3, 1.0));
-        assert_eq!(named.in_order_of(&names(&["a", "c"])).map_err(|e| e.kind), Err(Kind::Names));
-        assert_eq!(matrix()?.in_order_of(&names(&["a", "b"])).map_err(|e| e.kind), Err(Kind::Names));
+        assert_eq!(named.reordered(&names(&["a", "c"])).map_err(|e| e.kind), Err(ErrorKind::Names));
+        assert_eq!(matrix()?.reordered(&names(&["a", "b"])).map_err(|e| e.kind), Err(ErrorKind::Names));
         Ok(())
     }
 }

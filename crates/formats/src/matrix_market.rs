@@ -13,16 +13,16 @@
 //! Source: Boisvert, Pozo, Remington, The Matrix Market Exchange Formats:
 //! Initial Design, NISTIR 5935 (1996).
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
+use crate::first_line::{FirstLine, ambiguous, is_comment};
 use crate::format::{Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::sizes::{FirstLine, is_comment, unclear};
-use crate::text::{Line, Lines, shown, truncated};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, quoted, truncated};
 
 pub(crate) const FORMAT: Format = Format {
     name: "matrix-market",
     summary: "Matrix Market (.mtx): coordinate or array; SciPy `mmwrite`, MATLAB, Julia, most sparse libraries",
-    sniff: |bytes| banner(bytes).is_some() || !matches!(FirstLine::of(bytes), FirstLine::Entry),
+    sniff: |bytes| banner(bytes).is_some() || !matches!(FirstLine::classify(bytes), FirstLine::Entry),
     open,
 };
 
@@ -34,7 +34,7 @@ struct Layout {
 }
 
 /// The banner and the line of sizes.
-struct Header {
+struct MatrixMarketHeader {
     layout: Layout,
     rows: usize,
     columns: usize,
@@ -61,15 +61,15 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(vec![Item::new("", rows, columns, move || read(bytes))])
 }
 
-fn header(lines: &mut Lines) -> Result<Header, Error> {
+fn header(lines: &mut Lines) -> Result<MatrixMarketHeader, Error> {
     let mut layout = match banner(lines.rest()) {
         Some(line) => layout(&line)?,
-        None => match FirstLine::of(lines.rest()) {
-            FirstLine::Sizes => Layout { coordinate: true, pattern: false, symmetry: Symmetry::Unsaid },
-            FirstLine::Unclear(line) => return Err(unclear(&line)),
+        None => match FirstLine::classify(lines.rest()) {
+            FirstLine::Sizes => Layout { coordinate: true, pattern: false, symmetry: Symmetry::Unstated },
+            FirstLine::Ambiguous(line) => return Err(ambiguous(&line)),
             FirstLine::Entry => {
                 let line = lines.expect_filled("the banner `%%MatrixMarket matrix …`")?;
-                return Err(line.malformed("the banner `%%MatrixMarket matrix …`", &shown(line.text)));
+                return Err(line.malformed("the banner `%%MatrixMarket matrix …`", &quoted(line.text)));
             }
         },
     };
@@ -86,21 +86,21 @@ fn header(lines: &mut Lines) -> Result<Header, Error> {
         let [rows, columns] = sizes.exactly("rows and columns")?;
         (sizes.count(rows)?, sizes.count(columns)?, None)
     };
-    if rows != columns && layout.symmetry == Symmetry::Unsaid {
+    if rows != columns && layout.symmetry == Symmetry::Unstated {
         layout.symmetry = Symmetry::General;
     }
     if layout.symmetry != Symmetry::General && rows != columns {
         return Err(sizes.malformed("a square symmetric matrix", &format!("{rows} x {columns}")));
     }
     let entries = entries.map_or_else(|| stored(rows, columns, layout.symmetry, &sizes), Ok)?;
-    Ok(Header { layout, rows, columns, entries })
+    Ok(MatrixMarketHeader { layout, rows, columns, entries })
 }
 
 fn layout(banner: &Line) -> Result<Layout, Error> {
     let words = words(banner);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let [_, "matrix", layout, field, symmetry] = words[..] else {
-        return Err(banner.malformed("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &shown(banner.text)));
+        return Err(banner.malformed("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &quoted(banner.text)));
     };
     let coordinate = match layout {
         "coordinate" => true,
@@ -112,7 +112,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
         "pattern" if coordinate => true,
         "complex" => {
             return Err(Error::new(
-                Kind::Complex,
+                ErrorKind::Complex,
                 banner.location(),
                 "the matrix is complex, but it must be real".into(),
                 "write its real part; structural damping is not supported as a complex matrix",
@@ -134,7 +134,7 @@ fn layout(banner: &Line) -> Result<Layout, Error> {
 fn stored(rows: usize, columns: usize, symmetry: Symmetry, line: &Line) -> Result<usize, Error> {
     let all = rows.checked_mul(columns).ok_or_else(|| line.malformed("a size that fits in a file", "a larger one"))?;
     Ok(match symmetry {
-        Symmetry::General | Symmetry::Unsaid => all,
+        Symmetry::General | Symmetry::Unstated => all,
         Symmetry::Symmetric => (all - rows) / 2 + rows,
         Symmetry::Skew => (all - rows) / 2,
     })
@@ -145,8 +145,8 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     let header = header(&mut lines)?;
     // The shortest line of an entry is `1 1` with a line end, that of a number `0` with a line end.
     let shortest = if header.layout.coordinate { 4 } else { 2 };
-    let room = header.entries.min(lines.left() / shortest + 1);
-    let mut triplets = Triplets::new(header.rows, header.columns, room, lines.location())?;
+    let room = header.entries.min(lines.remaining() / shortest + 1);
+    let mut triplets = TripletBuilder::new(header.rows, header.columns, room, lines.location())?;
     if header.layout.coordinate {
         coordinates(&mut lines, &header, &mut triplets)?;
     } else {
@@ -155,7 +155,7 @@ fn read(bytes: &[u8]) -> Result<Matrix, Error> {
     triplets.finish(header.layout.symmetry)
 }
 
-fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
+fn coordinates(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut TripletBuilder) -> Result<(), Error> {
     let mut count = 0;
     for line in lines.by_ref() {
         if line.text.trim_ascii().is_empty() || is_comment(&line) {
@@ -177,9 +177,9 @@ fn coordinates(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> R
     if count == header.entries { Ok(()) } else { Err(too_few(lines.location(), count, header.entries)) }
 }
 
-fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<(), Error> {
+fn array(lines: &mut Lines, header: &MatrixMarketHeader, triplets: &mut TripletBuilder) -> Result<(), Error> {
     let first = |column: usize| match header.layout.symmetry {
-        Symmetry::General | Symmetry::Unsaid => 0,
+        Symmetry::General | Symmetry::Unstated => 0,
         Symmetry::Symmetric => column,
         Symmetry::Skew => column + 1,
     };
@@ -204,7 +204,7 @@ fn array(lines: &mut Lines, header: &Header, triplets: &mut Triplets) -> Result<
 
 fn too_many(location: Location, expected: usize) -> Error {
     Error::new(
-        Kind::Count,
+        ErrorKind::Count,
         location,
         format!("the file has more entries than the {expected} that the header states"),
         "correct the line of sizes, or export the file again",
@@ -213,7 +213,7 @@ fn too_many(location: Location, expected: usize) -> Error {
 
 fn too_few(location: Location, found: usize, expected: usize) -> Error {
     let error = truncated(location, &format!("entry {} of {expected}", found + 1));
-    Error { kind: Kind::Truncated, ..error }
+    Error { kind: ErrorKind::Truncated, ..error }
 }
 
 /// Returns a matrix as a file of coordinates.
@@ -321,7 +321,7 @@ mod tests {
         for text in [format!("3 3 6\n{CHAIN}"), format!("3 3 4\n{CHAIN}"), "2 2 1000\n2 1 -1000\n1 1 2000\n".into()] {
             for format in [None, Some("coordinate"), Some("matrix-market")] {
                 let error = read_bytes(text.as_bytes(), format, None).map(|_| ()).map_err(|e| (e.kind, e.location));
-                assert_eq!(error, Err((Kind::Malformed, Location::Line(1))), "{text}");
+                assert_eq!(error, Err((ErrorKind::Malformed, Location::Line(1))), "{text}");
             }
         }
         let stated = read_bytes(format!("3 3 5\n{CHAIN}").as_bytes(), Some("coordinate"), None).map(|_| ());
@@ -329,33 +329,37 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: &str, kind, location| {
             let error = read(text).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(error, Err((kind, location)), "{text}");
         };
         let real = "%%MatrixMarket matrix coordinate real general\n";
-        check(&format!("{real}2 2 2\n1 1 1\n"), Kind::Truncated, Location::Line(3));
-        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), Kind::Count, Location::Line(4));
-        check(&format!("{real}2 2 1\n3 1 1\n"), Kind::Count, Location::Line(3));
-        check(&format!("{real}2 2 1\n0 1 1\n"), Kind::Malformed, Location::Line(3));
-        check(&format!("{real}2 2 1\n1 1 nan\n"), Kind::NotFinite, Location::Line(3));
-        check(&format!("{real}2 2 1\n1 1 1 0\n"), Kind::Malformed, Location::Line(3));
-        check(&format!("{real}2 2\n1 1 1\n"), Kind::Malformed, Location::Line(2));
-        check(real, Kind::Truncated, Location::Line(2));
-        check(&format!("{real}99999999999 1 0\n"), Kind::TooLarge, Location::File);
-        check("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n", Kind::Complex, Location::Line(1));
-        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", Kind::Malformed, Location::Line(1));
-        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", Kind::Malformed, Location::Line(2));
+        check(&format!("{real}2 2 2\n1 1 1\n"), ErrorKind::Truncated, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1\n2 2 1\n"), ErrorKind::Count, Location::Line(4));
+        check(&format!("{real}2 2 1\n3 1 1\n"), ErrorKind::Count, Location::Line(3));
+        check(&format!("{real}2 2 1\n0 1 1\n"), ErrorKind::Malformed, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 nan\n"), ErrorKind::NotFinite, Location::Line(3));
+        check(&format!("{real}2 2 1\n1 1 1 0\n"), ErrorKind::Malformed, Location::Line(3));
+        check(&format!("{real}2 2\n1 1 1\n"), ErrorKind::Malformed, Location::Line(2));
+        check(real, ErrorKind::Truncated, Location::Line(2));
+        check(&format!("{real}99999999999 1 0\n"), ErrorKind::TooLarge, Location::File);
+        check(
+            "%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0\n",
+            ErrorKind::Complex,
+            Location::Line(1),
+        );
+        check("%%MatrixMarket vector coordinate real general\n1 1 1\n", ErrorKind::Malformed, Location::Line(1));
+        check("%%MatrixMarket matrix coordinate real symmetric\n1 2 1\n", ErrorKind::Malformed, Location::Line(2));
         // A header that claims more memory than there is.
-        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), Kind::Truncated, Location::Line(3));
+        check(&format!("{real}1000000 1000000 999999999999\n1 1 1\n"), ErrorKind::Truncated, Location::Line(3));
         let array = "%%MatrixMarket matrix array real general\n";
-        check(&format!("{array}4000000000 4000000000\n1\n"), Kind::TooLarge, Location::File);
-        check(&format!("{array}4000000000000 4000000000000\n1\n"), Kind::Malformed, Location::Line(2));
+        check(&format!("{array}4000000000 4000000000\n1\n"), ErrorKind::TooLarge, Location::File);
+        check(&format!("{array}4000000000000 4000000000000\n1\n"), ErrorKind::Malformed, Location::Line(2));
     }
 
     #[test]
-    fn what_is_written_reads_back_to_the_last_bit() -> Result<(), Error> {
+    fn written_files_read_back_exactly() -> Result<(), Error> {
         let values = [1.0 / 3.0, f64::MIN_POSITIVE / 3.0, -f64::MAX, 1e22 + 2e6];
         let entries = values.iter().enumerate().map(|(row, &value)| (row, row / 2, value));
         for symmetry in [Symmetry::General, Symmetry::Symmetric] {

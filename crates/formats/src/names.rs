@@ -15,10 +15,10 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::file::{io, load};
 use crate::matrix::Matrix;
-use crate::text::{Line, Lines, integer, shown};
+use crate::text::{Line, Lines, integer, quoted};
 
 /// A file format for row names.
 pub struct NameFormat {
@@ -61,11 +61,11 @@ pub const TABLE: &[NameFormat] = &[
 /// Reads the names of `rows` rows. A row without a name gets an empty one.
 ///
 /// # Errors
-/// [`Kind::Names`] if the names do not match the rows, [`Kind::Format`] if no
+/// [`ErrorKind::Names`] if the names do not match the rows, [`ErrorKind::Format`] if no
 /// format of [`TABLE`] recognizes the file.
 pub fn read(path: impl AsRef<Path>, rows: usize) -> Result<Vec<String>, Error> {
     let path = path.as_ref();
-    read_bytes(&load(path)?, rows).map_err(|error| error.of(path))
+    read_bytes(&load(path)?, rows).map_err(|error| error.with_path(path))
 }
 
 /// Reads names from a file in memory, like [`read`].
@@ -76,14 +76,15 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
     let mut lines = Lines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let first = lines.expect_filled("names of rows")?;
     let format = TABLE.iter().find(|format| (format.sniff)(&first)).ok_or_else(|| {
-        let problem = format!("expected row names, found {}", shown(first.text));
+        let problem = format!("expected row names, found {}", quoted(first.text));
         let known = TABLE.iter().map(|format| format.summary).collect::<Vec<_>>().join("; ");
-        Error::new(Kind::Format, first.location(), problem, format!("use one of these formats: {known}"))
+        Error::new(ErrorKind::Format, first.location(), problem, format!("use one of these formats: {known}"))
     })?;
-    let mut names = Names { names: Vec::new(), rows };
-    for (at, line) in std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
+    let mut names = NameList { names: Vec::new(), rows };
+    for (index, line) in
+        std::iter::once(first).chain(lines).filter(|line| !line.text.trim_ascii().is_empty()).enumerate()
     {
-        if let Some((row, name)) = (format.line)(&line, at)? {
+        if let Some((row, name)) = (format.line)(&line, index)? {
             names.put(row, name, &line)?;
         }
     }
@@ -93,22 +94,22 @@ pub fn read_bytes(bytes: &[u8], rows: usize) -> Result<Vec<String>, Error> {
 /// Writes the row names of a matrix as CSV `row,name`.
 ///
 /// # Errors
-/// [`Kind::Names`] if the matrix has no names, [`Kind::Io`].
+/// [`ErrorKind::Names`] if the matrix has no names, [`ErrorKind::Io`].
 pub fn write(path: impl AsRef<Path>, matrix: &Matrix) -> Result<(), Error> {
     let path = path.as_ref();
     let names = matrix.names().ok_or_else(|| {
         let problem = "the rows of the matrix have no names".into();
-        Error::new(Kind::Names, Location::File, problem, "give it names first").of(path)
+        Error::new(ErrorKind::Names, Location::File, problem, "give it names first").with_path(path)
     })?;
     let mut text = String::from("row,name\n");
-    for (at, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
-        text.push_str(&format!("{},{}\n", at + 1, quoted(name)));
+    for (index, name) in names.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+        text.push_str(&format!("{},{}\n", index + 1, csv_field(name)));
     }
     std::fs::write(path, text).map_err(|error| io(path, &error))
 }
 
 /// Returns a name as a CSV field, in quotes if necessary.
-fn quoted(name: &str) -> String {
+fn csv_field(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.into() }
 }
 
@@ -121,16 +122,16 @@ pub(crate) fn direction(number: i64) -> String {
 }
 
 /// The names read so far.
-struct Names {
+struct NameList {
     names: Vec<String>,
     rows: usize,
 }
 
-impl Names {
+impl NameList {
     fn put(&mut self, row: usize, name: String, line: &Line) -> Result<(), Error> {
         let fault = |problem| {
             let remedy = "provide the file of row names that was written with the matrix";
-            Err(Error::new(Kind::Names, line.location(), problem, remedy))
+            Err(Error::new(ErrorKind::Names, line.location(), problem, remedy))
         };
         if row >= self.rows {
             return fault(format!("the file names row {}, but the matrix has {} rows", row + 1, self.rows));
@@ -152,7 +153,7 @@ impl Names {
         let named = self.names.iter().filter(|name| !name.is_empty()).count();
         if named != self.rows && !gaps {
             return Err(Error::new(
-                Kind::Names,
+                ErrorKind::Names,
                 Location::File,
                 format!("the file has {named} names for {} rows", self.rows),
                 "provide the file of row names that was written with the matrix",
@@ -162,19 +163,19 @@ impl Names {
         order.sort_by(|a, b| self.names[*a].cmp(&self.names[*b]));
         if let Some(&[a, b]) = order.array_windows().find(|[a, b]| self.names[*a] == self.names[*b]) {
             let problem = format!("rows {} and {} have the same name `{}`", a + 1, b + 1, self.names[a]);
-            return Err(Error::new(Kind::Names, Location::File, problem, "give every row a unique name"));
+            return Err(Error::new(ErrorKind::Names, Location::File, problem, "give every row a unique name"));
         }
         self.names.resize(self.rows, String::new());
         Ok(self.names)
     }
 }
 
-fn csv_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
-    if at == 0 {
+fn csv_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
+    if index == 0 {
         return Ok(None);
     }
-    let text = std::str::from_utf8(line.text).map_err(|_| line.malformed("`row,name` in UTF-8", &shown(line.text)))?;
-    let (row, name) = text.split_once(',').ok_or_else(|| line.malformed("`row,name`", &shown(line.text)))?;
+    let text = std::str::from_utf8(line.text).map_err(|_| line.malformed("`row,name` in UTF-8", &quoted(line.text)))?;
+    let (row, name) = text.split_once(',').ok_or_else(|| line.malformed("`row,name`", &quoted(line.text)))?;
     let name = name.trim();
     let name = match name.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')) {
         Some(inner) => inner.replace("\"\"", "\""),
@@ -189,10 +190,10 @@ fn dof(text: &[u8]) -> Option<(i64, i64)> {
     Some((integer(&text[..dot])?, integer(&text[dot + 1..])?))
 }
 
-fn dof_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+fn dof_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
     let text = line.text.trim_ascii();
-    let (node, number) = dof(text).ok_or_else(|| line.malformed("`node.direction`", &shown(text)))?;
-    Ok(Some((at, format!("{node}.{}", direction(number)))))
+    let (node, number) = dof(text).ok_or_else(|| line.malformed("`node.direction`", &quoted(text)))?;
+    Ok(Some((index, format!("{node}.{}", direction(number)))))
 }
 
 /// Returns equation, node and label of a line of HBMAT's mapping file.
@@ -211,12 +212,12 @@ fn mapping(line: &Line) -> Option<(usize, i64, String)> {
     Some((equation, integer(node)?, label))
 }
 
-fn mapping_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
+fn mapping_line(line: &Line, index: usize) -> Result<Option<Named>, Error> {
     match mapping(line) {
         Some((equation, node, label)) => Ok(Some((equation, format!("{node}.{label}")))),
         // The column titles.
-        None if at == 0 => Ok(None),
-        None => Err(line.malformed("`equation node label`", &shown(line.text))),
+        None if index == 0 => Ok(None),
+        None => Err(line.malformed("`equation node label`", &quoted(line.text))),
     }
 }
 
@@ -224,7 +225,7 @@ fn mapping_line(line: &Line, at: usize) -> Result<Option<Named>, Error> {
 mod tests {
     use super::*;
 
-    fn check(text: &str, rows: usize, expected: Result<&[&str], (Kind, Location)>) {
+    fn check(text: &str, rows: usize, expected: Result<&[&str], (ErrorKind, Location)>) {
         let found = read_bytes(text.as_bytes(), rows).map_err(|e| (e.kind, e.location));
         assert_eq!(found, expected.map(|names| names.iter().map(ToString::to_string).collect()), "{text}");
     }
@@ -233,20 +234,20 @@ mod tests {
     fn csv_may_leave_rows_without_a_name() {
         check("row,name\n3,tip\n1,\"a, \"\"b\"\"\"\n", 3, Ok(&["a, \"b\"", "", "tip"]));
         check("\u{feff}Row, Name\r\n1,x\r\n", 1, Ok(&["x"]));
-        check("row,name\n1,a\n1,b\n", 2, Err((Kind::Names, Location::Line(3))));
-        check("row,name\n3,a\n", 2, Err((Kind::Names, Location::Line(2))));
-        check("row,name\n0,a\n", 2, Err((Kind::Malformed, Location::Line(2))));
-        check("row,name\n1,\n", 2, Err((Kind::Names, Location::Line(2))));
-        check("row,name\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("row,name\n1,a\n1,b\n", 2, Err((ErrorKind::Names, Location::Line(3))));
+        check("row,name\n3,a\n", 2, Err((ErrorKind::Names, Location::Line(2))));
+        check("row,name\n0,a\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
+        check("row,name\n1,\n", 2, Err((ErrorKind::Names, Location::Line(2))));
+        check("row,name\nx\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
     }
 
     #[test]
     fn calculix_directions_are_no_decimals() {
         check("10.1\n10.10\n7.4\n", 3, Ok(&["10.x", "10.10", "7.rx"]));
-        check("10.1\n10.2\n", 3, Err((Kind::Names, Location::File)));
-        check("10.1\n10.2\n", 1, Err((Kind::Names, Location::Line(2))));
-        check("10.1\n10.2\n10.1\n", 3, Err((Kind::Names, Location::File)));
-        check("10.1\nx\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("10.1\n10.2\n", 3, Err((ErrorKind::Names, Location::File)));
+        check("10.1\n10.2\n", 1, Err((ErrorKind::Names, Location::Line(2))));
+        check("10.1\n10.2\n10.1\n", 3, Err((ErrorKind::Names, Location::File)));
+        check("10.1\nx\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
     }
 
     #[test]
@@ -254,12 +255,12 @@ mod tests {
         let text = "   Matrix Eqn      Node      DOF\n       2         7     ROTZ\n       1         7     UX\n";
         check(text, 2, Ok(&["7.x", "7.rz"]));
         check("1 7 UX\n2 7 TEMP\n", 2, Ok(&["7.x", "7.TEMP"]));
-        check("1 7 UX\nmore\n", 2, Err((Kind::Malformed, Location::Line(2))));
+        check("1 7 UX\nmore\n", 2, Err((ErrorKind::Malformed, Location::Line(2))));
     }
 
     #[test]
-    fn what_is_no_list_of_names_is_refused() {
-        check("hello\n", 1, Err((Kind::Format, Location::Line(1))));
-        check("", 1, Err((Kind::Truncated, Location::Line(1))));
+    fn other_files_are_refused() {
+        check("hello\n", 1, Err((ErrorKind::Format, Location::Line(1))));
+        check("", 1, Err((ErrorKind::Truncated, Location::Line(1))));
     }
 }

@@ -18,9 +18,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
 use crate::names::direction;
 use crate::text::{Line, Lines};
 
@@ -60,23 +60,23 @@ fn is_continuation(line: &Line) -> bool {
 }
 
 /// Grid point and component.
-type Row = (i64, i64);
+type GridDof = (i64, i64);
 
 /// The properties of the matrix of one name.
 #[derive(Default)]
-struct Found {
+struct DmigMatrix {
     form: i64,
     complex: bool,
     /// Number of columns of a rectangular matrix by its first card, or zero if
     /// the card does not state it.
     columns: usize,
-    rows: BTreeSet<Row>,
+    rows: BTreeSet<GridDof>,
     /// Columns of a rectangular matrix, which are not rows.
-    others: BTreeSet<Row>,
+    column_points: BTreeSet<GridDof>,
     entries: usize,
 }
 
-impl Found {
+impl DmigMatrix {
     fn rectangular(&self) -> bool {
         matches!(self.form, 2 | 9)
     }
@@ -84,7 +84,7 @@ impl Found {
     fn size(&self) -> (usize, usize) {
         match self.rectangular() {
             true => {
-                let last = self.others.last().map_or(0, |(column, _)| usize::try_from(*column).unwrap_or(0));
+                let last = self.column_points.last().map_or(0, |(column, _)| usize::try_from(*column).unwrap_or(0));
                 (self.rows.len(), self.columns.max(last))
             }
             false => (self.rows.len(), self.rows.len()),
@@ -93,14 +93,14 @@ impl Found {
 }
 
 /// A header or an entry from the cards.
-enum Said<'a> {
+enum Card<'a> {
     Header { name: String, form: i64, complex: bool, columns: usize },
-    Entry { name: &'a str, column: Row, row: Row, value: f64, imaginary: bool },
+    Entry { name: &'a str, column: GridDof, row: GridDof, value: f64, imaginary: bool },
 }
 
-/// Calls `tell` for every header and entry of all DMIG cards.
-fn scan(bytes: &[u8], mut tell: impl FnMut(Said, &Line) -> Result<(), Error>) -> Result<(), Error> {
-    let mut column: Option<(String, Row)> = None;
+/// Calls `visit` for every header and entry of all DMIG cards.
+fn scan(bytes: &[u8], mut visit: impl FnMut(Card, &Line) -> Result<(), Error>) -> Result<(), Error> {
+    let mut column: Option<(String, GridDof)> = None;
     for line in Lines::new(bytes).filter(|line| !line.text.starts_with(b"$")) {
         if is_dmig(&line) {
             let fields = fields(&line);
@@ -113,15 +113,15 @@ fn scan(bytes: &[u8], mut tell: impl FnMut(Said, &Line) -> Result<(), Error>) ->
             if number(1)? == 0 {
                 let kind = number(3)?;
                 let columns = usize::try_from(number(7)?).unwrap_or(0);
-                tell(Said::Header { name, form: number(2)?, complex: matches!(kind, 3 | 4), columns }, &line)?;
+                visit(Card::Header { name, form: number(2)?, complex: matches!(kind, 3 | 4), columns }, &line)?;
                 column = None;
                 continue;
             }
             let at = (number(1)?, number(2)?);
-            entries(&fields[4.min(fields.len())..], &name, at, &line, &mut tell)?;
+            entries(&fields[4.min(fields.len())..], &name, at, &line, &mut visit)?;
             column = Some((name, at));
         } else if let Some((name, at)) = column.as_ref().filter(|_| is_continuation(&line)) {
-            entries(&fields(&line), name, *at, &line, &mut tell)?;
+            entries(&fields(&line), name, *at, &line, &mut visit)?;
         } else {
             column = None;
         }
@@ -133,9 +133,9 @@ fn scan(bytes: &[u8], mut tell: impl FnMut(Said, &Line) -> Result<(), Error>) ->
 fn entries(
     fields: &[&[u8]],
     name: &str,
-    column: Row,
+    column: GridDof,
     line: &Line,
-    tell: &mut impl FnMut(Said, &Line) -> Result<(), Error>,
+    visit: &mut impl FnMut(Card, &Line) -> Result<(), Error>,
 ) -> Result<(), Error> {
     for entry in fields.chunks(4) {
         let [grid, component, value, rest @ ..] = entry else { continue };
@@ -145,7 +145,7 @@ fn entries(
         let imaginary = rest.first().is_some_and(|field| !field.is_empty() && line.real(field).is_ok_and(|x| x != 0.0));
         let component = if component.is_empty() { 0 } else { line.integer(component)? };
         let row = (line.integer(grid)?, component);
-        tell(Said::Entry { name, column, row, value: line.real(value)?, imaginary }, line)?;
+        visit(Card::Entry { name, column, row, value: line.real(value)?, imaginary }, line)?;
     }
     Ok(())
 }
@@ -153,7 +153,7 @@ fn entries(
 fn complex(name: &str, location: Location) -> Error {
     let problem = format!("the matrix {name} is complex, but it must be real");
     Error::new(
-        Kind::Complex,
+        ErrorKind::Complex,
         location,
         problem,
         "export the real stiffness; structural damping is a separate matrix, K4AAX",
@@ -165,26 +165,27 @@ fn unknown(name: &str, line: &Line) -> Error {
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let mut found: BTreeMap<String, Found> = BTreeMap::new();
+    let mut found: BTreeMap<String, DmigMatrix> = BTreeMap::new();
     let mut order = Vec::new();
-    scan(bytes, |said, line| {
-        match said {
-            Said::Header { name, form, complex, columns } => {
+    scan(bytes, |card, line| {
+        match card {
+            Card::Header { name, form, complex, columns } => {
                 if !matches!(form, 1 | 2 | 6 | 9) {
                     return Err(line.malformed("form 1, 2, 6 or 9", &form.to_string()));
                 }
-                if found.insert(name.clone(), Found { form, complex, columns, ..Found::default() }).is_some() {
+                if found.insert(name.clone(), DmigMatrix { form, complex, columns, ..DmigMatrix::default() }).is_some()
+                {
                     return Err(
                         line.malformed("exactly one first card for every name", &format!("a second one of {name}"))
                     );
                 }
                 order.push(name);
             }
-            Said::Entry { name, column, row, .. } => {
+            Card::Entry { name, column, row, .. } => {
                 let matrix = found.get_mut(name).ok_or_else(|| unknown(name, line))?;
                 matrix.rows.insert(row);
                 if matrix.rectangular() {
-                    matrix.others.insert(column)
+                    matrix.column_points.insert(column)
                 } else {
                     matrix.rows.insert(column)
                 };
@@ -196,7 +197,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let items = order.into_iter().filter_map(|name| {
         let matrix = found.remove(&name)?;
         if matrix.complex {
-            return Some(Item::other(name, COMPLEX));
+            return Some(Item::not_a_matrix(name, COMPLEX));
         }
         let (rows, columns) = matrix.size();
         Some(Item::new(name.clone(), rows, columns, move || read(bytes, &name, &matrix)))
@@ -204,12 +205,12 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items.collect())
 }
 
-fn read(bytes: &[u8], wanted: &str, matrix: &Found) -> Result<Matrix, Error> {
-    let places: BTreeMap<Row, usize> = matrix.rows.iter().enumerate().map(|(at, row)| (*row, at)).collect();
+fn read(bytes: &[u8], wanted: &str, matrix: &DmigMatrix) -> Result<Matrix, Error> {
+    let places: BTreeMap<GridDof, usize> = matrix.rows.iter().enumerate().map(|(at, row)| (*row, at)).collect();
     let (rows, columns) = matrix.size();
-    let mut triplets = Triplets::new(rows, columns, matrix.entries, Location::File)?;
-    scan(bytes, |said, line| {
-        let Said::Entry { name, column, row, value, imaginary } = said else { return Ok(()) };
+    let mut triplets = TripletBuilder::new(rows, columns, matrix.entries, Location::File)?;
+    scan(bytes, |card, line| {
+        let Card::Entry { name, column, row, value, imaginary } = card else { return Ok(()) };
         if name != wanted {
             return Ok(());
         }
@@ -226,7 +227,7 @@ fn read(bytes: &[u8], wanted: &str, matrix: &Found) -> Result<Matrix, Error> {
         triplets.push(places[&row], column, value, line.location())
     })?;
     let symmetry = if matrix.form == 6 { Symmetry::Symmetric } else { Symmetry::General };
-    let name = |(grid, component): &Row| match component {
+    let name = |(grid, component): &GridDof| match component {
         0 => grid.to_string(),
         component => format!("{grid}.{}", direction(*component)),
     };
@@ -296,16 +297,16 @@ mod tests {
         assert_eq!(listed, ["KAAX (2 x 2)", "C (complex)"]);
         assert_eq!(read_bytes(mixed.as_bytes(), None, Some("KAAX"))?.get(0, 0), 1e3);
         let named = read_bytes(mixed.as_bytes(), None, Some("C")).map(|_| ()).map_err(|e| (e.kind, e.location));
-        assert_eq!(named, Err((Kind::Complex, Location::Variable("C".into()))));
-        check("DMIG,C,0,6,4\n", Kind::Complex, Location::Variable("C".into()));
-        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", Kind::Complex, Location::Line(2));
-        check("DMIG,M,1,1,,1,1,2.0\n", Kind::Malformed, Location::Line(1));
-        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,x\n", Kind::Malformed, Location::Line(2));
-        check("DMIG,M,0,7,2\n", Kind::Malformed, Location::Line(1));
-        check("DMIG,M,0,9,2\nDMIG,M,-1,,,1,1,1.0\n", Kind::Malformed, Location::Line(2));
+        assert_eq!(named, Err((ErrorKind::Complex, Location::Variable("C".into()))));
+        check("DMIG,C,0,6,4\n", ErrorKind::Complex, Location::Variable("C".into()));
+        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,2.0,3.0\n", ErrorKind::Complex, Location::Line(2));
+        check("DMIG,M,1,1,,1,1,2.0\n", ErrorKind::Malformed, Location::Line(1));
+        check("DMIG,M,0,6,2\nDMIG,M,1,1,,1,1,x\n", ErrorKind::Malformed, Location::Line(2));
+        check("DMIG,M,0,7,2\n", ErrorKind::Malformed, Location::Line(1));
+        check("DMIG,M,0,9,2\nDMIG,M,-1,,,1,1,1.0\n", ErrorKind::Malformed, Location::Line(2));
         check(
             "DMIG,M,0,6,2\nDMIG,M,1,1,,2,1,1.0\nDMIG,M,2,1,,1,1,2.0\n",
-            Kind::NotSymmetric,
+            ErrorKind::NotSymmetric,
             Location::Variable("M".into()),
         );
         Ok(())

@@ -9,22 +9,24 @@
 //!
 //! Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4, and Utility Guide.
 
-use crate::bytes::{Bytes, Order};
-use crate::error::{Error, Kind, Location};
+use crate::bytes::{ByteCursor, ByteOrder};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::matrix::{Matrix, Symmetry, Triplets};
-use crate::text::{Line, Lines, integer, shown};
+use crate::matrix::{Matrix, Symmetry, TripletBuilder};
+use crate::text::{Line, Lines, integer, quoted};
 
 pub(crate) const FORMAT: Format = Format {
     name: "nastran-op4",
     summary: "Nastran OUTPUT4 (.op4), as text or binary, dense, sparse or BIGMAT",
-    sniff: |bytes| binary(bytes).is_some() || Lines::new(bytes).next().is_some_and(|line| Text::new(&line).is_ok()),
+    sniff: |bytes| {
+        binary(bytes).is_some() || Lines::new(bytes).next().is_some_and(|line| TextHeader::new(&line).is_ok())
+    },
     open: |bytes| if binary(bytes).is_some() { open_binary(bytes) } else { open_text(bytes) },
 };
 
 /// The header of a matrix, common to text and binary files.
 #[derive(Clone)]
-struct Header {
+struct Op4Header {
     name: String,
     rows: usize,
     columns: usize,
@@ -33,7 +35,7 @@ struct Header {
     big: bool,
 }
 
-impl Header {
+impl Op4Header {
     fn new(numbers: [i64; 4], name: &[u8]) -> Option<Self> {
         let [columns, rows, form, kind] = numbers;
         let name = String::from_utf8_lossy(name).trim().to_uppercase();
@@ -53,23 +55,23 @@ impl Header {
     /// Returns the matrix as an item that `read` reads.
     fn item<'a>(self, read: impl Fn(&Self) -> Result<Matrix, Error> + 'a) -> Item<'a> {
         if self.is_complex() {
-            return Item::other(self.name, COMPLEX);
+            return Item::not_a_matrix(self.name, COMPLEX);
         }
         Item::new(self.name.clone(), self.rows, self.columns, move || read(&self))
     }
 }
 
 /// A matrix as text: its header and the width of its numbers.
-struct Text {
-    header: Header,
+struct TextHeader {
+    header: Op4Header,
     /// Number of characters of a number.
     width: usize,
 }
 
-impl Text {
+impl TextHeader {
     fn new(line: &Line) -> Result<Self, Error> {
         let wrong =
-            || line.malformed("the header of a matrix: columns, rows, form, type, name, format", &shown(line.text));
+            || line.malformed("the header of a matrix: columns, rows, form, type, name, format", &quoted(line.text));
         // Sizes beyond seven digits have 16 characters, which the end of the line indicates.
         let text = line.text.trim_ascii_end();
         let wide = text.ends_with(b"|I16");
@@ -79,7 +81,7 @@ impl Text {
         for (at, number) in numbers.iter_mut().enumerate() {
             *number = integer(field(at)).ok_or_else(wrong)?;
         }
-        let header = Header::new(numbers, field(4)).ok_or_else(wrong)?;
+        let header = Op4Header::new(numbers, field(4)).ok_or_else(wrong)?;
         let format = String::from_utf8_lossy(line.columns(widths[5], text.len())).to_uppercase().replace("|I16", "");
         // A row of integers has neither a name nor a format.
         if format.is_empty() && !header.name.starts_with(|c: char| c.is_ascii_alphabetic()) {
@@ -107,7 +109,7 @@ fn open_text(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         if line.text.trim_ascii().is_empty() {
             continue;
         }
-        let Text { header, width } = Text::new(&line)?;
+        let TextHeader { header, width } = TextHeader::new(&line)?;
         let start = lines.clone();
         skip_text(&mut lines, header.columns)?;
         items.push(header.item(move |header| read_text(start.clone(), header, width)));
@@ -122,7 +124,7 @@ fn column_of(line: &Line) -> Result<Option<[usize; 3]>, Error> {
     match words[..] {
         [column, row, count] => Ok(Some([line.count(column)?, line.count(row)?, line.count(count)?])),
         [_] | [_, _] => Ok(None),
-        _ => Err(line.malformed("column, first row and words", &shown(line.text))),
+        _ => Err(line.malformed("column, first row and words", &quoted(line.text))),
     }
 }
 
@@ -140,13 +142,13 @@ fn skip_text(lines: &mut Lines, columns: usize) -> Result<(), Error> {
     }
 }
 
-fn read_text(mut lines: Lines, header: &Header, width: usize) -> Result<Matrix, Error> {
+fn read_text(mut lines: Lines, header: &Op4Header, width: usize) -> Result<Matrix, Error> {
     let words = if header.kind == 2 { 2 } else { 1 };
-    let mut triplets = Triplets::new(header.rows, header.columns, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(header.rows, header.columns, 0, Location::File)?;
     let mut line = lines.expect("a column of the matrix")?;
     loop {
         let Some([column, first, count]) = column_of(&line)? else {
-            return Err(line.malformed("column, first row and words", &shown(line.text)));
+            return Err(line.malformed("column, first row and words", &quoted(line.text)));
         };
         if column > header.columns {
             break;
@@ -177,7 +179,7 @@ fn read_text(mut lines: Lines, header: &Header, width: usize) -> Result<Matrix, 
 
 fn wrong_count(line: &Line, words: usize, found: usize) -> Error {
     let problem = format!("the file states {words} words, but {found} numbers follow");
-    Error::new(Kind::Count, line.location(), problem, "the file is damaged; export it again")
+    Error::new(ErrorKind::Count, line.location(), problem, "the file is damaged; export it again")
 }
 
 /// Returns the first row, counted from zero, and the number of words of a string.
@@ -190,7 +192,7 @@ fn string(line: &Line) -> Result<(usize, usize), Error> {
     };
     match (usize::try_from(row), usize::try_from(count)) {
         (Ok(row), Ok(count)) => Ok((row, count)),
-        _ => Err(line.malformed("first row and words of a string", &shown(line.text))),
+        _ => Err(line.malformed("first row and words of a string", &quoted(line.text))),
     }
 }
 
@@ -209,7 +211,7 @@ fn values<'a>(
     width: usize,
     first: usize,
     column: usize,
-    triplets: &mut Triplets,
+    triplets: &mut TripletBuilder,
 ) -> Result<usize, Error> {
     let mut found = 0;
     while has_values(line) {
@@ -226,21 +228,21 @@ fn values<'a>(
 
 /// Returns the byte order and the size of an integer, if the file begins with
 /// the header of a binary matrix.
-fn binary(bytes: &[u8]) -> Option<(Order, usize)> {
-    let orders = [Order::Little, Order::Big];
+fn binary(bytes: &[u8]) -> Option<(ByteOrder, usize)> {
+    let orders = [ByteOrder::Little, ByteOrder::Big];
     orders.into_iter().find_map(|order| {
-        let whole = match Bytes::new(bytes, order).u32().ok()? {
+        let whole = match ByteCursor::new(bytes, order).u32().ok()? {
             24 => 4,
             48 => 8,
             _ => return None,
         };
-        let header = record(&mut Bytes::new(bytes, order)).ok()?;
+        let header = record(&mut ByteCursor::new(bytes, order)).ok()?;
         header_of(header, order, whole).map(|_| (order, whole))
     })
 }
 
 /// Returns the bytes of a Fortran record, whose length stands before and after it.
-fn record<'a>(file: &mut Bytes<'a>) -> Result<&'a [u8], Error> {
+fn record<'a>(file: &mut ByteCursor<'a>) -> Result<&'a [u8], Error> {
     let length = file.u32()? as usize;
     let data = file.take(length)?;
     let behind = file.u32()? as usize;
@@ -252,30 +254,30 @@ fn record<'a>(file: &mut Bytes<'a>) -> Result<&'a [u8], Error> {
 }
 
 /// Reads an integer of 4 or 8 bytes.
-fn whole_number(bytes: &mut Bytes, size: usize) -> Result<i64, Error> {
+fn whole_number(bytes: &mut ByteCursor, size: usize) -> Result<i64, Error> {
     if size == 8 { bytes.i64() } else { bytes.i32().map(i64::from) }
 }
 
-fn header_of(record: &[u8], order: Order, whole: usize) -> Option<Header> {
-    let mut bytes = Bytes::new(record, order);
+fn header_of(record: &[u8], order: ByteOrder, whole: usize) -> Option<Op4Header> {
+    let mut bytes = ByteCursor::new(record, order);
     let mut numbers = [0; 4];
     for number in &mut numbers {
         *number = whole_number(&mut bytes, whole).ok()?;
     }
-    Header::new(numbers, bytes.take(2 * whole).ok()?)
+    Op4Header::new(numbers, bytes.take(2 * whole).ok()?)
 }
 
 fn open_binary(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let (order, whole) = binary(bytes).unwrap_or((Order::Little, 4));
-    let mut file = Bytes::new(bytes, order);
+    let (order, whole) = binary(bytes).unwrap_or((ByteOrder::Little, 4));
+    let mut file = ByteCursor::new(bytes, order);
     let mut items = Vec::new();
-    while file.left() > 0 {
+    while file.remaining() > 0 {
         let location = file.clone();
         let header = header_of(record(&mut file)?, order, whole)
             .ok_or_else(|| location.malformed("the header of a matrix", "something else"))?;
         let start = file.clone();
         loop {
-            let mut column = Bytes::new(record(&mut file)?, order);
+            let mut column = ByteCursor::new(record(&mut file)?, order);
             if whole_number(&mut column, whole)? > header.columns as i64 {
                 break;
             }
@@ -285,16 +287,16 @@ fn open_binary(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     Ok(items)
 }
 
-fn read_binary(mut file: Bytes, header: &Header, whole: usize) -> Result<Matrix, Error> {
+fn read_binary(mut file: ByteCursor, header: &Op4Header, whole: usize) -> Result<Matrix, Error> {
     let order = file.order;
     // If integers have 8 bytes, words do too, and each number is one word.
     let double = header.kind == 2 || whole == 8;
     let words = if header.kind == 2 && whole == 4 { 2 } else { 1 };
-    let mut triplets = Triplets::new(header.rows, header.columns, 0, Location::File)?;
+    let mut triplets = TripletBuilder::new(header.rows, header.columns, 0, Location::File)?;
     loop {
         let location = file.clone();
         let wrong = |what: &str| location.malformed(what, "something else");
-        let mut record = Bytes::new(record(&mut file)?, order);
+        let mut record = ByteCursor::new(record(&mut file)?, order);
         let column = whole_number(&mut record, whole)?;
         if column > header.columns as i64 {
             return triplets.finish(Symmetry::General);
@@ -302,7 +304,7 @@ fn read_binary(mut file: Bytes, header: &Header, whole: usize) -> Result<Matrix,
         let column = usize::try_from(column - 1).map_err(|_| wrong("a column from 1"))?;
         let first = whole_number(&mut record, whole)?;
         let count = whole_number(&mut record, whole)?;
-        let mut put = |row: i64, count: i64, record: &mut Bytes| -> Result<(), Error> {
+        let mut put = |row: i64, count: i64, record: &mut ByteCursor| -> Result<(), Error> {
             let row = usize::try_from(row).map_err(|_| wrong("a first row from 1"))?;
             let count = usize::try_from(count).map_err(|_| wrong("a number of words"))? / words;
             for at in 0..count {
@@ -317,7 +319,7 @@ fn read_binary(mut file: Bytes, header: &Header, whole: usize) -> Result<Matrix,
             put(first - 1, count, &mut record)?;
             continue;
         }
-        while record.left() >= whole {
+        while record.remaining() >= whole {
             let both = whole_number(&mut record, whole)?;
             let (row, count) = match header.big {
                 true => (whole_number(&mut record, whole)?.wrapping_sub(1), both.wrapping_sub(1)),
@@ -379,7 +381,7 @@ mod tests {
         assert_eq!(listed, ["3 x 2", "K (3 x 2)"]);
         assert_eq!(read_bytes(two.as_bytes(), None, Some("K"))?.get(1, 0), 1.5);
         let error = read_bytes(two.as_bytes(), None, None).map(|_| ()).map_err(|e| (e.kind, e.remedy));
-        assert!(error.is_err_and(|(kind, remedy)| kind == Kind::Choice && remedy.contains("export")));
+        assert!(error.is_err_and(|(kind, remedy)| kind == ErrorKind::Selection && remedy.contains("export")));
         // A row of a full matrix.
         let rows: String = ["2 1 1 2", "1 2 1 1", "1 1 2 1", "2 1 1 2"]
             .map(|row| row.split(' ').map(|word| format!("{word:>8}")).collect::<String>() + "\n")
@@ -389,23 +391,35 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_state_their_line() {
         let check = |text: String, kind, location| {
             let found =
                 read_bytes(text.as_bytes(), Some("nastran-op4"), None).map(|_| ()).map_err(|e| (e.kind, e.location));
             assert_eq!(found, Err((kind, location)), "{text}");
         };
-        check(DENSE.replace("       1       2       4", "       1       2       5"), Kind::Count, Location::Line(2));
-        check(DENSE.replace("       1       2       4", "       1       3       4"), Kind::Count, Location::Line(3));
         check(
-            DENSE.replace("       1       2       4", "       0       2       4"),
-            Kind::Malformed,
+            DENSE.replace("       1       2       4", "       1       2       5"),
+            ErrorKind::Count,
             Location::Line(2),
         );
-        check(DENSE.lines().take(3).map(|line| format!("{line}\n")).collect(), Kind::Truncated, Location::Line(4));
-        check(DENSE.replace("       2       2K", "       2       4K"), Kind::Complex, Location::Variable("K".into()));
-        check(DENSE.replace("2E23.16", "2X23.16"), Kind::Malformed, Location::Line(1));
-        check(SPARSE.replace("     327681", "     262145"), Kind::Count, Location::Line(3));
-        check(SPARSE.replace("     327681", "          1"), Kind::Malformed, Location::Line(3));
+        check(
+            DENSE.replace("       1       2       4", "       1       3       4"),
+            ErrorKind::Count,
+            Location::Line(3),
+        );
+        check(
+            DENSE.replace("       1       2       4", "       0       2       4"),
+            ErrorKind::Malformed,
+            Location::Line(2),
+        );
+        check(DENSE.lines().take(3).map(|line| format!("{line}\n")).collect(), ErrorKind::Truncated, Location::Line(4));
+        check(
+            DENSE.replace("       2       2K", "       2       4K"),
+            ErrorKind::Complex,
+            Location::Variable("K".into()),
+        );
+        check(DENSE.replace("2E23.16", "2X23.16"), ErrorKind::Malformed, Location::Line(1));
+        check(SPARSE.replace("     327681", "     262145"), ErrorKind::Count, Location::Line(3));
+        check(SPARSE.replace("     327681", "          1"), ErrorKind::Malformed, Location::Line(3));
     }
 }

@@ -5,11 +5,11 @@
 //! ```
 //! Source: NumPy Enhancement Proposal 1, A Simple File Format for NumPy Arrays.
 
-use crate::bytes::{Bytes, Number, Order};
-use crate::error::{Error, Kind, Location};
+use crate::bytes::{ByteCursor, ByteOrder, NumberType};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{COMPLEX, Format, Item};
-use crate::matrix::{Along, Matrix, dense};
-use crate::text::shown;
+use crate::matrix::{DenseLayout, Matrix, StorageOrder, from_dense};
+use crate::text::quoted;
 
 pub(crate) const FORMAT: Format = Format {
     name: "npy",
@@ -26,8 +26,8 @@ const LONGEST_HEADER: usize = 4096;
 
 /// The type of the elements of an array.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Element {
-    Number(Number),
+pub(crate) enum ElementType {
+    Number(NumberType),
     Complex,
     /// Text of the given number of bytes.
     Text(usize),
@@ -36,24 +36,24 @@ pub(crate) enum Element {
 }
 
 /// An array whose header is read, and whose numbers are not read yet.
-pub(crate) struct Array<'a> {
-    pub element: Element,
+pub(crate) struct NpyArray<'a> {
+    pub element: ElementType,
     pub shape: Vec<usize>,
     fortran: bool,
-    data: Bytes<'a>,
+    data: ByteCursor<'a>,
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
-    let item = match Array::new(bytes)?.size() {
-        Ok((rows, columns)) => Item::new("", rows, columns, move || Array::new(bytes)?.matrix()),
-        Err(note) => Item::other("", note),
+    let item = match NpyArray::new(bytes)?.size() {
+        Ok((rows, columns)) => Item::new("", rows, columns, move || NpyArray::new(bytes)?.matrix()),
+        Err(note) => Item::not_a_matrix("", note),
     };
     Ok(vec![item])
 }
 
-impl<'a> Array<'a> {
+impl<'a> NpyArray<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
-        let mut data = Bytes::new(bytes, Order::Little);
+        let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         if data.take(MAGIC.len())? != MAGIC {
             return Err(data.malformed("the magic of NumPy", "something else"));
         }
@@ -75,7 +75,7 @@ impl<'a> Array<'a> {
                 let shape = shape(text)?;
                 Some((value(text, "descr")?, value(text, "fortran_order")?.starts_with("True"), shape))
             })
-            .ok_or_else(|| at.malformed("a header with descr, fortran_order and shape", shown(header)))?;
+            .ok_or_else(|| at.malformed("a header with descr, fortran_order and shape", quoted(header)))?;
         let (element, order) = element_of(element);
         data.order = order;
         Ok(Self { element, shape, fortran, data })
@@ -84,10 +84,10 @@ impl<'a> Array<'a> {
     /// Returns rows and columns, or a description of an array that is not a matrix.
     pub fn size(&self) -> Result<(usize, usize), String> {
         match &self.element {
-            Element::Number(_) => {}
-            Element::Complex => return Err(COMPLEX.into()),
-            Element::Text(_) => return Err("text".into()),
-            Element::Other(name) => return Err(format!("an array of type {name}")),
+            ElementType::Number(_) => {}
+            ElementType::Complex => return Err(COMPLEX.into()),
+            ElementType::Text(_) => return Err("text".into()),
+            ElementType::Other(name) => return Err(format!("an array of type {name}")),
         }
         match self.shape[..] {
             [] => Ok((1, 1)),
@@ -98,8 +98,11 @@ impl<'a> Array<'a> {
     }
 
     /// Reads the numbers in file order.
-    pub fn numbers<T>(mut self, read: impl Fn(Number, &mut Bytes) -> Result<T, Error>) -> Result<Vec<T>, Error> {
-        let Element::Number(number) = self.element else {
+    pub fn numbers<T>(
+        mut self,
+        read: impl Fn(NumberType, &mut ByteCursor) -> Result<T, Error>,
+    ) -> Result<Vec<T>, Error> {
+        let ElementType::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
         };
         let count = self.count(number)?;
@@ -109,19 +112,19 @@ impl<'a> Array<'a> {
     /// Returns the bytes of an array of one text.
     pub fn text(mut self) -> Result<&'a [u8], Error> {
         match self.element {
-            Element::Text(length) => self.data.take(length),
+            ElementType::Text(length) => self.data.take(length),
             ref other => Err(self.data.malformed("a text", format!("{other:?}"))),
         }
     }
 
     /// Returns the number of elements. Fails if the file does not have enough bytes.
-    fn count(&self, number: Number) -> Result<usize, Error> {
+    fn count(&self, number: NumberType) -> Result<usize, Error> {
         let count = self.shape.iter().try_fold(1_usize, |product, &size| product.checked_mul(size));
-        let room = self.data.left() / number.size();
+        let room = self.data.remaining() / number.size();
         match count {
             Some(count) if count <= room => Ok(count),
             _ => Err(Error::new(
-                Kind::Truncated,
+                ErrorKind::Truncated,
                 self.data.location(),
                 format!("the header states the shape {:?}, but the file contains {room} numbers", self.shape),
                 "the file is not complete; export or copy it again",
@@ -131,18 +134,20 @@ impl<'a> Array<'a> {
 
     pub fn matrix(self) -> Result<Matrix, Error> {
         let size = self.size().map_err(|note| {
-            let kind = if self.element == Element::Complex { Kind::Complex } else { Kind::Unsupported };
+            let kind = if self.element == ElementType::Complex { ErrorKind::Complex } else { ErrorKind::Unsupported };
             let remedy = "save a real array of two dimensions";
             Error::new(kind, Location::File, format!("this is not a real matrix: {note}"), remedy)
         });
-        let size = size?;
-        let Element::Number(number) = self.element else {
+        let (rows, columns) = size?;
+        let ElementType::Number(number) = self.element else {
             return Err(self.data.malformed("an array of numbers", format!("{:?}", self.element)));
         };
         // All numbers are in the file, so no position lies beyond the end.
         self.count(number)?;
-        let along = if self.fortran { Along::Columns } else { Along::Rows };
-        dense(size, along, &self.data.location(), |at| number.real(&mut self.data.ahead(at * number.size())))
+        let order = if self.fortran { StorageOrder::Columns } else { StorageOrder::Rows };
+        from_dense(DenseLayout { rows, columns, order }, &self.data.location(), |at| {
+            number.real(&mut self.data.ahead(at * number.size()))
+        })
     }
 }
 
@@ -160,29 +165,29 @@ fn shape(header: &str) -> Option<Vec<usize>> {
 }
 
 /// Returns the type and the byte order of a descr such as `'<f8'`.
-fn element_of(descr: &str) -> (Element, Order) {
-    let other = |name: &str| (Element::Other(name.chars().take(20).collect()), Order::Little);
+fn element_of(descr: &str) -> (ElementType, ByteOrder) {
+    let other = |name: &str| (ElementType::Other(name.chars().take(20).collect()), ByteOrder::Little);
     let Some(name) = descr.strip_prefix('\'').and_then(|rest| rest.split_once('\'')).map(|(name, _)| name) else {
         return other("a record");
     };
-    let order = if name.starts_with('>') { Order::Big } else { Order::Little };
+    let order = if name.starts_with('>') { ByteOrder::Big } else { ByteOrder::Little };
     let element = match name.trim_start_matches(['<', '>', '|', '=']) {
-        "b1" | "u1" => Element::Number(Number::U8),
-        "i1" => Element::Number(Number::I8),
-        "i2" => Element::Number(Number::I16),
-        "u2" => Element::Number(Number::U16),
-        "i4" => Element::Number(Number::I32),
-        "u4" => Element::Number(Number::U32),
-        "i8" => Element::Number(Number::I64),
-        "u8" => Element::Number(Number::U64),
-        "f4" => Element::Number(Number::F32),
-        "f8" => Element::Number(Number::F64),
-        "c8" | "c16" | "c32" => Element::Complex,
+        "b1" | "u1" => ElementType::Number(NumberType::U8),
+        "i1" => ElementType::Number(NumberType::I8),
+        "i2" => ElementType::Number(NumberType::I16),
+        "u2" => ElementType::Number(NumberType::U16),
+        "i4" => ElementType::Number(NumberType::I32),
+        "u4" => ElementType::Number(NumberType::U32),
+        "i8" => ElementType::Number(NumberType::I64),
+        "u8" => ElementType::Number(NumberType::U64),
+        "f4" => ElementType::Number(NumberType::F32),
+        "f8" => ElementType::Number(NumberType::F64),
+        "c8" | "c16" | "c32" => ElementType::Complex,
         text => match (text.strip_prefix('S'), text.strip_prefix('U')) {
-            (Some(length), _) if length.parse::<usize>().is_ok() => Element::Text(length.parse().unwrap_or(0)),
+            (Some(length), _) if length.parse::<usize>().is_ok() => ElementType::Text(length.parse().unwrap_or(0)),
             // Four bytes per character.
             (_, Some(length)) if length.parse::<u32>().is_ok() => {
-                Element::Text(length.parse::<u32>().map_or(0, |length| length as usize * 4))
+                ElementType::Text(length.parse::<u32>().map_or(0, |length| length as usize * 4))
             }
             _ => return other(text),
         },
@@ -240,19 +245,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn errors_state_their_kind() {
         let check = |descr, shape, data: &[u8], kind| {
             let found = read_bytes(&write(descr, shape, data), Some("npy"), None).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind), "{descr} {shape}");
         };
-        check("<f8", "(2, 3)", &doubles(&[1.0; 5]), Kind::Truncated);
-        check("<f8", "(1, 1)", &doubles(&[f64::NAN]), Kind::NotFinite);
-        check("<c16", "(1, 1)", &doubles(&[1.0; 2]), Kind::Complex);
-        check("<f8", "(1, 1, 1)", &doubles(&[1.0]), Kind::Unsupported);
-        check("|O", "(1, 1)", &doubles(&[1.0]), Kind::Unsupported);
-        check("<f8", "(99999999999, 99999999999)", &doubles(&[1.0]), Kind::TooLarge);
-        check("<f8", "(-1, 2)", &[], Kind::Malformed);
-        check("<f8", "2, 2", &[], Kind::Malformed);
-        assert_eq!(read_bytes(MAGIC, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        check("<f8", "(2, 3)", &doubles(&[1.0; 5]), ErrorKind::Truncated);
+        check("<f8", "(1, 1)", &doubles(&[f64::NAN]), ErrorKind::NotFinite);
+        check("<c16", "(1, 1)", &doubles(&[1.0; 2]), ErrorKind::Complex);
+        check("<f8", "(1, 1, 1)", &doubles(&[1.0]), ErrorKind::Unsupported);
+        check("|O", "(1, 1)", &doubles(&[1.0]), ErrorKind::Unsupported);
+        check("<f8", "(99999999999, 99999999999)", &doubles(&[1.0]), ErrorKind::TooLarge);
+        check("<f8", "(-1, 2)", &[], ErrorKind::Malformed);
+        check("<f8", "2, 2", &[], ErrorKind::Malformed);
+        assert_eq!(read_bytes(MAGIC, None, None).map_err(|e| e.kind), Err(ErrorKind::Truncated));
     }
 }

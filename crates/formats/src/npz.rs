@@ -6,13 +6,13 @@
 
 use std::borrow::Cow;
 
-use crate::bytes::{Bytes, Number, Order};
-use crate::error::{Error, Kind, Location};
+use crate::bytes::{ByteCursor, ByteOrder, NumberType};
+use crate::error::{Error, ErrorKind, Location};
 use crate::format::{Format, Item};
-use crate::inflate::{Limit, Wrapping, beginning, inflate};
-use crate::matrix::{Entry, Matrix, Symmetry, Triplets, compressed};
-use crate::npy::{self, Array};
-use crate::text::shown;
+use crate::inflate::{Container, DecompressionLimit, beginning, inflate};
+use crate::matrix::{Entry, Matrix, Symmetry, TripletBuilder, for_each_compressed};
+use crate::npy::{self, NpyArray};
+use crate::text::quoted;
 
 pub(crate) const FORMAT: Format = Format {
     name: "npz",
@@ -31,11 +31,11 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let members = members(bytes)?;
     let sparse = |name| members.iter().any(|member| member.name == name);
     if sparse("format") && sparse("shape") && sparse("data") {
-        let size = array(&find(&members, "shape")?.contents()?)?.numbers(Number::index)?;
+        let size = array(&find(&members, "shape")?.contents()?)?.numbers(NumberType::index)?;
         let [rows, columns] = size[..] else {
             let location = Location::Variable("shape".into());
             let problem = format!("the array `shape` has {} numbers instead of two", size.len());
-            return Err(Error::new(Kind::Unsupported, location, problem, "save a matrix of two dimensions"));
+            return Err(Error::new(ErrorKind::Unsupported, location, problem, "save a matrix of two dimensions"));
         };
         return Ok(vec![Item::new("", rows, columns, move || read_sparse(&members, rows, columns))]);
     }
@@ -46,25 +46,25 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 fn item(member: Member) -> Result<Item, Error> {
     let start = member.beginning();
     if !start.starts_with(npy::MAGIC) {
-        return Ok(Item::other(member.name.clone(), "not an array"));
+        return Ok(Item::not_a_matrix(member.name.clone(), "not an array"));
     }
-    let array = Array::new(&start).map_err(|error| error.at(Location::Variable(member.name.clone())))?;
+    let array = NpyArray::new(&start).map_err(|error| error.with_location(Location::Variable(member.name.clone())))?;
     Ok(match array.size() {
         Ok((rows, columns)) => {
             Item::new(member.name.clone(), rows, columns, move || self::array(&member.contents()?)?.matrix())
         }
-        Err(note) => Item::other(member.name.clone(), note),
+        Err(note) => Item::not_a_matrix(member.name.clone(), note),
     })
 }
 
-fn array(contents: &[u8]) -> Result<Array<'_>, Error> {
-    Array::new(contents)
+fn array(contents: &[u8]) -> Result<NpyArray<'_>, Error> {
+    NpyArray::new(contents)
 }
 
 fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>, Error> {
     members.iter().find(|member| member.name == name).ok_or_else(|| {
         let problem = format!("the sparse matrix has no array `{name}`");
-        Error::new(Kind::Malformed, Location::File, problem, "write the file with scipy.sparse.save_npz")
+        Error::new(ErrorKind::Malformed, Location::File, problem, "write the file with scipy.sparse.save_npz")
     })
 }
 
@@ -72,28 +72,30 @@ fn find<'m, 'a>(members: &'m [Member<'a>], name: &str) -> Result<&'m Member<'a>,
 fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix, Error> {
     let part = |name: &str| -> Result<Cow<[u8]>, Error> { find(members, name)?.contents() };
     let indices = |name: &str| -> Result<Vec<usize>, Error> {
-        array(&part(name)?)?.numbers(Number::index).map_err(|error| error.at(Location::Variable(name.into())))
+        array(&part(name)?)?
+            .numbers(NumberType::index)
+            .map_err(|error| error.with_location(Location::Variable(name.into())))
     };
     let layout = part("format")?;
     let layout: Vec<u8> = array(&layout)?.text()?.iter().copied().filter(|&byte| byte != 0).collect();
     let data = part("data")?;
     let values = array(&data)?;
-    if values.element == npy::Element::Complex {
+    if values.element == npy::ElementType::Complex {
         let location = Location::Variable("data".into());
         return Err(Error::new(
-            Kind::Complex,
+            ErrorKind::Complex,
             location,
             "the matrix is complex, but it must be real".into(),
             "save its real part",
         ));
     }
-    let values = values.numbers(Number::real)?;
-    let mut triplets = Triplets::new(rows, columns, values.len(), Location::File)?;
+    let values = values.numbers(NumberType::real)?;
+    let mut triplets = TripletBuilder::new(rows, columns, values.len(), Location::File)?;
     match &layout[..] {
         b"csc" | b"csr" => {
             let (pointers, inner) = (indices("indptr")?, indices("indices")?);
             let outer = if layout == b"csc" { columns } else { rows };
-            compressed(&pointers, &inner, &values, outer, |outer, inner, value| {
+            for_each_compressed(&pointers, &inner, &values, outer, |outer, inner, value| {
                 let (row, column) = if layout == b"csc" { (inner, outer) } else { (outer, inner) };
                 triplets.push(row, column, value, Location::Variable("data".into()))
             })?;
@@ -108,7 +110,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
                     values.len()
                 );
                 return Err(Error::new(
-                    Kind::Count,
+                    ErrorKind::Count,
                     Location::File,
                     problem,
                     "write the file again with scipy.sparse.save_npz",
@@ -119,10 +121,10 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
             }
         }
         other => {
-            let problem = format!("the matrix is stored as {}; supported are {LAYOUTS}", shown(other));
+            let problem = format!("the matrix is stored as {}; supported are {LAYOUTS}", quoted(other));
             let location = Location::Variable("format".into());
             return Err(Error::new(
-                Kind::Unsupported,
+                ErrorKind::Unsupported,
                 location,
                 problem,
                 "save it as csc: save_npz(path, matrix.tocsc())",
@@ -139,7 +141,7 @@ struct Member<'a> {
     deflated: bool,
     packed: &'a [u8],
     crc: u32,
-    limit: Limit,
+    limit: DecompressionLimit,
 }
 
 impl<'a> Member<'a> {
@@ -149,14 +151,14 @@ impl<'a> Member<'a> {
 
     fn beginning(&self) -> Cow<'a, [u8]> {
         match self.deflated {
-            true => Cow::Owned(beginning(self.packed, Wrapping::Bare, HEADER)),
+            true => Cow::Owned(beginning(self.packed, Container::Bare, HEADER)),
             false => Cow::Borrowed(&self.packed[..self.packed.len().min(HEADER)]),
         }
     }
 
     fn contents(&self) -> Result<Cow<'a, [u8]>, Error> {
         let contents = match self.deflated {
-            true => Cow::Owned(inflate(self.packed, Wrapping::Bare, self.limit, &self.location())?),
+            true => Cow::Owned(inflate(self.packed, Container::Bare, self.limit, &self.location())?),
             false => Cow::Borrowed(self.packed),
         };
         let mut crc = flate2::Crc::new();
@@ -165,7 +167,7 @@ impl<'a> Member<'a> {
             return Ok(contents);
         }
         let problem = "the checksum of the member differs from the one in the zip".into();
-        Err(Error::new(Kind::Malformed, self.location(), problem, "the file is damaged; copy or export it again"))
+        Err(Error::new(ErrorKind::Malformed, self.location(), problem, "the file is damaged; copy or export it again"))
     }
 }
 
@@ -181,9 +183,9 @@ const IN_EXTRA: usize = u32::MAX as usize;
 
 /// Returns the members of a zip, by its central directory.
 fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
-    let mut zip = Bytes::new(bytes, Order::Little);
+    let mut zip = ByteCursor::new(bytes, ByteOrder::Little);
     zip.seek(directory(bytes)?)?;
-    let limit = Limit::of(bytes.len());
+    let limit = DecompressionLimit::for_file(bytes.len());
     let mut members = Vec::new();
     while zip.clone().u32().is_ok_and(|mark| mark == CENTRAL) {
         zip.skip(8);
@@ -204,9 +206,9 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
             let problem =
                 format!("the member is encrypted or compressed with method {method}; only deflate is supported");
             let remedy = "write the file with numpy.savez or numpy.savez_compressed";
-            return Err(Error::new(Kind::Unsupported, Location::Variable(name), problem, remedy));
+            return Err(Error::new(ErrorKind::Unsupported, Location::Variable(name), problem, remedy));
         }
-        let mut data = Bytes::new(bytes, Order::Little);
+        let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         data.seek(local)?;
         if data.u32()? != LOCAL {
             return Err(data.malformed("the header of a member of a zip", "something else"));
@@ -221,14 +223,14 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
 
 /// Replaces sizes that need 64 bits by those of the extra field.
 fn sizes_64<const N: usize>(extra: &[u8], mut sizes: [usize; N]) -> Result<[usize; N], Error> {
-    let mut extra = Bytes::new(extra, Order::Little);
-    while extra.left() >= 4 {
+    let mut extra = ByteCursor::new(extra, ByteOrder::Little);
+    while extra.remaining() >= 4 {
         let (kind, length) = (extra.u16()?, usize::from(extra.u16()?));
-        let field = extra.take(length.min(extra.left()))?;
+        let field = extra.take(length.min(extra.remaining()))?;
         if kind == 1 {
-            let mut field = Bytes::new(field, Order::Little);
+            let mut field = ByteCursor::new(field, ByteOrder::Little);
             for size in sizes.iter_mut().filter(|size| **size == IN_EXTRA) {
-                *size = Number::U64.index(&mut field)?;
+                *size = NumberType::U64.index(&mut field)?;
             }
         }
     }
@@ -243,13 +245,13 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
     let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
         let problem = "the zip has no central directory at its end".into();
         Error::new(
-            Kind::Truncated,
+            ErrorKind::Truncated,
             Location::Byte(bytes.len()),
             problem,
             "the file is not complete; export or copy it again",
         )
     })?;
-    let mut zip = Bytes::new(bytes, Order::Little);
+    let mut zip = ByteCursor::new(bytes, ByteOrder::Little);
     zip.seek(end + 16)?;
     let start = zip.u32()? as usize;
     if start != IN_EXTRA {
@@ -260,13 +262,13 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
         return Ok(start);
     }
     zip.skip(4);
-    let record = Number::U64.index(&mut zip)?;
+    let record = NumberType::U64.index(&mut zip)?;
     zip.seek(record)?;
     if zip.u32()? != END_64 {
         return Err(zip.malformed("the 64-bit end record of a zip", "something else"));
     }
     zip.skip(44);
-    Number::U64.index(&mut zip)
+    NumberType::U64.index(&mut zip)
 }
 
 /// Returns a matrix as a file for SciPy's `load_npz`: compressed columns, both
@@ -277,7 +279,7 @@ pub(crate) fn write(matrix: &Matrix) -> Result<Vec<u8>, Error> {
     let largest = i32::MAX as usize;
     if matrix.rows().max(matrix.columns()).max(entries.len()) > largest {
         let problem = format!("more than {largest} rows, columns or entries");
-        return Err(Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"));
+        return Err(Error::new(ErrorKind::TooLarge, Location::File, problem, "write it as Matrix Market"));
     }
     let mut pointers = vec![0_i32; matrix.columns() + 1];
     for e in &entries {
@@ -305,7 +307,7 @@ fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
     let small = |size: usize| {
         let problem = format!("{size} bytes exceed the limit of a 32-bit zip");
         u32::try_from(size)
-            .map_err(|_| Error::new(Kind::TooLarge, Location::File, problem, "write it as Matrix Market"))
+            .map_err(|_| Error::new(ErrorKind::TooLarge, Location::File, problem, "write it as Matrix Market"))
     };
     for (name, contents) in parts {
         let name = format!("{name}.npy");
@@ -391,8 +393,8 @@ mod tests {
             several,
             Err("the file contains several matrices: K (1 x 1), M (2 x 1), note (text); select one by its name".into())
         );
-        assert_eq!(read_bytes(&file, None, Some("C")).map_err(|e| e.kind), Err(Kind::Choice));
-        assert_eq!(read_bytes(&file, None, Some("note")).map_err(|e| e.kind), Err(Kind::Unsupported));
+        assert_eq!(read_bytes(&file, None, Some("C")).map_err(|e| e.kind), Err(ErrorKind::Selection));
+        assert_eq!(read_bytes(&file, None, Some("note")).map_err(|e| e.kind), Err(ErrorKind::Unsupported));
         Ok(())
     }
 
@@ -405,14 +407,14 @@ mod tests {
             assert_eq!(found.map_err(|e| e.kind), Err(kind), "{pointers:?} {rows:?}");
             Ok(())
         };
-        check(&[0, 1, 2], &[1, 0], b"csc", Kind::Count)?;
-        check(&[0, 1, 1, 3], &[1, 0], b"csc", Kind::Count)?;
-        check(&[0, 2, 1, 2], &[1, 0], b"csc", Kind::Count)?;
-        check(&[1, 1, 1, 2], &[1, 0], b"csc", Kind::Count)?;
-        check(&[0, 1, 1, 2], &[2, 0], b"csc", Kind::Count)?;
-        check(&[0, 1, 1, 2], &[-1, 0], b"csc", Kind::Malformed)?;
-        check(&[0, 1, 1, 2], &[1, 0], b"dia", Kind::Unsupported)?;
-        check(&[0, 1, 1, 2], &[1, 0], b"coo", Kind::Malformed)?;
+        check(&[0, 1, 2], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 1, 1, 3], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 2, 1, 2], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[1, 1, 1, 2], &[1, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 1, 1, 2], &[2, 0], b"csc", ErrorKind::Count)?;
+        check(&[0, 1, 1, 2], &[-1, 0], b"csc", ErrorKind::Malformed)?;
+        check(&[0, 1, 1, 2], &[1, 0], b"dia", ErrorKind::Unsupported)?;
+        check(&[0, 1, 1, 2], &[1, 0], b"coo", ErrorKind::Malformed)?;
         Ok(())
     }
 
@@ -421,9 +423,9 @@ mod tests {
         let mut file = csc(&[0, 1, 1, 2], &[1, 0], &[5.0, 6.0], b"csc")?;
         let at = file.windows(8).position(|eight| eight == 6.0_f64.to_le_bytes()).unwrap_or_default();
         file[at] ^= 1;
-        assert_eq!(read_bytes(&file, None, None).map_err(|e| e.kind), Err(Kind::Malformed));
+        assert_eq!(read_bytes(&file, None, None).map_err(|e| e.kind), Err(ErrorKind::Malformed));
         let half = &file[..file.len() / 2];
-        assert_eq!(read_bytes(half, None, None).map_err(|e| e.kind), Err(Kind::Truncated));
+        assert_eq!(read_bytes(half, None, None).map_err(|e| e.kind), Err(ErrorKind::Truncated));
         Ok(())
     }
 }

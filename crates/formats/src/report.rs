@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::constrained::CLAMPED;
+use crate::constrained::CONSTRAINED_DIAGONAL;
 use crate::matrix::Matrix;
 
 /// Number of rows and names that a report shows.
@@ -11,16 +11,16 @@ const SHOWN: usize = 6;
 /// Statistics of one matrix.
 ///
 /// ```
-/// use stickslip_formats::{Matrix, Report, Symmetry};
+/// use stickslip_formats::{Matrix, MatrixReport, Symmetry};
 ///
 /// let k = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5)])?;
-/// let report = Report::new(&k);
+/// let report = MatrixReport::new(&k);
 /// assert_eq!((report.entries, &report.zero_diagonal[..]), (2, &[1][..]));
 /// assert!(report.to_string().contains("2 x 2, 2 entries"));
 /// # Ok::<(), stickslip_formats::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
+pub struct MatrixReport {
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
@@ -43,16 +43,16 @@ pub struct Report {
     /// row is not positive semidefinite.
     pub negative_diagonal: Vec<usize>,
     /// Rows without any entry, counted from zero.
-    pub empty: Vec<usize>,
+    pub empty_rows: Vec<usize>,
     /// Rows with 1e36 or more on their diagonal, counted from zero: constrained rows of Abaqus.
-    pub clamped: Vec<usize>,
+    pub constrained: Vec<usize>,
     /// The first names of rows, and the number of names.
     pub names: Option<(Vec<String>, usize)>,
     /// Format and variable.
     pub origin: String,
 }
 
-impl Report {
+impl MatrixReport {
     /// Computes the statistics of a matrix.
     pub fn new(matrix: &Matrix) -> Self {
         let mut diagonal = vec![0.0; matrix.rows()];
@@ -66,7 +66,7 @@ impl Report {
         // Only the diagonal of a square matrix is meaningful.
         let rows = if matrix.rows() == matrix.columns() { matrix.rows() } else { 0 };
         let where_is = |test: fn(f64) -> bool| (0..rows).filter(|&row| test(diagonal[row])).collect();
-        let largest = matrix.largest();
+        let largest = matrix.max_abs();
         let origin = matrix.origin();
         Self {
             rows: matrix.rows(),
@@ -81,15 +81,15 @@ impl Report {
             },
             zero_diagonal: where_is(|value| value == 0.0),
             negative_diagonal: where_is(|value| value < 0.0),
-            empty: (0..matrix.rows()).filter(|&row| !filled[row]).collect(),
-            clamped: where_is(|value| value >= CLAMPED),
+            empty_rows: (0..matrix.rows()).filter(|&row| !filled[row]).collect(),
+            constrained: where_is(|value| value >= CONSTRAINED_DIAGONAL),
             names: matrix.names().map(|names| (names.iter().take(SHOWN).cloned().collect(), names.len())),
             origin: [origin.format, &origin.variable].map(str::trim).join(" ").trim().to_string(),
         }
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for MatrixReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rows, columns, entries, zeros, largest, smallest, asymmetry, .. } = self;
         write!(f, "{rows} x {columns}, {entries} entries")?;
@@ -112,8 +112,8 @@ impl fmt::Display for Report {
         let lists = [
             ("a zero diagonal", &self.zero_diagonal),
             ("a negative diagonal", &self.negative_diagonal),
-            ("no entry", &self.empty),
-            ("1e36 on the diagonal (constrained)", &self.clamped),
+            ("no entry", &self.empty_rows),
+            ("1e36 on the diagonal (constrained)", &self.constrained),
         ];
         for (what, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
             let first: Vec<String> = list.iter().take(SHOWN).map(|row| (row + 1).to_string()).collect();
@@ -139,11 +139,11 @@ mod tests {
     fn a_report_says_what_looks_wrong() -> Result<(), Error> {
         let entries = [(0, 0, 1e36), (1, 1, -2.0), (2, 1, 4.0), (1, 2, 5.0), (3, 3, 0.0)];
         let names = (1..=4).map(|row| format!("{row}.x")).collect();
-        let report = Report::new(&Matrix::new(4, 4, Symmetry::General, entries)?.with_names(names)?);
-        assert_eq!(report.clamped, [0]);
+        let report = MatrixReport::new(&Matrix::new(4, 4, Symmetry::General, entries)?.with_names(names)?);
+        assert_eq!(report.constrained, [0]);
         assert_eq!(report.negative_diagonal, [1]);
         assert_eq!(report.zero_diagonal, [2, 3]);
-        assert_eq!(report.empty, [3]);
+        assert_eq!(report.empty_rows, [3]);
         assert_eq!(report.asymmetry, 1e-36);
         assert_eq!((report.smallest, report.zeros), (2.0, 1));
         let text = "4 x 4, 4 entries and 1 zeros\nvalues from 2.000e0 to 1.000e36\nnot symmetric: the triangles \
@@ -151,7 +151,7 @@ mod tests {
                     diagonal: 2\n1 row with no entry: 4\n1 row with 1e36 on the diagonal (constrained): 1\nrows are \
                     named 1.x, 2.x, 3.x, 4.x";
         assert_eq!(report.to_string(), text);
-        let wide = Report::new(&Matrix::new(1, 2, Symmetry::General, [])?);
+        let wide = MatrixReport::new(&Matrix::new(1, 2, Symmetry::General, [])?);
         assert_eq!(wide.to_string(), "1 x 2, 0 entries\nnot square\n1 row with no entry: 1");
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Text files: numbered lines, fields, and numbers in Fortran notation.
 
-use crate::error::{Error, Kind, Location};
+use crate::error::{Error, ErrorKind, Location};
 
 /// Number of characters of a wrong field that a message shows.
 const SHOWN: usize = 40;
@@ -39,7 +39,7 @@ impl<'a> Lines<'a> {
     }
 
     /// Returns the number of bytes not read yet.
-    pub fn left(&self) -> usize {
+    pub fn remaining(&self) -> usize {
         self.rest.len()
     }
 
@@ -102,31 +102,31 @@ impl<'a> Line<'a> {
     }
 
     pub fn real(&self, field: &[u8]) -> Result<f64, Error> {
-        real(field).ok_or_else(|| self.malformed("a number", &shown(field)))
+        real(field).ok_or_else(|| self.malformed("a number", &quoted(field)))
     }
 
     pub fn integer(&self, field: &[u8]) -> Result<i64, Error> {
-        integer(field).ok_or_else(|| self.malformed("a whole number", &shown(field)))
+        integer(field).ok_or_else(|| self.malformed("a whole number", &quoted(field)))
     }
 
     /// Reads a count or size, which is not negative.
     pub fn count(&self, field: &[u8]) -> Result<usize, Error> {
         let count = integer(field).and_then(|value| usize::try_from(value).ok());
-        count.ok_or_else(|| self.malformed("a count", &shown(field)))
+        count.ok_or_else(|| self.malformed("a count", &quoted(field)))
     }
 
     /// Reads a row or column, counted from one in the file and from zero in the result.
     pub fn index(&self, field: &[u8]) -> Result<usize, Error> {
         match integer(field).map(|value| usize::try_from(value - 1)) {
             Some(Ok(index)) => Ok(index),
-            _ => Err(self.malformed("a row or column from 1", &shown(field))),
+            _ => Err(self.malformed("a row or column from 1", &quoted(field))),
         }
     }
 
     /// Creates an error for unexpected content in this line.
     pub fn malformed(&self, expected: &str, found: &str) -> Error {
         Error::new(
-            Kind::Malformed,
+            ErrorKind::Malformed,
             self.location(),
             format!("expected {expected}, found {found}"),
             "the file is damaged or has another format; export it again, or state its format",
@@ -136,19 +136,19 @@ impl<'a> Line<'a> {
 
 /// Refuses a file that ends within a line, if it does not state its number of
 /// lines: the last number may lack digits.
-pub(crate) fn must_end_its_lines(bytes: &[u8]) -> Result<(), Error> {
+pub(crate) fn require_final_newline(bytes: &[u8]) -> Result<(), Error> {
     if bytes.last().is_none_or(|last| *last == b'\n') {
         return Ok(());
     }
     let remedy = "if the file is not complete, export or copy it again; otherwise add a line break at its end";
     let location = Location::Line(Lines::new(bytes).count());
-    Err(Error::new(Kind::Truncated, location, "the file ends within a line".into(), remedy))
+    Err(Error::new(ErrorKind::Truncated, location, "the file ends within a line".into(), remedy))
 }
 
 /// Creates the error for a file that ends before `what`.
 pub(crate) fn truncated(location: Location, what: &str) -> Error {
     Error::new(
-        Kind::Truncated,
+        ErrorKind::Truncated,
         location,
         format!("the file ends before {what}"),
         "the file is not complete; export or copy it again",
@@ -156,7 +156,7 @@ pub(crate) fn truncated(location: Location, what: &str) -> Error {
 }
 
 /// Returns a field in the notation of a message.
-pub(crate) fn shown(field: &[u8]) -> String {
+pub(crate) fn quoted(field: &[u8]) -> String {
     let text = String::from_utf8_lossy(field);
     let mut short: String = text.chars().take(SHOWN).collect();
     if short.len() < text.len() {

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use stickslip_formats::{Error, Kind, TABLE, list_bytes, read_bytes};
+use stickslip_formats::{Error, ErrorKind, TABLE, list_bytes, read_bytes};
 
 /// Returns the files of matrices in `data`, with their names.
 fn files() -> Vec<(String, Vec<u8>)> {
@@ -100,9 +100,9 @@ fn a_file_of_another_format_is_refused_without_panic() {
 fn no_name_reads_nothing() {
     for (name, bytes) in files() {
         let found = read_bytes(&bytes, None, Some("no such name")).map(|_| ()).map_err(|error| error.kind);
-        assert_eq!(found, Err(Kind::Choice), "{name}");
+        assert_eq!(found, Err(ErrorKind::Selection), "{name}");
         let found = read_bytes(&bytes, Some("no such format"), None).map(|_| ()).map_err(|error| error.kind);
-        assert_eq!(found, Err(Kind::Format), "{name}");
+        assert_eq!(found, Err(ErrorKind::Format), "{name}");
     }
     let check = |bytes: &[u8], part: &str| {
         let text = read_bytes(bytes, None, None).map(|_| ()).map_err(|error| error.to_string());

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use stickslip_formats::{Kind, Matrix, Report, list, names, read, read_bytes, write};
+use stickslip_formats::{ErrorKind, Matrix, MatrixReport, list, names, read, read_bytes, write};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
@@ -105,9 +105,9 @@ fn matlab_5_plain_and_compressed() {
         check(file, Some("model.K"), "matlab", "stiffness");
         check(file, Some("model.inner.M"), "matlab", "mass");
         let kind = |name| read(data(file), None, Some(name)).map(|_| ()).map_err(|error| error.kind);
-        assert_eq!(kind("z"), Err(Kind::Complex));
-        assert_eq!(kind("label"), Err(Kind::Unsupported));
-        assert_eq!(kind("k"), Err(Kind::Choice));
+        assert_eq!(kind("z"), Err(ErrorKind::Complex));
+        assert_eq!(kind("label"), Err(ErrorKind::Unsupported));
+        assert_eq!(kind("k"), Err(ErrorKind::Selection));
         let listed: Vec<_> = list(data(file), None).expect("a list").iter().map(ToString::to_string).collect();
         let all = "K (6 x 6), M (6 x 6), G (4 x 3), bytes (2 x 2), single (2 x 2), z (complex), label (text), \
             cells (a cell array), model.K (6 x 6), model.inner.M (6 x 6)";
@@ -126,8 +126,8 @@ fn matlab_73_and_plain_hdf5() {
     let kind =
         |name| read(data("v73.mat"), None, Some(name)).map(|matrix| matrix.entries().len()).map_err(|error| error.kind);
     assert_eq!(kind("nothing"), Ok(0));
-    assert_eq!(kind("z"), Err(Kind::Complex));
-    assert_eq!(kind("label"), Err(Kind::Unsupported));
+    assert_eq!(kind("z"), Err(ErrorKind::Complex));
+    assert_eq!(kind("label"), Err(ErrorKind::Unsupported));
     check("plain.h5", Some("K"), "hdf5", "stiffness");
     check("plain.h5", Some("sub.G"), "hdf5", "general");
 }
@@ -142,7 +142,7 @@ fn matlab_files_of_octave() {
         check(file, Some("model.inner.M"), "matlab", "mass");
     }
     let kind = |name| read(data("octave.h5"), None, Some(name)).map(|_| ()).map_err(|error| error.kind);
-    assert_eq!(kind("G"), Err(Kind::Unsupported));
+    assert_eq!(kind("G"), Err(ErrorKind::Unsupported));
     check("octave.h5", Some("plain"), "hdf5", "stiffness");
 }
 
@@ -154,8 +154,8 @@ fn calculix_matrices_and_names() {
     assert!(mass.origin().zeros * 2 > mass.entries().len());
     let found = names::read(data("bricks.dof"), stiffness.rows()).expect("names");
     assert_eq!((found[0].as_str(), found.len()), ("2.x", 30));
-    assert_eq!(names::read(data("bricks.dof"), 29).map_err(|error| error.kind), Err(Kind::Names));
-    let report = Report::new(&stiffness.with_names(found).expect("as many names as rows"));
+    assert_eq!(names::read(data("bricks.dof"), 29).map_err(|error| error.kind), Err(ErrorKind::Names));
+    let report = MatrixReport::new(&stiffness.with_names(found).expect("as many names as rows"));
     assert!(report.zero_diagonal.is_empty() && report.negative_diagonal.is_empty());
     let total: f64 = mass.both_triangles().map(|e| e.value).sum();
     // Ten nodes are at least partly free. The sum is less than three times the mass, 7.8e-9 (1
@@ -224,7 +224,7 @@ fn what_is_written_reads_back_to_the_last_bit() {
         }
     }
     let matrix = read(data("stiffness.mtx"), None, None).expect("a matrix");
-    assert_eq!(write(folder.path().join("copy.mat"), &matrix).map_err(|error| error.kind), Err(Kind::Format));
+    assert_eq!(write(folder.path().join("copy.mat"), &matrix).map_err(|error| error.kind), Err(ErrorKind::Format));
     let named = matrix.with_names(["a,b", "c", "", "d", "e", "f"].map(String::from).to_vec()).expect("names");
     let path = folder.path().join("names.csv");
     names::write(&path, &named).expect("a file");

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use peak_alloc::PeakAlloc;
-use stickslip_formats::{Matrix, Report, Symmetry, TABLE, list_bytes, names, read_bytes, write};
+use stickslip_formats::{Matrix, MatrixReport, Symmetry, TABLE, list_bytes, names, read_bytes, write};
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
@@ -17,14 +17,14 @@ static ALONE: Mutex<()> = Mutex::new(());
 ///
 /// A damaged size may state a million rows without entries. The matrix and its
 /// report store some numbers for each row.
-const ALWAYS: usize = 64 << 20;
+const BASE_MEMORY: usize = 64 << 20;
 
 /// Bytes of memory for every byte of a damaged file.
-const TIMES: usize = 100;
+const MEMORY_PER_BYTE: usize = 100;
 
 /// Time limit for one damaged file of some kilobytes. A run takes milliseconds;
 /// the rest allows for other processes.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIME_LIMIT: Duration = Duration::from_secs(5);
 
 /// Random numbers with the same sequence in every run (Marsaglia's xorshift).
 struct Random(u64);
@@ -113,7 +113,7 @@ fn read_all(bytes: &[u8], format: &str) -> usize {
         let matrix = read_bytes(bytes, Some(format), name).ok()?;
         assert!(matrix.entries().iter().all(|e| e.value.is_finite() && e.value != 0.0));
         assert!(matrix.entries().is_sorted_by(|a, b| (a.column, a.row) < (b.column, b.row)));
-        Some(Report::new(&matrix).to_string().len())
+        Some(MatrixReport::new(&matrix).to_string().len())
     });
     found.count()
 }
@@ -142,7 +142,7 @@ fn fuzz(format: &str, seed: u64, count: usize, end: Instant) -> (usize, usize) {
             let (memory, time) = (MEMORY.peak_usage().saturating_sub(before), start.elapsed());
             runs += 1;
             let path = std::env::temp_dir().join(format!("stickslip-damaged-{format}"));
-            if memory > ALWAYS + TIMES * bytes.len() || time > PATIENCE {
+            if memory > BASE_MEMORY + MEMORY_PER_BYTE * bytes.len() || time > TIME_LIMIT {
                 std::fs::write(&path, &bytes).expect("a file");
                 panic!("{memory} bytes and {time:?} for {} bytes, kept as {}", bytes.len(), path.display());
             }
@@ -398,7 +398,7 @@ fn memory_follows_the_file() {
 
 /// One damaged index far beyond all others does not create rows.
 #[test]
-fn a_damaged_index_makes_no_rows() {
+fn damaged_index_is_too_large() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut text: String = (1..=100_000).map(|row| format!("{row} {row} 2.0\n")).collect();
     assert_eq!(read_bytes(text.as_bytes(), None, None).expect("a diagonal").rows(), 100_000);

@@ -92,7 +92,7 @@ proptest! {
             let found = read_bytes(file, None, None).expect("a matrix");
             // Formats with row names omit rows without a line.
             let found = match found.names() {
-                Some(_) => found.in_order_of(&(1..=size).map(|row| format!("{row}.x")).collect::<Vec<_>>()).expect("rows"),
+                Some(_) => found.reordered(&(1..=size).map(|row| format!("{row}.x")).collect::<Vec<_>>()).expect("rows"),
                 None => found,
             };
             prop_assert_eq!(bits(&found), bits(&expected), "format {}", at);
@@ -106,7 +106,7 @@ proptest! {
         let matrix = Matrix::new(size, size, Symmetry::Symmetric, lower).expect("a matrix");
         let matrix = matrix.with_names((0..size).map(names).collect()).expect("names");
         let left: Vec<usize> = (0..size).filter(|&row| row != out).collect();
-        let smaller = matrix.clone().without(&[out]).expect("a square matrix");
+        let smaller = matrix.clone().without_rows(&[out]).expect("a square matrix");
         prop_assert_eq!(smaller.rows(), left.len());
         for (at, &row) in left.iter().enumerate() {
             for (beside, &column) in left.iter().enumerate() {
@@ -115,7 +115,7 @@ proptest! {
             prop_assert_eq!(&smaller.names().expect("names")[at], &names(row));
         }
         let order: Vec<usize> = (0..size).map(|at| (at + shift) % size).collect();
-        let moved = matrix.clone().in_order_of(&order.iter().copied().map(names).collect::<Vec<_>>()).expect("rows");
+        let moved = matrix.clone().reordered(&order.iter().copied().map(names).collect::<Vec<_>>()).expect("rows");
         for (at, &row) in order.iter().enumerate() {
             for (beside, &column) in order.iter().enumerate() {
                 prop_assert_eq!(moved.get(at, beside), matrix.get(row, column));

@@ -11,18 +11,18 @@ use std::ops::Range;
 /// Half bandwidth from which elimination in blocks is faster.
 ///
 /// Measured: a ninth of the time with full bands of 255 and 511, a fifth with 96.
-const WIDE: usize = 64;
+const BLOCKED_FROM: usize = 64;
 /// Columns of a block.
-const BLOCK: usize = 16;
+const BLOCK_COLUMNS: usize = 16;
 /// Runs of nonzero rows or columns are merged across gaps of at most this length.
-const GAP: usize = 8;
+const MERGED_GAP: usize = 8;
 
-/// A square matrix with `band` diagonals on either side of the main diagonal.
+/// A square matrix with `half_bandwidth` diagonals on either side of the main diagonal.
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::banded::Banded;
-/// let mut matrix = Banded::new(3, 1);
+/// use stickslip_numerics::banded::BandedMatrix;
+/// let mut matrix = BandedMatrix::new(3, 1);
 /// for (i, j, value) in [(0, 1, 1.0), (1, 0, 2.0), (1, 2, 1.0), (2, 2, 4.0)] {
 ///     matrix.add(i, j, value);
 /// }
@@ -32,12 +32,12 @@ const GAP: usize = 8;
 /// assert_eq!(x, [1.0, 2.0, 3.0]);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Banded {
+pub struct BandedMatrix {
     n: usize,
-    band: usize,
+    half_bandwidth: usize,
     /// Columns factored before the trailing matrix is updated.
     block: usize,
-    /// Stored entries of a row: columns i - band - block + 1 to i + 2 band + block - 1 of row i.
+    /// Stored entries of a row: columns i - b - block + 1 to i + 2 b + block - 1 of row i.
     ///
     /// Row exchanges widen the upper band to twice its width. All rows of a
     /// block extend to the last column of the longest one. Row exchanges inside
@@ -48,38 +48,38 @@ pub struct Banded {
     /// Last column of each factored row.
     ends: Vec<usize>,
     /// Multipliers of a block, row by row.
-    left: Vec<f64>,
+    multipliers: Vec<f64>,
     /// Runs of nonzero rows below a block, and of nonzero columns to its right.
-    runs: [Vec<Range<usize>>; 2],
+    nonzero_runs: [Vec<Range<usize>>; 2],
 }
 
-impl Banded {
+impl BandedMatrix {
     /// Creates a zero matrix of `n` rows.
-    pub fn new(n: usize, band: usize) -> Self {
-        let block = Banded::block(band);
-        let width = 3 * band + 2 * block - 1;
+    pub fn new(n: usize, half_bandwidth: usize) -> Self {
+        let block = BandedMatrix::block(half_bandwidth);
+        let width = 3 * half_bandwidth + 2 * block - 1;
         let rows = vec![0.0; n * width];
-        Banded {
+        BandedMatrix {
             n,
-            band,
+            half_bandwidth,
             block,
             width,
             rows,
             pivots: vec![0; n],
             ends: vec![0; n],
-            left: Vec::new(),
-            runs: [Vec::new(), Vec::new()],
+            multipliers: Vec::new(),
+            nonzero_runs: [Vec::new(), Vec::new()],
         }
     }
 
     /// Returns the number of columns factored at a time.
-    fn block(band: usize) -> usize {
-        if band < WIDE { 1 } else { BLOCK }
+    fn block(half_bandwidth: usize) -> usize {
+        if half_bandwidth < BLOCKED_FROM { 1 } else { BLOCK_COLUMNS }
     }
 
     /// Returns the memory of a matrix of `n` rows, bytes.
-    pub fn bytes(n: usize, band: usize) -> f64 {
-        8.0 * n as f64 * (3 * band + 2 * Banded::block(band) + 1) as f64
+    pub fn bytes(n: usize, half_bandwidth: usize) -> f64 {
+        8.0 * n as f64 * (3 * half_bandwidth + 2 * BandedMatrix::block(half_bandwidth) + 1) as f64
     }
 
     /// Sets all entries to zero.
@@ -93,15 +93,19 @@ impl Banded {
     /// If the entry lies outside the band.
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
-        assert!(i.abs_diff(j) <= self.band, "entry ({i}, {j}) lies outside the half bandwidth {}", self.band);
-        let at = self.place()(i, j);
+        assert!(
+            i.abs_diff(j) <= self.half_bandwidth,
+            "entry ({i}, {j}) lies outside the half bandwidth {}",
+            self.half_bandwidth
+        );
+        let at = self.index()(i, j);
         self.rows[at] += value;
     }
 
     /// Factors the matrix in place. Returns false if it is singular.
     pub fn factor(&mut self) -> bool {
-        let (n, b) = (self.n, self.band);
-        let place = self.place();
+        let (n, b) = (self.n, self.half_bandwidth);
+        let index = self.index();
         // The last nonzero column of every row before row exchanges.
         self.ends.iter_mut().enumerate().for_each(|(i, end)| *end = (i + b).min(n - 1));
         let mut first = 0;
@@ -112,7 +116,7 @@ impl Banded {
             }
             let end = self.ends[first..next].iter().fold(0, |most, end| most.max(*end)) + 1;
             if next < end {
-                self.eliminate(first, next, end, place);
+                self.eliminate(first, next, end, index);
             }
             first = next;
         }
@@ -120,44 +124,44 @@ impl Banded {
     }
 
     /// Returns the function that maps entry (i, j) to its index in `rows`.
-    fn place(&self) -> impl Fn(usize, usize) -> usize + Copy + use<> {
-        let (width, below) = (self.width, self.band + self.block - 1);
+    fn index(&self) -> impl Fn(usize, usize) -> usize + Copy + use<> {
+        let (width, below) = (self.width, self.half_bandwidth + self.block - 1);
         move |i: usize, j: usize| i * width + j + below - i
     }
 
     /// Factors the columns `first..next` in all rows that they reach. Row
     /// exchanges begin at column `first`.
     fn factor_panel(&mut self, first: usize, next: usize) -> bool {
-        let (n, b, place) = (self.n, self.band, self.place());
+        let (n, b, index) = (self.n, self.half_bandwidth, self.index());
         for k in first..next {
             let last = (k + b).min(n - 1);
             let mut pivot = k;
             for i in k + 1..=last {
-                if self.rows[place(i, k)].abs() > self.rows[place(pivot, k)].abs() {
+                if self.rows[index(i, k)].abs() > self.rows[index(pivot, k)].abs() {
                     pivot = i;
                 }
             }
-            let value = self.rows[place(pivot, k)];
+            let value = self.rows[index(pivot, k)];
             if value == 0.0 || !value.is_finite() {
                 return false;
             }
             self.pivots[k] = pivot;
             if pivot != k {
                 for j in first..=self.ends[k].max(self.ends[pivot]) {
-                    self.rows.swap(place(k, j), place(pivot, j));
+                    self.rows.swap(index(k, j), index(pivot, j));
                 }
                 self.ends.swap(k, pivot);
             }
             let end = self.ends[k];
             let inverse = 1.0 / value;
             for i in k + 1..=last {
-                let at = place(i, k);
+                let at = index(i, k);
                 let factor = self.rows[at] * inverse;
                 self.rows[at] = factor;
                 if factor != 0.0 {
                     self.ends[i] = self.ends[i].max(end);
-                    let (top, bottom) = self.rows.split_at_mut(place(i, k + 1));
-                    let source = &top[place(k, k + 1)..place(k, next)];
+                    let (top, bottom) = self.rows.split_at_mut(index(i, k + 1));
+                    let source = &top[index(k, k + 1)..index(k, next)];
                     bottom.iter_mut().zip(source).for_each(|(x, p)| *x -= factor * p);
                 }
             }
@@ -166,27 +170,27 @@ impl Banded {
     }
 
     /// Updates the columns `next..end`: first in the rows of the panel, then in the rows below it.
-    fn eliminate(&mut self, first: usize, next: usize, end: usize, place: impl Fn(usize, usize) -> usize) {
+    fn eliminate(&mut self, first: usize, next: usize, end: usize, index: impl Fn(usize, usize) -> usize) {
         for k in first..next {
             for i in k + 1..next {
-                let factor = self.rows[place(i, k)];
+                let factor = self.rows[index(i, k)];
                 if factor != 0.0 {
-                    let (top, bottom) = self.rows.split_at_mut(place(i, next));
-                    let source = &top[place(k, next)..place(k, end)];
+                    let (top, bottom) = self.rows.split_at_mut(index(i, next));
+                    let source = &top[index(k, next)..index(k, end)];
                     bottom.iter_mut().zip(source).for_each(|(x, p)| *x -= factor * p);
                 }
             }
         }
-        let last = (next + self.band).min(self.n);
+        let last = (next + self.half_bandwidth).min(self.n);
         if next >= last {
             return;
         }
         if self.block == 1 {
             for i in next..last {
-                let factor = self.rows[place(i, first)];
+                let factor = self.rows[index(i, first)];
                 if factor != 0.0 {
-                    let (top, bottom) = self.rows.split_at_mut(place(i, next));
-                    let source = &top[place(first, next)..place(first, self.ends[first] + 1)];
+                    let (top, bottom) = self.rows.split_at_mut(index(i, next));
+                    let source = &top[index(first, next)..index(first, self.ends[first] + 1)];
                     bottom.iter_mut().zip(source).for_each(|(x, p)| *x -= factor * p);
                 }
             }
@@ -194,20 +198,25 @@ impl Banded {
         }
         // Distance in memory between two entries of one column in consecutive rows.
         let stride = self.width - 1;
-        self.left.clear();
+        self.multipliers.clear();
         for i in next..last {
-            self.left.extend_from_slice(&self.rows[place(i, first)..place(i, next)]);
+            self.multipliers.extend_from_slice(&self.rows[index(i, first)..index(i, next)]);
         }
         let (rows, columns, inner) = (last - next, end - next, next - first);
-        let (top, bottom) = self.rows.split_at_mut(place(next, next));
-        let right = &top[place(first, next)..place(next - 1, end)];
-        runs(rows, |i| self.left[i * inner..(i + 1) * inner].iter().any(|x| *x != 0.0), &mut self.runs[0]);
-        runs(columns, |j| (0..inner).any(|k| right[k * stride + j] != 0.0), &mut self.runs[1]);
-        let [below, beside] = &self.runs;
-        for (i, j) in below.iter().flat_map(|i| beside.iter().map(move |j| (i, j))) {
+        let (top, bottom) = self.rows.split_at_mut(index(next, next));
+        let right = &top[index(first, next)..index(next - 1, end)];
+        runs(
+            rows,
+            |i| self.multipliers[i * inner..(i + 1) * inner].iter().any(|x| *x != 0.0),
+            &mut self.nonzero_runs[0],
+        );
+        runs(columns, |j| (0..inner).any(|k| right[k * stride + j] != 0.0), &mut self.nonzero_runs[1]);
+        let [row_runs, column_runs] = &self.nonzero_runs;
+        for (i, j) in row_runs.iter().flat_map(|i| column_runs.iter().map(move |j| (i, j))) {
             // The storage is row-major and `matmul` reads columns, so all three
             // matrices are transposed.
-            let left = MatRef::from_column_major_slice(&self.left[i.start * inner..i.end * inner], inner, i.len());
+            let left =
+                MatRef::from_column_major_slice(&self.multipliers[i.start * inner..i.end * inner], inner, i.len());
             let right = &right[j.start..(inner - 1) * stride + j.end];
             let right = MatRef::from_column_major_slice_with_stride(right, j.len(), inner, stride);
             let rest = &mut bottom[i.start * stride + j.start..(i.end - 1) * stride + j.end];
@@ -218,7 +227,7 @@ impl Banded {
 
     /// Solves with the factors. Replaces `right` by the solution.
     pub fn solve(&self, right: &mut [f64]) {
-        let (n, b, place) = (self.n, self.band, self.place());
+        let (n, b, index) = (self.n, self.half_bandwidth, self.index());
         for first in (0..n).step_by(self.block) {
             let next = (first + self.block).min(n);
             (first..next).for_each(|k| right.swap(k, self.pivots[k]));
@@ -226,13 +235,13 @@ impl Banded {
                 // Row exchanges inside a panel move multipliers below the band.
                 let last = if self.block == 1 { k + b } else { next - 1 + b };
                 for i in k + 1..=last.min(n - 1) {
-                    right[i] -= self.rows[place(i, k)] * right[k];
+                    right[i] -= self.rows[index(i, k)] * right[k];
                 }
             }
         }
         for k in (0..n).rev() {
             let end = self.ends[k];
-            let row = &self.rows[place(k, k)..=place(k, end)];
+            let row = &self.rows[index(k, k)..=index(k, end)];
             let sum: f64 = row[1..].iter().zip(&right[k + 1..=end]).map(|(a, x)| a * x).sum();
             right[k] = (right[k] - sum) / row[0];
         }
@@ -244,7 +253,7 @@ fn runs(count: usize, taken: impl Fn(usize) -> bool, out: &mut Vec<Range<usize>>
     out.clear();
     for i in (0..count).filter(|i| taken(*i)) {
         match out.last_mut() {
-            Some(run) if i - run.end <= GAP => run.end = i + 1,
+            Some(run) if i - run.end <= MERGED_GAP => run.end = i + 1,
             _ => out.push(i..i + 1),
         }
     }
@@ -252,10 +261,10 @@ fn runs(count: usize, taken: impl Fn(usize) -> bool, out: &mut Vec<Range<usize>>
 
 /// Returns an order of the nodes of a graph that places connected nodes close together.
 ///
-/// `order[node]` is the position of a node. `links` lists the connected pairs.
+/// The result contains the position of every node. `links` lists the connected pairs.
 ///
 /// Source: Cuthill and McKee (1969).
-pub fn order(nodes: usize, links: &[(usize, usize)]) -> Vec<usize> {
+pub fn cuthill_mckee(nodes: usize, links: &[(usize, usize)]) -> Vec<usize> {
     let mut neighbours = vec![Vec::new(); nodes];
     for &(a, b) in links {
         if a != b {
@@ -299,11 +308,11 @@ mod tests {
     /// The solution agrees with that of the full matrix.
     #[test]
     fn blocks_solve_what_the_full_matrix_does() {
-        for (n, band) in [(40, 7), (300, WIDE), (331, WIDE + 45), (150, 149), (97, 96)] {
+        for (n, half_bandwidth) in [(40, 7), (300, BLOCKED_FROM), (331, BLOCKED_FROM + 45), (150, 149), (97, 96)] {
             let stream = Stream::new(n as u64);
-            let (mut full, mut banded) = (vec![0.0; n * n], Banded::new(n, band));
+            let (mut full, mut banded) = (vec![0.0; n * n], BandedMatrix::new(n, half_bandwidth));
             for i in 0..n {
-                for j in i.saturating_sub(band)..=(i + band).min(n - 1) {
+                for j in i.saturating_sub(half_bandwidth)..=(i + half_bandwidth).min(n - 1) {
                     let value = if i == j || (i + 3 * j) % 5 == 0 || (40..75).contains(&i.abs_diff(j)) {
                         0.0
                     } else {
@@ -319,7 +328,7 @@ mod tests {
             banded.solve(&mut other);
             let size = right.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             let apart = right.iter().zip(&other).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
-            assert!(apart < 1e-9 * size, "{n} {band}: {apart:.1e} of {size:.1e}");
+            assert!(apart < 1e-9 * size, "{n} {half_bandwidth}: {apart:.1e} of {size:.1e}");
         }
     }
 }

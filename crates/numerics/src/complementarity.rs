@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// The position of a component of the solution between its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+enum BoundState {
     Inside,
     Low,
     High,
@@ -22,12 +22,12 @@ enum Side {
 
 /// Block pivots without a decrease of the number of infeasible components,
 /// after which single pivots take over.
-const PATIENCE: usize = 3;
+const BLOCK_PIVOTS_WITHOUT_PROGRESS: usize = 3;
 /// A component is infeasible if it violates its condition by more than this fraction of the
 /// problem's scale. The value is the rounding of a small dense solve.
-const FEASIBLE: f64 = 1e-13;
+const FEASIBILITY_TOLERANCE: f64 = 1e-13;
 /// Singular values of `D` below this fraction of the largest count as zero: redundant contacts.
-const RANK: f64 = 1e-12;
+const RANK_TOLERANCE: f64 = 1e-12;
 
 /// Solves the problem. Returns `None` if the pivoting cycles, which an indefinite `D` can cause.
 ///
@@ -63,37 +63,37 @@ pub fn solve_into(
 /// Solves the problem by block pivoting.
 fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
     let n = b.len();
-    let mut side = vec![Side::Inside; n];
-    let (mut fewest, mut patience) = (n + 1, PATIENCE);
+    let mut side = vec![BoundState::Inside; n];
+    let (mut fewest, mut remaining_block_pivots) = (n + 1, BLOCK_PIVOTS_WITHOUT_PROGRESS);
     for _ in 0..(100 + 20 * n * n) {
         let mut lambda = solve_inside(d, b, low, high, &side);
         let w = b - d * &lambda;
-        let w_scale = FEASIBLE * (b.amax() + (d * &lambda).amax());
-        let l_scale = FEASIBLE * lambda.amax();
-        let wrong: Vec<usize> = (0..n)
+        let w_scale = FEASIBILITY_TOLERANCE * (b.amax() + (d * &lambda).amax());
+        let l_scale = FEASIBILITY_TOLERANCE * lambda.amax();
+        let infeasible: Vec<usize> = (0..n)
             .filter(|&i| match side[i] {
-                Side::Inside => lambda[i] > high[i] + l_scale || lambda[i] < low[i] - l_scale,
-                Side::High => w[i] < -w_scale,
-                Side::Low => w[i] > w_scale,
+                BoundState::Inside => lambda[i] > high[i] + l_scale || lambda[i] < low[i] - l_scale,
+                BoundState::High => w[i] < -w_scale,
+                BoundState::Low => w[i] > w_scale,
             })
             .collect();
-        if wrong.is_empty() {
+        if infeasible.is_empty() {
             for i in 0..n {
                 lambda[i] = lambda[i].clamp(low[i], high[i]);
             }
             return Some(lambda);
         }
-        if wrong.len() < fewest {
-            (fewest, patience) = (wrong.len(), PATIENCE);
+        if infeasible.len() < fewest {
+            (fewest, remaining_block_pivots) = (infeasible.len(), BLOCK_PIVOTS_WITHOUT_PROGRESS);
         } else {
-            patience = patience.saturating_sub(1);
+            remaining_block_pivots = remaining_block_pivots.saturating_sub(1);
         }
-        let change = if patience > 0 { &wrong[..] } else { &wrong[..1] };
+        let change = if remaining_block_pivots > 0 { &infeasible[..] } else { &infeasible[..1] };
         for &i in change {
             side[i] = match side[i] {
-                Side::Inside if lambda[i] > high[i] => Side::High,
-                Side::Inside => Side::Low,
-                _ => Side::Inside,
+                BoundState::Inside if lambda[i] > high[i] => BoundState::High,
+                BoundState::Inside => BoundState::Low,
+                _ => BoundState::Inside,
             };
         }
     }
@@ -103,13 +103,13 @@ fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<
 /// Solves a problem of one component: inside if that is feasible, else at the violated bound.
 fn solve_one(d: f64, b: f64, low: f64, high: f64) -> Option<f64> {
     let lambda = if d > 0.0 { b / d } else { 0.0 };
-    let beyond = if lambda > high { high } else { low };
-    if (low..=high).contains(&lambda) || (lambda - beyond).abs() <= FEASIBLE * lambda.abs() {
+    let bound = if lambda > high { high } else { low };
+    if (low..=high).contains(&lambda) || (lambda - bound).abs() <= FEASIBILITY_TOLERANCE * lambda.abs() {
         return Some(lambda.clamp(low, high));
     }
-    let w = b - d * beyond;
-    let wrong = if beyond == high { -w } else { w };
-    (wrong <= FEASIBLE * (b.abs() + (d * beyond).abs())).then_some(beyond)
+    let w = b - d * bound;
+    let violation = if bound == high { -w } else { w };
+    (violation <= FEASIBILITY_TOLERANCE * (b.abs() + (d * bound).abs())).then_some(bound)
 }
 
 fn solve_inside(
@@ -117,41 +117,41 @@ fn solve_inside(
     b: &DVector<f64>,
     low: &DVector<f64>,
     high: &DVector<f64>,
-    side: &[Side],
+    side: &[BoundState],
 ) -> DVector<f64> {
     let n = b.len();
     let mut lambda = DVector::from_fn(n, |i, _| match side[i] {
-        Side::Inside => 0.0,
-        Side::Low => low[i],
-        Side::High => high[i],
+        BoundState::Inside => 0.0,
+        BoundState::Low => low[i],
+        BoundState::High => high[i],
     });
-    let inside: Vec<usize> = (0..n).filter(|&i| side[i] == Side::Inside).collect();
+    let inside: Vec<usize> = (0..n).filter(|&i| side[i] == BoundState::Inside).collect();
     if inside.is_empty() {
         return lambda;
     }
-    let rest = b - d * &lambda;
+    let rhs = b - d * &lambda;
     if let [i] = inside[..] {
-        lambda[i] = if d[(i, i)] > 0.0 { rest[i] / d[(i, i)] } else { 0.0 };
+        lambda[i] = if d[(i, i)] > 0.0 { rhs[i] / d[(i, i)] } else { 0.0 };
         return lambda;
     }
     // Redundant contacts share the load in proportion to their limits, which minimizes Σ λ²/high.
-    let share = |i: usize| if high[i].is_finite() && high[i] > 0.0 { high[i].sqrt() } else { 1.0 };
+    let weight = |i: usize| if high[i].is_finite() && high[i] > 0.0 { high[i].sqrt() } else { 1.0 };
     let scaled = DMatrix::from_fn(inside.len(), inside.len(), |i, j| {
-        share(inside[i]) * d[(inside[i], inside[j])] * share(inside[j])
+        weight(inside[i]) * d[(inside[i], inside[j])] * weight(inside[j])
     });
-    let right = DVector::from_fn(inside.len(), |i, _| share(inside[i]) * rest[inside[i]]);
+    let weighted_rhs = DVector::from_fn(inside.len(), |i, _| weight(inside[i]) * rhs[inside[i]]);
     let solution = match scaled.clone().cholesky() {
-        Some(factor) if factor.l_dirty().diagonal().iter().all(|p| p * p > RANK * scaled.amax()) => {
-            factor.solve(&right)
+        Some(factor) if factor.l_dirty().diagonal().iter().all(|p| p * p > RANK_TOLERANCE * scaled.amax()) => {
+            factor.solve(&weighted_rhs)
         }
         _ => {
-            let least =
-                eigen::singular(scaled).and_then(|svd| svd.solve(&right, RANK * svd.singular_values.amax()).ok());
+            let least = eigen::svd(scaled)
+                .and_then(|svd| svd.solve(&weighted_rhs, RANK_TOLERANCE * svd.singular_values.amax()).ok());
             least.unwrap_or_else(|| DVector::zeros(inside.len()))
         }
     };
     for (k, &i) in inside.iter().enumerate() {
-        lambda[i] = solution[k] * share(i);
+        lambda[i] = solution[k] * weight(i);
     }
     lambda
 }

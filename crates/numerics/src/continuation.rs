@@ -10,7 +10,7 @@ use crate::dense;
 ///
 /// The unknowns and the range of the parameter should be of the order of one,
 /// because the arc length adds them.
-pub trait Equations {
+pub trait ParametricEquations {
     /// Returns the number of unknowns.
     fn size(&self) -> usize;
     /// Evaluates `F` and its derivatives with respect to x (row-major, size²)
@@ -22,14 +22,14 @@ pub trait Equations {
     ///
     /// It is called if short steps fail, at kinks that the corrector cannot
     /// pass. Returns false if it finds no solution.
-    fn leap(&mut self, _x: &mut [f64], _p: f64) -> bool {
+    fn jump_kink(&mut self, _x: &mut [f64], _p: f64) -> bool {
         false
     }
 }
 
 /// Range, direction and step sizes of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Steps {
+pub struct ContinuationSettings {
     /// Least and largest value of the parameter.
     pub range: (f64, f64),
     /// +1 to start with a rising parameter, -1 with a falling one.
@@ -37,23 +37,23 @@ pub struct Steps {
     /// Unit of the parameter in the arc length.
     pub unit: f64,
     /// Largest step size, as arc length. It grows with the norm of the unknowns above one.
-    pub longest: f64,
+    pub largest_step: f64,
     /// Smallest step size, as arc length.
-    pub shortest: f64,
+    pub smallest_step: f64,
     /// Maximum number of points.
     pub points: usize,
 }
 
-impl Steps {
+impl ContinuationSettings {
     /// Returns the steps from one value to another, with a step of at most
     /// `step` along the parameter.
     pub fn between(from: f64, to: f64, step: f64) -> Self {
-        Steps {
+        ContinuationSettings {
             range: (from.min(to), from.max(to)),
             direction: if to < from { -1.0 } else { 1.0 },
             unit: (to - from).abs(),
-            longest: step / (to - from).abs(),
-            shortest: 1e-9,
+            largest_step: step / (to - from).abs(),
+            smallest_step: 1e-9,
             points: 100_000,
         }
     }
@@ -61,7 +61,7 @@ impl Steps {
 
 /// The reason why a branch ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum End {
+pub enum BranchEnd {
     /// The parameter has reached the border of its range: the last point is on it.
     Border,
     /// The maximum number of points is reached.
@@ -69,7 +69,7 @@ pub enum End {
     /// The corrector failed at the smallest step size.
     Stalled {
         /// Parameter at the last point.
-        at: f64,
+        parameter: f64,
     },
     /// The visitor ended the continuation.
     Stopped,
@@ -82,9 +82,10 @@ pub enum End {
 const ITERATIONS: usize = 20;
 /// A step with at most this number of corrector iterations makes the next step
 /// longer. See [`ITERATIONS`].
-const FEW: usize = 10;
-/// A step below the largest step size divided by this number calls [`Equations::leap`].
-const LEAP: f64 = 32.0;
+const EASY_ITERATIONS: usize = 10;
+/// A step below the largest step size divided by this number calls
+/// [`ParametricEquations::jump_kink`].
+const JUMP_DIVISOR: f64 = 32.0;
 
 /// Follows the branch from `(x, p)`, which solves the equations.
 ///
@@ -93,9 +94,9 @@ const LEAP: f64 = 32.0;
 /// # Example
 /// A circle, past its turning points:
 /// ```
-/// use stickslip_numerics::continuation::{End, Equations, Steps, trace};
+/// use stickslip_numerics::continuation::{BranchEnd, ContinuationSettings, ParametricEquations, trace};
 /// struct Circle;
-/// impl Equations for Circle {
+/// impl ParametricEquations for Circle {
 ///     fn size(&self) -> usize { 1 }
 ///     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
 ///         (f[0], by_x[0], by_p[0]) = (x[0] * x[0] + p * p - 1.0, 2.0 * x[0], 2.0 * p);
@@ -103,41 +104,41 @@ const LEAP: f64 = 32.0;
 ///     }
 ///     fn tolerance(&self) -> f64 { 1e-12 }
 /// }
-/// let steps = Steps { unit: 1.0, points: 200, ..Steps::between(-2.0, 2.0, 0.1) };
+/// let steps = ContinuationSettings { unit: 1.0, points: 200, ..ContinuationSettings::between(-2.0, 2.0, 0.1) };
 /// let mut lowest = 1.0f64;
 /// let end = trace(&mut Circle, &[1.0], 0.0, steps, &mut |_, x, _| { lowest = lowest.min(x[0]); true });
-/// assert_eq!(end, End::Points);
+/// assert_eq!(end, BranchEnd::Points);
 /// assert!(lowest < -0.99);
 /// ```
-pub fn trace<E: Equations>(
+pub fn trace<E: ParametricEquations>(
     equations: &mut E,
     x: &[f64],
     p: f64,
-    steps: Steps,
+    steps: ContinuationSettings,
     visit: &mut dyn FnMut(&mut E, &[f64], f64) -> bool,
-) -> End {
+) -> BranchEnd {
     let n = equations.size();
-    let mut work = Work::new(n);
+    let mut corrector = Corrector::new(n);
     let (mut x, mut p) = (x.to_vec(), p);
     let mut tangent = vec![0.0; n + 1];
     tangent[n] = steps.direction;
-    let mut length = 0.25 * steps.longest;
+    let mut step_size = 0.25 * steps.largest_step;
     if !visit(equations, &x, p) {
-        return End::Stopped;
+        return BranchEnd::Stopped;
     }
-    let mut fresh = true;
-    let mut ahead = steps.direction;
+    let mut tangent_outdated = true;
+    let mut direction = steps.direction;
     for _ in 1..steps.points {
         // The largest step size grows with the norm of x, so a branch to infinity takes few steps.
-        let longest = steps.longest * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
-        length = length.min(longest);
-        if fresh {
-            work.tangent(equations, &x, p, steps.unit, &mut tangent);
-            fresh = false;
+        let longest = steps.largest_step * x.iter().map(|x| x * x).sum::<f64>().sqrt().max(1.0);
+        step_size = step_size.min(longest);
+        if tangent_outdated {
+            corrector.tangent(equations, &x, p, steps.unit, &mut tangent);
+            tangent_outdated = false;
         }
         let (low, high) = steps.range;
-        let mut next: Vec<f64> = x.iter().zip(&tangent).map(|(x, t)| x + length * t).collect();
-        let mut q = p + length * tangent[n] * steps.unit;
+        let mut next: Vec<f64> = x.iter().zip(&tangent).map(|(x, t)| x + step_size * t).collect();
+        let mut q = p + step_size * tangent[n] * steps.unit;
         // A step that leaves the range ends on the border, with the parameter fixed.
         let border = if q > high {
             Some(high)
@@ -149,68 +150,68 @@ pub fn trace<E: Equations>(
         let solved = match border {
             Some(value) => {
                 let share = if q == p { 0.0 } else { (value - p) / (q - p) };
-                next = x.iter().zip(&tangent).map(|(x, t)| x + share * length * t).collect();
+                next = x.iter().zip(&tangent).map(|(x, t)| x + share * step_size * t).collect();
                 q = value;
-                work.correct(equations, &mut next, &mut q, steps.unit, None)
+                corrector.correct(equations, &mut next, &mut q, steps.unit, None)
             }
             None => {
                 let predicted = (next.clone(), q);
-                work.correct(equations, &mut next, &mut q, steps.unit, Some((&tangent, &predicted)))
+                corrector.correct(equations, &mut next, &mut q, steps.unit, Some((&tangent, &predicted)))
             }
         };
         let inside = q >= low && q <= high;
         // A corrector that moves too far has converged to another branch.
         let moved: f64 = next.iter().zip(&x).map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
             + ((q - p) / steps.unit) * ((q - p) / steps.unit);
-        let near = moved.sqrt() <= 2.0 * length + 1e-12;
+        let close_to_last_point = moved.sqrt() <= 2.0 * step_size + 1e-12;
         let accepted = match solved {
-            Some(iterations) if inside && near => Some(iterations),
+            Some(iterations) if inside && close_to_last_point => Some(iterations),
             _ => None,
         };
         let Some(iterations) = accepted else {
-            length *= 0.5;
-            if length < longest / LEAP {
+            step_size *= 0.5;
+            if step_size < longest / JUMP_DIVISOR {
                 // Let the equations jump over the kink, by a fraction of the largest step size.
-                let q = (p + (4.0 / LEAP) * steps.longest * steps.unit * ahead).clamp(low, high);
+                let q = (p + (4.0 / JUMP_DIVISOR) * steps.largest_step * steps.unit * direction).clamp(low, high);
                 next.copy_from_slice(&x);
-                if q != p && equations.leap(&mut next, q) {
+                if q != p && equations.jump_kink(&mut next, q) {
                     let border = q == low || q == high;
-                    (x, p, fresh, length) = (next, q, true, 0.25 * steps.longest);
+                    (x, p, tangent_outdated, step_size) = (next, q, true, 0.25 * steps.largest_step);
                     tangent.fill(0.0);
-                    tangent[n] = ahead;
+                    tangent[n] = direction;
                     if !visit(equations, &x, p) {
-                        return End::Stopped;
+                        return BranchEnd::Stopped;
                     }
                     if border {
-                        return End::Border;
+                        return BranchEnd::Border;
                     }
                     continue;
                 }
             }
-            if length < steps.shortest {
-                return End::Stalled { at: p };
+            if step_size < steps.smallest_step {
+                return BranchEnd::Stalled { parameter: p };
             }
             continue;
         };
-        ahead = if q < p { -1.0 } else { 1.0 };
-        (x, p, fresh) = (next, q, true);
+        direction = if q < p { -1.0 } else { 1.0 };
+        (x, p, tangent_outdated) = (next, q, true);
         if !visit(equations, &x, p) {
-            return End::Stopped;
+            return BranchEnd::Stopped;
         }
         if border.is_some() {
-            return End::Border;
+            return BranchEnd::Border;
         }
-        if iterations <= FEW {
-            length *= 1.5;
+        if iterations <= EASY_ITERATIONS {
+            step_size *= 1.5;
         }
     }
-    End::Points
+    BranchEnd::Points
 }
 
 /// A predicted point: unknowns and parameter.
 type Predicted = (Vec<f64>, f64);
 
-struct Work {
+struct Corrector {
     n: usize,
     f: Vec<f64>,
     by_x: Vec<f64>,
@@ -219,9 +220,9 @@ struct Work {
     right: Vec<f64>,
 }
 
-impl Work {
+impl Corrector {
     fn new(n: usize) -> Self {
-        Work {
+        Corrector {
             n,
             f: vec![0.0; n],
             by_x: vec![0.0; n * n],
@@ -243,7 +244,14 @@ impl Work {
 
     /// Computes the unit tangent in the direction of `tangent`. Leaves it
     /// unchanged if the point is singular.
-    fn tangent<E: Equations>(&mut self, equations: &mut E, x: &[f64], p: f64, unit: f64, tangent: &mut [f64]) {
+    fn tangent<E: ParametricEquations>(
+        &mut self,
+        equations: &mut E,
+        x: &[f64],
+        p: f64,
+        unit: f64,
+        tangent: &mut [f64],
+    ) {
         let n = self.n;
         if !equations.evaluate(x, p, &mut self.f, &mut self.by_x, &mut self.by_p) {
             return;
@@ -261,7 +269,7 @@ impl Work {
 
     /// Corrects by Newton's method on the plane orthogonal to `across`, or with the parameter
     /// fixed. Returns the number of iterations, or `None` if it fails.
-    fn correct<E: Equations>(
+    fn correct<E: ParametricEquations>(
         &mut self,
         equations: &mut E,
         x: &mut [f64],
@@ -270,8 +278,8 @@ impl Work {
         across: Option<(&[f64], &Predicted)>,
     ) -> Option<usize> {
         let n = self.n;
-        let mut held = vec![0.0; n + 1];
-        held[n] = 1.0;
+        let mut fixed_parameter_row = vec![0.0; n + 1];
+        fixed_parameter_row[n] = 1.0;
         for iteration in 0..=ITERATIONS {
             if !equations.evaluate(x, *p, &mut self.f, &mut self.by_x, &mut self.by_p) {
                 return None;
@@ -291,7 +299,7 @@ impl Work {
                     self.right[n] = along + (*p - start) / unit * tangent[n];
                 }
                 None => {
-                    self.border(unit, &held);
+                    self.border(unit, &fixed_parameter_row);
                     self.right[n] = 0.0;
                 }
             }
@@ -314,7 +322,7 @@ mod tests {
     /// `x (1 - p) = 1`: a resonance without damping.
     struct Pole;
 
-    impl Equations for Pole {
+    impl ParametricEquations for Pole {
         fn size(&self) -> usize {
             1
         }
@@ -325,22 +333,22 @@ mod tests {
             (f[0], by_x[0], by_p[0]) = (x[0] * (1.0 - p) - 1.0, 1.0 - p, -x[0]);
             true
         }
-        fn leap(&mut self, _: &mut [f64], _: f64) -> bool {
+        fn jump_kink(&mut self, _: &mut [f64], _: f64) -> bool {
             false
         }
     }
 
     /// Each step is at most a tenth of the distance covered, so 193 steps reach a hundred million.
     #[test]
-    fn what_leads_to_infinity_takes_few_steps() {
+    fn branches_to_infinity_take_few_steps() {
         let (mut visited, mut farthest) = (0, 0.0f64);
-        let end = trace(&mut Pole, &[1.0], 0.0, Steps::between(0.0, 2.0, 0.2), &mut |_, x, p| {
+        let end = trace(&mut Pole, &[1.0], 0.0, ContinuationSettings::between(0.0, 2.0, 0.2), &mut |_, x, p| {
             visited += 1;
             farthest = farthest.max(x[0]);
             assert!((x[0] * (1.0 - p) - 1.0).abs() < 1e-6, "{x:?} {p}");
             x[0] < 1e6
         });
-        assert_eq!(end, End::Stopped);
+        assert_eq!(end, BranchEnd::Stopped);
         assert!(farthest >= 1e6 && visited < 400, "{farthest} {visited} {end:?}");
     }
 }

@@ -16,7 +16,7 @@ use faer::{Accum, Conj, MatMut, MatRef, Par, Spec};
 use num_complex::Complex64;
 
 /// Size from which elimination in blocks is faster.
-const LARGE: usize = 96;
+const BLOCKED_FROM: usize = 96;
 
 /// Solves `A x = b` by elimination with row exchanges. Returns false if a pivot
 /// is zero or not finite.
@@ -32,14 +32,14 @@ const LARGE: usize = 96;
 /// assert_eq!(b, [2.0, 1.0]);
 /// ```
 pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
-    solve_signed(matrix, n, right).is_some()
+    solve_with_determinant_sign(matrix, n, right).is_some()
 }
 
 /// Solves `A x = b` like [`solve`]. Returns the sign ±1 of the determinant of
 /// A, or `None` if [`solve`] returns false.
-pub fn solve_signed(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
-    if n >= LARGE {
-        return in_blocks(&mut matrix[..n * n], n, &mut right[..n]);
+pub fn solve_with_determinant_sign(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+    if n >= BLOCKED_FROM {
+        return solve_blocked(&mut matrix[..n * n], n, &mut right[..n]);
     }
     let exchanges = eliminate(matrix, n, right)?;
     for k in (0..n).rev() {
@@ -89,11 +89,11 @@ fn eliminate(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<usize> {
     Some(exchanges)
 }
 
-/// Solves like [`solve_signed`], in blocks that stay in the cache.
+/// Solves like [`solve_with_determinant_sign`], in blocks that stay in the cache.
 ///
 /// `faer` reads the row-major memory by columns and therefore factors the transpose. The
 /// solution uses the transpose of these factors.
-fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
+fn solve_blocked(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     let params = Spec::<PartialPivLuParams, f64>::default();
     let mut memory = MemBuffer::new(StackReq::any_of(&[
         lu_in_place_scratch::<u32, f64>(n, n, Par::Seq, params),
@@ -117,6 +117,26 @@ fn in_blocks(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {
     right.iter().all(|x| x.is_finite()).then_some(sign)
 }
 
+/// The sizes of a product of matrices: `rows × inner` times `inner × columns`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProductShape {
+    /// Rows of the left factor and of the product.
+    pub rows: usize,
+    /// Columns of the left factor and rows of the right one.
+    pub inner: usize,
+    /// Columns of the right factor and of the product.
+    pub columns: usize,
+}
+
+/// Says whether a matrix is used as it is stored, or transposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transpose {
+    /// As it is stored.
+    No,
+    /// Transposed.
+    Yes,
+}
+
 /// Rows and columns of a tile of a product, whose sums are kept in registers.
 const TILE: usize = 4;
 
@@ -127,11 +147,14 @@ const TILE: usize = 4;
 ///
 /// # Example
 /// ```
+/// use stickslip_numerics::dense::{ProductShape, multiply};
 /// let mut c = [0.0; 2];
-/// stickslip_numerics::dense::multiply(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0], &mut c, (2, 2, 1));
+/// let shape = ProductShape { rows: 2, inner: 2, columns: 1 };
+/// multiply(&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0], &mut c, shape);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (usize, usize, usize)) {
+pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], shape: ProductShape) {
+    let ProductShape { rows, inner, columns } = shape;
     if rows == 0 || columns == 0 {
         return;
     }
@@ -165,33 +188,30 @@ pub fn multiply(a: &[f64], b: &[f64], c: &mut [f64], (rows, inner, columns): (us
     }
 }
 
-/// Computes `C = A B`, or `A Bᵀ` if `transposed`, of large real or complex column-major
+/// Computes `C = A B`, or `A Bᵀ` with [`Transpose::Yes`], of large real or complex column-major
 /// matrices, in blocks that stay in the cache.
 ///
-/// A is `rows × inner`. B is `inner × columns`, or `columns × inner` if `transposed`. The
+/// A is `rows × inner`. B is `inner × columns`, or `columns × inner` if it is transposed. The
 /// result has the same bits on every run, but may differ between processors.
 ///
 /// # Example
 /// ```
+/// use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 /// let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0]);
 /// let mut c = [0.0; 2];
-/// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), false);
+/// let shape = ProductShape { rows: 2, inner: 2, columns: 1 };
+/// multiply_blocked(&a, &b, &mut c, shape, Transpose::No);
 /// assert_eq!(c, [23.0, 34.0]);
-/// stickslip_numerics::dense::multiply_in_blocks(&a, &b, &mut c, (2, 2, 1), true);
+/// multiply_blocked(&a, &b, &mut c, shape, Transpose::Yes);
 /// assert_eq!(c, [23.0, 34.0]);
 /// ```
-pub fn multiply_in_blocks<T: Number>(
-    a: &[T],
-    b: &[T],
-    c: &mut [T],
-    (rows, inner, columns): (usize, usize, usize),
-    transposed: bool,
-) {
+pub fn multiply_blocked<T: Scalar>(a: &[T], b: &[T], c: &mut [T], shape: ProductShape, transpose: Transpose) {
+    let ProductShape { rows, inner, columns } = shape;
     let a = MatRef::from_column_major_slice(&a[..rows * inner], rows, inner);
     let b = &b[..inner * columns];
-    let b = match transposed {
-        true => MatRef::from_column_major_slice(b, columns, inner).transpose(),
-        false => MatRef::from_column_major_slice(b, inner, columns),
+    let b = match transpose {
+        Transpose::Yes => MatRef::from_column_major_slice(b, columns, inner).transpose(),
+        Transpose::No => MatRef::from_column_major_slice(b, inner, columns),
     };
     let c = MatMut::from_column_major_slice_mut(&mut c[..rows * columns], rows, columns);
     matmul(c, Accum::Replace, a, b, one(), Par::Seq);
@@ -206,11 +226,11 @@ pub fn multiply_in_blocks<T: Number>(
 /// # Example
 /// ```
 /// let mut matrix = [4.0, 2.0, 2.0, 17.0];
-/// assert!(stickslip_numerics::dense::cholesky_in_blocks(&mut matrix, 2));
+/// assert!(stickslip_numerics::dense::cholesky_blocked(&mut matrix, 2));
 /// assert_eq!((matrix[0], matrix[1], matrix[3]), (2.0, 1.0, 4.0));
-/// assert!(!stickslip_numerics::dense::cholesky_in_blocks(&mut [1.0, 2.0, 2.0, 3.0], 2));
+/// assert!(!stickslip_numerics::dense::cholesky_blocked(&mut [1.0, 2.0, 2.0, 3.0], 2));
 /// ```
-pub fn cholesky_in_blocks(matrix: &mut [f64], n: usize) -> bool {
+pub fn cholesky_blocked(matrix: &mut [f64], n: usize) -> bool {
     let params = Spec::<LltParams, f64>::default();
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(n, Par::Seq, params));
     let lower = MatMut::from_column_major_slice_mut(&mut matrix[..n * n], n, n);
@@ -218,42 +238,44 @@ pub fn cholesky_in_blocks(matrix: &mut [f64], n: usize) -> bool {
         && (0..n).all(|k| matrix[k * n + k].is_finite())
 }
 
-/// Solves `L X = B`, or `Lᵀ X = B` if `transposed`, in place and in blocks that stay in the cache.
+/// Solves `L X = B`, or `Lᵀ X = B` with [`Transpose::Yes`], in place and in blocks that stay in
+/// the cache.
 ///
 /// L is the lower triangle of a column-major matrix `n × n`. `right` holds the
 /// columns of B, each of length n, and becomes X.
 ///
 /// # Example
 /// ```
+/// use stickslip_numerics::dense::{Transpose, solve_lower_blocked};
 /// let (lower, mut right) = ([2.0, 1.0, 0.0, 4.0], [2.0, 9.0]);
-/// stickslip_numerics::dense::solve_lower_in_blocks(&lower, 2, &mut right, false);
+/// solve_lower_blocked(&lower, 2, &mut right, Transpose::No);
 /// assert_eq!(right, [1.0, 2.0]);
-/// stickslip_numerics::dense::solve_lower_in_blocks(&lower, 2, &mut right, true);
+/// solve_lower_blocked(&lower, 2, &mut right, Transpose::Yes);
 /// assert_eq!(right, [0.25, 0.5]);
 /// ```
-pub fn solve_lower_in_blocks(lower: &[f64], n: usize, right: &mut [f64], transposed: bool) {
+pub fn solve_lower_blocked(lower: &[f64], n: usize, right: &mut [f64], transpose: Transpose) {
     let columns = right.len() / n.max(1);
     let lower = MatRef::from_column_major_slice(&lower[..n * n], n, n);
     let right = MatMut::from_column_major_slice_mut(&mut right[..n * columns], n, columns);
-    match transposed {
-        false => solve_lower_triangular_in_place(lower, right, Par::Seq),
-        true => solve_upper_triangular_in_place(lower.transpose(), right, Par::Seq),
+    match transpose {
+        Transpose::No => solve_lower_triangular_in_place(lower, right, Par::Seq),
+        Transpose::Yes => solve_upper_triangular_in_place(lower.transpose(), right, Par::Seq),
     }
 }
 
 /// The numbers of a matrix: real or complex.
-pub trait Number: ComplexField + Copy {
+pub trait Scalar: ComplexField + Copy {
     /// Returns true if the number is finite and not zero.
     fn is_pivot(self) -> bool;
 }
 
-impl Number for f64 {
+impl Scalar for f64 {
     fn is_pivot(self) -> bool {
         self != 0.0 && self.is_finite()
     }
 }
 
-impl Number for Complex64 {
+impl Scalar for Complex64 {
     fn is_pivot(self) -> bool {
         self != Complex64::ZERO && self.is_finite()
     }
@@ -274,7 +296,7 @@ impl Number for Complex64 {
 /// assert_eq!(x, [-j, 0.5 + 0.0 * j]);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Lu<T> {
+pub struct DenseLu<T> {
     n: usize,
     factors: Vec<T>,
     order: Vec<u32>,
@@ -282,9 +304,9 @@ pub struct Lu<T> {
 }
 
 /// The factorization of a complex matrix.
-pub type ComplexLu = Lu<Complex64>;
+pub type ComplexLu = DenseLu<Complex64>;
 
-impl<T: Number> Lu<T> {
+impl<T: Scalar> DenseLu<T> {
     /// Returns the memory of the factors, bytes.
     pub fn bytes(&self) -> usize {
         size_of::<T>() * self.factors.len()
@@ -301,7 +323,7 @@ impl<T: Number> Lu<T> {
         let mut factors = MatMut::from_column_major_slice_mut(&mut matrix, n, n);
         lu_in_place(factors.as_mut(), &mut order, &mut inverse, Par::Seq, MemStack::new(&mut memory), params);
         let weak = (0..n).find(|&k| !factors[(k, k)].is_pivot());
-        weak.map_or(Ok(Lu { n, factors: matrix, order, inverse }), Err)
+        weak.map_or(Ok(DenseLu { n, factors: matrix, order, inverse }), Err)
     }
 
     /// Solves in place for right sides of length n, stored consecutively.
@@ -314,7 +336,7 @@ impl<T: Number> Lu<T> {
         });
     }
 
-    /// Solves with the conjugate transpose of the matrix, like [`Lu::solve`].
+    /// Solves with the conjugate transpose of the matrix, like [`DenseLu::solve`].
     ///
     /// # Panics
     /// If the length of `right` is not a multiple of n.
@@ -357,7 +379,7 @@ mod tests {
             let a: Vec<f64> = (0..rows * inner).map(entry).collect();
             let b: Vec<f64> = (0..inner * columns).map(|at| entry(at + 1000)).collect();
             let mut c = vec![f64::NAN; rows * columns];
-            multiply(&a, &b, &mut c, (rows, inner, columns));
+            multiply(&a, &b, &mut c, ProductShape { rows, inner, columns });
             for (at, c) in c.iter().enumerate() {
                 let (i, j) = (at % rows, at / rows);
                 let sum = (0..inner).fold(0.0, |sum, k| sum + a[k * rows + i] * b[j * inner + k]);
@@ -369,7 +391,7 @@ mod tests {
     /// With and without blocks, the solution is the vector that the matrix was multiplied with.
     #[test]
     fn large_systems_are_solved_in_blocks() {
-        for n in [1, 7, LARGE - 1, LARGE, 2 * LARGE + 5] {
+        for n in [1, 7, BLOCKED_FROM - 1, BLOCKED_FROM, 2 * BLOCKED_FROM + 5] {
             // Entries without a pattern between -1 and 1. The zero diagonal forces row exchanges.
             let entry =
                 |i: usize, k: usize| if i == k && n > 1 { 0.0 } else { ((i * 7919 + k * 104_729 + 1) as f64).sin() };
@@ -382,13 +404,13 @@ mod tests {
             }
         }
         // A cyclic permutation of n rows has the sign (-1)^(n - 1). Every second entry is negative.
-        for n in [1, 2, 3, 4, 2 * LARGE + 5, 2 * LARGE + 6, 2 * LARGE + 7] {
+        for n in [1, 2, 3, 4, 2 * BLOCKED_FROM + 5, 2 * BLOCKED_FROM + 6, 2 * BLOCKED_FROM + 7] {
             let mut matrix = vec![0.0; n * n];
             for i in 0..n {
                 matrix[i * n + (i + 1) % n] = if i % 2 == 1 { -2.0 } else { 3.0 };
             }
             let sign = if (n - 1 + n / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
-            assert_eq!(solve_signed(&mut matrix, n, &mut vec![1.0; n]), Some(sign), "{n}");
+            assert_eq!(solve_with_determinant_sign(&mut matrix, n, &mut vec![1.0; n]), Some(sign), "{n}");
         }
         let mut singular = vec![1.0; 4];
         assert!(!solve(&mut singular, 2, &mut [1.0, 2.0]));

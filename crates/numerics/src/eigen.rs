@@ -1,6 +1,6 @@
 //! Eigenvalues and singular values by iterations with a bounded number of steps.
 //!
-//! - [`symmetric`] and [`singular`]: nalgebra's decompositions with a bound on their iterations.
+//! - [`symmetric`] and [`svd`]: nalgebra's decompositions with a bound on their iterations.
 //! - [`eigenvalues`]: all eigenvalues of a general matrix, by deflation of exact
 //!   zeros, balancing, and QR iteration of the Hessenberg form with Wilkinson's
 //!   shift. A subdiagonal entry counts as zero relative to the *whole* matrix. The
@@ -12,7 +12,7 @@
 //! Source: Golub and Van Loan, "Matrix Computations" (2013), Sec. 7.4, 7.5 and
 //! 10.5; Parlett and Reinsch (1969) for balancing.
 
-use crate::dense::{cholesky_in_blocks, solve_lower_in_blocks};
+use crate::dense::{Transpose, cholesky_blocked, solve_lower_blocked};
 use crate::interrupt;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, SelfAdjointEvdParams, self_adjoint_evd, self_adjoint_evd_scratch};
@@ -32,26 +32,26 @@ const SWEEPS: usize = 20;
 ///
 /// Measured: reducing a structure with 900 ports took 7.5 s, mostly in three such
 /// decompositions. With blocks it takes 1.8 s.
-const IN_BLOCKS: usize = 256;
+const BLOCKED_FROM: usize = 256;
 /// Size from which computing the largest eigenvalue alone is cheaper than computing all.
-const LARGE: usize = 64;
+const ARNOLDI_FROM: usize = 64;
 /// First dimension of the Arnoldi process; it doubles from there.
-const FIRST: usize = 24;
+const ARNOLDI_START: usize = 24;
 /// Residual, relative to the eigenvalue, at which an eigenvalue of the Arnoldi
 /// process has converged.
 ///
 /// Its error is then far below the threshold of stability decisions (1e-6), even if the
 /// eigenvectors are a hundred times worse conditioned than orthogonal ones.
-const SETTLED: f64 = 1e-9;
+const CONVERGED: f64 = 1e-9;
 /// Eigenvalues with a modulus above this fraction of the largest must converge
 /// too, because one of them may still exceed it.
-const RIVAL: f64 = 0.9;
+const COMPETING: f64 = 0.9;
 
 /// Returns the eigenvalues and eigenvectors of a symmetric matrix, or `None` if an entry is not
 /// finite or the iteration does not converge.
 pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
-    if matrix.nrows() >= IN_BLOCKS {
-        let (values, eigenvectors) = symmetric_in_blocks(&matrix)?;
+    if matrix.nrows() >= BLOCKED_FROM {
+        let (values, eigenvectors) = symmetric_blocked(&matrix)?;
         return Some(SymmetricEigen { eigenvalues: DVector::from_vec(values), eigenvectors });
     }
     let steps = STEPS * (matrix.nrows() + 1);
@@ -61,7 +61,7 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     if found.as_ref().is_some_and(|found| found.eigenvalues.iter().chain(&found.eigenvectors).all(|x| x.is_finite())) {
         return found;
     }
-    let (values, eigenvectors) = symmetric_in_blocks(&matrix)?;
+    let (values, eigenvectors) = symmetric_blocked(&matrix)?;
     Some(SymmetricEigen { eigenvalues: DVector::from_vec(values), eigenvectors })
 }
 
@@ -74,11 +74,11 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let (values, vectors) = stickslip_numerics::eigen::symmetric_in_blocks(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
+/// let (values, vectors) = stickslip_numerics::eigen::symmetric_blocked(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
 /// assert!((values[0] - 1.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
 /// assert!((vectors[(0, 1)] - vectors[(1, 1)]).abs() < 1e-14);
 /// ```
-pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+pub fn symmetric_blocked(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = matrix.nrows();
     if !finite(matrix) || matrix.ncols() != n {
         return None;
@@ -102,11 +102,11 @@ pub fn symmetric_in_blocks(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let (values, vectors) = stickslip_numerics::eigen::symmetric_pair(&dmatrix![3.0, 0.0; 0.0, 8.0], &dmatrix![1.0, 0.0; 0.0, 4.0]).unwrap();
+/// let (values, vectors) = stickslip_numerics::eigen::generalized_symmetric(&dmatrix![3.0, 0.0; 0.0, 8.0], &dmatrix![1.0, 0.0; 0.0, 4.0]).unwrap();
 /// assert!((values[0] - 2.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
 /// assert!((vectors[(1, 0)].abs() - 0.5).abs() < 1e-14 && vectors[(0, 0)].abs() < 1e-14);
 /// ```
-pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+pub fn generalized_symmetric(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = h.nrows();
     if n == 0 {
         return Some((Vec::new(), DMatrix::zeros(0, 0)));
@@ -115,15 +115,15 @@ pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, D
     let unit = h.diagonal().map(|v| 1.0 / v.sqrt());
     let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, k| unit[i] * matrix[(i, k)] * unit[k]);
     let mut lower = scaled(h);
-    if !cholesky_in_blocks(lower.as_mut_slice(), n) {
+    if !cholesky_blocked(lower.as_mut_slice(), n) {
         return None;
     }
-    let solve = |mut right: DMatrix<f64>, transposed: bool| {
-        solve_lower_in_blocks(lower.as_slice(), n, right.as_mut_slice(), transposed);
+    let solve = |mut right: DMatrix<f64>, transpose: Transpose| {
+        solve_lower_blocked(lower.as_slice(), n, right.as_mut_slice(), transpose);
         right
     };
-    let (values, vectors) = symmetric_in_blocks(&solve(solve(scaled(a), false).transpose(), false))?;
-    let mut vectors = solve(vectors, true);
+    let (values, vectors) = symmetric_blocked(&solve(solve(scaled(a), Transpose::No).transpose(), Transpose::No))?;
+    let mut vectors = solve(vectors, Transpose::Yes);
     for mut column in vectors.column_iter_mut() {
         column.component_mul_assign(&unit);
     }
@@ -132,7 +132,7 @@ pub fn symmetric_pair(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<(Vec<f64>, D
 
 /// Returns the singular value decomposition, or `None` if the matrix is empty, an entry is not
 /// finite or the iteration does not converge.
-pub fn singular<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
+pub fn svd<T: ComplexField<RealField = f64>>(matrix: DMatrix<T>) -> Option<SVD<T, Dyn, Dyn>> {
     let steps = STEPS * (matrix.nrows().max(matrix.ncols()) + 1);
     let usable = !matrix.is_empty() && matrix.iter().all(|z| z.clone().modulus().is_finite());
     let found = usable.then(|| SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, steps))?;
@@ -156,7 +156,7 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex64>> {
     let mut found = match core.nrows() {
         0 => Vec::new(),
         1 => vec![Complex64::new(core[0], 0.0)],
-        _ => of_hessenberg(balanced(core).hessenberg().unpack_h().map(|x| Complex64::new(x, 0.0)))?,
+        _ => hessenberg_eigenvalues(balanced(core).hessenberg().unpack_h().map(|x| Complex64::new(x, 0.0)))?,
     };
     found.resize(found.len() + zeros, ZERO);
     Some(found)
@@ -177,7 +177,7 @@ pub fn largest_modulus(matrix: &DMatrix<f64>) -> Option<f64> {
         return None;
     }
     let (core, _) = deflated(matrix);
-    if core.nrows() > LARGE
+    if core.nrows() > ARNOLDI_FROM
         && let Some(largest) = arnoldi(&balanced(core.clone()))
     {
         return Some(largest);
@@ -236,7 +236,7 @@ fn balanced(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Returns the eigenvalues of an upper Hessenberg matrix.
-fn of_hessenberg(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
+fn hessenberg_eigenvalues(mut h: DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     let n = h.nrows();
     let small = f64::EPSILON * h.norm();
     if !small.is_finite() {
@@ -324,7 +324,7 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
     // The start vector needs a component along every eigenvector. Golden-ratio steps never repeat.
     let first = DVector::from_fn(n, |i, _| 0.5 + (i as f64 * 0.618_033_988_749_894_9).fract());
     basis.set_column(0, &first.normalize());
-    let mut check = FIRST.min(most);
+    let mut check = ARNOLDI_START.min(most);
     for k in 0..most {
         interrupt::check();
         let mut next = matrix * basis.column(k);
@@ -344,10 +344,10 @@ fn arnoldi(matrix: &DMatrix<f64>) -> Option<f64> {
         basis.set_column(k + 1, &(next / length));
         if k + 1 == check {
             let square = h.view((0, 0), (check, check)).into_owned();
-            let found = of_hessenberg(square.map(|x| Complex64::new(x, 0.0)))?;
+            let found = hessenberg_eigenvalues(square.map(|x| Complex64::new(x, 0.0)))?;
             let largest = found.iter().map(|z| z.norm()).fold(0.0, f64::max);
-            let settled = |value: Complex64| residual(&square, value, length) <= SETTLED * largest;
-            if found.iter().filter(|z| z.norm() >= RIVAL * largest).all(|z| settled(*z)) {
+            let converged = |value: Complex64| residual(&square, value, length) <= CONVERGED * largest;
+            if found.iter().filter(|z| z.norm() >= COMPETING * largest).all(|z| converged(*z)) {
                 return Some(largest);
             }
             check = (2 * check).min(most);
@@ -511,12 +511,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_finite_is_asked() {
+    fn non_finite_matrices_have_no_eigenvalues() {
         assert_eq!(eigenvalues(&dmatrix![f64::NAN, 0.0; 1.0, 2.0]), None);
         assert_eq!(largest_modulus(&dmatrix![f64::INFINITY]), None);
         assert!(symmetric(dmatrix![1.0, f64::NAN; f64::NAN, 1.0]).is_none());
-        assert!(singular(dmatrix![f64::INFINITY, 1.0; 0.0, 1.0]).is_none());
-        assert!(singular(DMatrix::<f64>::zeros(0, 0)).is_none());
+        assert!(svd(dmatrix![f64::INFINITY, 1.0; 0.0, 1.0]).is_none());
+        assert!(svd(DMatrix::<f64>::zeros(0, 0)).is_none());
         assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), Some(vec![]));
         assert_eq!(largest_modulus(&DMatrix::zeros(0, 0)), Some(0.0));
     }

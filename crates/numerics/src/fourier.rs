@@ -12,16 +12,16 @@ use std::sync::Arc;
 /// # Example
 /// ```
 /// use num_complex::Complex64;
-/// use stickslip_numerics::fourier::Fourier;
-/// let mut fourier = Fourier::new(16);
+/// use stickslip_numerics::fourier::FourierPlan;
+/// let mut fourier = FourierPlan::new(16);
 /// let mut samples = vec![0.0; 16];
-/// fourier.synthesise(&[(0, Complex64::new(0.5, 0.0)), (3, Complex64::new(0.0, -2.0))], &mut samples);
+/// fourier.synthesize(&[(0, Complex64::new(0.5, 0.0)), (3, Complex64::new(0.0, -2.0))], &mut samples);
 /// assert!((samples[1] - (0.5 + 2.0 * (3.0 * std::f64::consts::TAU / 16.0).sin())).abs() < 1e-14);
-/// let sums = fourier.sums(&mut samples);       // Σ u_i e^{-jhθ_i}
+/// let sums = fourier.transform(&mut samples);       // Σ u_i e^{-jhθ_i}
 /// assert!((sums[3] * (2.0 / 16.0) - Complex64::new(0.0, -2.0)).norm() < 1e-14);
 /// ```
 #[derive(Clone)]
-pub struct Fourier {
+pub struct FourierPlan {
     samples: usize,
     forward: Arc<dyn RealToComplex<f64>>,
     inverse: Arc<dyn ComplexToReal<f64>>,
@@ -29,19 +29,19 @@ pub struct Fourier {
     scratch: Vec<Complex64>,
 }
 
-impl fmt::Debug for Fourier {
+impl fmt::Debug for FourierPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Fourier").field("samples", &self.samples).finish_non_exhaustive()
+        f.debug_struct("FourierPlan").field("samples", &self.samples).finish_non_exhaustive()
     }
 }
 
-impl Fourier {
+impl FourierPlan {
     /// Makes a plan for `samples` points per period (even, at least 2).
     pub fn new(samples: usize) -> Self {
         let mut planner = RealFftPlanner::<f64>::new();
         let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
-        Fourier {
+        FourierPlan {
             samples,
             forward,
             inverse,
@@ -57,7 +57,7 @@ impl Fourier {
 
     /// Writes the samples of `Re Σ U_h e^{jhθ}` into `out` (length N), from
     /// pairs (h, U_h) with `h < N/2`.
-    pub fn synthesise(&mut self, harmonics: &[(usize, Complex64)], out: &mut [f64]) {
+    pub fn synthesize(&mut self, harmonics: &[(usize, Complex64)], out: &mut [f64]) {
         self.spectrum.fill(Complex64::default());
         for &(h, c) in harmonics {
             // The inverse transform adds the conjugate half, which doubles all
@@ -71,7 +71,7 @@ impl Fourier {
     }
 
     /// Returns `Σ_i u_i e^{-jhθ_i}` for h = 0..=N/2. Overwrites the samples.
-    pub fn sums(&mut self, samples: &mut [f64]) -> &[Complex64] {
+    pub fn transform(&mut self, samples: &mut [f64]) -> &[Complex64] {
         let scratch = &mut self.scratch[..self.forward.get_scratch_len()];
         self.forward
             .process_with_scratch(samples, &mut self.spectrum, scratch)

@@ -1,8 +1,8 @@
 //! Interruption of long computations.
 //!
-//! A caller gives its thread a [`Stop`]. Loops call [`check`] between their
+//! A caller gives its thread a [`StopFlag`]. Loops call [`check`] between their
 //! steps, and the stack unwinds once the flag is set. A thread without a
-//! [`Stop`], which is the default, never unwinds. The unwinding discards the
+//! [`StopFlag`], which is the default, never unwinds. The unwinding discards the
 //! unfinished result, so callers must drop state that spans an interruption.
 
 use std::any::Any;
@@ -21,8 +21,8 @@ pub struct Interrupted;
 /// # Example
 /// ```
 /// use std::panic::{AssertUnwindSafe, catch_unwind};
-/// use stickslip_numerics::interrupt::{Interrupted, Stop, check};
-/// let stop = Stop::new();
+/// use stickslip_numerics::interrupt::{Interrupted, StopFlag, check};
+/// let stop = StopFlag::new();
 /// assert_eq!(stop.watch(|| { check(); 3 }), 3);
 /// stop.set();
 /// let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| check()))).unwrap_err();
@@ -30,30 +30,30 @@ pub struct Interrupted;
 /// check(); // the thread has no flag any more
 /// ```
 #[derive(Clone, Default)]
-pub struct Stop(Arc<Inner>);
+pub struct StopFlag(Arc<Inner>);
 
 #[derive(Default)]
 struct Inner {
     set: AtomicBool,
     /// A function called at every check in addition to the flag.
-    ask: Option<Box<dyn Fn() -> bool + Send + Sync>>,
+    callback: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
 thread_local! {
-    static WATCHED: RefCell<Option<Stop>> = const { RefCell::new(None) };
+    static THREAD_FLAG: RefCell<Option<StopFlag>> = const { RefCell::new(None) };
 }
 
-impl Stop {
+impl StopFlag {
     /// Creates a flag that is not set.
-    pub fn new() -> Stop {
-        Stop::default()
+    pub fn new() -> StopFlag {
+        StopFlag::default()
     }
 
-    /// Creates a flag that is also set once `ask` returns true.
+    /// Creates a flag that is also set once `callback` returns true.
     ///
-    /// Every check calls `ask`, on the thread that computes.
-    pub fn asking(ask: impl Fn() -> bool + Send + Sync + 'static) -> Stop {
-        Stop(Arc::new(Inner { set: AtomicBool::new(false), ask: Some(Box::new(ask)) }))
+    /// Every check calls `callback`, on the thread that computes.
+    pub fn with_callback(callback: impl Fn() -> bool + Send + Sync + 'static) -> StopFlag {
+        StopFlag(Arc::new(Inner { set: AtomicBool::new(false), callback: Some(Box::new(callback)) }))
     }
 
     /// Sets the flag: the watched computations end at their next check.
@@ -72,38 +72,38 @@ impl Stop {
     /// Unwinds with [`Interrupted`] at the first [`check`] after the flag is
     /// set, or with the reason given to [`throw`].
     pub fn watch<T>(&self, work: impl FnOnce() -> T) -> T {
-        let _lent = Lent(WATCHED.replace(Some(self.clone())));
+        let _guard = FlagGuard(THREAD_FLAG.replace(Some(self.clone())));
         work()
     }
 }
 
-impl fmt::Debug for Stop {
+impl fmt::Debug for StopFlag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Stop").field("set", &self.is_set()).finish_non_exhaustive()
+        f.debug_struct("StopFlag").field("set", &self.is_set()).finish_non_exhaustive()
     }
 }
 
 /// Sets or removes the flag of this thread, for threads that receive work from
 /// others. The flag stays until the next call.
-pub fn lend(stop: Option<Stop>) {
-    WATCHED.set(stop);
+pub fn set_thread_flag(stop: Option<StopFlag>) {
+    THREAD_FLAG.set(stop);
 }
 
 /// Restores the thread's former flag when dropped.
-struct Lent(Option<Stop>);
+struct FlagGuard(Option<StopFlag>);
 
-impl Drop for Lent {
+impl Drop for FlagGuard {
     fn drop(&mut self) {
-        WATCHED.set(self.0.take());
+        THREAD_FLAG.set(self.0.take());
     }
 }
 
 /// Unwinds if the flag of this thread is set.
 #[inline]
 pub fn check() {
-    // Cloned, not borrowed: `ask` may run a computation that has a flag too.
-    if let Some(stop) = WATCHED.with_borrow(Clone::clone)
-        && (stop.is_set() || stop.0.ask.as_ref().is_some_and(|ask| ask()))
+    // Cloned, not borrowed: `callback` may run a computation that has a flag too.
+    if let Some(stop) = THREAD_FLAG.with_borrow(Clone::clone)
+        && (stop.is_set() || stop.0.callback.as_ref().is_some_and(|callback| callback()))
     {
         stop.set();
         resume_unwind(Box::new(Interrupted));
@@ -114,8 +114,8 @@ pub fn check() {
 ///
 /// Returns normally if the thread has no flag.
 pub fn throw(reason: Box<dyn Any + Send>) {
-    let watched = WATCHED.with_borrow(Clone::clone);
-    if let Some(stop) = watched {
+    let flag = THREAD_FLAG.with_borrow(Clone::clone);
+    if let Some(stop) = flag {
         stop.set();
         resume_unwind(reason);
     }
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_reason_ends_all_that_share_the_flag() {
-        let stop = Stop::new();
+        let stop = StopFlag::new();
         let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| throw(Box::new(7_u8))))).unwrap_err();
         assert_eq!(ended.downcast_ref(), Some(&7_u8));
         let other = stop.clone();
@@ -137,15 +137,15 @@ mod tests {
     }
 
     #[test]
-    fn a_question_is_asked_until_it_is_answered_with_yes() {
+    fn callback_runs_until_it_returns_true() {
         let asked = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let count = asked.clone();
-        let stop = Stop::asking(move || count.fetch_add(1, Ordering::Relaxed) == 2);
+        let stop = StopFlag::with_callback(move || count.fetch_add(1, Ordering::Relaxed) == 2);
         let ended = catch_unwind(AssertUnwindSafe(|| stop.watch(|| (0..9).for_each(|_| check()))));
         assert!(ended.is_err() && stop.is_set());
         assert_eq!(asked.load(Ordering::Relaxed), 3);
         // After the inner flag ends, the outer flag counts again.
-        let (outer, inner) = (Stop::new(), Stop::new());
+        let (outer, inner) = (StopFlag::new(), StopFlag::new());
         outer.watch(|| {
             inner.watch(|| ());
             outer.set();
@@ -155,8 +155,8 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_watches_goes_on() {
-        Stop::new().set();
+    fn threads_without_a_flag_continue() {
+        StopFlag::new().set();
         check();
         throw(Box::new("nobody hears it"));
     }

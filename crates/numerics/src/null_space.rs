@@ -13,16 +13,16 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 /// Rows from which the iteration takes less time than the singular value decomposition.
-const MANY: usize = 8;
+const ITERATED_FROM: usize = 8;
 /// Maximum number of steps. Each step divides the error by the square of the ratio of the
 /// singular values, which is at least 10⁶ where the iteration is useful.
 const STEPS: usize = 6;
 /// The iteration stops when a step changes the directions by less than this: a
 /// few times the rounding of a solution.
-const TURNED: f64 = 1e-13;
+const CONVERGED: f64 = 1e-13;
 /// If the factorization finds no pivot, this fraction of the largest entry is added to the
 /// diagonal. It is within the rounding of the matrix.
-const NUDGE: f64 = f64::EPSILON;
+const DIAGONAL_SHIFT: f64 = f64::EPSILON;
 
 /// Returns an orthonormal basis, by columns, of the `dimension` directions with
 /// the smallest singular values.
@@ -33,14 +33,14 @@ pub(crate) fn null_space(matrix: &DMatrix<Complex64>, dimension: usize) -> Optio
     if r == 1 {
         return Some(DMatrix::from_element(1, 1, Complex64::ONE));
     }
-    let iterated = if r >= MANY && dimension < r { iterated(matrix, dimension) } else { None };
-    iterated.or_else(|| decomposed(matrix, dimension))
+    let converged = if r >= ITERATED_FROM && dimension < r { by_inverse_iteration(matrix, dimension) } else { None };
+    converged.or_else(|| by_svd(matrix, dimension))
 }
 
 /// Computes the basis by the singular value decomposition.
-fn decomposed(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
+fn by_svd(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
-    let svd = eigen::singular(matrix.clone())?;
+    let svd = eigen::svd(matrix.clone())?;
     let v_t = svd.v_t.expect("asked for");
     let mut order: Vec<usize> = (0..r).collect();
     order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
@@ -49,12 +49,12 @@ fn decomposed(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<C
 
 /// Computes the basis by inverse iteration. Returns `None` if it does not
 /// converge because the next singular value is not much larger.
-fn iterated(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
+fn by_inverse_iteration(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Complex64>> {
     let r = matrix.nrows();
     let factor = ComplexLu::new(matrix.as_slice().to_vec(), r).or_else(|_| {
         let size = matrix.iter().map(|z| z.norm()).fold(0.0, f64::max);
-        let nudged = matrix + DMatrix::from_diagonal_element(r, r, Complex64::new(NUDGE * size, 0.0));
-        ComplexLu::new(nudged.as_slice().to_vec(), r)
+        let shifted = matrix + DMatrix::from_diagonal_element(r, r, Complex64::new(DIAGONAL_SHIFT * size, 0.0));
+        ComplexLu::new(shifted.as_slice().to_vec(), r)
     });
     let factor = factor.ok()?;
     // Start columns without a pattern. If they are orthogonal to the null space by chance, the
@@ -70,9 +70,9 @@ fn iterated(matrix: &DMatrix<Complex64>, dimension: usize) -> Option<DMatrix<Com
         next = orthonormal(next)?;
         factor.solve(next.as_mut_slice());
         next = orthonormal(next)?;
-        let turned = &next - &found * (found.adjoint() * &next);
+        let change = &next - &found * (found.adjoint() * &next);
         found = next;
-        if turned.iter().all(|z| z.norm() <= TURNED) {
+        if change.iter().all(|z| z.norm() <= CONVERGED) {
             return Some(found);
         }
     }
@@ -115,16 +115,16 @@ mod tests {
     /// Both methods find the directions that the matrix was made with: one or
     /// several, singular to rounding or not.
     #[test]
-    fn both_ways_find_the_directions() {
+    fn both_methods_find_the_directions() {
         for least in [0.0, 1e-16, 1e-9] {
             for dimension in [1, 2, 3] {
-                let values: Vec<f64> = (0..MANY + 5)
+                let values: Vec<f64> = (0..ITERATED_FROM + 5)
                     .map(|i| if i < dimension { least * (1.0 + i as f64) } else { 1.0 + i as f64 })
                     .collect();
                 let (matrix, v) = made(&values, 3.0 + dimension as f64);
                 let exact = v.columns(0, dimension);
-                let of_iteration = iterated(&matrix, dimension).expect("it settles");
-                for found in [&of_iteration, &decomposed(&matrix, dimension).unwrap()] {
+                let of_iteration = by_inverse_iteration(&matrix, dimension).expect("it settles");
+                for found in [&of_iteration, &by_svd(&matrix, dimension).unwrap()] {
                     assert!((found.adjoint() * found - DMatrix::identity(dimension, dimension)).camax() < 1e-14);
                     let missed = found - exact * (exact.adjoint() * found);
                     assert!(missed.camax() < 1e-13, "{least} {dimension}: {:.1e}", missed.camax());
@@ -137,17 +137,17 @@ mod tests {
     /// and the decomposition answers.
     #[test]
     fn directions_that_are_not_apart_are_left_to_the_decomposition() {
-        let values: Vec<f64> = (0..MANY + 2).map(|i| 1.0 + 0.01 * i as f64).collect();
+        let values: Vec<f64> = (0..ITERATED_FROM + 2).map(|i| 1.0 + 0.01 * i as f64).collect();
         let (matrix, _) = made(&values, 5.0);
-        assert!(iterated(&matrix, 1).is_none());
+        assert!(by_inverse_iteration(&matrix, 1).is_none());
         let found = null_space(&matrix, 1).unwrap();
         assert!(((&matrix * &found).norm() - 1.0).abs() < 1e-13);
     }
 
     /// A matrix with an entry that is not finite has no null space.
     #[test]
-    fn what_is_not_finite_is_refused() {
-        let mut matrix = DMatrix::from_element(MANY, MANY, Complex64::ONE);
+    fn non_finite_matrices_are_refused() {
+        let mut matrix = DMatrix::from_element(ITERATED_FROM, ITERATED_FROM, Complex64::ONE);
         matrix[(1, 2)] = Complex64::new(f64::NAN, 0.0);
         assert!(null_space(&matrix, 1).is_none());
     }

@@ -8,12 +8,12 @@
 pub const STAGES: usize = 5;
 
 /// Nodes within a step: the zeros of `d⁴/dx⁴ (x⁴ (x - 1)⁵)`. The last is the end of the step.
-pub const C: [f64; STAGES] =
+pub const NODES: [f64; STAGES] =
     [0.057_104_196_114_517_68, 0.276_843_013_638_123_8, 0.583_590_432_368_916_8, 0.860_240_135_656_219_5, 1.0];
 
 /// Matrix of the method, `∫₀^cᵢ ℓⱼ` with the Lagrange polynomials ℓ of the nodes. Its last row
 /// is the quadrature of order 9 over the step.
-pub const A: [[f64; STAGES]; STAGES] = [
+pub const BUTCHER_MATRIX: [[f64; STAGES]; STAGES] = [
     [
         0.072_998_864_317_903_33,
         -0.026_735_331_107_945_57,
@@ -47,21 +47,22 @@ pub const A: [[f64; STAGES]; STAGES] = [
 
 /// Weights of the stage increments in the embedded error estimate of order 5. For a polynomial
 /// of degree 5 the weighted sum is minus its slope at the start.
-pub const ERROR: [f64; STAGES] =
+pub const ERROR_WEIGHTS: [f64; STAGES] =
     [-27.780_933_944_064_64, 3.641_478_498_049_213, -1.252_547_721_169_118_7, 0.592_003_167_184_542_8, -0.2];
 
 /// Order of the embedded estimate in the step size h: the estimate vanishes like `h⁶`.
-pub const ESTIMATE: i32 = STAGES as i32 + 1;
+pub const ESTIMATE_ORDER: i32 = STAGES as i32 + 1;
 
-/// The real eigenvalue of the inverse of [`A`]. The error estimate is filtered by `(REAL/h - J)⁻¹`.
-pub const REAL: f64 = 6.286_704_751_729_276_5;
+/// The real eigenvalue of the inverse of [`BUTCHER_MATRIX`]. The error estimate is filtered by
+/// `(γ - J)⁻¹` with γ = `REAL_EIGENVALUE / h`.
+pub const REAL_EIGENVALUE: f64 = 6.286_704_751_729_276_5;
 
 /// Returns `A²`, which gives displacements from accelerations.
-pub fn squared() -> [[f64; STAGES]; STAGES] {
+pub fn matrix_squared() -> [[f64; STAGES]; STAGES] {
     let mut out = [[0.0; STAGES]; STAGES];
     for i in 0..STAGES {
         for j in 0..STAGES {
-            out[i][j] = (0..STAGES).map(|k| A[i][k] * A[k][j]).sum();
+            out[i][j] = (0..STAGES).map(|k| BUTCHER_MATRIX[i][k] * BUTCHER_MATRIX[k][j]).sum();
         }
     }
     out
@@ -100,7 +101,7 @@ mod tests {
     /// `126 x⁵ - 350 x⁴ + 350 x³ - 150 x² + 25 x - 1`.
     #[test]
     fn nodes_are_those_of_radau() {
-        for x in C {
+        for x in NODES {
             let value = ((((126.0 * x - 350.0) * x + 350.0) * x - 150.0) * x + 25.0) * x - 1.0;
             assert!(value.abs() < 350.0 * 4.0 * f64::EPSILON, "{x}: {value}");
         }
@@ -112,12 +113,12 @@ mod tests {
     fn coefficients_satisfy_the_order_conditions() {
         for i in 0..STAGES {
             for k in 1..=STAGES as i32 {
-                let sum: f64 = (0..STAGES).map(|j| A[i][j] * C[j].powi(k - 1)).sum();
-                assert!((sum - C[i].powi(k) / f64::from(k)).abs() < 1e-15, "stage {i}, degree {k}");
+                let sum: f64 = (0..STAGES).map(|j| BUTCHER_MATRIX[i][j] * NODES[j].powi(k - 1)).sum();
+                assert!((sum - NODES[i].powi(k) / f64::from(k)).abs() < 1e-15, "stage {i}, degree {k}");
             }
         }
         for k in 1..=9 {
-            let sum: f64 = (0..STAGES).map(|j| A[STAGES - 1][j] * C[j].powi(k - 1)).sum();
+            let sum: f64 = (0..STAGES).map(|j| BUTCHER_MATRIX[STAGES - 1][j] * NODES[j].powi(k - 1)).sum();
             assert!((sum - 1.0 / f64::from(k)).abs() < 1e-15, "degree {k}");
         }
     }
@@ -126,7 +127,7 @@ mod tests {
     #[test]
     fn the_estimate_vanishes_to_order_five() {
         for k in 1..=STAGES as i32 {
-            let sum: f64 = ERROR.iter().zip(C).map(|(weight, c)| weight * c.powi(k)).sum();
+            let sum: f64 = ERROR_WEIGHTS.iter().zip(NODES).map(|(weight, c)| weight * c.powi(k)).sum();
             assert!((sum + if k == 1 { 1.0 } else { 0.0 }).abs() < 1e-14, "degree {k}: {sum}");
         }
     }
@@ -139,7 +140,7 @@ mod tests {
         let mut sum = 1.0;
         for j in 1..=STAGES {
             let (left, of) = ((STAGES + 1 - j) as f64, (2 * STAGES - j) as f64);
-            term *= -REAL * left / (of * j as f64);
+            term *= -REAL_EIGENVALUE * left / (of * j as f64);
             sum += term;
         }
         assert!(sum.abs() < 1e-14, "{sum}");

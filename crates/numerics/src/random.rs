@@ -22,9 +22,9 @@ pub struct Stream {
 }
 
 /// Increment of SplitMix64: the fractional part of the golden ratio.
-const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 
-fn mixed(mut z: u64) -> u64 {
+fn splitmix64(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
@@ -33,12 +33,12 @@ fn mixed(mut z: u64) -> u64 {
 impl Stream {
     /// Creates the stream of a seed. Streams of consecutive seeds are not correlated.
     pub fn new(seed: u64) -> Self {
-        Stream { seed: mixed(seed.wrapping_add(STEP)) }
+        Stream { seed: splitmix64(seed.wrapping_add(GOLDEN_GAMMA)) }
     }
 
     /// Returns number `index`, uniform in the open interval (0, 1).
     pub fn uniform(self, index: u64) -> f64 {
-        let bits = mixed(self.seed.wrapping_add(index.wrapping_add(1).wrapping_mul(STEP)));
+        let bits = splitmix64(self.seed.wrapping_add(index.wrapping_add(1).wrapping_mul(GOLDEN_GAMMA)));
         // The middle of one of 2⁵³ intervals.
         ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
@@ -75,17 +75,17 @@ pub fn normal_quantile(p: f64) -> f64 {
     };
     let q = p - 0.5;
     if q.abs() <= 0.425 {
-        return q * ratio(0.180_625 - q * q, MIDDLE.0, MIDDLE.1);
+        return q * ratio(0.180_625 - q * q, CENTER.0, CENTER.1);
     }
     let r = (-logarithm(if q < 0.0 { p } else { 1.0 - p })).sqrt();
-    let value = if r <= 5.0 { ratio(r - 1.6, NEAR.0, NEAR.1) } else { ratio(r - 5.0, FAR.0, FAR.1) };
+    let value = if r <= 5.0 { ratio(r - 1.6, TAIL.0, TAIL.1) } else { ratio(r - 5.0, FAR_TAIL.0, FAR_TAIL.1) };
     if q < 0.0 { -value } else { value }
 }
 
-type Ratio = ([f64; 8], [f64; 7]);
+type RationalCoefficients = ([f64; 8], [f64; 7]);
 
 #[allow(clippy::excessive_precision)] // as published
-const MIDDLE: Ratio = (
+const CENTER: RationalCoefficients = (
     [
         3.387_132_872_796_366_608_0,
         1.331_416_678_917_843_774_5e2,
@@ -108,7 +108,7 @@ const MIDDLE: Ratio = (
 );
 
 #[allow(clippy::excessive_precision)]
-const NEAR: Ratio = (
+const TAIL: RationalCoefficients = (
     [
         1.423_437_110_749_683_577_34,
         4.630_337_846_156_545_295_90,
@@ -131,7 +131,7 @@ const NEAR: Ratio = (
 );
 
 #[allow(clippy::excessive_precision)]
-const FAR: Ratio = (
+const FAR_TAIL: RationalCoefficients = (
     [
         6.657_904_643_501_103_777_20,
         5.463_784_911_164_114_369_90,
@@ -183,9 +183,9 @@ mod tests {
 
     /// The first numbers of SplitMix64's mixing are fixed: studies with seeds must not change.
     #[test]
-    fn a_seed_stays_what_it_is() {
-        // Stafford's variant 13: mixed(1) computed by hand from the published code.
-        assert_eq!(mixed(1), 0x5692_161d_100b_05e5);
+    fn seeds_are_stable() {
+        // Stafford's variant 13: splitmix64(1) computed by hand from the published code.
+        assert_eq!(splitmix64(1), 0x5692_161d_100b_05e5);
         let stream = Stream::new(7);
         let mut numbers: Vec<u64> = (0..1000).map(|i| stream.uniform(i).to_bits()).collect();
         numbers.sort_unstable();
@@ -205,10 +205,10 @@ mod tests {
             let error = 5.0 / (n as f64).sqrt();
             assert!(moment(1).abs() < error && (moment(2) - 1.0).abs() < 1.5 * error, "{seed}");
             assert!((moment(4) - 3.0).abs() < 10.0 * error, "{seed}: {}", moment(4));
-            let beside = x.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / n as f64;
+            let serial = x.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / n as f64;
             let other = Stream::new(seed + 1);
             let across = (0..n).map(|i| other.normal(i) * x[i as usize]).sum::<f64>() / n as f64;
-            assert!(beside.abs() < error && across.abs() < error, "{seed}: {beside} {across}");
+            assert!(serial.abs() < error && across.abs() < error, "{seed}: {serial} {across}");
         }
     }
 }

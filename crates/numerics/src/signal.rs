@@ -8,7 +8,7 @@
 //! - `1` for constant forces, and `τ, τ²/2` for bodies that are free to move.
 //!
 //! Values, derivatives, integrals and bounds of such a signal have closed forms. A bound on the
-//! second derivative gives a step without any zero of the signal. [`Basis::first_zero`]
+//! second derivative gives a step without any zero of the signal. [`ExponentialBasis::first_zero`]
 //! advances by such steps and therefore misses no zero.
 
 use crate::quadrature;
@@ -19,7 +19,7 @@ use num_complex::Complex64;
 /// The order of the coefficients is: exponentials, resonant pairs, the
 /// constant, and `τ, τ²/2` if `drifts` is set.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Basis {
+pub struct ExponentialBasis {
     /// Exponents `s`, rad/s.
     pub exponents: Vec<Complex64>,
     /// Resonant pairs `(s, δ)`, rad/s.
@@ -42,7 +42,7 @@ fn phi1(z: Complex64) -> Complex64 {
 
 /// Returns [`phi1`] for a known `e^z`.
 #[inline]
-fn phi1_of(z: Complex64, exp: Complex64) -> Complex64 {
+fn phi1_from_exp(z: Complex64, exp: Complex64) -> Complex64 {
     if z.norm_sqr() < SERIES_BELOW * SERIES_BELOW { phi1_series(z) } else { (exp - 1.0) / z }
 }
 
@@ -56,7 +56,7 @@ pub enum FirstZero {
     /// No signal vanishes before the end.
     None,
     /// Signal `index` reaches zero at `time`.
-    At {
+    Found {
         /// Index of the signal.
         index: usize,
         /// Time of the zero, s.
@@ -69,7 +69,7 @@ pub enum FirstZero {
 
 /// The state of a monitored signal at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Begin {
+pub enum InitialSign {
     /// The signal is positive.
     Positive,
     /// The signal is zero and expected to rise. Its first nonzero derivative decides.
@@ -84,9 +84,9 @@ const TIME_RESOLUTION: f64 = 4e-16;
 
 /// A derivative of a signal counts as zero at the start if it is below this fraction of its
 /// bound. The solution that leads to it has rounding errors of about 1e-13.
-const VANISHES: f64 = 1e-9;
+const ZERO_TOLERANCE: f64 = 1e-9;
 
-impl Basis {
+impl ExponentialBasis {
     /// Returns the number of coefficients of a signal.
     pub fn len(&self) -> usize {
         self.constant() + if self.drifts { 3 } else { 1 }
@@ -101,13 +101,13 @@ impl Basis {
         self.exponents.len() + self.resonant.len()
     }
 
-    /// Computes the basis functions at `time` into `out` (length [`Basis::len`]).
+    /// Computes the basis functions at `time` into `out` (length [`ExponentialBasis::len`]).
     #[inline]
     pub fn evaluate(&self, time: f64, out: &mut [Complex64]) {
         self.evaluate_and(time, out, |_, _| {});
     }
 
-    /// Computes the basis functions like [`Basis::evaluate`]. `size` receives
+    /// Computes the basis functions like [`ExponentialBasis::evaluate`]. `size` receives
     /// the magnitude of every exponential that decays or grows.
     #[inline]
     pub(crate) fn evaluate_and(&self, time: f64, out: &mut [Complex64], mut size: impl FnMut(usize, f64)) {
@@ -141,7 +141,7 @@ impl Basis {
 
     /// Returns the value of a signal at `τ = 0`: the coefficients of the exponentials and of
     /// the constant. Resonant pairs contribute nothing.
-    pub fn beginning(&self, coefficients: &[Complex64]) -> f64 {
+    pub fn initial_value(&self, coefficients: &[Complex64]) -> f64 {
         coefficients[..self.exponents.len()].iter().map(|c| c.re).sum::<f64>() + coefficients[self.constant()].re
     }
 
@@ -194,17 +194,17 @@ impl Basis {
     }
 
     /// Computes the magnitudes of the exponents into `out`.
-    pub(crate) fn speeds(&self, out: &mut [f64]) {
+    pub(crate) fn exponent_magnitudes(&self, out: &mut [f64]) {
         let every = self.exponents.iter().chain(self.resonant.iter().map(|(s, _)| s));
-        out.iter_mut().zip(every).for_each(|(speed, s)| *speed = size_of(s));
+        out.iter_mut().zip(every).for_each(|(speed, s)| *speed = magnitude(s));
     }
 
     /// Computes bounds on the magnitudes of the coefficients of a derivative into `out`.
-    /// `sizes` are those of the signal, and `speeds` are the magnitudes of the exponents.
+    /// `sizes` are those of the signal.
     #[inline]
-    pub(crate) fn differentiate_sizes(&self, sizes: &[f64], speeds: &[f64], out: &mut [f64]) {
+    pub(crate) fn differentiate_sizes(&self, sizes: &[f64], exponent_magnitudes: &[f64], out: &mut [f64]) {
         let (e, c) = (self.exponents.len(), self.constant());
-        for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(speeds) {
+        for ((out, size), speed) in out[..c].iter_mut().zip(sizes).zip(exponent_magnitudes) {
             *out = size * speed;
         }
         for (r, &driven_by) in self.driven_by.iter().enumerate() {
@@ -240,27 +240,42 @@ impl Basis {
     /// `g + g' h - max|g''| h²/2 > 0`, so no zero is missed. The value of the second derivative
     /// and a bound on the third may permit a longer step. Close to a simple zero the steps
     /// converge cubically, from the left. `scratch` is scratch memory.
-    pub fn first_zero(&self, signals: &[Complex64], begins: &[Begin], end: f64, scratch: &mut Scratch) -> FirstZero {
+    pub fn first_zero(
+        &self,
+        signals: &[Complex64],
+        begins: &[InitialSign],
+        end: f64,
+        scratch: &mut ZeroScratch,
+    ) -> FirstZero {
         let (nb, count) = (self.len(), begins.len());
         scratch.prepare(nb, count);
-        let Scratch { values, magnitudes, speeds, first, second, second_weights, third_weights, clear_until, rising } =
-            scratch;
-        self.speeds(speeds);
+        let ZeroScratch {
+            values,
+            magnitudes,
+            exponent_magnitudes,
+            first,
+            second,
+            second_weights,
+            third_weights,
+            zero_free_until,
+            rising,
+        } = scratch;
+        self.exponent_magnitudes(exponent_magnitudes);
         for k in 0..count {
             let range = k * nb..(k + 1) * nb;
             self.differentiate(&signals[range.clone()], &mut first[range.clone()]);
             self.differentiate(&first[range.clone()], &mut second[range.clone()]);
             let (weights, signal) = (&mut second_weights[range.clone()], &second[range.clone()]);
-            weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
-            self.differentiate_sizes(weights, speeds, &mut third_weights[range]);
+            weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = magnitude(c));
+            self.differentiate_sizes(weights, exponent_magnitudes, &mut third_weights[range]);
         }
         self.magnitudes(end, magnitudes);
         for k in 0..count {
-            clear_until[k] = match begins[k] {
-                Begin::Positive => 0.0,
-                Begin::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
+            zero_free_until[k] = match begins[k] {
+                InitialSign::Positive => 0.0,
+                InitialSign::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
                     Some(until) => until,
-                    None => return FirstZero::At { index: k, time: 0.0 },
+                    None => return FirstZero::Found { index: k, time: 0.0 },
                 },
             };
         }
@@ -272,50 +287,50 @@ impl Basis {
                     magnitudes[b] = size; // it decays from here on
                 }
             });
-            let (mut step, mut nearest, mut settled) = (f64::INFINITY, 0, false);
+            let (mut step, mut nearest, mut converged) = (f64::INFINITY, 0, false);
             for k in 0..count {
-                if time < clear_until[k] {
-                    if clear_until[k] - time < step {
-                        (step, nearest, settled) = (clear_until[k] - time, k, false);
+                if time < zero_free_until[k] {
+                    if zero_free_until[k] - time < step {
+                        (step, nearest, converged) = (zero_free_until[k] - time, k, false);
                     }
                     continue;
                 }
                 let range = k * nb..(k + 1) * nb;
                 let g = real_dot(&signals[range.clone()], values);
                 if g <= 0.0 {
-                    return FirstZero::At { index: k, time };
+                    return FirstZero::Found { index: k, time };
                 }
                 let slope = real_dot(&first[range.clone()], values);
-                let bound = bounded_by(&second_weights[range.clone()], magnitudes);
-                let safe = fall(g, slope, -bound);
+                let bound = magnitude_bound(&second_weights[range.clone()], magnitudes);
+                let safe = first_root(g, slope, -bound);
                 if safe >= step {
                     continue;
                 }
                 // Over twice that step the second derivative stays within `change` of its value.
                 let reach = 2.0 * safe;
                 let curvature = real_dot(&second[range.clone()], values);
-                let change = reach * bounded_by(&third_weights[range], magnitudes);
+                let change = reach * magnitude_bound(&third_weights[range], magnitudes);
                 let (mut first_possible, mut last_possible) = (safe, f64::INFINITY);
                 if curvature - change > -bound {
-                    first_possible = fall(g, slope, curvature - change).min(reach);
-                    last_possible = fall(g, slope, curvature + change);
+                    first_possible = first_root(g, slope, curvature - change).min(reach);
+                    last_possible = first_root(g, slope, curvature + change);
                 }
                 if first_possible < step {
                     // The interval of the zero is below the resolution of the time.
-                    let settled_here = last_possible <= reach && last_possible - first_possible <= resolution;
-                    (step, nearest, settled) = (first_possible, k, settled_here);
+                    let converged_here = last_possible <= reach && last_possible - first_possible <= resolution;
+                    (step, nearest, converged) = (first_possible, k, converged_here);
                 }
             }
             if time + step >= end {
                 return FirstZero::None;
             }
-            if settled {
-                return FirstZero::At { index: nearest, time: time + step };
+            if converged {
+                return FirstZero::Found { index: nearest, time: time + step };
             }
             if step <= resolution {
                 let range = nearest * nb..(nearest + 1) * nb;
                 if real_dot(&first[range], values) <= 0.0 {
-                    return FirstZero::At { index: nearest, time };
+                    return FirstZero::Found { index: nearest, time };
                 }
                 step = resolution; // the signal touches zero and rises again
             }
@@ -336,14 +351,14 @@ impl Basis {
                 self.differentiate(current, next);
                 std::mem::swap(current, next);
             }
-            let value = self.beginning(current);
-            let size: f64 = current[..=self.constant()].iter().map(size_of).sum();
-            if value.abs() > VANISHES * size {
+            let value = self.initial_value(current);
+            let size: f64 = current[..=self.constant()].iter().map(magnitude).sum();
+            if value.abs() > ZERO_TOLERANCE * size {
                 if value < 0.0 {
                     return None;
                 }
                 self.differentiate(current, next);
-                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| size_of(c) * m).sum();
+                let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| magnitude(c) * m).sum();
                 // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!
                 return Some(if bound == 0.0 { f64::INFINITY } else { 0.5 * f64::from(order + 1) * value / bound });
             }
@@ -364,7 +379,7 @@ impl Basis {
 /// With `e_b` the exponentials and the constant, the integrals `∫ e_b e_c dτ` and
 /// `∫ e_b e_c* dτ` serve all signals of a basis.
 #[derive(Debug, Clone, Default)]
-pub struct Products {
+pub struct ProductIntegrals {
     length: f64,
     /// Number of exponentials plus one for the constant.
     terms: usize,
@@ -374,10 +389,10 @@ pub struct Products {
     mixed: Vec<Complex64>,
 }
 
-impl Products {
+impl ProductIntegrals {
     /// Computes the integrals over `[0, length]`. `at_end` contains the basis
     /// functions at `length`.
-    pub fn new(basis: &Basis, at_end: &[Complex64], length: f64) -> Self {
+    pub fn new(basis: &ExponentialBasis, at_end: &[Complex64], length: f64) -> Self {
         let (e, zero, one) = (basis.exponents.len(), Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
         let terms = e + 1;
         let term = |b: usize| if b < e { (basis.exponents[b], at_end[b]) } else { (zero, one) };
@@ -386,24 +401,25 @@ impl Products {
             let (s, s_end) = term(b);
             for c in 0..=b {
                 let (r, r_end) = term(c);
-                let value = phi1_of((s + r) * length, s_end * r_end) * length;
+                let value = phi1_from_exp((s + r) * length, s_end * r_end) * length;
                 plain[b * terms + c] = value;
                 plain[c * terms + b] = value;
-                let value = phi1_of((s + r.conj()) * length, s_end * r_end.conj()) * length;
+                let value = phi1_from_exp((s + r.conj()) * length, s_end * r_end.conj()) * length;
                 mixed[b * terms + c] = value;
                 mixed[c * terms + b] = value.conj();
             }
         }
-        Products { length, terms, plain, mixed }
+        ProductIntegrals { length, terms, plain, mixed }
     }
 
     /// Returns `∫ g h dτ`.
-    pub fn integral(&self, basis: &Basis, g: &[Complex64], h: &[Complex64]) -> f64 {
+    pub fn integral(&self, basis: &ExponentialBasis, g: &[Complex64], h: &[Complex64]) -> f64 {
         if !(basis.is_exponential(g) && basis.is_exponential(h)) {
-            return quadrature((basis, g), (basis, h), self.length);
+            return quadrature(Signal { basis, coefficients: g }, Signal { basis, coefficients: h }, self.length);
         }
         let zero = Complex64::new(0.0, 0.0);
-        let coefficient = |of: &[Complex64], b: usize| of[if b + 1 < self.terms { b } else { basis.constant() }];
+        let coefficient =
+            |coefficients: &[Complex64], b: usize| coefficients[if b + 1 < self.terms { b } else { basis.constant() }];
         let mut sum = 0.0;
         for b in 0..self.terms {
             let c = coefficient(g, b);
@@ -435,23 +451,27 @@ pub struct FourierIntegrals {
 impl FourierIntegrals {
     /// Computes the integrals over `[0, length]` at `nu` (rad/s). `at_end`
     /// contains the basis functions at `length`.
-    pub fn new(basis: &Basis, at_end: &[Complex64], nu: f64, length: f64) -> Self {
+    pub fn new(basis: &ExponentialBasis, at_end: &[Complex64], nu: f64, length: f64) -> Self {
         let (sin, cos) = (nu * length).sin_cos();
         let (rate, turn) = (Complex64::new(0.0, -nu), Complex64::new(cos, -sin));
         let constant = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
         let terms = basis.exponents.iter().copied().zip(at_end.iter().copied()).chain([constant]).map(|(s, end)| {
-            let part = |s: Complex64, end: Complex64| phi1_of((s + rate) * length, end * turn) * length;
+            let part = |s: Complex64, end: Complex64| phi1_from_exp((s + rate) * length, end * turn) * length;
             (part(s, end), part(s.conj(), end.conj()))
         });
         FourierIntegrals { nu, length, terms: terms.collect() }
     }
 
     /// Returns `∫ g e^{-jντ} dτ`.
-    pub fn integral(&self, basis: &Basis, g: &[Complex64]) -> Complex64 {
+    pub fn integral(&self, basis: &ExponentialBasis, g: &[Complex64]) -> Complex64 {
         if !basis.is_exponential(g) {
-            let probe = Basis { exponents: vec![Complex64::new(0.0, self.nu)], ..Basis::default() };
-            let part =
-                |turn: Complex64| quadrature((basis, g), (&probe, &[turn, Complex64::new(0.0, 0.0)]), self.length);
+            let probe =
+                ExponentialBasis { exponents: vec![Complex64::new(0.0, self.nu)], ..ExponentialBasis::default() };
+            let part = |turn: Complex64| {
+                let wave = [turn, Complex64::new(0.0, 0.0)];
+                let signal = Signal { basis, coefficients: g };
+                quadrature(signal, Signal { basis: &probe, coefficients: &wave }, self.length)
+            };
             // Re e^{jντ} = cos ντ, Re(-j e^{jντ}) = sin ντ
             return Complex64::new(part(Complex64::new(1.0, 0.0)), -part(Complex64::new(0.0, -1.0)));
         }
@@ -464,26 +484,33 @@ impl FourierIntegrals {
 }
 
 /// Quadrature nodes and weights of a panel.
-const NODES: [(f64, f64); 8] = quadrature::outwards(quadrature::EIGHT);
+const NODES: [(f64, f64); 8] = quadrature::from_center(quadrature::GAUSS_8);
 /// Maximum phase of the fastest exponential in a panel of the quadrature, up to
 /// which the 8-point rule is exact to rounding.
 const PANEL_PHASE: f64 = 1.0;
 
+/// A signal with its basis.
+#[derive(Clone, Copy)]
+struct Signal<'a> {
+    basis: &'a ExponentialBasis,
+    coefficients: &'a [Complex64],
+}
+
 /// Returns `∫ g h dτ` over `[0, length]` by Gauss-Legendre quadrature in panels.
-fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Complex64]), length: f64) -> f64 {
-    let fastest = g_basis.exponents.iter().chain(&h_basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
+fn quadrature(g: Signal, h: Signal, length: f64) -> f64 {
+    let fastest = g.basis.exponents.iter().chain(&h.basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
     let panels = (2.0 * fastest * length / PANEL_PHASE).ceil().clamp(1.0, 1e5) as usize;
     let width = length / panels as f64;
     let zero = Complex64::new(0.0, 0.0);
-    let (mut gv, mut hv) = (vec![zero; g_basis.len()], vec![zero; h_basis.len()]);
+    let (mut gv, mut hv) = (vec![zero; g.basis.len()], vec![zero; h.basis.len()]);
     let mut sum = 0.0;
     for panel in 0..panels {
         let middle = (panel as f64 + 0.5) * width;
         for (node, weight) in NODES {
             let time = middle + node * 0.5 * width;
-            g_basis.evaluate(time, &mut gv);
-            h_basis.evaluate(time, &mut hv);
-            sum += weight * real_dot(g, &gv) * real_dot(h, &hv);
+            g.basis.evaluate(time, &mut gv);
+            h.basis.evaluate(time, &mut hv);
+            sum += weight * real_dot(g.coefficients, &gv) * real_dot(h.coefficients, &hv);
         }
     }
     0.5 * width * sum
@@ -492,7 +519,7 @@ fn quadrature((g_basis, g): (&Basis, &[Complex64]), (h_basis, h): (&Basis, &[Com
 /// Returns the first positive root of `g + slope h + curvature h²/2`, `g > 0`,
 /// in the form without cancellation.
 #[inline]
-fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
+fn first_root(g: f64, slope: f64, curvature: f64) -> f64 {
     let square = slope * slope - 2.0 * curvature * g;
     if square < 0.0 || (slope >= 0.0 && curvature >= 0.0) {
         return f64::INFINITY;
@@ -503,14 +530,14 @@ fn fall(g: f64, slope: f64, curvature: f64) -> f64 {
 
 /// Returns a bound of a signal from the magnitudes of its coefficients and of the basis functions.
 #[inline]
-pub(crate) fn bounded_by(weights: &[f64], magnitudes: &[f64]) -> f64 {
+pub(crate) fn magnitude_bound(weights: &[f64], magnitudes: &[f64]) -> f64 {
     weights.iter().zip(magnitudes).map(|(w, m)| w * m).sum()
 }
 
 /// Returns the magnitude of a coefficient. Overflow cannot occur here, so the
 /// slower `hypot` is not needed.
 #[inline]
-pub fn size_of(c: &Complex64) -> f64 {
+pub fn magnitude(c: &Complex64) -> f64 {
     c.norm_sqr().sqrt()
 }
 
@@ -520,31 +547,31 @@ pub fn real_dot(coefficients: &[Complex64], values: &[Complex64]) -> f64 {
     coefficients.iter().zip(values).map(|(c, v)| c.re * v.re - c.im * v.im).sum()
 }
 
-/// Scratch memory of [`Basis::first_zero`], reused between calls.
+/// Scratch memory of [`ExponentialBasis::first_zero`], reused between calls.
 #[derive(Debug, Clone, Default)]
-pub struct Scratch {
+pub struct ZeroScratch {
     values: Vec<Complex64>,
     magnitudes: Vec<f64>,
-    speeds: Vec<f64>,
+    exponent_magnitudes: Vec<f64>,
     first: Vec<Complex64>,
     second: Vec<Complex64>,
     second_weights: Vec<f64>,
     third_weights: Vec<f64>,
-    clear_until: Vec<f64>,
+    zero_free_until: Vec<f64>,
     rising: [Vec<Complex64>; 2],
 }
 
-impl Scratch {
+impl ZeroScratch {
     fn prepare(&mut self, nb: usize, count: usize) {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
         self.magnitudes.resize(nb, 0.0);
-        self.speeds.resize(nb, 0.0);
+        self.exponent_magnitudes.resize(nb, 0.0);
         self.first.resize(nb * count, zero);
         self.second.resize(nb * count, zero);
         self.second_weights.resize(nb * count, 0.0);
         self.third_weights.resize(nb * count, 0.0);
-        self.clear_until.resize(count, 0.0);
+        self.zero_free_until.resize(count, 0.0);
     }
 }
 
@@ -560,36 +587,37 @@ mod tests {
     /// 1.000001 - cos τ has no zero.
     #[test]
     fn narrow_dips_are_found_and_near_misses_are_not_zeros() {
-        let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
-        let mut scratch = Scratch::default();
+        let basis = ExponentialBasis { exponents: vec![c(0.0, 1.0)], ..ExponentialBasis::default() };
+        let mut scratch = ZeroScratch::default();
         let dip = [c(-1.0, 0.0), c(0.999, 0.0)];
         // At τ = 0 the signal is below zero, so it is shifted: g(τ) = 0.999 - cos(τ + 1).
         let shifted = [dip[0] * c(0.0, 1.0).exp(), dip[1]];
-        let FirstZero::At { time, .. } = basis.first_zero(&shifted, &[Begin::Positive], 10.0, &mut scratch) else {
+        let FirstZero::Found { time, .. } = basis.first_zero(&shifted, &[InitialSign::Positive], 10.0, &mut scratch)
+        else {
             panic!("a zero was missed");
         };
         assert!((time - (2.0 * std::f64::consts::PI - 1.0 - 0.999f64.acos())).abs() < 1e-14, "{time}");
         let near_miss = [dip[0], c(1.000_001, 0.0)];
-        assert_eq!(basis.first_zero(&near_miss, &[Begin::Positive], 100.0, &mut scratch), FirstZero::None);
+        assert_eq!(basis.first_zero(&near_miss, &[InitialSign::Positive], 100.0, &mut scratch), FirstZero::None);
     }
 
     /// A signal that starts at zero and rises has no zero there: 1 - cos τ
     /// starts with a zero value and a zero slope.
     #[test]
     fn a_start_at_zero_is_no_zero() {
-        let basis = Basis { exponents: vec![c(0.0, 1.0)], ..Basis::default() };
+        let basis = ExponentialBasis { exponents: vec![c(0.0, 1.0)], ..ExponentialBasis::default() };
         let g = [c(-1.0, 0.0), c(1.0, 0.0)];
-        let mut scratch = Scratch::default();
-        assert_eq!(basis.first_zero(&g, &[Begin::Zero], 6.0, &mut scratch), FirstZero::None);
+        let mut scratch = ZeroScratch::default();
+        assert_eq!(basis.first_zero(&g, &[InitialSign::Zero], 6.0, &mut scratch), FirstZero::None);
         let sine = [c(0.0, -1.0), c(0.0, 0.0)];
-        let FirstZero::At { time, .. } = basis.first_zero(&sine, &[Begin::Zero], 6.0, &mut scratch) else {
+        let FirstZero::Found { time, .. } = basis.first_zero(&sine, &[InitialSign::Zero], 6.0, &mut scratch) else {
             panic!("the zero at pi was missed");
         };
         assert!((time - std::f64::consts::PI).abs() < 1e-14);
         let falling = [c(1.0, 0.0), c(-1.0, 0.0)];
         assert_eq!(
-            basis.first_zero(&falling, &[Begin::Zero], 6.0, &mut scratch),
-            FirstZero::At { index: 0, time: 0.0 }
+            basis.first_zero(&falling, &[InitialSign::Zero], 6.0, &mut scratch),
+            FirstZero::Found { index: 0, time: 0.0 }
         );
     }
 
@@ -599,18 +627,19 @@ mod tests {
     fn integrals_agree_with_quadrature() {
         let (s, delta) = (c(-0.1, 2.0), c(0.1, 1e-7));
         let exponents = vec![s, s + delta, c(-30.0, 0.0)];
-        let basis = Basis { exponents, resonant: vec![(s, delta)], driven_by: vec![1], drifts: true };
+        let basis = ExponentialBasis { exponents, resonant: vec![(s, delta)], driven_by: vec![1], drifts: true };
         let zero = c(0.0, 0.0);
         let g = [c(1.0, 0.5), c(-0.3, 0.2), c(0.7, 0.0), zero, c(0.4, 0.0), zero, zero];
         let mut end = vec![zero; basis.len()];
         basis.evaluate(3.0, &mut end);
-        let exact = Products::new(&basis, &end, 3.0).integral(&basis, &g, &g);
-        let numeric = quadrature((&basis, &g), (&basis, &g), 3.0);
+        let exact = ProductIntegrals::new(&basis, &end, 3.0).integral(&basis, &g, &g);
+        let signal = Signal { basis: &basis, coefficients: &g };
+        let numeric = quadrature(signal, signal, 3.0);
         assert!((exact - numeric).abs() < 1e-13 * exact.abs(), "{exact} {numeric}");
         let nu = 1.7;
         let of = FourierIntegrals::new(&basis, &end, nu, 3.0).integral(&basis, &g);
-        let probe = Basis { exponents: vec![c(0.0, nu)], ..Basis::default() };
-        let part = |turn| quadrature((&basis, &g), (&probe, &[turn, zero]), 3.0);
+        let probe = ExponentialBasis { exponents: vec![c(0.0, nu)], ..ExponentialBasis::default() };
+        let part = |turn| quadrature(signal, Signal { basis: &probe, coefficients: &[turn, zero] }, 3.0);
         assert!((of - c(part(c(1.0, 0.0)), -part(c(0.0, -1.0)))).norm() < 1e-13 * of.norm(), "{of}");
         // The derivative of every basis function, by differences.
         for b in 0..basis.len() {

@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::time::{Duration, Instant};
-use stickslip_numerics::interrupt::{self, Interrupted, Stop};
+use stickslip_numerics::interrupt::{self, Interrupted, StopFlag};
 use stickslip_study::run::Context;
 
 /// Interval between progress reports, and between checks for Ctrl-C.
@@ -34,7 +34,7 @@ pub fn run_here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
     let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let (begun, last_check) = (Instant::now(), AtomicU64::new(0));
     let slot = raised.clone();
-    let stop = Stop::asking(move || {
+    let stop = StopFlag::with_callback(move || {
         let now = begun.elapsed().as_millis() as u64;
         if now < last_check.load(Ordering::Relaxed) + POLL_INTERVAL.as_millis() as u64 {
             return false;
@@ -51,7 +51,7 @@ pub fn run_here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
 
 /// Runs long `work` on a new thread, which Ctrl-C abandons if it cannot end at once.
 pub fn run_on_new_thread<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
-    let stop = Stop::new();
+    let stop = StopFlag::new();
     let (send, receive) = mpsc::channel();
     let stop_flag = stop.clone();
     let spawned = std::thread::Builder::new().spawn(move || {
@@ -91,7 +91,7 @@ struct PoolLease {
     number: usize,
     pool: Option<rayon::ThreadPool>,
     /// Flag that ends their work.
-    stop: Stop,
+    stop: StopFlag,
 }
 
 impl PoolLease {
@@ -131,8 +131,8 @@ fn lease_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<PoolLease> {
             .build()
             .map_err(|cause| error::exception(py, "StickslipError", format!("cannot create threads: {cause}")))?,
     };
-    let stop = Stop::new();
-    pool.broadcast(|_| interrupt::lend(Some(stop.clone())));
+    let stop = StopFlag::new();
+    pool.broadcast(|_| interrupt::set_thread_flag(Some(stop.clone())));
     Ok(PoolLease { number, pool: Some(pool), stop })
 }
 

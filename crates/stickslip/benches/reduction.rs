@@ -16,7 +16,7 @@ use python::{Peer, number};
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::structure::reduction::{Damping, Free, Reference, Whole};
-use stickslip_numerics::sparse::{Analysis, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SymbolicAnalysis};
 
 const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
 const MODES: usize = 20;
@@ -29,12 +29,13 @@ fn main() {
     let brick = Brick::new(elements, elements.map(|e| 0.005 * e as f64), true);
     println!("{} degrees of freedom, {} entries", brick.dofs(), brick.stiffness.len());
     let mut clock = Clock::new();
-    let analysis = Analysis::new(&[&brick.stiffness, &brick.mass]);
-    clock.tell(&format!("analysis ({} MB in a factor)", analysis.fill() / 125_000));
+    let analysis = SymbolicAnalysis::new(&[&brick.stiffness, &brick.mass]);
+    clock.tell(&format!("analysis ({} MB in a factor)", analysis.factor_entries() / 125_000));
     drop(analysis.factor(&[(1.0, &brick.stiffness)]).expect("the block is held"));
     clock.tell("factor");
-    let modes = NaturalModes::new(&analysis, &brick.stiffness, &brick.mass, Wanted::Lowest(MODES)).expect("modes");
-    clock.tell(&format!("{MODES} modes, counted ({} factors, {} vectors)", modes.effort.factors, modes.effort.vectors));
+    let modes =
+        NaturalModes::new(&analysis, &brick.stiffness, &brick.mass, ModeSelection::Lowest(MODES)).expect("modes");
+    clock.tell(&format!("{MODES} modes, counted ({} factors, {} vectors)", modes.cost.factors, modes.cost.vectors));
     drop(analysis);
 
     let up_to = modes.values[MODES - 1].sqrt();

@@ -8,7 +8,7 @@ use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 /// Returns nodes of `directions` degrees of freedom on springs. Springs and a contact couple
 /// each node to the next. The excitation is a travelling wave with one period per
@@ -17,7 +17,7 @@ fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System
     let (mass, stiffness, coupling, damping) = (0.2, 1e5, 4e3, 1.5);
     let at = |node: usize, direction: usize| (node % nodes) * directions + direction;
     let n = nodes * directions;
-    let diagonal = |value: f64| Matrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
+    let diagonal = |value: f64| SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
     let mut springs = Vec::new();
     for node in 0..nodes {
         for d in 0..directions {
@@ -28,7 +28,7 @@ fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System
     }
     let names = (0..n).map(|i| format!("{i}")).collect();
     let structure =
-        Structure::sparse(names, diagonal(mass), diagonal(damping), Matrix::from_triplets(n, springs).unwrap())
+        Structure::sparse(names, diagonal(mass), diagonal(damping), SparseMatrix::from_triplets(n, springs).unwrap())
             .unwrap();
     let mut builder = System::builder(structure);
     for node in 0..nodes {

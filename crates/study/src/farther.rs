@@ -13,7 +13,7 @@ use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::first_largest;
 
 /// Factors on the frequency limit of the basis. The check uses the first factor whose number of
 /// modes is at most [`MODES`].
@@ -191,7 +191,7 @@ impl Point {
 fn chosen(points: &[Point]) -> BTreeSet<usize> {
     let heights: Vec<f64> = points.iter().map(Point::largest).collect();
     let others = (0..POINTS - 1).map(|k| k * points.len().saturating_sub(1) / (POINTS - 2));
-    leading(heights.iter().copied()).into_iter().chain(others).filter(|index| *index < points.len()).collect()
+    first_largest(heights.iter().copied()).into_iter().chain(others).filter(|index| *index < points.len()).collect()
 }
 
 /// Assembles the same model with a larger reduction basis, if it has few enough modes.

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};
 use stickslip::structure::{Component, Node, Reduction, ReductionKind};
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 /// The statement of a model: lists of the study file or of a template, and matrices.
 #[derive(Debug, Clone)]
@@ -50,7 +50,7 @@ impl Matrices {
         let (mass, damping, stiffness) = component.matrices();
         let more = self.stiffened.as_ref().map(Stiffened::more);
         for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
-            for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
+            for (row, column, value) in matrix.into_iter().flat_map(SparseMatrix::entries) {
                 let place = [number, row, column].map(|index| index as u64);
                 place.iter().for_each(|index| hasher.update(&index.to_le_bytes()));
                 hasher.update(&value.to_le_bytes());

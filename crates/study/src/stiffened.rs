@@ -7,7 +7,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 use stickslip::structure::{Component, StructureError};
-use stickslip_numerics::sparse::{Matrix, MatrixError};
+use stickslip_numerics::sparse::{MatrixError, SparseMatrix};
 
 /// Number of components that are kept, one per speed. Reductions belong to a component, and
 /// cases at the same speed share it.
@@ -19,7 +19,7 @@ pub struct Exports {
     /// The structure at rest.
     pub rest: Component,
     /// The stiffness at the speed `at`, N/m.
-    pub there: Matrix,
+    pub there: SparseMatrix,
     /// The speed of the second export, rad/s.
     pub at: f64,
     /// The speed of the study, as its file states it.
@@ -29,7 +29,7 @@ pub struct Exports {
 /// Difference between the stiffness of the second export and that at rest.
 #[derive(Debug, Clone)]
 pub(crate) struct Stiffened {
-    more: Matrix,
+    more: SparseMatrix,
     /// Components by the bits of their factor `(Ω/Ω₁)²`.
     kept: Arc<Mutex<Vec<(u64, Component)>>>,
 }
@@ -37,9 +37,9 @@ pub(crate) struct Stiffened {
 impl Stiffened {
     /// Computes the difference from the stiffness at rest and that at the speed of the second
     /// export.
-    pub fn new(rest: &Matrix, there: &Matrix) -> Result<Self, MatrixError> {
+    pub fn new(rest: &SparseMatrix, there: &SparseMatrix) -> Result<Self, MatrixError> {
         let less = rest.entries().map(|(row, column, value)| (row, column, -value));
-        let more = Matrix::from_triplets(rest.n(), there.entries().chain(less))?;
+        let more = SparseMatrix::from_triplets(rest.n(), there.entries().chain(less))?;
         Ok(Stiffened { more, kept: Arc::default() })
     }
 
@@ -57,7 +57,8 @@ impl Stiffened {
         let (mass, damping, rest) = component.matrices();
         let more = self.more.entries().map(|(row, column, value)| (row, column, share * value));
         // both matrices have the same size, so only a factor that is not finite can fail here
-        let stiffness = Matrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
+        let stiffness =
+            SparseMatrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
         let found = Component::new(component.rows().to_vec(), mass.clone(), damping.cloned(), stiffness)?;
         if kept.len() == KEPT {
             kept.remove(0);
@@ -67,7 +68,7 @@ impl Stiffened {
     }
 
     /// Returns the difference of the two stiffness matrices.
-    pub fn more(&self) -> &Matrix {
+    pub fn more(&self) -> &SparseMatrix {
         &self.more
     }
 }

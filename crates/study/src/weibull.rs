@@ -14,7 +14,7 @@
 //!   67-90.
 
 use std::convert::Infallible;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::golden_section;
 
 /// The distribution of maxima with the largest likelihood for some values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +86,7 @@ impl Maxima {
         let heights: Vec<f64> = (0..=STEPS).map(|i| height(at(i))).collect();
         let best = (0..=STEPS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let ends = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
-        let Ok((s, _)) = maximum(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
+        let Ok((s, _)) = golden_section(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
         let Profile { scale, shape, .. } = profile(s)?;
         let found = Maxima { bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
         // the bound counts as known at the far end, and if the likelihood is not regular in it

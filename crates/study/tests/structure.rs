@@ -39,7 +39,7 @@ fn tip(brick: &Brick, y: usize, z: usize) -> String {
     (101 + brick.row([8, y, z], 0).unwrap() / 3).to_string()
 }
 
-fn full(matrix: &stickslip_numerics::sparse::Matrix) -> DMatrix<f64> {
+fn full(matrix: &stickslip_numerics::sparse::SparseMatrix) -> DMatrix<f64> {
     let mut full = DMatrix::zeros(matrix.n(), matrix.n());
     matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
     full

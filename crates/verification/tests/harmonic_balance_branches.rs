@@ -9,7 +9,7 @@ use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
 use stickslip::orbit::Orbit;
-use stickslip_numerics::continuation::End;
+use stickslip_numerics::continuation::BranchEnd;
 use stickslip_study::templates;
 
 fn balance(harmonics: usize) -> HarmonicBalance {
@@ -33,7 +33,7 @@ fn along_frequency_to_the_peak() {
             }
             .branch()
             .unwrap();
-            assert_eq!(branch.end, End::Border, "{template} {limit} N after {} points", branch.points.len());
+            assert_eq!(branch.end, BranchEnd::Border, "{template} {limit} N after {} points", branch.points.len());
             assert!(branch.turns.is_empty(), "a response with friction and damping is unique");
             let method = balance(harmonics);
             let performance = Performance {
@@ -75,7 +75,7 @@ fn figures_6_7_and_10_by_continuation() {
                 .unwrap();
                 assert_eq!(
                     branch.end,
-                    End::Border,
+                    BranchEnd::Border,
                     "{template} {all:?} H = {harmonics}: {} points",
                     branch.points.len()
                 );
@@ -122,7 +122,7 @@ fn along_a_force_around_a_turning_point() {
     .branch()
     .unwrap();
     assert!(!branch.turns.is_empty(), "{:?} {:?}", branch.end, branch.points.len());
-    assert_eq!(branch.end, End::Border);
+    assert_eq!(branch.end, BranchEnd::Border);
     for point in &branch.points {
         let a = point.orbit.places[0].amplitude();
         let stiffness = if a <= 1.0 / kt {
@@ -167,7 +167,7 @@ fn rigid_friction_around_two_turning_points() {
     }
     .branch()
     .unwrap();
-    assert_eq!((branch.end, branch.turns.len()), (End::Border, 2));
+    assert_eq!((branch.end, branch.turns.len()), (BranchEnd::Border, 2));
     // for one harmonic the first turn is at `F² = ((1 - ω²) a)² + (4/π - 0.03 ω a)²`, minimized
     // over a
     let first = |a: f64| (0.1 * a).hypot(4.0 / PI - 0.03 * omega * a);

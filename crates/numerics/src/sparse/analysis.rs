@@ -1,8 +1,8 @@
 //! Symbolic analysis of sparse matrices, and the factors made from it.
 
-use super::factor::{ComplexFactor, Factor, Singular};
-use super::matrix::Matrix;
-use super::pattern::Pattern;
+use super::factor::{ComplexFactor, LdlFactor, Singular};
+use super::matrix::SparseMatrix;
+use super::symbolic::Pattern;
 use num_complex::Complex64;
 use std::sync::Arc;
 
@@ -13,32 +13,32 @@ use std::sync::Arc;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::{Analysis, Matrix};
+/// use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 /// // three equal masses between walls, on four equal springs: ω² = 2 - √2, 2, 2 + √2
 /// let k = (0..3).flat_map(|i: usize| (0..3).map(move |l| (i, l, [2.0, -1.0, 0.0][i.abs_diff(l)])));
-/// let k = Matrix::from_triplets(3, k).unwrap();
-/// let m = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
-/// let analysis = Analysis::new(&[&k, &m]);
+/// let k = SparseMatrix::from_triplets(3, k).unwrap();
+/// let m = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
+/// let analysis = SymbolicAnalysis::new(&[&k, &m]);
 /// // the number of negative pivots is the number of eigenvalues below the shift
-/// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative(), 1);
-/// assert_eq!(analysis.factor(&[(1.0, &k), (-2.1, &m)]).unwrap().negative(), 2);
+/// assert_eq!(analysis.factor(&[(1.0, &k), (-1.9, &m)]).unwrap().negative_pivots(), 1);
+/// assert_eq!(analysis.factor(&[(1.0, &k), (-2.1, &m)]).unwrap().negative_pivots(), 2);
 /// let mut x = [1.0, 0.0, 0.0];
 /// analysis.factor(&[(1.0, &k)]).unwrap().solve(&mut x);
 /// assert!((x[0] - 0.75).abs() < 1e-15, "{x:?}");
 /// ```
 #[derive(Debug, Clone)]
-pub struct Analysis {
+pub struct SymbolicAnalysis {
     pub(super) pattern: Arc<Pattern>,
 }
 
-impl Analysis {
+impl SymbolicAnalysis {
     /// Analyses matrices of one size. A pattern need not be symmetric: the
     /// mirrored entries are added.
     ///
     /// # Panics
     /// If the matrices differ in size, or if the entries of the factor exceed the 32-bit indices.
-    pub fn new(matrices: &[&Matrix]) -> Self {
-        Analysis { pattern: Arc::new(Pattern::new(matrices)) }
+    pub fn new(matrices: &[&SparseMatrix]) -> Self {
+        SymbolicAnalysis { pattern: Arc::new(Pattern::new(matrices)) }
     }
 
     /// Analyses other matrices of the same size, with the elimination order of this analysis.
@@ -50,8 +50,8 @@ impl Analysis {
     /// If the matrices have another size, or if the entries of the factor
     /// exceed the 32-bit indices.
     #[must_use]
-    pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
-        Analysis { pattern: Arc::new(self.pattern.in_order(matrices)) }
+    pub fn with_same_order(&self, matrices: &[&SparseMatrix]) -> Self {
+        SymbolicAnalysis { pattern: Arc::new(self.pattern.with_order(matrices)) }
     }
 
     /// Returns the number of rows and columns.
@@ -60,7 +60,7 @@ impl Analysis {
     }
 
     /// Returns the number of entries of a real factor, eight bytes each.
-    pub fn fill(&self) -> usize {
+    pub fn factor_entries(&self) -> usize {
         if self.pattern.n == 0 { 0 } else { self.pattern.real().cholesky.len_val() }
     }
 
@@ -81,8 +81,8 @@ impl Analysis {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn factor(&self, sum: &[(f64, &Matrix)]) -> Result<Factor, Singular> {
-        Factor::new(&self.pattern, sum, vec![])
+    pub fn factor(&self, sum: &[(f64, &SparseMatrix)]) -> Result<LdlFactor, Singular> {
+        LdlFactor::new(&self.pattern, sum, vec![])
     }
 
     /// Factors a sum of matrices in complex numbers.
@@ -95,7 +95,7 @@ impl Analysis {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn factor_complex(&self, sum: &[(Complex64, &Matrix)]) -> Result<ComplexFactor, Singular> {
+    pub fn factor_complex(&self, sum: &[(Complex64, &SparseMatrix)]) -> Result<ComplexFactor, Singular> {
         ComplexFactor::new(&self.pattern, self.pattern.sum(sum))
     }
 }

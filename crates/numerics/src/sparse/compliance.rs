@@ -3,13 +3,13 @@
 //! With `A = L D Lᵀ` this is `Yᵀ D⁻¹ Y` with `L Y = F`. If a force acts on few rows, Y has
 //! entries only on the paths from these rows to the root of the elimination tree.
 
-use super::factor::Factor;
+use super::factor::LdlFactor;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
-impl Factor {
+impl LdlFactor {
     /// Returns `Fᵀ A⁻¹ F` for columns F with few entries each, given as (row, value).
     ///
     /// # Panics
@@ -17,29 +17,29 @@ impl Factor {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{Analysis, Matrix};
-    /// let springs = Matrix::from_triplets(2, [(0, 0, 3.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)]).unwrap();
-    /// let factor = Analysis::new(&[&springs]).factor(&[(1.0, &springs)]).unwrap();
+    /// use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
+    /// let springs = SparseMatrix::from_triplets(2, [(0, 0, 3.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)]).unwrap();
+    /// let factor = SymbolicAnalysis::new(&[&springs]).factor(&[(1.0, &springs)]).unwrap();
     /// let compliance = factor.compliance(&[vec![(1, 1.0)], vec![(0, 1.0), (1, -1.0)]]);
     /// assert!((compliance[(0, 0)] - 1.5).abs() < 1e-15 && (compliance[(0, 1)] + 1.0).abs() < 1e-15);
     /// ```
     pub fn compliance(&self, forces: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
         let k = forces.len();
         let mut compliance = DMatrix::zeros(k, k);
-        let Some(parts) = self.parts() else { return compliance };
+        let Some(supernodes) = self.supernodes() else { return compliance };
         // The rows of Y in elimination order, k numbers each.
         let mut y = vec![0.0; self.n() * k];
         let mut moved = vec![false; self.n()];
         for (column, force) in forces.iter().enumerate() {
             for &(row, value) in force {
-                let at = self.place(row);
+                let at = self.elimination_place(row);
                 y[at * k + column] += value;
                 moved[at] = true;
             }
         }
         let (mut below, mut weighted) = (Vec::new(), Vec::new());
-        for s in 0..parts.symbolic().n_supernodes() {
-            let part = parts.supernode(s);
+        for s in 0..supernodes.symbolic().n_supernodes() {
+            let part = supernodes.supernode(s);
             let (first, values) = (part.start(), part.val());
             let size = values.ncols();
             if !moved[first..first + size].contains(&true) {
@@ -59,7 +59,7 @@ impl Factor {
                 Par::Seq,
             );
             for (&row, below) in part.pattern().iter().zip(below.chunks_exact(k)) {
-                let at = self.exchanged(row as usize);
+                let at = self.pivoted_place(row as usize);
                 y[at * k..(at + 1) * k].iter_mut().zip(below).for_each(|(y, below)| *y -= below);
                 moved[at] = true;
             }
@@ -81,7 +81,7 @@ impl Factor {
 
 #[cfg(test)]
 mod tests {
-    use crate::sparse::{Analysis, Matrix};
+    use crate::sparse::{SparseMatrix, SymbolicAnalysis};
     use nalgebra::DMatrix;
 
     /// Matrices with pivots of one and of two rows, compared with full solutions.
@@ -91,8 +91,8 @@ mod tests {
         let noise = |i: usize| ((i * 7919 + 13) as f64).sin();
         let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
         let chain = (1..n).flat_map(|i| [(i, i - 1, noise(i)), (i - 1, i, noise(i)), (i, i, 0.01 * noise(i + n))]);
-        let matrix = Matrix::from_triplets(n, pairs.chain(chain)).unwrap();
-        let factor = Analysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, pairs.chain(chain)).unwrap();
+        let factor = SymbolicAnalysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
         let forces: Vec<Vec<(usize, f64)>> =
             (0..7).map(|k| (0..=k % 3).map(|i| ((11 * k + 5 * i) % n, noise(k + i))).collect()).collect();
         let mut x = DMatrix::zeros(n, forces.len());

@@ -1,7 +1,7 @@
 //! Real and complex factors of sparse matrices, and their solutions.
 
-use super::matrix::Matrix;
-use super::pattern::{Pattern, Symbolic};
+use super::matrix::SparseMatrix;
+use super::symbolic::{Pattern, Symbolic};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor::LbltParams;
 use faer::linalg::lu::partial_pivoting::factor::PartialPivLuParams;
@@ -22,7 +22,7 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 const ACCURATE: f64 = 1e-12;
 /// Addition to the diagonal of a singular matrix, relative to its largest
 /// entry, with which its null vector is computed.
-const NUDGE: f64 = 1e-9;
+const DIAGONAL_SHIFT: f64 = 1e-9;
 
 /// Error: the matrix is singular to rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -36,9 +36,9 @@ pub struct Singular {
 
 /// The factor `A = L D Lᵀ` of a real symmetric matrix.
 #[derive(Debug, Clone)]
-pub struct Factor {
+pub struct LdlFactor {
     pattern: Arc<Pattern>,
-    blocks: Blocks,
+    ldl: LdlValues,
     negative: usize,
 }
 
@@ -46,36 +46,40 @@ pub struct Factor {
 #[derive(Debug, Clone)]
 pub struct ComplexFactor {
     pattern: Arc<Pattern>,
-    kind: Kind,
+    kind: ComplexKind,
 }
 
 #[derive(Debug, Clone)]
-enum Kind {
-    Symmetric(Blocks),
+enum ComplexKind {
+    Symmetric(LdlValues),
     Exchanged(Box<NumericLu<u32, Complex64>>),
     Empty,
 }
 
 /// The numbers of `L D Lᵀ`. D has 1 × 1 and 2 × 2 pivots, with exchanges inside the supernodes.
 #[derive(Debug, Clone)]
-struct Blocks {
+struct LdlValues {
     values: Vec<f64>,
     /// Off-diagonal entries of D.
-    beside: Vec<f64>,
+    subdiagonal: Vec<f64>,
     order: Vec<u32>,
     inverse: Vec<u32>,
 }
 
-impl Factor {
-    pub(super) fn new(pattern: &Arc<Pattern>, sum: &[(f64, &Matrix)], memory: Vec<f64>) -> Result<Self, Singular> {
-        let empty = Blocks { values: vec![], beside: vec![], order: vec![], inverse: vec![] };
-        let mut factor = Factor { pattern: pattern.clone(), blocks: empty, negative: 0 };
+impl LdlFactor {
+    pub(super) fn new(
+        pattern: &Arc<Pattern>,
+        sum: &[(f64, &SparseMatrix)],
+        memory: Vec<f64>,
+    ) -> Result<Self, Singular> {
+        let empty = LdlValues { values: vec![], subdiagonal: vec![], order: vec![], inverse: vec![] };
+        let mut factor = LdlFactor { pattern: pattern.clone(), ldl: empty, negative: 0 };
         if pattern.n == 0 {
             return Ok(factor);
         }
         let symbolic = pattern.real();
         let lower = pattern.lower_sum(sum);
-        factor.blocks = Blocks::new(symbolic, &lower, memory);
+        factor.ldl = LdlValues::new(symbolic, &lower, memory);
         let mut largest = vec![0.0f64; pattern.n];
         for column in 0..pattern.n {
             for at in symbolic.starts[column] as usize..symbolic.starts[column + 1] as usize {
@@ -84,15 +88,15 @@ impl Factor {
                 largest[column] = largest[column].max(size);
             }
         }
-        let (mut negative, mut weak) = (0, None);
-        factor.blocks.pivots(symbolic, |row, pivot| {
+        let (mut negative, mut singular_row) = (0, None);
+        factor.ldl.pivots(symbolic, |row, pivot| {
             negative += usize::from(pivot < 0.0);
             // NaN is not a valid pivot.
-            if !(pivot.abs() > ROUNDING * largest[row] && pivot.is_finite()) && weak.is_none() {
-                weak = Some(row);
+            if !(pivot.abs() > ROUNDING * largest[row] && pivot.is_finite()) && singular_row.is_none() {
+                singular_row = Some(row);
             }
         });
-        if let Some(row) = weak {
+        if let Some(row) = singular_row {
             return Err(Singular { row });
         }
         factor.negative = negative;
@@ -100,7 +104,7 @@ impl Factor {
     }
 
     /// Factors another sum of the analysed matrices in the memory of this factor, like
-    /// [`Analysis::factor`](super::Analysis::factor).
+    /// [`SymbolicAnalysis::factor`](super::SymbolicAnalysis::factor).
     ///
     /// Allocation takes a fifth of the time of a large factor.
     ///
@@ -109,8 +113,8 @@ impl Factor {
     ///
     /// # Panics
     /// If an entry lies outside the analysed pattern.
-    pub fn again(self, sum: &[(f64, &Matrix)]) -> Result<Self, Singular> {
-        Factor::new(&self.pattern, sum, self.blocks.values)
+    pub fn refactor(self, sum: &[(f64, &SparseMatrix)]) -> Result<Self, Singular> {
+        LdlFactor::new(&self.pattern, sum, self.ldl.values)
     }
 
     /// Returns the number of rows and columns.
@@ -119,26 +123,26 @@ impl Factor {
     }
 
     /// Returns the supernodes, or `None` for a matrix without rows.
-    pub(super) fn parts(&self) -> Option<SupernodalIntranodeLbltRef<'_, u32, f64>> {
-        (self.pattern.n > 0).then(|| self.blocks.parts(self.pattern.real()))
+    pub(super) fn supernodes(&self) -> Option<SupernodalIntranodeLbltRef<'_, u32, f64>> {
+        (self.pattern.n > 0).then(|| self.ldl.supernodes(self.pattern.real()))
     }
 
     /// Returns the place of a row of the matrix in the elimination order.
-    pub(super) fn place(&self, row: usize) -> usize {
+    pub(super) fn elimination_place(&self, row: usize) -> usize {
         let at = self.pattern.real().cholesky.perm().map_or(row, |order| order.arrays().1[row] as usize);
-        self.exchanged(at)
+        self.pivoted_place(at)
     }
 
     /// Returns the place of a row of the supernodes after the exchanges inside them.
-    pub(super) fn exchanged(&self, row: usize) -> usize {
-        self.blocks.inverse[row] as usize
+    pub(super) fn pivoted_place(&self, row: usize) -> usize {
+        self.ldl.inverse[row] as usize
     }
 
     /// Divides rows of length `k` by the pivots of the supernode that begins with row `first`.
     pub(super) fn divide_by_pivots(&self, first: usize, block: MatRef<'_, f64>, rows: &mut [f64], k: usize) {
         let mut at = 0;
         while at < block.ncols() {
-            let (a, b) = (block[(at, at)], self.blocks.beside[first + at]);
+            let (a, b) = (block[(at, at)], self.ldl.subdiagonal[first + at]);
             if b == 0.0 {
                 rows[at * k..(at + 1) * k].iter_mut().for_each(|x| *x /= a);
                 at += 1;
@@ -162,7 +166,7 @@ impl Factor {
     /// For `K - ω² M` with M positive definite it is the number of natural frequencies below ω.
     ///
     /// Source: Sylvester's law of inertia.
-    pub fn negative(&self) -> usize {
+    pub fn negative_pivots(&self) -> usize {
         self.negative
     }
 
@@ -176,7 +180,7 @@ impl Factor {
             return;
         }
         assert!(right.len().is_multiple_of(n), "{} numbers do not form columns of length {n}", right.len());
-        self.blocks.solve(self.pattern.real(), right);
+        self.ldl.solve(self.pattern.real(), right);
     }
 }
 
@@ -184,28 +188,29 @@ impl ComplexFactor {
     /// Returns the memory of the factor, bytes; an estimate if rows were exchanged.
     pub fn bytes(&self) -> usize {
         match &self.kind {
-            Kind::Symmetric(blocks) => size_of::<f64>() * (blocks.values.len() + blocks.beside.len()),
-            Kind::Exchanged(_) => 2 * size_of::<Complex64>() * self.pattern.real().cholesky.len_val(),
-            Kind::Empty => 0,
+            ComplexKind::Symmetric(ldl) => size_of::<f64>() * (ldl.values.len() + ldl.subdiagonal.len()),
+            ComplexKind::Exchanged(_) => 2 * size_of::<Complex64>() * self.pattern.real().cholesky.len_val(),
+            ComplexKind::Empty => 0,
         }
     }
 
     pub(super) fn new(pattern: &Arc<Pattern>, values: Vec<Complex64>) -> Result<Self, Singular> {
         let make = |kind| ComplexFactor { pattern: pattern.clone(), kind };
         if pattern.n == 0 {
-            return Ok(make(Kind::Empty));
+            return Ok(make(ComplexKind::Empty));
         }
         if pattern.is_symmetric(&values) {
-            let factor = make(Kind::Symmetric(Blocks::new(pattern.complex(), &pattern.doubled(&values), vec![])));
+            let factor =
+                make(ComplexKind::Symmetric(LdlValues::new(pattern.complex(), &pattern.doubled(&values), vec![])));
             if factor.error(&values) <= ACCURATE {
                 return Ok(factor);
             }
         }
-        let factor = make(Kind::Exchanged(exchanged(pattern, &values)));
+        let factor = make(ComplexKind::Exchanged(factor_with_exchanges(pattern, &values)));
         if factor.error(&values) <= ACCURATE {
             return Ok(factor);
         }
-        Err(Singular { row: factor.free_row(values) })
+        Err(Singular { row: factor.unsupported_row(values) })
     }
 
     /// Solves in place for right sides of length n, stored consecutively.
@@ -219,15 +224,15 @@ impl ComplexFactor {
         }
         assert!(right.len().is_multiple_of(n), "{} numbers do not form columns of length {n}", right.len());
         match &self.kind {
-            Kind::Symmetric(blocks) => {
+            ComplexKind::Symmetric(ldl) => {
                 let mut parts: Vec<f64> = right.iter().flat_map(|z| [z.re, z.im]).collect();
-                blocks.solve(self.pattern.complex(), &mut parts);
+                ldl.solve(self.pattern.complex(), &mut parts);
                 // The real form gives the conjugate.
                 for (z, part) in right.iter_mut().zip(parts.chunks_exact(2)) {
                     *z = Complex64::new(part[0], -part[1]);
                 }
             }
-            Kind::Exchanged(numeric) => {
+            ComplexKind::Exchanged(numeric) => {
                 let symbolic = self.pattern.unsymmetric();
                 let columns = right.len() / n;
                 let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<Complex64>(columns, Par::Seq));
@@ -238,7 +243,7 @@ impl ComplexFactor {
                     MemStack::new(&mut memory),
                 );
             }
-            Kind::Empty => {}
+            ComplexKind::Empty => {}
         }
     }
 
@@ -267,23 +272,26 @@ impl ComplexFactor {
 
     /// Returns the row with the largest motion in the null vector of a singular matrix, by
     /// inverse iteration with a slightly shifted matrix.
-    fn free_row(&self, mut values: Vec<Complex64>) -> usize {
+    fn unsupported_row(&self, mut values: Vec<Complex64>) -> usize {
         let pattern = &self.pattern;
         let largest = values.iter().fold(0.0f64, |m, v| m.max(v.norm()));
         for column in 0..pattern.n {
             for at in pattern.column(column).filter(|at| pattern.rows[*at] as usize == column) {
-                values[at] += Complex64::new(1.0, 1.0) * (NUDGE * largest.max(f64::MIN_POSITIVE));
+                values[at] += Complex64::new(1.0, 1.0) * (DIAGONAL_SHIFT * largest.max(f64::MIN_POSITIVE));
             }
         }
-        let beside = ComplexFactor { pattern: pattern.clone(), kind: Kind::Exchanged(exchanged(pattern, &values)) };
+        let shifted = ComplexFactor {
+            pattern: pattern.clone(),
+            kind: ComplexKind::Exchanged(factor_with_exchanges(pattern, &values)),
+        };
         let mut x: Vec<Complex64> = (0..pattern.n).map(|i| Complex64::new(1.0 + (i as f64).cos(), 0.0)).collect();
-        beside.solve(&mut x);
+        shifted.solve(&mut x);
         (0..pattern.n).max_by(|&a, &b| x[a].norm().total_cmp(&x[b].norm())).unwrap_or(0)
     }
 }
 
 /// Factors with row exchanges.
-fn exchanged(pattern: &Pattern, values: &[Complex64]) -> Box<NumericLu<u32, Complex64>> {
+fn factor_with_exchanges(pattern: &Pattern, values: &[Complex64]) -> Box<NumericLu<u32, Complex64>> {
     let n = pattern.n;
     let symbolic = pattern.unsymmetric();
     let matrix =
@@ -300,7 +308,7 @@ fn exchanged(pattern: &Pattern, values: &[Complex64]) -> Box<NumericLu<u32, Comp
     numeric
 }
 
-impl Blocks {
+impl LdlValues {
     /// Factors the lower triangle, in the memory of an earlier factor if its size fits.
     fn new(symbolic: &Symbolic, lower: &[f64], mut memory: Vec<f64>) -> Self {
         let cholesky = &symbolic.cholesky;
@@ -311,12 +319,12 @@ impl Blocks {
             // Zeroed memory that the system need not touch yet.
             memory = vec![0.0; cholesky.len_val()];
         }
-        let mut blocks = Blocks { values: memory, beside: vec![0.0; n], order: vec![0; n], inverse: vec![0; n] };
+        let mut ldl = LdlValues { values: memory, subdiagonal: vec![0.0; n], order: vec![0; n], inverse: vec![0; n] };
         cholesky.factorize_numeric_intranode_lblt(
-            &mut blocks.values,
-            &mut blocks.beside,
-            &mut blocks.order,
-            &mut blocks.inverse,
+            &mut ldl.values,
+            &mut ldl.subdiagonal,
+            &mut ldl.order,
+            &mut ldl.inverse,
             SparseColMatRef::new(
                 SymbolicSparseColMatRef::new_checked(n, n, &symbolic.starts, None, &symbolic.rows),
                 lower,
@@ -326,7 +334,7 @@ impl Blocks {
             MemStack::new(&mut scratch),
             params,
         );
-        blocks
+        ldl
     }
 
     fn solve(&self, symbolic: &Symbolic, right: &mut [f64]) {
@@ -334,7 +342,7 @@ impl Blocks {
         let columns = right.len() / n;
         let exchanges = PermRef::new_checked(&self.order, &self.inverse, n);
         let mut memory = MemBuffer::new(symbolic.cholesky.solve_in_place_scratch::<f64>(columns, Par::Seq));
-        IntranodeLbltRef::new(&symbolic.cholesky, &self.values, &self.beside, exchanges).solve_in_place_with_conj(
+        IntranodeLbltRef::new(&symbolic.cholesky, &self.values, &self.subdiagonal, exchanges).solve_in_place_with_conj(
             Conj::No,
             MatMut::from_column_major_slice_mut(right, n, columns),
             Par::Seq,
@@ -342,27 +350,27 @@ impl Blocks {
         );
     }
 
-    fn parts<'a>(&'a self, symbolic: &'a Symbolic) -> SupernodalIntranodeLbltRef<'a, u32, f64> {
+    fn supernodes<'a>(&'a self, symbolic: &'a Symbolic) -> SupernodalIntranodeLbltRef<'a, u32, f64> {
         let SymbolicCholeskyRaw::Supernodal(supernodal) = symbolic.cholesky.raw() else {
             unreachable!("blocks of columns were asked for");
         };
         let exchanges = PermRef::new_checked(&self.order, &self.inverse, self.order.len());
-        SupernodalIntranodeLbltRef::new(supernodal, &self.values, &self.beside, exchanges)
+        SupernodalIntranodeLbltRef::new(supernodal, &self.values, &self.subdiagonal, exchanges)
     }
 
     /// Calls `each` with a row and the eigenvalue of D that belongs to it.
     fn pivots(&self, symbolic: &Symbolic, mut each: impl FnMut(usize, f64)) {
-        let parts = self.parts(symbolic);
+        let supernodes = self.supernodes(symbolic);
         let row = |at: usize| match symbolic.cholesky.perm() {
             Some(order) => order.arrays().0[self.order[at] as usize] as usize,
             None => self.order[at] as usize,
         };
-        for s in 0..parts.symbolic().n_supernodes() {
-            let part = parts.supernode(s);
+        for s in 0..supernodes.symbolic().n_supernodes() {
+            let part = supernodes.supernode(s);
             let (first, values) = (part.start(), part.val());
             let mut k = 0;
             while k < values.ncols() {
-                let (a, b) = (values[(k, k)], self.beside[first + k]);
+                let (a, b) = (values[(k, k)], self.subdiagonal[first + k]);
                 if b == 0.0 {
                     each(row(first + k), a);
                     k += 1;
@@ -417,25 +425,25 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Analysis, Matrix};
+    use super::super::{SparseMatrix, SymbolicAnalysis};
     use super::*;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
     /// Springs of stiffness one between neighbours and, if `held`, to walls at both ends.
-    fn chain(n: usize, held: bool) -> Matrix {
+    fn chain(n: usize, held: bool) -> SparseMatrix {
         let between = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
         let walls = [(0, 0, f64::from(u8::from(held))), (n - 1, n - 1, f64::from(u8::from(held)))];
-        Matrix::from_triplets(n, between.chain(walls)).unwrap()
+        SparseMatrix::from_triplets(n, between.chain(walls)).unwrap()
     }
 
-    fn identity(n: usize) -> Matrix {
-        Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap()
+    fn identity(n: usize) -> SparseMatrix {
+        SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap()
     }
 
     /// Springs between the neighbours of a cube of `side`³ nodes. One face is
     /// connected to the ground.
-    fn brick(side: usize) -> Matrix {
+    fn brick(side: usize) -> SparseMatrix {
         let at = |x: usize, y: usize, z: usize| (x * side + y) * side + z;
         let mut entries = Vec::new();
         for x in 0..side {
@@ -451,10 +459,10 @@ mod tests {
                 }
             }
         }
-        Matrix::from_triplets(side * side * side, entries).unwrap()
+        SparseMatrix::from_triplets(side * side * side, entries).unwrap()
     }
 
-    fn dense(matrix: &Matrix) -> DMatrix<f64> {
+    fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
         let mut full = DMatrix::zeros(matrix.n(), matrix.n());
         matrix.entries().for_each(|(i, k, value)| full[(i, k)] = value);
         full
@@ -466,12 +474,12 @@ mod tests {
     fn the_frequencies_of_a_chain_are_counted() {
         for n in [1, 2, 3, 40, 257] {
             let (k, m) = (chain(n, true), identity(n));
-            let analysis = Analysis::new(&[&k, &m]);
+            let analysis = SymbolicAnalysis::new(&[&k, &m]);
             let frequency = |i: f64| 4.0 * (std::f64::consts::FRAC_PI_2 * i / (n + 1) as f64).sin().powi(2);
             for below in 0..=n {
                 let shift = frequency(below as f64 + 0.5);
                 let factor = analysis.factor(&[(1.0, &k), (-shift, &m)]).unwrap();
-                assert_eq!(factor.negative(), below, "{n} masses, shift {shift}");
+                assert_eq!(factor.negative_pivots(), below, "{n} masses, shift {shift}");
             }
         }
     }
@@ -481,8 +489,8 @@ mod tests {
     fn the_deflection_of_a_chain() {
         let n = 1000;
         let k = chain(n, true);
-        let factor = Analysis::new(&[&k]).factor(&[(1.0, &k)]).unwrap();
-        assert_eq!(factor.negative(), 0);
+        let factor = SymbolicAnalysis::new(&[&k]).factor(&[(1.0, &k)]).unwrap();
+        assert_eq!(factor.negative_pivots(), 0);
         let mut x = vec![0.0; 2 * n];
         (x[0], x[n + 399]) = (1.0, 1.0);
         factor.solve(&mut x);
@@ -498,7 +506,7 @@ mod tests {
     /// A part without support is singular, and the reported row belongs to it.
     /// A soft spring next to stiff ones is a support.
     #[test]
-    fn what_is_free_is_named() {
+    fn unsupported_row_is_named() {
         let n = 50;
         for first in [0, 20] {
             // Masses from `first` on have no support; the others have a wall.
@@ -507,16 +515,16 @@ mod tests {
             if first > 0 {
                 entries.extend([(0, 0, 1.0), (first - 1, first - 1, -1.0), (first, first, -1.0)]);
             }
-            let k = Matrix::from_triplets(n, entries.clone()).unwrap();
-            let analysis = Analysis::new(&[&k]);
+            let k = SparseMatrix::from_triplets(n, entries.clone()).unwrap();
+            let analysis = SymbolicAnalysis::new(&[&k]);
             let real = analysis.factor(&[(1.0, &k)]).unwrap_err();
             assert!(real.row >= first, "{real}");
             entries.push((n - 1, n - 1, 1e-10));
-            let k = Matrix::from_triplets(n, entries).unwrap();
-            assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative(), 0);
+            let k = SparseMatrix::from_triplets(n, entries).unwrap();
+            assert_eq!(analysis.factor(&[(1.0, &k)]).unwrap().negative_pivots(), 0);
         }
-        let empty_row = Matrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
-        let analysis = Analysis::new(&[&empty_row]);
+        let empty_row = SparseMatrix::from_triplets(3, [(0, 0, 1.0), (2, 2, 4.0)]).unwrap();
+        let analysis = SymbolicAnalysis::new(&[&empty_row]);
         assert_eq!(analysis.factor(&[(1.0, &empty_row)]).unwrap_err(), Singular { row: 1 });
         let complex = analysis.factor_complex(&[(Complex64::new(0.0, 2.0), &empty_row)]);
         assert_eq!(complex.unwrap_err(), Singular { row: 1 });
@@ -532,8 +540,8 @@ mod tests {
             let m = identity(n);
             let spin = (0..if gyroscopic { n / 2 } else { 0 })
                 .flat_map(|i| [(2 * i, 2 * i + 1, 0.2), (2 * i + 1, 2 * i, -0.2)]);
-            let c = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.01)).chain(spin)).unwrap();
-            let analysis = Analysis::new(&[&k, &m, &c]);
+            let c = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 0.01)).chain(spin)).unwrap();
+            let analysis = SymbolicAnalysis::new(&[&k, &m, &c]);
             for omega in [0.0, 0.3, 1.1, 1.7] {
                 let sum = [(1.0, 0.0), (-omega * omega, 0.0), (0.0, omega)].map(|(re, im)| Complex64::new(re, im));
                 let factor = analysis.factor_complex(&[(sum[0], &k), (sum[1], &m), (sum[2], &c)]).unwrap();
@@ -541,7 +549,7 @@ mod tests {
                     (0..3 * n).map(|i| Complex64::new((i as f64).sin(), (2.0 * i as f64).cos())).collect();
                 let mut x = right.clone();
                 factor.solve(&mut x);
-                let complex = |a: &Matrix, factor: Complex64| dense(a).map(|v| factor * v);
+                let complex = |a: &SparseMatrix, factor: Complex64| dense(a).map(|v| factor * v);
                 let full = (complex(&k, sum[0]) + complex(&m, sum[1]) + complex(&c, sum[2])).lu();
                 for (x, right) in x.chunks(n).zip(right.chunks(n)) {
                     let expected = full.solve(&DVector::from_column_slice(right)).unwrap();
@@ -558,21 +566,21 @@ mod tests {
     fn zeros_on_the_diagonal() {
         let n = 60;
         let pairs = (0..n / 2).flat_map(|i| [(2 * i, 2 * i + 1, 2.0), (2 * i + 1, 2 * i, 2.0)]);
-        let matrix = Matrix::from_triplets(n, pairs).unwrap();
-        let factor = Analysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
-        assert_eq!(factor.negative(), n / 2);
+        let matrix = SparseMatrix::from_triplets(n, pairs).unwrap();
+        let factor = SymbolicAnalysis::new(&[&matrix]).factor(&[(1.0, &matrix)]).unwrap();
+        assert_eq!(factor.negative_pivots(), n / 2);
         let mut x: Vec<f64> = (0..n).map(|i| i as f64).collect();
         factor.solve(&mut x);
         assert!((0..n).all(|i| (x[i] - 0.5 * (i ^ 1) as f64).abs() < 1e-14));
     }
 
     #[test]
-    fn nothing_is_a_matrix_too() {
-        let none = Matrix::from_triplets(0, []).unwrap();
-        let analysis = Analysis::new(&[&none]);
+    fn empty_matrix_has_a_factor() {
+        let none = SparseMatrix::from_triplets(0, []).unwrap();
+        let analysis = SymbolicAnalysis::new(&[&none]);
         analysis.factor(&[(1.0, &none)]).unwrap().solve(&mut []);
         analysis.factor_complex(&[]).unwrap().solve(&mut []);
-        assert_eq!(analysis.fill(), 0);
+        assert_eq!(analysis.factor_entries(), 0);
     }
 
     /// Same input, same bits, on any thread. One elimination order serves every shift.
@@ -580,7 +588,7 @@ mod tests {
     fn same_bits_on_every_thread() {
         let solve = || {
             let (k, m) = (brick(7), identity(343));
-            let analysis = Analysis::new(&[&k, &m]);
+            let analysis = SymbolicAnalysis::new(&[&k, &m]);
             let mut x = vec![1.0; 343];
             analysis.factor(&[(1.0, &k), (-0.8, &m)]).unwrap().solve(&mut x);
             let mut z = vec![Complex64::new(1.0, 0.5); 343];
@@ -599,15 +607,15 @@ mod tests {
         fn random_matrices(entries in proptest::collection::vec((0usize..30, 0usize..30, -1.0f64..1.0), 20..200)) {
             let both = entries.iter().flat_map(|&(i, k, v)| [(i, k, v), (k, i, v)]);
             let loose = (0..30).map(|i| (i, i, 0.3 * ((i * 7919 + 13) as f64).sin()));
-            let matrix = Matrix::from_triplets(30, both.chain(loose)).unwrap();
+            let matrix = SparseMatrix::from_triplets(30, both.chain(loose)).unwrap();
             let full = dense(&matrix);
             let eigenvalues = full.clone().symmetric_eigenvalues();
             prop_assume!(eigenvalues.iter().all(|e| e.abs() > 1e-3));
-            let analysis = Analysis::new(&[&matrix]);
+            let analysis = SymbolicAnalysis::new(&[&matrix]);
             let right = DVector::from_fn(30, |i, _| (i as f64).cos());
             let expected = full.lu().solve(&right).unwrap();
             if let Ok(factor) = analysis.factor(&[(1.0, &matrix)]) {
-                prop_assert_eq!(factor.negative(), eigenvalues.iter().filter(|e| **e < 0.0).count());
+                prop_assert_eq!(factor.negative_pivots(), eigenvalues.iter().filter(|e| **e < 0.0).count());
             }
             let complex = analysis.factor_complex(&[(Complex64::new(0.0, 1.0), &matrix)]).unwrap();
             let mut z: Vec<Complex64> = right.iter().map(|r| Complex64::new(0.0, *r)).collect();

@@ -5,23 +5,23 @@ use std::ops::Range;
 
 /// Maximum number of rows and entries. Indices have 32 bits, which halves the
 /// memory of the pattern.
-const MOST: usize = i32::MAX as usize;
+const MAX_SIZE: usize = i32::MAX as usize;
 
 /// A square matrix of which only nonzero entries are stored, by columns with rising rows.
 ///
-/// A symmetric matrix stores both triangles; [`asymmetry`](Matrix::asymmetry) tests the symmetry.
+/// A symmetric matrix stores both triangles; [`asymmetry`](SparseMatrix::asymmetry) tests it.
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::Matrix;
+/// use stickslip_numerics::sparse::SparseMatrix;
 /// // a spring between two masses, as its contributions to either mass
-/// let k = Matrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
+/// let k = SparseMatrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
 /// assert_eq!((k.get(0, 0), k.get(0, 1), k.entries().count()), (6.0, -5.0, 4));
-/// assert_eq!(k.times(&[1.0, 1.0]), [1.0, 0.0]);
+/// assert_eq!(k.multiply(&[1.0, 1.0]), [1.0, 0.0]);
 /// assert!(k.asymmetry(0.0).is_none());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Matrix {
+pub struct SparseMatrix {
     n: usize,
     /// Start of each column in `rows` and `values`, n + 1 numbers.
     pub(super) starts: Vec<u32>,
@@ -54,7 +54,7 @@ pub enum MatrixError {
     },
     /// The numbers of rows or entries exceed the 32-bit indices.
     #[error(
-        "a matrix with {n} rows and {entries} entries is too large; at most {MOST} rows and {MOST} entries are supported"
+        "a matrix with {n} rows and {entries} entries is too large; at most {MAX_SIZE} rows and {MAX_SIZE} entries are supported"
     )]
     TooLarge {
         /// Number of rows.
@@ -77,7 +77,7 @@ pub struct Asymmetry {
     pub mirrored: f64,
 }
 
-impl Matrix {
+impl SparseMatrix {
     /// Builds a matrix from entries (row, column, value), counted from 0, in any order.
     ///
     /// Entries at the same place are added in the order in which they come. Zeros are dropped.
@@ -94,15 +94,15 @@ impl Matrix {
             if row >= n || column >= n {
                 return Err(MatrixError::OutOfRange { row, column, n });
             }
-            if n > MOST || entries.len() == MOST {
+            if n > MAX_SIZE || entries.len() == MAX_SIZE {
                 return Err(MatrixError::TooLarge { n, entries: entries.len() + 1 });
             }
             entries.push((column as u32, row as u32, value));
         }
         // Both sorts are stable, so contributions to one place keep their order.
         if !entries.is_sorted_by_key(|&(column, row, _)| (column, row)) {
-            entries = sorted_by(n, &entries, |entry| entry.1);
-            entries = sorted_by(n, &entries, |entry| entry.0);
+            entries = counting_sort(n, &entries, |entry| entry.1);
+            entries = counting_sort(n, &entries, |entry| entry.0);
         }
         entries.dedup_by(|next, kept| {
             let same = (next.0, next.1) == (kept.0, kept.1);
@@ -119,7 +119,7 @@ impl Matrix {
         entries.iter().for_each(|&(column, ..)| starts[column as usize + 1] += 1);
         (0..n).for_each(|column| starts[column + 1] += starts[column]);
         let rows = entries.iter().map(|entry| entry.1).collect();
-        Ok(Matrix { n, starts, rows, values: entries.iter().map(|entry| entry.2).collect() })
+        Ok(SparseMatrix { n, starts, rows, values: entries.iter().map(|entry| entry.2).collect() })
     }
 
     /// Returns the number of rows and columns.
@@ -163,7 +163,7 @@ impl Matrix {
     }
 
     /// Returns the largest magnitude of an entry.
-    pub fn largest(&self) -> f64 {
+    pub fn max_abs(&self) -> f64 {
         self.values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
     }
 
@@ -187,7 +187,7 @@ impl Matrix {
     ///
     /// # Panics
     /// If `x` does not have n entries.
-    pub fn times(&self, x: &[f64]) -> Vec<f64> {
+    pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
         assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
         let mut product = vec![0.0; self.n];
         for (row, column, value) in self.entries() {
@@ -200,7 +200,7 @@ impl Matrix {
     ///
     /// # Panics
     /// If `x` does not have n entries.
-    pub fn times_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
+    pub fn multiply_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
         assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
         let mut product = vec![Complex64::new(0.0, 0.0); self.n];
         for (row, column, value) in self.entries() {
@@ -217,7 +217,7 @@ type Entry = (u32, u32, f64);
 ///
 /// Two such sorts, by row and by column, take as long as reading the entries a
 /// few times, for any number of entries.
-fn sorted_by(n: usize, entries: &[Entry], key: impl Fn(&Entry) -> u32) -> Vec<Entry> {
+fn counting_sort(n: usize, entries: &[Entry], key: impl Fn(&Entry) -> u32) -> Vec<Entry> {
     let mut next = vec![0u32; n + 1];
     entries.iter().for_each(|entry| next[key(entry) as usize + 1] += 1);
     (0..n).for_each(|at| next[at + 1] += next[at]);
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn wrong_triplets_are_refused_with_their_place() {
-        let make = |entries: &[(usize, usize, f64)]| Matrix::from_triplets(2, entries.iter().copied());
+        let make = |entries: &[(usize, usize, f64)]| SparseMatrix::from_triplets(2, entries.iter().copied());
         assert_eq!(make(&[(2, 0, 1.0)]), Err(MatrixError::OutOfRange { row: 2, column: 0, n: 2 }));
         assert!(matches!(make(&[(0, 1, f64::NAN)]), Err(MatrixError::NotFinite { row: 0, column: 1, .. })));
         assert!(matches!(make(&[(0, 1, f64::MAX), (0, 1, f64::MAX)]), Err(MatrixError::NotFinite { .. })));
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(one_sided.asymmetry(2.0), None);
         // Above the diagonal only, below it only, and both.
         let sided = |entries: &[(usize, usize, f64)]| {
-            let matrix = Matrix::from_triplets(4, entries.iter().copied()).unwrap();
+            let matrix = SparseMatrix::from_triplets(4, entries.iter().copied()).unwrap();
             matrix.asymmetry(0.0).map(|pair| (pair.row, pair.column, pair.mirrored))
         };
         assert_eq!(sided(&[(0, 3, 1.0), (3, 0, 1.0), (1, 3, 2.0)]), Some((1, 3, 0.0)));
@@ -263,16 +263,16 @@ mod tests {
         let value = |i: usize, k: usize| ((i * 31 + k * 17 + 1) as f64).sin();
         let all: Vec<(usize, usize, f64)> =
             (0..n * n).filter(|at| at % 3 == 0).map(|at| (at / n, at % n, value(at / n, at % n))).collect();
-        let matrix = Matrix::from_triplets(n, all.iter().copied()).unwrap();
-        assert_eq!(matrix, Matrix::from_triplets(n, all.iter().rev().copied()).unwrap());
+        let matrix = SparseMatrix::from_triplets(n, all.iter().copied()).unwrap();
+        assert_eq!(matrix, SparseMatrix::from_triplets(n, all.iter().rev().copied()).unwrap());
         assert_eq!(matrix.len(), all.len());
         let x: Vec<f64> = (0..n).map(|i| 1.0 + i as f64).collect();
-        for (i, y) in matrix.times(&x).iter().enumerate() {
+        for (i, y) in matrix.multiply(&x).iter().enumerate() {
             let row: f64 = (0..n).filter(|k| (i * n + k) % 3 == 0).map(|k| value(i, k) * x[k]).sum();
             assert!((y - row).abs() < 1e-13, "{y} {row}");
         }
         let twisted: Vec<Complex64> = x.iter().map(|x| Complex64::new(*x, -2.0 * x)).collect();
-        for (z, y) in matrix.times_complex(&twisted).iter().zip(matrix.times(&x)) {
+        for (z, y) in matrix.multiply_complex(&twisted).iter().zip(matrix.multiply(&x)) {
             assert!((z - Complex64::new(y, -2.0 * y)).norm() < 1e-12);
         }
     }

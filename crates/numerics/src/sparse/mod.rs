@@ -1,8 +1,8 @@
 //! Sparse matrices and their factors, for structures in which each degree of
 //! freedom is coupled to a few others.
 //!
-//! [`Matrix`] contains the entries. [`Analysis`] computes the elimination order (nested
-//! dissection) and the fill-in once for all matrices of a pattern. [`Factor`] and
+//! [`SparseMatrix`] contains the entries. [`SymbolicAnalysis`] computes the elimination order
+//! (nested dissection) and the fill-in once for all matrices of a pattern. [`LdlFactor`] and
 //! [`ComplexFactor`] solve for many right sides. All computations run on the caller's thread,
 //! in an order that depends on the input alone: same input, same bits.
 //!
@@ -12,14 +12,14 @@
 //! symmetric indefinite systems", for pivoting inside supernodes only.
 
 mod analysis;
-pub mod columns;
 mod compliance;
 mod factor;
 mod matrix;
 mod modes;
-mod pattern;
+pub mod multi_vector;
+mod symbolic;
 
-pub use analysis::Analysis;
-pub use factor::{ComplexFactor, Factor, Singular};
-pub use matrix::{Asymmetry, Matrix, MatrixError};
-pub use modes::{Effort, ModesError, NaturalModes, Wanted};
+pub use analysis::SymbolicAnalysis;
+pub use factor::{ComplexFactor, LdlFactor, Singular};
+pub use matrix::{Asymmetry, MatrixError, SparseMatrix};
+pub use modes::{ModeSelection, ModesCost, ModesError, NaturalModes};

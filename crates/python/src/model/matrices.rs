@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use std::collections::HashMap;
 use stickslip::model::Place;
 use stickslip::structure::Component;
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 /// Entries of a matrix: row, column, value.
 pub(super) type Entries = Vec<(usize, usize, f64)>;
@@ -72,7 +72,7 @@ pub fn component(
 ) -> PyResult<Component> {
     let n = names.len();
     let matrix = |value: &Bound<'_, PyAny>, what: &str| {
-        let made = Matrix::from_triplets(n, entries(value, n, what)?.into_iter().filter(|entry| entry.2 != 0.0));
+        let made = SparseMatrix::from_triplets(n, entries(value, n, what)?.into_iter().filter(|entry| entry.2 != 0.0));
         made.map_err(|cause| error::model(py, format!("the {what} matrix: {cause}")))
     };
     let (mass, stiffness) = (matrix(mass, "mass")?, matrix(stiffness, "stiffness")?);

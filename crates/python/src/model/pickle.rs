@@ -7,7 +7,7 @@ use stickslip::model::{
     Around, Body, Force, Joint, Mass, Model, Motion, Place, Ring, Spring, Substructure, SubstructureDamping,
 };
 use stickslip::structure::{Component, Reduction};
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 /// Distribution of forces and of imposed motions around a disk.
 type Arounds = [Vec<Option<Around>>; 2];
@@ -139,7 +139,7 @@ pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), Str
 impl StoredStructure {
     fn of(structure: &Substructure, places: &[Place]) -> StoredStructure {
         let (mass, damping, stiffness) = structure.component.matrices();
-        let entries = |matrix: &Matrix| matrix.entries().collect();
+        let entries = |matrix: &SparseMatrix| matrix.entries().collect();
         StoredStructure {
             rows: structure.component.rows().to_vec(),
             mass: entries(mass),
@@ -162,7 +162,7 @@ impl StoredStructure {
 
     fn made(self) -> Result<(Substructure, Vec<Place>), String> {
         let n = self.rows.len();
-        let matrix = |entries: Entries| Matrix::from_triplets(n, entries).map_err(|cause| cause.to_string());
+        let matrix = |entries: Entries| SparseMatrix::from_triplets(n, entries).map_err(|cause| cause.to_string());
         let (mass, stiffness) = (matrix(self.mass)?, matrix(self.stiffness)?);
         let damping = self.damping.map(matrix).transpose()?;
         let component = Component::new(self.rows, mass, damping, stiffness).map_err(|cause| cause.to_string())?;

@@ -29,7 +29,7 @@ use crate::method::{MethodError, ways};
 use crate::model::System;
 use follow::ModeCurve;
 use num_complex::Complex64;
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::first_largest;
 
 /// A point of a nonlinear mode.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +63,8 @@ impl ModePoint {
     /// assert_eq!(point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(), [std::f64::consts::PI, 0.0]);
     /// ```
     pub fn phases(&self) -> Vec<f64> {
-        let leading = leading(self.places.iter().map(|x| x.norm())).map_or(Complex64::default(), |i| self.places[i]);
+        let leading =
+            first_largest(self.places.iter().map(|x| x.norm())).map_or(Complex64::default(), |i| self.places[i]);
         self.places.iter().map(|x| (x * leading.conj()).arg()).collect()
     }
 }

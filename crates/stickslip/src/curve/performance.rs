@@ -15,7 +15,7 @@ use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::golden_section;
 
 /// Specification of a performance curve.
 #[derive(Clone, Copy)]
@@ -194,7 +194,7 @@ impl<E: Send> Performance<'_, E> {
     fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
         let mut best = middle;
         let close = |a: f64, b: f64| b - a <= BRACKET * (a.abs() + b.abs());
-        maximum((low, high), close, |value| {
+        golden_section((low, high), close, |value| {
             let row = self.peak(value)?;
             if height(&row) < height(&best) {
                 best = row;

@@ -15,10 +15,10 @@ use crate::method::{MethodError, OrbitError};
 use crate::model::System;
 use crate::orbit::Orbit;
 use std::convert::Infallible;
-use stickslip_numerics::continuation::{self, Steps};
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::continuation::{self, ContinuationSettings};
+use stickslip_numerics::golden_section::golden_section;
 
-pub use stickslip_numerics::continuation::End;
+pub use stickslip_numerics::continuation::BranchEnd;
 
 /// Specification of a branch.
 #[derive(Clone, Copy)]
@@ -55,7 +55,7 @@ pub struct Branch {
     /// Indices of the points at turning points of the parameter.
     pub turns: Vec<usize>,
     /// Why the branch ends.
-    pub end: End,
+    pub end: BranchEnd,
 }
 
 impl Branch {
@@ -104,17 +104,22 @@ struct Way {
 
 impl Way {
     /// Follows the curve from a point, also outside of the range if it returns from there.
-    fn follow(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) -> End {
+    fn follow(
+        &mut self,
+        equations: &mut BranchEquations<'_>,
+        from: (Vec<f64>, f64),
+        steps: ContinuationSettings,
+    ) -> BranchEnd {
         let mut from = (from, steps);
         loop {
             let ((x, value), steps) = from;
-            let left = Steps { points: steps.points.saturating_sub(self.points.len()), ..steps };
+            let left = ContinuationSettings { points: steps.points.saturating_sub(self.points.len()), ..steps };
             let end = continuation::trace(equations, &x, value, left, &mut |equations, x, value| {
                 let Some(orbit) = equations.orbit(x, value) else { return false };
                 self.points.push((TracePoint { value, orbit }, (x.to_vec(), value)));
                 true
             });
-            let leaves = end == End::Border && !self.single;
+            let leaves = end == BranchEnd::Border && !self.single;
             let Some((_, last)) = self.points.last().filter(|_| leaves) else { return end };
             match Way::excursion(equations, last.clone(), steps) {
                 Some(back) if !self.has(&back.0) => from = back,
@@ -124,7 +129,7 @@ impl Way {
     }
 
     /// Leaves the range from a point at its border, and follows the curve if it returns.
-    fn outside(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) {
+    fn outside(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: ContinuationSettings) {
         if let Some((back, steps)) = Way::excursion(equations, from, steps) {
             self.follow(equations, back, steps);
         }
@@ -135,19 +140,19 @@ impl Way {
     fn excursion(
         equations: &mut BranchEquations<'_>,
         (x, border): (Vec<f64>, f64),
-        steps: Steps,
-    ) -> Option<((Vec<f64>, f64), Steps)> {
+        steps: ContinuationSettings,
+    ) -> Option<((Vec<f64>, f64), ContinuationSettings)> {
         let (low, high) = steps.range;
         let reach = 0.5 * (high - low);
         let (range, direction) = if border == low { ((low - reach, low), -1.0) } else { ((high, high + reach), 1.0) };
         let mut last = None;
-        let outside = Steps { range, direction, ..steps };
+        let outside = ContinuationSettings { range, direction, ..steps };
         let end = continuation::trace(equations, &x, border, outside, &mut |_, x, value| {
             last = Some((x.to_vec(), value));
             true
         });
-        let back = last.filter(|(_, value)| end == End::Border && *value == border)?;
-        Some((back, Steps { direction: -direction, ..steps }))
+        let back = last.filter(|(_, value)| end == BranchEnd::Border && *value == border)?;
+        Some((back, ContinuationSettings { direction: -direction, ..steps }))
     }
 
     /// Tells whether the curve contains a point at a border of the range.
@@ -185,23 +190,27 @@ impl Trace<'_> {
     pub fn branch(&self) -> Result<Branch, TraceError> {
         let mut equations = BranchEquations::new(self.at, self.method, self.range)?;
         let start = equations.start(self.range.0)?;
-        let steps = Steps::between(self.range.0, self.range.1, self.step);
+        let steps = ContinuationSettings::between(self.range.0, self.range.1, self.step);
         let single = (self.at)(self.range.0).0.contracts();
         let mut way = Way { single, ..Way::default() };
         let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
-        if !single && end == End::Border {
+        if !single && end == BranchEnd::Border {
             // In the opposite direction, the same curve may return into the range.
             let mut before = Way::default();
-            let out = Steps { direction: -steps.direction, ..steps };
+            let out = ContinuationSettings { direction: -steps.direction, ..steps };
             before.outside(&mut equations, (start, self.range.0), out);
             before.points.reverse();
             way.points.splice(..0, before.points);
         }
         let mut branch = self.told(&mut equations, way, end);
-        if end == End::Border && !branch.reaches(self.range.1) {
+        if end == BranchEnd::Border && !branch.reaches(self.range.1) {
             let mut way = Way { single, ..Way::default() };
             if let Ok(start) = equations.start(self.range.1) {
-                way.follow(&mut equations, (start, self.range.1), Steps { direction: -steps.direction, ..steps });
+                way.follow(
+                    &mut equations,
+                    (start, self.range.1),
+                    ContinuationSettings { direction: -steps.direction, ..steps },
+                );
             }
             way.points.reverse();
             branch.append(self.told(&mut equations, way, end));
@@ -210,7 +219,7 @@ impl Trace<'_> {
     }
 
     /// Computes peaks and turning points of the curve.
-    fn told(&self, equations: &mut BranchEquations<'_>, way: Way, end: End) -> Branch {
+    fn told(&self, equations: &mut BranchEquations<'_>, way: Way, end: BranchEnd) -> Branch {
         let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = way.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
         let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
@@ -241,7 +250,7 @@ impl Trace<'_> {
             orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit))
         };
         let close = |a: f64, b: f64| (b - a).abs() <= LOCATED * (a.abs() + b.abs());
-        let Ok(found) = maximum((a, b), close, |value| Ok::<_, Infallible>(height(value)));
+        let Ok(found) = golden_section((a, b), close, |value| Ok::<_, Infallible>(height(value)));
         if found.1 > best.1 { found } else { best }
     }
 }

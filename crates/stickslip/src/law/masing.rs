@@ -140,7 +140,7 @@ pub(super) fn stiffness(law: &dyn Masing, amplitude: f64) -> Complex64 {
     let top = law.backbone(amplitude).0;
     let mut sum = Complex64::ZERO;
     for panel in 0..PANELS {
-        for (node, weight) in quadrature::EIGHT {
+        for (node, weight) in quadrature::GAUSS_8 {
             let theta = PI * (f64::from(panel) + 0.5 * (1.0 + node)) / f64::from(PANELS);
             let force = top - 2.0 * law.backbone(0.5 * amplitude * (1.0 - theta.cos())).0;
             sum += Complex64::cis(-theta) * (force * weight);

@@ -69,7 +69,7 @@ impl Mean {
             return Mean { zeroth, slope, slope_second: slope / 3.0, ..Mean::default() };
         }
         let mut mean = Mean::default();
-        for (xi, weight) in const { quadrature::outwards(quadrature::SIX) } {
+        for (xi, weight) in const { quadrature::from_center(quadrature::GAUSS_6) } {
             let (value, slope) = g(y + e * xi);
             mean.zeroth += 0.5 * weight * value;
             mean.first += 0.5 * weight * xi * value;

@@ -507,7 +507,7 @@ pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f
     } else {
         // values out of range have no singular value decomposition; the step is then one
         // iteration of the map
-        eigen::singular(scaled()).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
+        eigen::svd(scaled()).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
     };
     let mut step = solution.unwrap_or_else(|| right.clone());
     for i in 0..n {

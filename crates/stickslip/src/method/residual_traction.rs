@@ -242,7 +242,7 @@ impl Rounds {
             let gaps = DMatrix::from_columns(&(0..back).map(|k| column(&self.gaps, &gap, k)).collect::<Vec<_>>());
             let moved = DMatrix::from_columns(&(0..back).map(|k| column(&self.places, &place, k)).collect::<Vec<_>>());
             let share =
-                eigen::singular(gaps.clone()).and_then(|svd| svd.solve(&gap, SAME * svd.singular_values.amax()).ok());
+                eigen::svd(gaps.clone()).and_then(|svd| svd.solve(&gap, SAME * svd.singular_values.amax()).ok());
             if let Some(share) = share {
                 next -= (moved + gaps) * share;
             }

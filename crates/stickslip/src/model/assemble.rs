@@ -14,7 +14,7 @@ use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 impl Model {
     /// Returns the names of all places: the ground, those of the nodes with their directions,
@@ -110,11 +110,11 @@ struct Assembler<'a> {
 
 /// Matrices over the free coordinates, followed by the moved coordinates.
 struct Matrices {
-    mass: Matrix,
-    damping: Matrix,
+    mass: SparseMatrix,
+    damping: SparseMatrix,
     /// Damped modes, in addition to `damping`.
     modes: Option<DampedModes>,
-    stiffness: Matrix,
+    stiffness: SparseMatrix,
 }
 
 impl Matrices {
@@ -181,7 +181,7 @@ impl Assembler<'_> {
             add_along(&mut stiffness, &along, spring.stiffness);
             add_along(&mut damping, &along, spring.damping);
         }
-        let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| whole(&error));
+        let sum = |entries| SparseMatrix::from_triplets(total, entries).map_err(|error| whole(&error));
         let modes = self.coordinates.modes.clone();
         Ok(Matrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
     }
@@ -189,12 +189,12 @@ impl Assembler<'_> {
     /// Returns the structure of the free coordinates.
     fn structure(&self, matrices: &Matrices) -> Result<Structure, ModelError> {
         let Coordinates { free: n, moved, names, .. } = &self.coordinates;
-        let block = |matrix: &Matrix| {
+        let block = |matrix: &SparseMatrix| {
             if *moved == 0 {
                 return Ok(matrix.clone());
             }
             let free = matrix.entries().filter(|(row, column, _)| row < n && column < n);
-            Matrix::from_triplets(*n, free).map_err(|error| whole(&error))
+            SparseMatrix::from_triplets(*n, free).map_err(|error| whole(&error))
         };
         let (mass, damping) = (block(&matrices.mass)?, block(&matrices.damping)?);
         let structure = Structure::sparse(names.clone(), mass, damping, block(&matrices.stiffness)?);

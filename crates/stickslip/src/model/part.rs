@@ -323,7 +323,7 @@ mod tests {
     use super::*;
     use crate::model::{Around, Disk, Force, GROUND, Mass, Place, Spring};
     use crate::structure::{Boundary, Component};
-    use stickslip_numerics::sparse::Matrix;
+    use stickslip_numerics::sparse::SparseMatrix;
 
     const DEVIATIONS: [f64; 5] = [0.03, -0.02, 0.0, 0.01, -0.04];
 
@@ -354,9 +354,9 @@ mod tests {
     fn by_matrices(deviation: f64, reduction: Reduction, damping: SubstructureDamping) -> Model {
         let springs = [(0, 1, 20.0), (0, 2, 5.0), (2, 3, 3.0)];
         let linked = springs.into_iter().flat_map(|(a, b, k)| [(a, a, k), (b, b, k), (a, b, -k), (b, a, -k)]);
-        let stiffness = Matrix::from_triplets(4, linked.chain([(0, 0, 30.0)])).unwrap();
+        let stiffness = SparseMatrix::from_triplets(4, linked.chain([(0, 0, 30.0)])).unwrap();
         // the mass on the boundary may be on either side
-        let mass = Matrix::from_triplets(4, [(0, 0, 1.5), (1, 1, 0.5), (2, 2, 0.3), (3, 3, 0.2)]).unwrap();
+        let mass = SparseMatrix::from_triplets(4, [(0, 0, 1.5), (1, 1, 0.5), (2, 2, 0.3), (3, 3, 0.2)]).unwrap();
         let names = ["1.x", "2.x", "3.x", "4.x"].map(str::to_owned).to_vec();
         let component = Component::new(names, mass, None, stiffness).unwrap();
         let boundary = Boundary::of_nodes(component.rows(), &[("1".into(), "2".into())], None).unwrap();

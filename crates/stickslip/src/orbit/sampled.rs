@@ -34,7 +34,7 @@ impl<'a> Sampled<'a> {
             let length = (pair[1] - pair[0]) / count;
             for i in 0..count as usize {
                 let at = |(node, weight)| (pair[0] + (i as f64 + 0.5 + 0.5 * node) * length, 0.5 * weight * length);
-                nodes.extend(quadrature::THREE.map(at));
+                nodes.extend(quadrature::GAUSS_3.map(at));
             }
         }
         let samples = nodes.iter().map(|(time, _)| path.sample(*time)).collect();

@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use stickslip_numerics::definite::sparse_definite_in_order;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
+use stickslip_numerics::definiteness::sparse_definite_with_order;
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, multi_vector};
 
 /// Matrices of a structure and the names of their rows.
 ///
@@ -25,14 +25,14 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 /// ```
 /// use std::f64::consts::TAU;
 /// use stickslip::structure::{Component, Reduction};
-/// use stickslip_numerics::sparse::Matrix;
+/// use stickslip_numerics::sparse::SparseMatrix;
 /// let n = 400;
 /// let stiffness = (0..n).flat_map(|i| {
 ///     let linked = if i > 0 { vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)] } else { vec![] };
 ///     linked.into_iter().chain([(i, i, 1e6)])
 /// });
-/// let stiffness = Matrix::from_triplets(n, stiffness)?;
-/// let mass = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
+/// let stiffness = SparseMatrix::from_triplets(n, stiffness)?;
+/// let mass = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
 /// let rod = Component::new((1..=n).map(|i| format!("{i}.x")).collect(), mass, None, stiffness)?;
 /// let end = vec![(rod.row("400.x").unwrap(), 1.0)];
 /// let seen = rod.reduced(&[end], &Reduction::up_to(TAU * 100.0))?;
@@ -118,7 +118,7 @@ pub struct BetweenComponent {
     /// The reduced component with its own stiffness.
     pub component: Component,
     /// The second stiffness in the same coordinates, N/m.
-    pub there: Matrix,
+    pub there: SparseMatrix,
     /// The observed displacements, over the coordinates.
     pub seen: Vec<Row>,
     /// Description of the reduction.
@@ -179,9 +179,9 @@ impl Component {
     /// matrix that is not positive semidefinite.
     pub fn new(
         rows: Vec<String>,
-        mass: Matrix,
-        damping: Option<Matrix>,
-        stiffness: Matrix,
+        mass: SparseMatrix,
+        damping: Option<SparseMatrix>,
+        stiffness: SparseMatrix,
     ) -> Result<Self, StructureError> {
         let places = rows.len();
         for (matrix, size) in [("mass", mass.n()), ("stiffness", stiffness.n())]
@@ -196,7 +196,7 @@ impl Component {
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry are already checked
         let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
-        let definite = sparse_definite_in_order(&whole.mass, &whole.analysis);
+        let definite = sparse_definite_with_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
@@ -223,7 +223,7 @@ impl Component {
     }
 
     /// Returns mass (kg), damping (kg/s), if any, and stiffness (N/m).
-    pub fn matrices(&self) -> (&Matrix, Option<&Matrix>, &Matrix) {
+    pub fn matrices(&self) -> (&SparseMatrix, Option<&SparseMatrix>, &SparseMatrix) {
         let Whole { mass, damping, stiffness, .. } = &self.0.whole;
         let own = match damping {
             Damping::Matrix(own) => Some(own),
@@ -244,7 +244,7 @@ impl Component {
     /// [`ReductionError::Modes`].
     pub fn frequencies(&self, count: usize) -> Result<Vec<f64>, ReductionError> {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
-        let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count))?;
+        let modes = NaturalModes::new(analysis, stiffness, mass, ModeSelection::Lowest(count))?;
         Ok(natural(&modes))
     }
 
@@ -261,9 +261,9 @@ impl Component {
     /// A shaft in two directions: `ω = g/2 ± sqrt(g²/4 + ω₀²)`.
     /// ```
     /// use stickslip::structure::Component;
-    /// use stickslip_numerics::sparse::Matrix;
-    /// let diagonal = |value: f64| Matrix::from_triplets(2, [(0, 0, value), (1, 1, value)]);
-    /// let turning = Matrix::from_triplets(2, [(0, 1, 6.0), (1, 0, -6.0)])?;
+    /// use stickslip_numerics::sparse::SparseMatrix;
+    /// let diagonal = |value: f64| SparseMatrix::from_triplets(2, [(0, 0, value), (1, 1, value)]);
+    /// let turning = SparseMatrix::from_triplets(2, [(0, 1, 6.0), (1, 0, -6.0)])?;
     /// let shaft = Component::new(vec![String::new(); 2], diagonal(1.0)?, Some(turning), diagonal(16.0)?)?;
     /// let found = shaft.free_vibration(2)?.unwrap();
     /// assert!((found[0] - 2.0).abs() < 1e-12 && (found[1] - 8.0).abs() < 1e-12);
@@ -274,8 +274,9 @@ impl Component {
         let Some(damping) = self.matrices().1.filter(|damping| damping.asymmetry(0.0).is_some()) else {
             return Ok(None);
         };
-        let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count.saturating_mul(4)))?;
-        let products = columns::products(self.dofs(), &modes.shapes, &damping.times_columns(&modes.shapes));
+        let modes = NaturalModes::new(analysis, stiffness, mass, ModeSelection::Lowest(count.saturating_mul(4)))?;
+        let products =
+            multi_vector::inner_products(self.dofs(), &modes.shapes, &damping.multiply_columns(&modes.shapes));
         let found = free_vibrations(&modes.values, &products);
         Ok(found.map(|found| found.iter().take(count).map(|one| one.omega).collect()))
     }
@@ -289,8 +290,8 @@ impl Component {
     /// # Example
     /// ```
     /// use stickslip::structure::Component;
-    /// use stickslip_numerics::sparse::Matrix;
-    /// let diagonal = |values: [f64; 3]| Matrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)));
+    /// use stickslip_numerics::sparse::SparseMatrix;
+    /// let diagonal = |values: [f64; 3]| SparseMatrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)));
     /// let three = Component::new(vec![String::new(); 3], diagonal([1.0; 3])?, None, diagonal([1.0, 4.0, 9.0])?)?;
     /// assert_eq!(three.modes_below(2.5), Some(2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -298,7 +299,7 @@ impl Component {
     pub fn modes_below(&self, omega: f64) -> Option<usize> {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
         once(&self.0.counts, &omega, || {
-            analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative())
+            analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative_pivots())
         })
     }
 
@@ -328,9 +329,9 @@ impl Component {
     /// A mass on a rod of springs, which tension stiffens.
     /// ```
     /// use stickslip::structure::{Component, Reduction, ReductionKind};
-    /// use stickslip_numerics::sparse::Matrix;
-    /// let rod = |k: f64| Matrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
-    /// let mass = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
+    /// use stickslip_numerics::sparse::SparseMatrix;
+    /// let rod = |k: f64| SparseMatrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
+    /// let mass = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
     /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 };
     /// let few = rest.reduced_between(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
@@ -339,7 +340,7 @@ impl Component {
     /// ```
     pub fn reduced_between(
         &self,
-        there: &Matrix,
+        there: &SparseMatrix,
         seen: &[Row],
         how: &Reduction,
     ) -> Result<BetweenComponent, ReductionError> {
@@ -385,9 +386,11 @@ impl Component {
         let r = reduced.dofs();
         let columns = kept.sector.whole_columns(&reduced.basis);
         let (mass, damping, stiffness) = self.matrices();
-        let project = |matrix: &Matrix| columns::products(self.dofs(), &columns, &matrix.times_columns(&columns));
+        let project = |matrix: &SparseMatrix| {
+            multi_vector::inner_products(self.dofs(), &columns, &matrix.multiply_columns(&columns))
+        };
         // symmetric up to rounding
-        let symmetric = |matrix: &Matrix| {
+        let symmetric = |matrix: &SparseMatrix| {
             let product = project(matrix);
             sparse(&((&product + product.transpose()) * 0.5))
         };
@@ -431,10 +434,10 @@ impl Component {
 }
 
 /// Converts a small dense matrix to a sparse one.
-fn sparse(dense: &DMatrix<f64>) -> Result<Matrix, ReductionError> {
+fn sparse(dense: &DMatrix<f64>) -> Result<SparseMatrix, ReductionError> {
     let all = (0..dense.ncols()).flat_map(|k| (0..dense.nrows()).map(move |i| (i, k)));
     let entries = all.map(|at| (at.0, at.1, dense[at])).filter(|entry| entry.2 != 0.0);
-    Matrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
+    SparseMatrix::from_triplets(dense.nrows(), entries).map_err(|_| ReductionError::OutOfRange)
 }
 
 /// Returns a stored result, or computes it once. Concurrent identical requests wait for the
@@ -581,7 +584,7 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 
 fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
     let Fewer { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
-    let (frequencies, free) = (natural(&modes), modes.free());
+    let (frequencies, free) = (natural(&modes), modes.rigid_body_count());
     let form = Form::Alone(Arc::new(reduced.in_metres()));
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
@@ -612,7 +615,7 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
                 ReductionKind::Rubin => Free::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
-                ReductionKind::CraigBampton => whole.held(Wanted::Lowest(count))?,
+                ReductionKind::CraigBampton => whole.held(ModeSelection::Lowest(count))?,
             };
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
             Fewer { reduced, deviation, modes, up_to, serves }

@@ -13,7 +13,7 @@ use super::reduction::{Damping, ReductionError, Row, Whole};
 use super::sector::in_wave;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
-use stickslip_numerics::sparse::{Analysis, Matrix};
+use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 
 /// The coupling between the two sides of a sector.
 ///
@@ -21,10 +21,10 @@ use stickslip_numerics::sparse::{Analysis, Matrix};
 /// A sector of two rows: row 1 is row 0 of the next sector.
 /// ```
 /// use stickslip::structure::{Boundary, Component};
-/// use stickslip_numerics::sparse::Matrix;
+/// use stickslip_numerics::sparse::SparseMatrix;
 /// let spring = [(0, 0, 2.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)];
-/// let stiffness = Matrix::from_triplets(2, spring).unwrap();
-/// let mass = Matrix::from_triplets(2, [(0, 0, 0.5), (1, 1, 0.5)]).unwrap();
+/// let stiffness = SparseMatrix::from_triplets(2, spring).unwrap();
+/// let mass = SparseMatrix::from_triplets(2, [(0, 0, 0.5), (1, 1, 0.5)]).unwrap();
 /// let rows = vec!["1.x".to_owned(), "2.x".to_owned()];
 /// let sector = Component::new(rows, mass, None, stiffness).unwrap();
 /// let boundary = Boundary::of_nodes(sector.rows(), &[("1".into(), "2".into())], None).unwrap();
@@ -272,7 +272,7 @@ pub(crate) struct CyclicSector {
 impl CyclicSector {
     /// Creates a sector from its mass, damping and stiffness.
     pub fn new(
-        (mass, damping, stiffness): (&Matrix, Option<&Matrix>, &Matrix),
+        (mass, damping, stiffness): (&SparseMatrix, Option<&SparseMatrix>, &SparseMatrix),
         boundary: &Boundary,
         sectors: usize,
     ) -> Self {
@@ -287,16 +287,16 @@ impl CyclicSector {
                 None => vec![(new[row], 0, 1.0)],
             })
             .collect();
-        let part = |matrix: &Matrix| eliminated(matrix, &rows);
-        let symmetric = |matrix: &Matrix| symmetrised(part(matrix), |shift| -shift);
+        let part = |matrix: &SparseMatrix| eliminated(matrix, &rows);
+        let symmetric = |matrix: &SparseMatrix| symmetrised(part(matrix), |shift| -shift);
         let (mass, damping, stiffness) = (symmetric(mass), damping.map(part), symmetric(stiffness));
         CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness }
     }
 
     /// Returns the matrix of a sector with the adjacent sectors fixed.
-    pub fn alone(&self, entries: &[RingEntry]) -> Result<Matrix, ReductionError> {
+    pub fn alone(&self, entries: &[RingEntry]) -> Result<SparseMatrix, ReductionError> {
         let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
-        Matrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
+        SparseMatrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
     }
 
     /// Converts a weighted sum of the component's rows to the remaining rows.
@@ -331,7 +331,7 @@ impl CyclicSector {
         let copies = if super::sector::is_real(diameter, sectors) { 1 } else { 2 };
         let matrix = |entries: &[RingEntry]| {
             let triplets = in_wave(entries.iter().copied(), [n, n], diameter, sectors);
-            Matrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange)
+            SparseMatrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange)
         };
         let damping = match &self.damping {
             Some(damping) => Damping::Matrix(matrix(damping)?),
@@ -354,7 +354,7 @@ impl CyclicSector {
     ///
     /// It is the strain energy of the blade in excess of a static motion that follows its
     /// foundation, over the remaining rows.
-    pub fn blade(&self, names: &[String], stiffness: &Matrix, blade: &[usize]) -> Result<Blade, BladeError> {
+    pub fn blade(&self, names: &[String], stiffness: &SparseMatrix, blade: &[usize]) -> Result<Blade, BladeError> {
         if blade.is_empty() {
             return Err(BladeError::Empty);
         }
@@ -383,10 +383,10 @@ impl CyclicSector {
             }
         }
         let n = rows.len();
-        let own = Matrix::from_triplets(n, own).map_err(|_| BladeError::NotHeld)?;
-        let analysis = Analysis::new(&[&own]);
+        let own = SparseMatrix::from_triplets(n, own).map_err(|_| BladeError::NotHeld)?;
+        let analysis = SymbolicAnalysis::new(&[&own]);
         let factor = analysis.factor(&[(1.0, &own)]).map_err(|_| BladeError::NotHeld)?;
-        if factor.negative() > 0 || towards.is_empty() {
+        if factor.negative_pivots() > 0 || towards.is_empty() {
             return Err(BladeError::NotHeld);
         }
         Ok(Blade { at: inside.into_values().collect(), own, towards, factor })
@@ -417,10 +417,10 @@ pub enum BladeError {
 pub(crate) struct Blade {
     /// Its rows among the remaining rows.
     at: Vec<usize>,
-    own: Matrix,
+    own: SparseMatrix,
     /// Row of the blade, remaining row outside the blade, stiffness.
     towards: Vec<(usize, usize, f64)>,
-    factor: stickslip_numerics::sparse::Factor,
+    factor: stickslip_numerics::sparse::LdlFactor,
 }
 
 impl Blade {
@@ -453,7 +453,7 @@ impl Blade {
     /// forces on these rows.
     pub fn times(&self, displacements: &[f64]) -> Vec<f64> {
         let moved: Vec<f64> = self.at.iter().map(|at| displacements[*at]).collect();
-        let mut forces = self.own.times(&moved);
+        let mut forces = self.own.multiply(&moved);
         self.towards.iter().for_each(|(row, at, value)| forces[*row] += value * displacements[*at]);
         let mut all = vec![0.0; displacements.len()];
         self.at.iter().zip(&forces).for_each(|(at, force)| all[*at] = *force);
@@ -466,14 +466,14 @@ impl Blade {
     /// Returns `Vᵀ D V` over columns of length `n`, with the matrix `D` of [`Blade::entries`].
     pub fn along(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
         let forces: Vec<f64> = basis.chunks_exact(n).flat_map(|column| self.times(column)).collect();
-        let energy = stickslip_numerics::sparse::columns::products(n, basis, &forces);
+        let energy = stickslip_numerics::sparse::multi_vector::inner_products(n, basis, &forces);
         let all = (0..energy.ncols()).flat_map(|k| (0..energy.nrows()).map(move |i| (i, k)));
         all.map(|(i, k)| (i, k, 0.5 * (energy[(i, k)] + energy[(k, i)]))).collect()
     }
 }
 
 /// Returns `TᵀAT` in the rows of one sector, sorted, without duplicate entries.
-fn eliminated(matrix: &Matrix, rows: &[RingRow]) -> Vec<RingEntry> {
+fn eliminated(matrix: &SparseMatrix, rows: &[RingRow]) -> Vec<RingEntry> {
     let mut all: Vec<RingEntry> = Vec::with_capacity(matrix.len());
     for (i, k, value) in matrix.entries() {
         for &(row, own, a) in &rows[i] {

@@ -4,7 +4,7 @@ use super::modal::WithModes;
 use super::{Form, Structure};
 use num_complex::Complex64;
 use stickslip_numerics::dense::ComplexLu;
-use stickslip_numerics::sparse::{Analysis, ComplexFactor, Singular};
+use stickslip_numerics::sparse::{ComplexFactor, Singular, SymbolicAnalysis};
 
 /// The factored dynamic stiffness of a structure at one complex frequency. It solves for any
 /// number of loads.
@@ -42,7 +42,7 @@ impl Structure {
                 Factor::Full(ComplexLu::new(sum, n).map_err(|row| Singular { row })?)
             }
             Form::Sparse { mass, damping, stiffness, modes, analysis, .. } => {
-                let analysis = analysis.get_or_init(|| Analysis::new(&[mass, damping, stiffness]));
+                let analysis = analysis.get_or_init(|| SymbolicAnalysis::new(&[mass, damping, stiffness]));
                 let one = Complex64::new(1.0, 0.0);
                 let factor = analysis.factor_complex(&[(of_mass, mass), (s, damping), (one, stiffness)])?;
                 match modes {
@@ -60,7 +60,7 @@ impl Structure {
         match &self.0.form {
             Form::Full(_) => 0,
             Form::Sparse { mass, damping, stiffness, analysis, .. } => {
-                let analysis = analysis.get_or_init(|| Analysis::new(&[mass, damping, stiffness]));
+                let analysis = analysis.get_or_init(|| SymbolicAnalysis::new(&[mass, damping, stiffness]));
                 analysis.complex_bytes()
             }
         }

@@ -27,8 +27,8 @@ pub(crate) use uncoupled::UncoupledModes;
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
-use stickslip_numerics::definite::{is_semidefinite, semidefinite, sparse_definite};
-use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
+use stickslip_numerics::definiteness::{is_semidefinite, semidefinite_rank, sparse_definite};
+use stickslip_numerics::sparse::{Asymmetry, MatrixError, SparseMatrix, SymbolicAnalysis};
 
 /// `M x'' + C x' + K x`, over the places that are free to move.
 ///
@@ -53,12 +53,12 @@ struct Kept {
 enum Form {
     Full(Arc<Matrices>),
     Sparse {
-        mass: Matrix,
-        damping: Matrix,
-        stiffness: Matrix,
+        mass: SparseMatrix,
+        damping: SparseMatrix,
+        stiffness: SparseMatrix,
         /// Modal damping in addition to the damping matrix.
         modes: Option<DampedModes>,
-        analysis: OnceLock<Analysis>,
+        analysis: OnceLock<SymbolicAnalysis>,
         /// Full copy, created when a method first requests it.
         full: OnceLock<Arc<Matrices>>,
     },
@@ -176,7 +176,7 @@ impl Structure {
         }
         let entries = |matrix: &DMatrix<f64>| {
             let all = (0..n).flat_map(|column| (0..n).map(move |row| (row, column)));
-            Matrix::from_triplets(n, all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0))
+            SparseMatrix::from_triplets(n, all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0))
         };
         let [mass, damping, stiffness] =
             [("mass", &full.mass), ("damping", &full.damping), ("stiffness", &full.stiffness)]
@@ -194,12 +194,12 @@ impl Structure {
     /// ```
     /// use num_complex::Complex64;
     /// use stickslip::structure::Structure;
-    /// use stickslip_numerics::sparse::Matrix;
+    /// use stickslip_numerics::sparse::SparseMatrix;
     /// let n = 50_000;
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
-    /// let diagonal = |value: f64| Matrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
+    /// let diagonal = |value: f64| SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
     /// let springs = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
-    /// let stiffness = Matrix::from_triplets(n, springs.chain([(0, 0, 1.0)])).unwrap();
+    /// let stiffness = SparseMatrix::from_triplets(n, springs.chain([(0, 0, 1.0)])).unwrap();
     /// let chain = Structure::sparse(places, diagonal(1.0), diagonal(0.1), stiffness).unwrap();
     /// // pulled at its end, each of the springs carries the force
     /// let mut x = vec![Complex64::ZERO; n];
@@ -209,9 +209,9 @@ impl Structure {
     /// ```
     pub fn sparse(
         places: Vec<String>,
-        mass: Matrix,
-        damping: Matrix,
-        stiffness: Matrix,
+        mass: SparseMatrix,
+        damping: SparseMatrix,
+        stiffness: SparseMatrix,
     ) -> Result<Self, StructureError> {
         let n = places.len();
         for (name, matrix) in [("mass", &mass), ("damping", &damping), ("stiffness", &stiffness)] {
@@ -221,7 +221,7 @@ impl Structure {
             }
         }
         let (analysis, full) = (OnceLock::new(), OnceLock::new());
-        let form = if is_full(n, [&mass, &damping, &stiffness].map(Matrix::len)) {
+        let form = if is_full(n, [&mass, &damping, &stiffness].map(SparseMatrix::len)) {
             Form::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
         } else {
             let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
@@ -243,14 +243,14 @@ impl Structure {
                 Form::Full(Arc::new(full))
             }
             Form::Sparse { mass, damping, stiffness, modes, .. } => {
-                let stiffness = Matrix::from_triplets(self.dofs(), stiffness.entries().chain(added)).ok()?;
+                let stiffness = SparseMatrix::from_triplets(self.dofs(), stiffness.entries().chain(added)).ok()?;
                 let (mass, damping, modes) = (mass.clone(), damping.clone(), modes.clone());
                 Form::Sparse { mass, damping, stiffness, modes, analysis: OnceLock::new(), full: OnceLock::new() }
             }
         };
         let largest = match &form {
             Form::Full(full) => full.stiffness.amax(),
-            Form::Sparse { stiffness, .. } => stiffness.largest(),
+            Form::Sparse { stiffness, .. } => stiffness.max_abs(),
         };
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
@@ -302,7 +302,7 @@ impl Structure {
                 if (negative || !is_diagonal) && sparse_definite(mass).is_none() {
                     return Err(StructureError::NegativeMass);
                 }
-                [mass, damping, stiffness].map(Matrix::largest)
+                [mass, damping, stiffness].map(SparseMatrix::max_abs)
             }
         };
         Ok(Structure::kept(places, form, largest))
@@ -370,7 +370,7 @@ impl Structure {
     /// motion has kinetic energy.
     pub fn has_definite_mass(&self) -> bool {
         match &self.0.form {
-            Form::Full(full) => semidefinite(&full.mass) == Some(self.dofs()),
+            Form::Full(full) => semidefinite_rank(&full.mass) == Some(self.dofs()),
             Form::Sparse { mass, .. } => sparse_definite(mass) == Some(true),
         }
     }
@@ -432,16 +432,16 @@ impl Structure {
                 let n = self.dofs();
                 // the gyroscopic part of the damping does no work
                 let halves = damping.entries().flat_map(|(i, k, c)| [(i, k, 0.5 * c), (k, i, 0.5 * c)]);
-                let Ok(damping) = Matrix::from_triplets(n, halves) else { return false };
+                let Ok(damping) = SparseMatrix::from_triplets(n, halves) else { return false };
                 // modal damping dissipates energy, and only in motions with mass
                 let matrices = [mass, &damping, stiffness];
                 let [Some(definite), Some(_), Some(_)] = matrices.map(sparse_definite) else { return false };
                 definite || {
-                    let share = |matrix: &Matrix| 1.0 / matrix.largest().max(f64::MIN_POSITIVE);
+                    let share = |matrix: &SparseMatrix| 1.0 / matrix.max_abs().max(f64::MIN_POSITIVE);
                     let all = matrices
                         .into_iter()
                         .flat_map(|matrix| matrix.entries().map(move |(i, k, v)| (i, k, v * share(matrix))));
-                    Matrix::from_triplets(n, all).is_ok_and(|sum| sparse_definite(&sum) == Some(true))
+                    SparseMatrix::from_triplets(n, all).is_ok_and(|sum| sparse_definite(&sum) == Some(true))
                 }
             }
         })
@@ -512,12 +512,12 @@ impl Matrices {
         if ![&damping, &self.stiffness].into_iter().all(is_semidefinite) {
             return false;
         }
-        let Some(rank) = semidefinite(&self.mass) else { return false };
+        let Some(rank) = semidefinite_rank(&self.mass) else { return false };
         let n = self.mass.nrows();
         rank == n || {
             // scaled by the largest entries, because the units differ
             let share = |matrix: &DMatrix<f64>| matrix / matrix.amax().max(f64::MIN_POSITIVE);
-            semidefinite(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
+            semidefinite_rank(&(share(&self.mass) + share(&damping) + share(&self.stiffness))) == Some(n)
         }
     }
 }
@@ -528,8 +528,8 @@ fn is_full(n: usize, entries: [usize; 3]) -> bool {
     n < SPARSE || most as f64 > FULL * (n as f64) * (n as f64)
 }
 
-fn written_out(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices {
-    let full = |matrix: &Matrix| {
+fn written_out(mass: &SparseMatrix, damping: &SparseMatrix, stiffness: &SparseMatrix) -> Matrices {
+    let full = |matrix: &SparseMatrix| {
         let mut full = DMatrix::zeros(matrix.n(), matrix.n());
         matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
         full
@@ -538,16 +538,16 @@ fn written_out(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices 
 }
 
 /// Returns the mean of both triangles, if they differ only by rounding.
-fn symmetric(name: &'static str, matrix: Matrix) -> Result<Matrix, StructureError> {
+fn symmetric(name: &'static str, matrix: SparseMatrix) -> Result<SparseMatrix, StructureError> {
     if matrix.asymmetry(0.0).is_none() {
         return Ok(matrix);
     }
-    if let Some(Asymmetry { row, column, value, mirrored }) = matrix.asymmetry(SYMMETRIC * matrix.largest()) {
+    if let Some(Asymmetry { row, column, value, mirrored }) = matrix.asymmetry(SYMMETRIC * matrix.max_abs()) {
         return Err(StructureError::NotSymmetric { matrix: name, row: row + 1, column: column + 1, value, mirrored });
     }
     let halves = matrix.entries().flat_map(|(i, k, value)| [(i, k, 0.5 * value), (k, i, 0.5 * value)]);
     // the sums of finite, nearly equal halves are finite, and the sparsity pattern is unchanged
-    Ok(Matrix::from_triplets(matrix.n(), halves).unwrap_or(matrix))
+    Ok(SparseMatrix::from_triplets(matrix.n(), halves).unwrap_or(matrix))
 }
 
 #[cfg(test)]
@@ -664,7 +664,7 @@ mod tests {
                 let below = (i > 0).then(|| [(i, i - 1, beside), (i - 1, i, beside)]);
                 below.into_iter().flatten().chain([(i, i, own)])
             });
-            Matrix::from_triplets(n, all).unwrap()
+            SparseMatrix::from_triplets(n, all).unwrap()
         };
         let structure = Structure::sparse(numbered(n), triple(1.0, 0.2), triple(0.02, 0.0), triple(2.0, -1.0)).unwrap();
         assert!(structure.dissipates());

@@ -12,7 +12,7 @@
 use super::{Structure, StructureError};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::sparse::{Matrix, Singular};
+use stickslip_numerics::sparse::{Singular, SparseMatrix};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -147,11 +147,11 @@ impl Sector {
     /// ```
     /// use num_complex::Complex64;
     /// use stickslip::structure::{Sector, Structure};
-    /// use stickslip_numerics::sparse::Matrix;
+    /// use stickslip_numerics::sparse::SparseMatrix;
     /// let (n, d) = (12, 5);
     /// let entries = |own: f64, beside: f64| {
     ///     let all = (0..n).flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
-    ///     Matrix::from_triplets(n, all).unwrap()
+    ///     SparseMatrix::from_triplets(n, all).unwrap()
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
     /// let ring = Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5)).unwrap();
@@ -172,7 +172,7 @@ impl Sector {
         };
         let triplets = [0, 1, 2].map(matrix);
         let [mass, damping, stiffness] = triplets.map(|entries| {
-            Matrix::from_triplets(copies * n, entries).map_err(|error| StructureError::of("sector's", &error))
+            SparseMatrix::from_triplets(copies * n, entries).map_err(|error| StructureError::of("sector's", &error))
         });
         let mut places = self.places.clone();
         if !real {

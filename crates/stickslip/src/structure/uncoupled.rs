@@ -6,7 +6,7 @@
 use super::{Matrices, Structure};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::eigen;
 
 /// Damping between modes that counts as rounding: relative to the damping of the two modes, and
@@ -68,10 +68,16 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
         (0..n).map(|i| stiffness[(i, i)] / mass[(i, i)]).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
     let shift = SHIFT * ratios.first().copied().unwrap_or(1.0);
-    let (values, shapes) = eigen::symmetric_pair(mass, &(stiffness + mass * shift))?;
+    let (values, shapes) = eigen::generalized_symmetric(mass, &(stiffness + mass * shift))?;
     let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
         let mut out = DMatrix::zeros(n, n);
-        multiply_in_blocks(a.as_slice(), b.as_slice(), out.as_mut_slice(), (n, n, n), false);
+        multiply_blocked(
+            a.as_slice(),
+            b.as_slice(),
+            out.as_mut_slice(),
+            ProductShape { rows: n, inner: n, columns: n },
+            Transpose::No,
+        );
         out
     };
     let modal = product(&shapes.transpose(), &product(damping, &shapes));

@@ -3,7 +3,7 @@
 use super::brick::Brick;
 use std::f64::consts::TAU;
 use stickslip::structure::reduction::{Damping, Free, Reduce, Reference, Series, Whole};
-use stickslip_numerics::sparse::{Analysis, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SymbolicAnalysis};
 
 /// Ratio of the highest retained mode to the highest frequency of interest.
 const BEYOND: f64 = 2.0;
@@ -56,8 +56,10 @@ const FREE: [f64; 8] = [
 #[test]
 fn modes_are_those_of_scipy() {
     let (held, free) = (brick([16, 8, 7], true), brick([12, 5, 4], false));
-    for (brick, wanted, expected) in [(held, Wanted::Lowest(20), &HELD[..]), (free, Wanted::Lowest(14), &FREE[..])] {
-        let analysis = Analysis::new(&[&brick.stiffness, &brick.mass]);
+    for (brick, wanted, expected) in
+        [(held, ModeSelection::Lowest(20), &HELD[..]), (free, ModeSelection::Lowest(14), &FREE[..])]
+    {
+        let analysis = SymbolicAnalysis::new(&[&brick.stiffness, &brick.mass]);
         let modes = NaturalModes::new(&analysis, &brick.stiffness, &brick.mass, wanted).unwrap();
         let rigid = modes.count() - expected.len();
         // the rounding error of free motions is relative to the largest eigenvalue, 1e13

@@ -4,15 +4,15 @@
 //! Source: Zienkiewicz and Taylor, "The Finite Element Method" (2000), Vol. 1, Chap. 8:
 //! trilinear shape functions, 2 x 2 x 2 Gauss points.
 
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 /// Young's modulus (Pa), Poisson's ratio, density (kg/m³).
 const STEEL: (f64, f64, f64) = (210e9, 0.3, 7850.0);
 
 /// Mass and stiffness, and the grid of nodes.
 pub struct Brick {
-    pub mass: Matrix,
-    pub stiffness: Matrix,
+    pub mass: SparseMatrix,
+    pub stiffness: SparseMatrix,
     elements: [usize; 3],
     held: bool,
 }
@@ -42,9 +42,9 @@ impl Brick {
             }
         }
         let n = brick.dofs();
-        brick.stiffness = Matrix::from_triplets(n, stiffness).unwrap();
+        brick.stiffness = SparseMatrix::from_triplets(n, stiffness).unwrap();
         drop(brick.mass);
-        brick.mass = Matrix::from_triplets(n, mass).unwrap();
+        brick.mass = SparseMatrix::from_triplets(n, mass).unwrap();
         brick
     }
 
@@ -72,8 +72,8 @@ impl Brick {
     }
 }
 
-fn empty() -> Matrix {
-    Matrix::from_triplets(0, []).unwrap()
+fn empty() -> SparseMatrix {
+    SparseMatrix::from_triplets(0, []).unwrap()
 }
 
 /// Returns the stiffness, and the mass of one direction, of a box element.

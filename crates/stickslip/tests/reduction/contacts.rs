@@ -20,7 +20,7 @@ const FIRST: f64 = 2.8e5;
 fn cube(nodes: usize) -> System {
     let brick = Brick::new([1, 1, 1], [0.02; 3], true);
     let n = brick.dofs();
-    let full = |matrix: &stickslip_numerics::sparse::Matrix| {
+    let full = |matrix: &stickslip_numerics::sparse::SparseMatrix| {
         let mut full = nalgebra::DMatrix::zeros(n, n);
         matrix.entries().for_each(|(i, k, value)| full[(i, k)] += value);
         full

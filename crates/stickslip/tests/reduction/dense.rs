@@ -3,19 +3,19 @@
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
 use stickslip::structure::reduction::{Damping, Free, Reduce, Reduced, ReductionError, Reference, Row, Series, Whole};
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
-fn sparse(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
-    Matrix::from_triplets(n, entries).unwrap()
+fn sparse(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> SparseMatrix {
+    SparseMatrix::from_triplets(n, entries).unwrap()
 }
 
-fn full(matrix: &Matrix) -> DMatrix<f64> {
+fn full(matrix: &SparseMatrix) -> DMatrix<f64> {
     DMatrix::from_fn(matrix.n(), matrix.n(), |i, k| matrix.get(i, k))
 }
 
 /// Returns the stiffness of springs (i, k, stiffness). A spring with i = k connects to the
 /// ground.
-fn springs(n: usize, between: &[(usize, usize, f64)]) -> Matrix {
+fn springs(n: usize, between: &[(usize, usize, f64)]) -> SparseMatrix {
     let spring = |&(i, k, v): &(usize, usize, f64)| match i == k {
         true => vec![(i, i, v)],
         false => vec![(i, i, v), (k, k, v), (i, k, -v), (k, i, -v)],
@@ -23,18 +23,24 @@ fn springs(n: usize, between: &[(usize, usize, f64)]) -> Matrix {
     sparse(n, between.iter().flat_map(spring))
 }
 
-fn chain(n: usize, held: bool) -> Matrix {
+fn chain(n: usize, held: bool) -> SparseMatrix {
     let mut links: Vec<_> = (1..n).map(|i| (i - 1, i, 1.0 + (i % 3) as f64)).collect();
     links.extend(held.then_some((0, 0, 2.0)));
     springs(n, &links)
 }
 
-fn masses(n: usize) -> Matrix {
+fn masses(n: usize) -> SparseMatrix {
     sparse(n, (0..n).map(|i| (i, i, 1.0 + 0.1 * (i % 4) as f64)))
 }
 
 /// Returns `P (K - ω² M + jω C)⁻¹ Pᵀ`.
-fn receptance(m: &Matrix, c: &DMatrix<f64>, k: &Matrix, ports: &[Row], omega: f64) -> DMatrix<Complex<f64>> {
+fn receptance(
+    m: &SparseMatrix,
+    c: &DMatrix<f64>,
+    k: &SparseMatrix,
+    ports: &[Row],
+    omega: f64,
+) -> DMatrix<Complex<f64>> {
     let n = m.n();
     let stiffness =
         DMatrix::from_fn(n, n, |i, j| Complex::new(k.get(i, j) - omega * omega * m.get(i, j), omega * c[(i, j)]));
@@ -48,7 +54,7 @@ fn off(a: &DMatrix<Complex<f64>>, b: &DMatrix<Complex<f64>>) -> f64 {
 }
 
 /// Returns λ and shapes of unit mass, from the Cholesky factor of M.
-fn modes(m: &Matrix, k: &Matrix) -> (Vec<f64>, DMatrix<f64>) {
+fn modes(m: &SparseMatrix, k: &SparseMatrix) -> (Vec<f64>, DMatrix<f64>) {
     let n = m.n();
     let inverse = full(m).cholesky().unwrap().l().solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
     let eigen = (&inverse * full(k) * inverse.transpose()).symmetric_eigen();
@@ -210,7 +216,9 @@ fn ports_without_mass() {
 fn what_is_no_reduction_says_why() {
     let n = 20;
     let (m, k) = (masses(n), chain(n, false));
-    let make = |m: &Matrix, k: &Matrix, damping, ports| Whole::new(m.clone(), damping, k.clone(), ports).map(|_| ());
+    let make = |m: &SparseMatrix, k: &SparseMatrix, damping, ports| {
+        Whole::new(m.clone(), damping, k.clone(), ports).map(|_| ())
+    };
     let one_sided = sparse(n, k.entries().chain([(0, 5, 1.0)]));
     assert!(matches!(
         make(&m, &one_sided, UNDAMPED, ports(n)),

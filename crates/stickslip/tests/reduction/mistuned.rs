@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
 use stickslip::model::{Around, Disk, DiskPart, Model, Place, Substructure, SubstructureDamping, System};
 use stickslip::structure::{Boundary, Component, Reduction, ReductionKind};
-use stickslip_numerics::sparse::{Analysis, Matrix};
+use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 
 /// Numbers of elements of a sector along the blade, across, and through the thickness.
 const ELEMENTS: [usize; 3] = [6, 2, 1];
@@ -111,10 +111,10 @@ fn the_error_of_blades_that_differ_is_that_against_the_whole_ring() {
 }
 
 /// Returns mass and stiffness of a ring of many sectors.
-fn matrices(system: &System) -> [Matrix; 2] {
+fn matrices(system: &System) -> [SparseMatrix; 2] {
     [0, 2].map(|of| {
         let entries = system.structure().entries().map(|(i, k, values)| (i, k, values[of]));
-        Matrix::from_triplets(system.dofs(), entries).unwrap()
+        SparseMatrix::from_triplets(system.dofs(), entries).unwrap()
     })
 }
 
@@ -122,7 +122,7 @@ fn matrices(system: &System) -> [Matrix; 2] {
 /// frequencies, rad/s.
 fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>>> {
     let [mass, stiffness] = matrices(system);
-    let analysis = Analysis::new(&[&stiffness, &mass]);
+    let analysis = SymbolicAnalysis::new(&[&stiffness, &mass]);
     let load = |place: usize| (1.3 * place as f64).cos();
     let one = |omega: &f64| {
         let sum = [(Complex::new(1.0, 2.0 * HALF_WIDTH), &stiffness), (Complex::new(-omega * omega, 0.0), &mass)];

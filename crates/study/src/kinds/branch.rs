@@ -24,7 +24,7 @@ use crate::values::{Frequencies, Values, hertz};
 use crate::warnings::{resonant, undamped};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
-use stickslip::curve::trace::{Branch, End, Trace, TraceError};
+use stickslip::curve::trace::{Branch, BranchEnd, Trace, TraceError};
 use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -205,12 +205,12 @@ fn compute(work: &Work<'_>) -> Computed {
         turns.end();
     }
     let reason = match branch.end {
-        End::Border => missing(&branch, range, (name.as_str(), factor)),
-        End::Stalled { at } => {
-            Some(format!("the continuation stopped at {name} = {:.9}: no step converges", at * factor))
+        BranchEnd::Border => missing(&branch, range, (name.as_str(), factor)),
+        BranchEnd::Stalled { parameter } => {
+            Some(format!("the continuation stopped at {name} = {:.9}: no step converges", parameter * factor))
         }
-        End::Points => Some("the branch does not reach the end of its range".to_owned()),
-        End::Stopped => {
+        BranchEnd::Points => Some("the branch does not reach the end of its range".to_owned()),
+        BranchEnd::Stopped => {
             Some("the next point is not an orbit: its mean forces or its energies do not balance".to_owned())
         }
     };

@@ -29,7 +29,7 @@ use stickslip::dimension::Dimension;
 use stickslip::law::MOST_DIRECTIONS;
 use stickslip::model::{Axis as Along, Model};
 use stickslip::orbit::{Orbit, Sample};
-use stickslip_numerics::quadrature::FIVE;
+use stickslip_numerics::quadrature::GAUSS_5;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -77,7 +77,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
     };
     let rows = points * loops * costing.instants();
     let keys = costing.varied + costing.several();
-    let read = costing.instants() + loops * (QUADRATURE * FIVE.len()) as f64;
+    let read = costing.instants() + loops * (QUADRATURE * GAUSS_5.len()) as f64;
     Cost {
         tables: vec![
             Shape { rows, numbers: keys + 3.0, words: 1.0 },
@@ -301,7 +301,7 @@ impl First {
         let mut corners = Vec::with_capacity(times.len());
         for pair in times.windows(2) {
             let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
-            for (node, weight) in FIVE {
+            for (node, weight) in GAUSS_5 {
                 let time = middle + node * half;
                 let (u, force) = source.read(&orbit.sample(time));
                 let (sin, cos) = (omega * time).sin_cos();

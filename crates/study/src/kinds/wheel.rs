@@ -6,7 +6,7 @@
 use crate::dataset::{Axis, Panel, Series};
 use crate::drawing::join;
 use std::f64::consts::TAU;
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::first_largest;
 
 /// A place of every sector: its name, and sector, amplitude and phase (degrees) of each.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +83,7 @@ pub(super) fn panel(places: &[Around], sectors: usize, title: String, colour: us
     let largest = places.iter().map(Around::largest).fold(0.0, f64::max);
     let all = places.iter().flat_map(|around| &around.of);
     // the first of equal displacements determines the instant
-    let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
+    let (_, _, now) = *all.clone().nth(first_largest(all.map(|(_, size, _)| *size))?)?;
     if sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
         return None;
     }

@@ -16,7 +16,7 @@ use crate::values::Given;
 use std::path::{Path, PathBuf};
 use stickslip::structure::{Component, StructureError};
 use stickslip_formats::{self as formats, names};
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 impl Reader {
     /// Reads the table and its matrices; `None` if a problem was found.
@@ -59,7 +59,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
         let path = folder.join(&file.path);
         let matrix = formats::read(&path, file.format.as_deref(), file.name.as_deref());
         let matrix =
-            matrix.and_then(|matrix| matrix.must_be_square().map(|()| matrix)).map_err(|error| said(error, &path));
+            matrix.and_then(|matrix| matrix.require_square().map(|()| matrix)).map_err(|error| said(error, &path));
         matrix.map(|matrix| Some((key, matrix))).map_err(|(message, help)| problem(key, message).help(help))
     };
     let missing = |key| problem(key, "the file is missing".to_owned());
@@ -67,7 +67,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     // some programs leave out empty rows; the rows of the stiffness matrix determine the order
     let ordered = |(key, matrix): Read| {
         let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
-        let ordered = formats::aligned(matrix, &stiffness.1).map_err(|error| said(error, &path));
+        let ordered = formats::align_rows(matrix, &stiffness.1).map_err(|error| said(error, &path));
         ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
     let mass = ordered(one("mass")?.ok_or_else(|| missing("mass"))?)?;
@@ -97,10 +97,10 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let names = row_names(stated, folder, [&stiffness.1, &mass.1])?;
     let (damped, spins) = (damping.is_some(), stiffened.is_some());
     let all: Vec<Read> = [Some(stiffness), Some(mass), damping, stiffened].into_iter().flatten().collect();
-    let left_out = formats::constrained(&all.iter().map(|(_, matrix)| matrix).collect::<Vec<_>>(), rows);
+    let left_out = formats::constrained_rows(&all.iter().map(|(_, matrix)| matrix).collect::<Vec<_>>(), rows);
     let kept: Vec<usize> = (0..rows).filter(|row| left_out.binary_search(row).is_err()).collect();
     let free = |(key, matrix): Read| {
-        let free = matrix.without(&left_out).map_err(|error| said(error, Path::new("")));
+        let free = matrix.without_rows(&left_out).map_err(|error| said(error, Path::new("")));
         free.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
     let all = all.into_iter().map(free).collect::<Result<Vec<Read>, Problem>>()?;
@@ -117,7 +117,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
         };
         let entries =
             matrix.both_triangles().map(|entry| (entry.row as usize, entry.column as usize, entry.value * unit));
-        Matrix::from_triplets(kept.len(), entries).map_err(|error| problem(key, error.to_string()))
+        SparseMatrix::from_triplets(kept.len(), entries).map_err(|error| problem(key, error.to_string()))
     };
     let mut made = all.iter().map(|(key, read)| matrix(key, read));
     let mut next = || made.next().transpose();

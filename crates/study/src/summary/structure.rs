@@ -6,7 +6,7 @@ use crate::words::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::model::{ReductionEvidence, Substructure};
-use stickslip_numerics::sparse::Matrix;
+use stickslip_numerics::sparse::SparseMatrix;
 
 /// Largest number of listed frequencies.
 const LISTED: usize = 6;
@@ -158,9 +158,9 @@ impl StructureSummary {
 ///
 /// All rows of that direction (`449.x`) move by one. Returns `None` if no row name has the
 /// direction.
-pub fn mass_along(rows: &[String], mass: &Matrix, along: &str) -> Option<f64> {
+pub fn mass_along(rows: &[String], mass: &SparseMatrix, along: &str) -> Option<f64> {
     let moves = |name: &String| f64::from(name.rsplit_once('.').is_some_and(|(_, direction)| direction == along));
     let motion: Vec<f64> = rows.iter().map(moves).collect();
     let moved = motion.contains(&1.0);
-    moved.then(|| mass.times(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
+    moved.then(|| mass.multiply(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
 }

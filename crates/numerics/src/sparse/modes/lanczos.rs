@@ -1,29 +1,29 @@
 //! A run of the block Lanczos process: a basis that grows by blocks, and the
 //! modes that converge in it.
 
-use super::found::{BLOCK, ModesError, NaturalModes};
+use super::natural_modes::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::interrupt;
-use crate::sparse::{Factor, Matrix, columns};
+use crate::sparse::{LdlFactor, SparseMatrix, multi_vector};
 use nalgebra::DMatrix;
 
 /// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
 /// 1e-11 to 1e-15 is usual. The error is about its square.
 const ACCURATE: f64 = 1e-8;
 /// A new vector is rounding if its norm, relative to its norm before the projection, is below this.
-const DEPENDENT: f64 = 1e-14;
+const DEPENDENCE: f64 = 1e-14;
 /// Below this fraction, so much has cancelled that the vector is orthogonalized once more. If
 /// half of it then vanishes, it was rounding.
 const CANCELLED: f64 = 1e-6;
 /// Below this fraction `M v` is recomputed, because the digits of a projected
 /// `M v` cancel with those of v.
-const FOLLOWED: f64 = 0.1;
+const RECOMPUTE_BELOW: f64 = 0.1;
 /// A negative `vᵀ M v` up to this fraction of `Σ |vᵢ Mᵢₖ vₖ|` is the rounding
 /// of a file with ten digits.
 const MASSLESS: f64 = 1e-10;
 
 /// An eigenvalue of the projected operator (Ritz value) and its vector.
-pub(super) struct Pair {
+pub(super) struct RitzPair {
     pub(super) theta: f64,
     /// Coefficients of the Ritz vector in the basis.
     vector: Vec<f64>,
@@ -33,40 +33,40 @@ pub(super) struct Pair {
 
 /// An M-orthonormal basis V, orthogonal to the modes already found, and `T = Vᵀ M (K - σM)⁻¹ M V`.
 pub(super) struct Lanczos<'a> {
-    factor: &'a Factor,
-    mass: &'a Matrix,
+    factor: &'a LdlFactor,
+    mass: &'a SparseMatrix,
     /// Largest entry of the mass matrix.
-    heaviest: f64,
-    found: &'a [f64],
+    max_mass_entry: f64,
+    locked: &'a [f64],
     n: usize,
     basis: Vec<f64>,
     /// M times the basis vectors that are not expanded yet.
-    heavy: Vec<f64>,
+    mass_times_basis: Vec<f64>,
     /// Columns of T, each as long as the basis was at its expansion.
     projected: Vec<Vec<f64>>,
     /// Number of basis vectors to which the operator was applied.
     pub(super) expanded: usize,
     /// Components of the last expansion along the block that it added.
-    beyond: DMatrix<f64>,
+    coupling: DMatrix<f64>,
     /// State of the random start vectors.
     seed: u64,
 }
 
 impl<'a> Lanczos<'a> {
-    pub(super) fn new(factor: &'a Factor, mass: &'a Matrix, found: &'a [f64]) -> Self {
+    pub(super) fn new(factor: &'a LdlFactor, mass: &'a SparseMatrix, locked: &'a [f64]) -> Self {
         let n = mass.n();
-        let beyond = DMatrix::zeros(0, 0);
+        let coupling = DMatrix::zeros(0, 0);
         Lanczos {
             factor,
             mass,
-            heaviest: mass.largest(),
-            found,
+            max_mass_entry: mass.max_abs(),
+            locked,
             n,
             basis: vec![],
-            heavy: vec![],
+            mass_times_basis: vec![],
             projected: vec![],
             expanded: 0,
-            beyond,
+            coupling,
             seed: 0,
         }
     }
@@ -79,34 +79,34 @@ impl<'a> Lanczos<'a> {
     /// Returns false if there are no new directions.
     pub(super) fn expand(&mut self) -> Result<bool, ModesError> {
         if self.size() == 0 {
-            self.fill(BLOCK)?;
+            self.add_random_vectors(BLOCK)?;
             if self.size() == 0 {
                 return Ok(false);
             }
         }
         interrupt::check();
         let n = self.n;
-        let mut block = std::mem::take(&mut self.heavy);
+        let mut block = std::mem::take(&mut self.mass_times_basis);
         self.factor.solve(&mut block);
         let width = block.len() / n;
-        let mut forces = self.mass.times_columns(&block);
+        let mut forces = self.mass.multiply_columns(&block);
         let sizes = self.norms(&block, &forces)?;
-        let coefficients = self.clear(&mut block, &mut forces);
+        let coefficients = self.project_out(&mut block, &mut forces);
         for k in 0..width {
             self.projected.push(coefficients.column(k).iter().copied().collect());
         }
         self.expanded += width;
-        self.beyond = self.append(block, forces, &sizes)?;
+        self.coupling = self.orthonormalize(block, forces, &sizes)?;
         let added = self.size() - self.expanded;
         if added < BLOCK {
-            self.fill(BLOCK - added)?;
+            self.add_random_vectors(BLOCK - added)?;
         }
         Ok(self.size() > self.expanded)
     }
 
     /// Returns `(K - σM)⁻¹ M V`.
     fn operator(&self, v: &[f64]) -> Vec<f64> {
-        let mut block = self.mass.times_columns(v);
+        let mut block = self.mass.multiply_columns(v);
         self.factor.solve(&mut block);
         block
     }
@@ -120,7 +120,7 @@ impl<'a> Lanczos<'a> {
     /// Returns the norm of a vector `v`, with `force` = M v. It is zero if all digits of
     /// `vᵀ M v` cancel, as for a motion without mass.
     fn norm(&self, v: &[f64], force: &[f64]) -> Result<f64, ModesError> {
-        let (square, longest) = (dot(v, force), self.heaviest * dot(v, v));
+        let (square, longest) = (dot(v, force), self.max_mass_entry * dot(v, v));
         if !square.is_finite() {
             return Err(ModesError::OutOfRange);
         }
@@ -140,19 +140,19 @@ impl<'a> Lanczos<'a> {
 
     /// Projects the modes found and the basis out of a block and of M times the block. Returns
     /// the components along the basis. Two passes are enough.
-    fn clear(&self, block: &mut [f64], forces: &mut Vec<f64>) -> DMatrix<f64> {
+    fn project_out(&self, block: &mut [f64], forces: &mut Vec<f64>) -> DMatrix<f64> {
         let n = self.n;
         let mut coefficients = DMatrix::zeros(self.size(), block.len() / n);
-        if self.found.is_empty() && self.basis.is_empty() {
+        if self.locked.is_empty() && self.basis.is_empty() {
             return coefficients;
         }
         for _ in 0..2 {
-            let known = columns::products(n, self.found, forces);
-            columns::add(n, block, -1.0, self.found, &known);
-            let along = columns::products(n, &self.basis, forces);
-            columns::add(n, block, -1.0, &self.basis, &along);
+            let known = multi_vector::inner_products(n, self.locked, forces);
+            multi_vector::add(n, block, -1.0, self.locked, &known);
+            let along = multi_vector::inner_products(n, &self.basis, forces);
+            multi_vector::add(n, block, -1.0, &self.basis, &along);
             coefficients += along;
-            *forces = self.mass.times_columns(block);
+            *forces = self.mass.multiply_columns(block);
         }
         coefficients
     }
@@ -162,7 +162,7 @@ impl<'a> Lanczos<'a> {
     ///
     /// Columns that are rounding relative to their former `sizes` are dropped. Returns the
     /// components of the block along the new vectors.
-    fn append(&mut self, block: Vec<f64>, forces: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
+    fn orthonormalize(&mut self, block: Vec<f64>, forces: Vec<f64>, sizes: &[f64]) -> Result<DMatrix<f64>, ModesError> {
         let n = self.n;
         let first = self.size();
         let mut components = DMatrix::zeros(0, sizes.len());
@@ -171,33 +171,33 @@ impl<'a> Lanczos<'a> {
             let mut along = DMatrix::zeros(self.size() - first, 1);
             let mut left = self.norm(&column, &force)?;
             for _ in 0..2 {
-                let part = columns::products(n, &self.basis[first * n..], &force);
-                columns::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
-                columns::add(n, &mut force, -1.0, &self.heavy[(first - self.expanded) * n..], &part);
+                let part = multi_vector::inner_products(n, &self.basis[first * n..], &force);
+                multi_vector::add(n, &mut column, -1.0, &self.basis[first * n..], &part);
+                multi_vector::add(n, &mut force, -1.0, &self.mass_times_basis[(first - self.expanded) * n..], &part);
                 along += part;
                 // The sign of a product that cancels to rounding is not reliable either.
-                if dot(&column, &force) < (FOLLOWED * left).powi(2) {
-                    force = self.mass.times_columns(&column);
+                if dot(&column, &force) < (RECOMPUTE_BELOW * left).powi(2) {
+                    force = self.mass.multiply_columns(&column);
                 }
                 left = self.norm(&column, &force)?;
             }
             (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
-            if left <= DEPENDENT * size {
+            if left <= DEPENDENCE * size {
                 continue;
             }
             scale(&mut column, 1.0 / left);
             scale(&mut force, 1.0 / left);
             if left < CANCELLED * size {
-                self.clear(&mut column, &mut force);
-                let again = self.norm(&column, &force)?;
-                if again < 0.5 {
+                self.project_out(&mut column, &mut force);
+                let second = self.norm(&column, &force)?;
+                if second < 0.5 {
                     continue;
                 }
-                scale(&mut column, 1.0 / again);
-                scale(&mut force, 1.0 / again);
+                scale(&mut column, 1.0 / second);
+                scale(&mut force, 1.0 / second);
             }
             self.basis.extend(column);
-            self.heavy.extend(force);
+            self.mass_times_basis.extend(force);
             components = components.insert_row(self.size() - first - 1, 0.0);
             components[(self.size() - first - 1, k)] = left;
         }
@@ -206,23 +206,23 @@ impl<'a> Lanczos<'a> {
 
     /// Adds up to `count` random vectors that are orthogonal to the known ones,
     /// fewer if the space is exhausted.
-    fn fill(&mut self, count: usize) -> Result<(), ModesError> {
-        let mut start: Vec<f64> = (0..count * self.n).map(|_| self.next()).collect();
-        let mut forces = self.mass.times_columns(&start);
+    fn add_random_vectors(&mut self, count: usize) -> Result<(), ModesError> {
+        let mut start: Vec<f64> = (0..count * self.n).map(|_| self.random()).collect();
+        let mut forces = self.mass.multiply_columns(&start);
         // Project out the known vectors before the operator, which would amplify them.
-        self.clear(&mut start, &mut forces);
+        self.project_out(&mut start, &mut forces);
         start = forces;
         self.factor.solve(&mut start);
-        forces = self.mass.times_columns(&start);
+        forces = self.mass.multiply_columns(&start);
         let sizes = self.norms(&start, &forces)?;
-        self.clear(&mut start, &mut forces);
-        self.append(start, forces, &sizes)?;
+        self.project_out(&mut start, &mut forces);
+        self.orthonormalize(start, forces, &sizes)?;
         Ok(())
     }
 
     /// Returns a random number between -1 and 1, with the same bits on every
     /// machine (Steele, Lea and Flood 2014, splitmix64).
-    fn next(&mut self) -> f64 {
+    fn random(&mut self) -> f64 {
         self.seed = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.seed;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -231,7 +231,7 @@ impl<'a> Lanczos<'a> {
     }
 
     /// Returns the eigenvalues of the projected operator, in falling order of |θ|.
-    pub(super) fn pairs(&self) -> Result<Vec<Pair>, ModesError> {
+    pub(super) fn pairs(&self) -> Result<Vec<RitzPair>, ModesError> {
         let m = self.expanded;
         if m == 0 {
             return Ok(vec![]);
@@ -242,35 +242,40 @@ impl<'a> Lanczos<'a> {
         let eigen = eigen::symmetric(t).ok_or(ModesError::OutOfRange)?;
         let mut order: Vec<usize> = (0..m).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[b].abs().total_cmp(&eigen.eigenvalues[a].abs()));
-        let last = self.beyond.ncols();
+        let last = self.coupling.ncols();
         let pair = |k: usize| {
             let vector: Vec<f64> = eigen.eigenvectors.column(k).iter().copied().collect();
             let tail = DMatrix::from_column_slice(last, 1, &vector[m - last..]);
-            Pair { theta: eigen.eigenvalues[k], vector, residual: (&self.beyond * tail).norm() }
+            RitzPair { theta: eigen.eigenvalues[k], vector, residual: (&self.coupling * tail).norm() }
         };
         Ok(order.into_iter().map(pair).filter(|pair| pair.theta != 0.0).collect())
     }
 
     /// Computes modes from Ritz pairs: applies the operator once more and
     /// diagonalizes K and M in the resulting space.
-    pub(super) fn modes(&self, stiffness: &Matrix, shift: f64, pairs: &[Pair]) -> Result<NaturalModes, ModesError> {
+    pub(super) fn modes(
+        &self,
+        stiffness: &SparseMatrix,
+        shift: f64,
+        pairs: &[RitzPair],
+    ) -> Result<NaturalModes, ModesError> {
         let (n, count) = (self.n, pairs.len());
         if count == 0 {
-            return Ok(NaturalModes::none());
+            return Ok(NaturalModes::empty());
         }
         let failed = || ModesError::NotConverged { found: 0, counted: count, below: shift };
         let coefficients = DMatrix::from_fn(self.expanded, count, |i, k| pairs[k].vector[i]);
-        let ritz = columns::combination(n, &self.basis[..self.expanded * n], &coefficients);
+        let ritz = multi_vector::combine(n, &self.basis[..self.expanded * n], &coefficients);
         let mut shapes = self.operator(&ritz);
         shapes.chunks_mut(n).zip(pairs).for_each(|(shape, pair)| scale(shape, 1.0 / pair.theta));
-        let mut forces = self.mass.times_columns(&shapes);
-        if !self.found.is_empty() {
-            let known = columns::products(n, self.found, &forces);
-            columns::add(n, &mut shapes, -1.0, self.found, &known);
-            forces = self.mass.times_columns(&shapes);
+        let mut forces = self.mass.multiply_columns(&shapes);
+        if !self.locked.is_empty() {
+            let known = multi_vector::inner_products(n, self.locked, &forces);
+            multi_vector::add(n, &mut shapes, -1.0, self.locked, &known);
+            forces = self.mass.multiply_columns(&shapes);
         }
-        let m = columns::products(n, &shapes, &forces);
-        let k = columns::products(n, &shapes, &stiffness.times_columns(&shapes));
+        let m = multi_vector::inner_products(n, &shapes, &forces);
+        let k = multi_vector::inner_products(n, &shapes, &stiffness.multiply_columns(&shapes));
         let inverse = m
             .clone()
             .cholesky()
@@ -280,7 +285,7 @@ impl<'a> Lanczos<'a> {
         // Relative to the shift, so that the rounding of modes far above does
         // not affect those near it.
         let eigen = eigen::symmetric(&inverse * (k - m * shift) * inverse.transpose()).ok_or_else(failed)?;
-        let shapes = columns::combination(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
+        let shapes = multi_vector::combine(n, &shapes, &(inverse.transpose() * &eigen.eigenvectors));
         let values: Vec<f64> = eigen.eigenvalues.iter().map(|v| v + shift).collect();
         let mut off = self.operator(&shapes);
         for ((off, shape), value) in off.chunks_mut(n).zip(shapes.chunks(n)).zip(&values) {
@@ -288,11 +293,11 @@ impl<'a> Lanczos<'a> {
         }
         // K and M are diagonal in the space of the modes. The rounding of the factor inside
         // that space is therefore not an error of the modes.
-        for modes in [self.found, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
-            let inside = columns::products(n, modes, &self.mass.times_columns(&off));
-            columns::add(n, &mut off, -1.0, modes, &inside);
+        for modes in [self.locked, &shapes].into_iter().filter(|modes| !modes.is_empty()) {
+            let inside = multi_vector::inner_products(n, modes, &self.mass.multiply_columns(&off));
+            multi_vector::add(n, &mut off, -1.0, modes, &inside);
         }
-        let residuals = self.norms(&off, &self.mass.times_columns(&off))?;
+        let residuals = self.norms(&off, &self.mass.multiply_columns(&off))?;
         // A rigid-body mode not found yet may spoil others by the rounding of
         // the factor. A later run finds those.
         let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();
@@ -301,8 +306,8 @@ impl<'a> Lanczos<'a> {
         }
         let shapes = good.iter().flat_map(|&k| shapes[k * n..(k + 1) * n].iter().copied()).collect();
         let [values, residuals] = [values, residuals].map(|all| good.iter().map(|&k| all[k]).collect());
-        let mut modes = NaturalModes::none();
-        modes.join(n, NaturalModes { values, shapes, residuals, ..NaturalModes::none() });
+        let mut modes = NaturalModes::empty();
+        modes.merge(n, NaturalModes { values, shapes, residuals, ..NaturalModes::empty() });
         Ok(modes)
     }
 }

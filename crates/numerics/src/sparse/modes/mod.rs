@@ -21,13 +21,13 @@
 //! singular M; Grimes, Lewis and Simon (1994), "A shifted block Lanczos algorithm for solving
 //! sparse symmetric generalized eigenproblems", for blocks, shifts and counts.
 
-mod found;
 mod lanczos;
+mod natural_modes;
 
-use super::{Analysis, Factor, Matrix, Singular};
-use found::BLOCK;
-pub use found::{Effort, ModesError, NaturalModes};
-use lanczos::{Lanczos, Pair};
+use super::{LdlFactor, Singular, SparseMatrix, SymbolicAnalysis};
+use lanczos::{Lanczos, RitzPair};
+use natural_modes::BLOCK;
+pub use natural_modes::{ModesCost, ModesError, NaturalModes};
 
 /// Residual in the Lanczos process, relative to θ, at which a mode has
 /// converged. The error of the eigenvalue is about its square.
@@ -35,10 +35,10 @@ const CONVERGED: f64 = 1e-10;
 /// An eigenvalue above a bound by less than this relative difference counts as below it.
 const ROUNDING: f64 = 1e-9;
 /// Maximum number of vectors of a run. Each takes memory of n numbers.
-const MOST: usize = 320;
+const MAX_VECTORS: usize = 320;
 /// Maximum number of runs. Each run except the first starts where eigenvalues are known to be
-/// missing, and finds about `MOST` / 3 modes.
-const RUNS: usize = 100;
+/// missing, and finds about `MAX_VECTORS` / 3 modes.
+const MAX_RUNS: usize = 100;
 /// The first shift without other knowledge, relative to a typical `k_ii / m_ii`.
 ///
 /// It is below the first mode of a compact body and far above the rounding of a rigid-body
@@ -53,12 +53,12 @@ const SHIFT_OF_BOUND: f64 = 0.01;
 const SLENDER: (f64, f64) = (1e-6, 0.1);
 /// Number of blocks after which an unfinished search tests if its first shift was too large.
 /// These blocks cost about as much as another factor.
-const JUDGED: usize = 12;
+const SLENDER_CHECK_BLOCKS: usize = 12;
 /// Number of blocks between two convergence checks.
-const CHECKED: usize = 4;
+const CHECK_INTERVAL: usize = 4;
 /// Divisor of the number of blocks so far that gives a longer interval between checks. The cost
 /// of the projected problem grows with the cube of the blocks.
-const CHECKED_SHARE: usize = 8;
+const CHECK_DIVISOR: usize = 8;
 /// Smallest gap between two eigenvalues, relative to their distance from the
 /// first shift, in which eigenvalues can be counted.
 const GAP: f64 = 1e-5;
@@ -66,13 +66,13 @@ const GAP: f64 = 1e-5;
 /// starts. It is relative to the distance of that mode from the first shift.
 ///
 /// It is at least the magnitude of that shift, for structures with many rigid-body modes.
-const BEYOND: f64 = 0.1;
+const NEXT_SHIFT_DISTANCE: f64 = 0.1;
 /// Number of attempts to factor near an eigenvalue, each further away by `GAP`.
 const ATTEMPTS: usize = 8;
 
 /// The modes to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wanted {
+pub enum ModeSelection {
     /// The given number of lowest modes, or all if there are fewer.
     Lowest(usize),
     /// All modes with an eigenvalue λ = ω² up to a bound.
@@ -98,24 +98,30 @@ impl NaturalModes {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+    /// use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
     /// // two equal masses connected by two parallel springs, without support: 0 and 4
-    /// let k = Matrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
-    /// let m = Matrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
-    /// let modes = NaturalModes::new(&Analysis::new(&[&k, &m]), &k, &m, Wanted::Lowest(2)).unwrap();
+    /// let k = SparseMatrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
+    /// let m = SparseMatrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
+    /// let modes = NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2)).unwrap();
     /// assert!(modes.values[0].abs() < 1e-12 && (modes.values[1] - 4.0).abs() < 1e-12);
     /// ```
-    pub fn new(analysis: &Analysis, stiffness: &Matrix, mass: &Matrix, wanted: Wanted) -> Result<Self, ModesError> {
+    pub fn new(
+        analysis: &SymbolicAnalysis,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
+        wanted: ModeSelection,
+    ) -> Result<Self, ModesError> {
         if mass.n() == 0 {
-            return Ok(NaturalModes::none());
+            return Ok(NaturalModes::empty());
         }
-        let scale = usual(stiffness, mass);
-        Search { analysis, stiffness, mass, wanted, scale, found: NaturalModes { scale, ..NaturalModes::none() } }.run()
+        let scale = typical_eigenvalue(stiffness, mass);
+        Search { analysis, stiffness, mass, wanted, scale, found: NaturalModes { scale, ..NaturalModes::empty() } }
+            .run()
     }
 }
 
 /// Returns the median of `k_ii / m_ii`, rad²/s², or one if no ratio is positive and finite.
-fn usual(stiffness: &Matrix, mass: &Matrix) -> f64 {
+fn typical_eigenvalue(stiffness: &SparseMatrix, mass: &SparseMatrix) -> f64 {
     let mut ratios: Vec<f64> = (0..mass.n())
         .map(|i| stiffness.get(i, i) / mass.get(i, i))
         .filter(|ratio| ratio.is_finite() && *ratio > 0.0)
@@ -126,24 +132,24 @@ fn usual(stiffness: &Matrix, mass: &Matrix) -> f64 {
 
 /// A search in progress.
 struct Search<'a> {
-    analysis: &'a Analysis,
-    stiffness: &'a Matrix,
-    mass: &'a Matrix,
-    wanted: Wanted,
+    analysis: &'a SymbolicAnalysis,
+    stiffness: &'a SparseMatrix,
+    mass: &'a SparseMatrix,
+    wanted: ModeSelection,
     /// A typical `k_ii / m_ii`, rad²/s².
     scale: f64,
     found: NaturalModes,
 }
 
 /// The result of a run of the Lanczos process.
-struct Run {
+struct LanczosRun {
     modes: NaturalModes,
     vectors: usize,
-    end: End,
+    end: RunEnd,
 }
 
 /// The reason why a run ended.
-enum End {
+enum RunEnd {
     /// Enough modes, or the maximum number of vectors.
     Full,
     /// The maximum number of vectors without a converged mode: the eigenvalues are closer to
@@ -158,41 +164,42 @@ enum End {
 impl Search<'_> {
     fn run(mut self) -> Result<NaturalModes, ModesError> {
         let least = LEAST_SHIFT * self.scale;
-        let mut depth = match self.wanted {
-            Wanted::Lowest(0) => return Ok(self.found),
-            Wanted::Lowest(_) => SHIFT * self.scale,
-            Wanted::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
-            Wanted::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
+        // The magnitude of the first, negative shift.
+        let mut first_shift = match self.wanted {
+            ModeSelection::Lowest(0) => return Ok(self.found),
+            ModeSelection::Lowest(_) => SHIFT * self.scale,
+            ModeSelection::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
+            ModeSelection::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
         };
-        let (mut shift, mut factor) = self.first(depth, None)?;
+        let (mut shift, mut factor) = self.first_factor(first_shift, None)?;
         let mut counted = 0;
-        for _ in 0..RUNS {
-            let run = self.around(shift, &factor, counted, depth)?;
-            self.found.effort.vectors += run.vectors;
-            if let End::Slender(value) = run.end {
-                depth = value.max(least);
-                (shift, factor) = self.first(depth, Some(factor))?;
+        for _ in 0..MAX_RUNS {
+            let run = self.run_at(shift, &factor, counted, first_shift)?;
+            self.found.cost.vectors += run.vectors;
+            if let RunEnd::Slender(value) = run.end {
+                first_shift = value.max(least);
+                (shift, factor) = self.first_factor(first_shift, Some(factor))?;
                 continue;
             }
-            if let End::Clustered(value) = run.end {
-                (shift, factor) = self.beside(value, depth, factor)?;
-                counted = factor.negative();
+            if let RunEnd::Clustered(value) = run.end {
+                (shift, factor) = self.factor_near(value, first_shift, factor)?;
+                counted = factor.negative_pivots();
                 continue;
             }
-            let (exhausted, more) = (matches!(run.end, End::Exhausted), run.modes.count());
-            self.found.join(self.mass.n(), run.modes);
-            (shift, factor) = self.beside(self.bound(exhausted, depth), depth, factor)?;
-            counted = factor.negative();
+            let (exhausted, more) = (matches!(run.end, RunEnd::Exhausted), run.modes.count());
+            self.found.merge(self.mass.n(), run.modes);
+            (shift, factor) = self.factor_near(self.complete_up_to(exhausted, first_shift), first_shift, factor)?;
+            counted = factor.negative_pivots();
             let found = self.found.below(shift);
             let (enough, keep) = match self.wanted {
-                Wanted::Lowest(n) => (found >= n, n),
-                Wanted::UpTo { value, most } if counted > most => {
+                ModeSelection::Lowest(n) => (found >= n, n),
+                ModeSelection::UpTo { value, most } if counted > most => {
                     return Err(ModesError::TooMany { count: counted, below: shift.min(value), most });
                 }
-                Wanted::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
+                ModeSelection::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
             };
             if found == counted && (enough || exhausted) {
-                return self.whole(keep);
+                return self.checked(keep);
             }
             if found > counted || exhausted || more == 0 {
                 break;
@@ -203,7 +210,7 @@ impl Search<'_> {
 
     /// Returns the first `keep` modes. Fails if a mode is negative, because a large first shift
     /// does not detect eigenvalues just below zero.
-    fn whole(mut self, keep: usize) -> Result<NaturalModes, ModesError> {
+    fn checked(mut self, keep: usize) -> Result<NaturalModes, ModesError> {
         let below = -SHIFT * self.scale;
         match self.found.below(below) {
             0 => {
@@ -215,29 +222,29 @@ impl Search<'_> {
     }
 
     /// Factors at a shift, in the memory of the last factor.
-    fn factor(&mut self, shift: f64, last: Option<Factor>) -> Result<Factor, Singular> {
-        self.found.effort.factors += 1;
+    fn factor(&mut self, shift: f64, last: Option<LdlFactor>) -> Result<LdlFactor, Singular> {
+        self.found.cost.factors += 1;
         let sum = [(1.0, self.stiffness), (-shift, self.mass)];
         match last {
-            Some(last) => last.again(&sum),
+            Some(last) => last.refactor(&sum),
             None => self.analysis.factor(&sum),
         }
     }
 
     /// Factors at the first, negative shift.
-    fn first(&mut self, depth: f64, last: Option<Factor>) -> Result<(f64, Factor), ModesError> {
-        let factor = self.factor(-depth, last).map_err(ModesError::Massless)?;
-        match factor.negative() {
-            0 => Ok((-depth, factor)),
-            count => Err(ModesError::Negative { count, below: -depth }),
+    fn first_factor(&mut self, first_shift: f64, last: Option<LdlFactor>) -> Result<(f64, LdlFactor), ModesError> {
+        let factor = self.factor(-first_shift, last).map_err(ModesError::Massless)?;
+        match factor.negative_pivots() {
+            0 => Ok((-first_shift, factor)),
+            count => Err(ModesError::Negative { count, below: -first_shift }),
         }
     }
 
     /// Factors at a shift, or slightly above it if the shift is an eigenvalue.
-    fn beside(&mut self, shift: f64, depth: f64, last: Factor) -> Result<(f64, Factor), ModesError> {
+    fn factor_near(&mut self, shift: f64, first_shift: f64, last: LdlFactor) -> Result<(f64, LdlFactor), ModesError> {
         let (mut last, mut failed) = (Some(last), Singular { row: 0 });
         for attempt in 0..ATTEMPTS {
-            let shift = shift + attempt as f64 * GAP * (shift.abs() + depth);
+            let shift = shift + attempt as f64 * GAP * (shift.abs() + first_shift);
             match self.factor(shift, last.take()) {
                 Ok(factor) => return Ok((shift, factor)),
                 Err(singular) => failed = singular,
@@ -247,71 +254,79 @@ impl Search<'_> {
     }
 
     /// Returns a value up to which the modes found may be complete, in a gap between them.
-    fn bound(&self, exhausted: bool, depth: f64) -> f64 {
+    fn complete_up_to(&self, exhausted: bool, first_shift: f64) -> f64 {
         let values = &self.found.values;
         // The bound needs this number of modes below it, and lies above `above`.
         let (below, above) = match self.wanted {
-            Wanted::Lowest(n) => (n.min(values.len()), f64::NEG_INFINITY),
-            Wanted::UpTo { value, .. } => match values.partition_point(|v| *v <= value) {
+            ModeSelection::Lowest(n) => (n.min(values.len()), f64::NEG_INFINITY),
+            ModeSelection::UpTo { value, .. } => match values.partition_point(|v| *v <= value) {
                 all if all == values.len() && !exhausted => (all, f64::NEG_INFINITY),
                 below => (below, value),
             },
         };
         let last = values.last().copied().unwrap_or(0.0).max(above);
         let gaps = (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
-        let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + depth);
+        let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + first_shift);
         // Inside a cluster no gap is wide, so the widest one serves.
         let widest = || gaps.clone().filter(wide(ROUNDING)).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
         let gap = gaps.clone().find(wide(GAP)).or_else(widest);
-        gap.map_or(last + (BEYOND * (last + depth)).max(depth), |(low, high)| 0.5 * (low + high))
+        gap.map_or(last + (NEXT_SHIFT_DISTANCE * (last + first_shift)).max(first_shift), |(low, high)| {
+            0.5 * (low + high)
+        })
     }
 
     /// Runs the Lanczos process at a shift with `counted` eigenvalues below it.
-    fn around(&self, shift: f64, factor: &Factor, counted: usize, depth: f64) -> Result<Run, ModesError> {
+    fn run_at(
+        &self,
+        shift: f64,
+        factor: &LdlFactor,
+        counted: usize,
+        first_shift: f64,
+    ) -> Result<LanczosRun, ModesError> {
         let mut lanczos = Lanczos::new(factor, self.mass, &self.found.shapes);
         let missing = counted.saturating_sub(self.found.below(shift));
         let wanted = match self.wanted {
-            Wanted::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
-            Wanted::UpTo { .. } => MOST,
+            ModeSelection::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
+            ModeSelection::UpTo { .. } => MAX_VECTORS,
         };
-        let value = |pair: &Pair| shift + 1.0 / pair.theta;
-        let (mut blocks, mut next) = (0, CHECKED);
+        let value = |pair: &RitzPair| shift + 1.0 / pair.theta;
+        let (mut blocks, mut next) = (0, CHECK_INTERVAL);
         loop {
             blocks += 1;
             let exhausted = !lanczos.expand()?;
-            let full = lanczos.expanded + BLOCK > MOST;
+            let full = lanczos.expanded + BLOCK > MAX_VECTORS;
             if !(exhausted || full || blocks == next) {
                 continue;
             }
-            next += CHECKED.max(blocks / CHECKED_SHARE);
+            next += CHECK_INTERVAL.max(blocks / CHECK_DIVISOR);
             let mut pairs = lanczos.pairs()?;
             let nearest_value = pairs.first().map(value);
-            let converged = |pair: &Pair| pair.residual <= CONVERGED * pair.theta.abs();
+            let converged = |pair: &RitzPair| pair.residual <= CONVERGED * pair.theta.abs();
             let nearest = pairs.iter().take_while(|pair| converged(pair)).count();
             pairs.retain(converged);
             let near = &pairs[..nearest];
             let low = near.iter().filter(|pair| pair.theta < 0.0).count();
             let enough = match self.wanted {
-                Wanted::Lowest(_) => nearest >= wanted,
-                Wanted::UpTo { value: bound, .. } => {
+                ModeSelection::Lowest(_) => nearest >= wanted,
+                ModeSelection::UpTo { value: bound, .. } => {
                     self.found.values.last().is_some_and(|v| *v > bound) || near.iter().any(|pair| value(pair) > bound)
                 }
             };
             if (enough && low >= missing) || full || exhausted {
                 let modes = lanczos.modes(self.stiffness, shift, &pairs)?;
                 let end = match nearest_value {
-                    _ if exhausted => End::Exhausted,
-                    Some(value) if pairs.is_empty() => End::Clustered(value),
-                    _ => End::Full,
+                    _ if exhausted => RunEnd::Exhausted,
+                    Some(value) if pairs.is_empty() => RunEnd::Clustered(value),
+                    _ => RunEnd::Full,
                 };
-                return Ok(Run { modes, vectors: lanczos.expanded, end });
+                return Ok(LanczosRun { modes, vectors: lanczos.expanded, end });
             }
-            if blocks >= JUDGED && self.found.count() == 0 && depth > LEAST_SHIFT * self.scale {
-                let elastic = pairs.iter().map(value).filter(|value| *value > SLENDER.0 * depth);
+            if blocks >= SLENDER_CHECK_BLOCKS && self.found.count() == 0 && first_shift > LEAST_SHIFT * self.scale {
+                let elastic = pairs.iter().map(value).filter(|value| *value > SLENDER.0 * first_shift);
                 let first = elastic.fold(f64::INFINITY, f64::min);
-                if first < SLENDER.1 * depth {
-                    let end = End::Slender(first);
-                    return Ok(Run { modes: NaturalModes::none(), vectors: lanczos.expanded, end });
+                if first < SLENDER.1 * first_shift {
+                    let end = RunEnd::Slender(first);
+                    return Ok(LanczosRun { modes: NaturalModes::empty(), vectors: lanczos.expanded, end });
                 }
             }
         }
@@ -321,25 +336,25 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sparse::columns;
+    use crate::sparse::multi_vector;
     use nalgebra::DMatrix;
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    fn modes(k: &Matrix, m: &Matrix, wanted: Wanted) -> Result<NaturalModes, ModesError> {
-        NaturalModes::new(&Analysis::new(&[k, m]), k, m, wanted)
+    fn modes(k: &SparseMatrix, m: &SparseMatrix, wanted: ModeSelection) -> Result<NaturalModes, ModesError> {
+        NaturalModes::new(&SymbolicAnalysis::new(&[k, m]), k, m, wanted)
     }
 
-    fn matrix(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> Matrix {
-        Matrix::from_triplets(n, entries).unwrap()
+    fn matrix(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> SparseMatrix {
+        SparseMatrix::from_triplets(n, entries).unwrap()
     }
 
-    fn identity(n: usize) -> Matrix {
+    fn identity(n: usize) -> SparseMatrix {
         matrix(n, (0..n).map(|i| (i, i, 1.0)))
     }
 
     /// Springs of stiffness one between i and k. A pair (i, i) is a spring to the ground.
-    fn springs(n: usize, between: impl IntoIterator<Item = (usize, usize)>) -> Matrix {
+    fn springs(n: usize, between: impl IntoIterator<Item = (usize, usize)>) -> SparseMatrix {
         let spring = |(i, k): (usize, usize)| match i == k {
             true => vec![(i, i, 1.0)],
             false => vec![(i, i, 1.0), (k, k, 1.0), (i, k, -1.0), (k, i, -1.0)],
@@ -349,18 +364,18 @@ mod tests {
 
     /// The eigenvalues agree with the expected ones to `tolerance` of the value plus
     /// `rounding`. The shapes are orthonormal and satisfy the equations.
-    fn check(k: &Matrix, m: &Matrix, modes: &NaturalModes, expected: &[f64], rounding: f64) {
+    fn check(k: &SparseMatrix, m: &SparseMatrix, modes: &NaturalModes, expected: &[f64], rounding: f64) {
         assert_eq!(modes.count(), expected.len(), "{:?}", modes.values);
         let n = k.n();
         for (value, expected) in modes.values.iter().zip(expected) {
             assert!((value - expected).abs() <= 1e-11 * expected + rounding, "{value} instead of {expected}");
         }
-        let gram = columns::products(n, &modes.shapes, &m.times_columns(&modes.shapes));
+        let gram = multi_vector::inner_products(n, &modes.shapes, &m.multiply_columns(&modes.shapes));
         assert!((gram - DMatrix::identity(modes.count(), modes.count())).amax() < 1e-10);
-        let (kx, mx) = (k.times_columns(&modes.shapes), m.times_columns(&modes.shapes));
+        let (kx, mx) = (k.multiply_columns(&modes.shapes), m.multiply_columns(&modes.shapes));
         for mode in 0..modes.count() {
             let length = modes.shape(mode).iter().map(|x| x * x).sum::<f64>().sqrt();
-            let size = k.largest() * length;
+            let size = k.max_abs() * length;
             let off =
                 (0..n).map(|i| (kx[mode * n + i] - modes.values[mode] * mx[mode * n + i]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-9 * size, "mode {mode}: {off:e} of {size:e}");
@@ -377,18 +392,18 @@ mod tests {
             let sine = |x: f64| 4.0 * x.sin().powi(2);
             let held = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0), (n - 1, n - 1)]));
             let expected: Vec<f64> = (1..=count).map(|i| sine(PI * i as f64 / (2 * n + 2) as f64)).collect();
-            check(&held, &m, &modes(&held, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            check(&held, &m, &modes(&held, &m, ModeSelection::Lowest(12)).unwrap(), &expected, 1e-14);
             if n == 1 {
                 continue;
             }
             let free = springs(n, (1..n).map(|i| (i - 1, i)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i as f64 / (2 * n) as f64)).collect();
-            let found = modes(&free, &m, Wanted::Lowest(12)).unwrap();
+            let found = modes(&free, &m, ModeSelection::Lowest(12)).unwrap();
             check(&free, &m, &found, &expected, 1e-14);
-            assert_eq!(found.free(), 1);
+            assert_eq!(found.rigid_body_count(), 1);
             let ring = springs(n, (0..n).map(|i| (i, (i + 1) % n)));
             let expected: Vec<f64> = (0..count).map(|i| sine(PI * i.div_ceil(2) as f64 / n as f64)).collect();
-            check(&ring, &m, &modes(&ring, &m, Wanted::Lowest(12)).unwrap(), &expected, 1e-14);
+            check(&ring, &m, &modes(&ring, &m, ModeSelection::Lowest(12)).unwrap(), &expected, 1e-14);
         }
     }
 
@@ -411,14 +426,14 @@ mod tests {
         };
         let expected: Vec<f64> = (0..30).map(value).collect();
         // The largest eigenvalue is 12 / h² = 2e6. Its rounding affects all others.
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected, 1e-9);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(30)).unwrap(), &expected, 1e-9);
         let bound = 0.5 * (expected[24] + expected[25]);
-        let up_to = modes(&k, &m, Wanted::UpTo { value: bound, most: 25 }).unwrap();
+        let up_to = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 25 }).unwrap();
         check(&k, &m, &up_to, &expected[..25], 1e-9);
-        let many = modes(&k, &m, Wanted::UpTo { value: bound, most: 24 });
+        let many = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 24 });
         assert_eq!(many.unwrap_err(), ModesError::TooMany { count: 25, below: bound, most: 24 });
-        assert_eq!(modes(&k, &m, Wanted::UpTo { value: 0.9 * expected[0], most: 9 }).unwrap().count(), 0);
-        assert_eq!(modes(&k, &m, Wanted::UpTo { value: -1.0, most: 9 }).unwrap().count(), 0);
+        assert_eq!(modes(&k, &m, ModeSelection::UpTo { value: 0.9 * expected[0], most: 9 }).unwrap().count(), 0);
+        assert_eq!(modes(&k, &m, ModeSelection::UpTo { value: -1.0, most: 9 }).unwrap().count(), 0);
     }
 
     /// Clusters of eigenvalues larger than a block, and an upper bound equal to an eigenvalue.
@@ -428,9 +443,9 @@ mod tests {
         let value = |i: usize| 1.0 + (i / 11) as f64;
         let (k, m) = (matrix(n, (0..n).map(|i| (i, i, 2.0 * value(i)))), matrix(n, (0..n).map(|i| (i, i, 2.0))));
         let expected: Vec<f64> = (0..n).map(value).collect();
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(30)).unwrap(), &expected[..30], 0.0);
-        check(&k, &m, &modes(&k, &m, Wanted::UpTo { value: 3.0, most: 99 }).unwrap(), &expected[..33], 0.0);
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(n + 5)).unwrap(), &expected, 0.0);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(30)).unwrap(), &expected[..30], 0.0);
+        check(&k, &m, &modes(&k, &m, ModeSelection::UpTo { value: 3.0, most: 99 }).unwrap(), &expected[..33], 0.0);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(n + 5)).unwrap(), &expected, 0.0);
     }
 
     /// Equal oscillators with weak coupling springs: all eigenvalues agree to 0.4 %,
@@ -442,10 +457,10 @@ mod tests {
         let k = matrix(n, links.chain((0..n).map(|i| (i, i, (1.0 + 2.0 * weak) * stiffness))));
         let cosine = |i: usize| (PI * i as f64 / (n + 1) as f64).cos();
         let expected: Vec<f64> = (1..=n).map(|i| stiffness * (1.0 + 2.0 * weak * (1.0 - cosine(i)))).collect();
-        check(&k, &identity(n), &modes(&k, &identity(n), Wanted::Lowest(6)).unwrap(), &expected[..6], 1e-8);
-        let bound = Wanted::UpTo { value: 1.1 * stiffness, most: n };
+        check(&k, &identity(n), &modes(&k, &identity(n), ModeSelection::Lowest(6)).unwrap(), &expected[..6], 1e-8);
+        let bound = ModeSelection::UpTo { value: 1.1 * stiffness, most: n };
         check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected, 1e-8);
-        let bound = Wanted::UpTo { value: 0.5 * (expected[29] + expected[30]), most: n };
+        let bound = ModeSelection::UpTo { value: 0.5 * (expected[29] + expected[30]), most: n };
         check(&k, &identity(n), &modes(&k, &identity(n), bound).unwrap(), &expected[..30], 1e-8);
     }
 
@@ -456,11 +471,11 @@ mod tests {
         let (k, m) = (springs(n, (0..n).map(|i| (i, (i + 1) % n))), identity(n));
         let expected: Vec<f64> =
             (0..401usize).map(|i| 4.0 * (PI * i.div_ceil(2) as f64 / n as f64).sin().powi(2)).collect();
-        let found = modes(&k, &m, Wanted::Lowest(401)).unwrap();
+        let found = modes(&k, &m, ModeSelection::Lowest(401)).unwrap();
         check(&k, &m, &found, &expected, 1e-13);
-        assert!(found.effort.factors > 2, "{:?}", found.effort);
+        assert!(found.cost.factors > 2, "{:?}", found.cost);
         let bound = 0.5 * (expected[350] + expected[351]);
-        let found = modes(&k, &m, Wanted::UpTo { value: bound, most: 400 }).unwrap();
+        let found = modes(&k, &m, ModeSelection::UpTo { value: bound, most: 400 }).unwrap();
         check(&k, &m, &found, &expected[..351], 1e-13);
     }
 
@@ -491,8 +506,8 @@ mod tests {
             [-13.0, -3.0, -22.0, 4.0],
         ];
         let (k, m) = (element(bending, h.powi(-3)), element(inertia, h / 420.0));
-        let found = modes(&k, &m, Wanted::Lowest(8)).unwrap();
-        assert_eq!(found.free(), 0);
+        let found = modes(&k, &m, ModeSelection::Lowest(8)).unwrap();
+        assert_eq!(found.rigid_body_count(), 0);
         // Roots of cos β cosh β = -1, by Newton's method.
         for (i, value) in found.values.iter().enumerate() {
             let mut beta = (i as f64 + 0.5) * PI;
@@ -515,30 +530,30 @@ mod tests {
         let k = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0), (n - 1, n - 1)]));
         let m = matrix(n, (0..n).filter(|i| i % 2 == 1).map(|i| (i, i, 1.0)));
         let expected: Vec<f64> = (1..=100).map(|i| 2.0 * (PI * i as f64 / 202.0).sin().powi(2)).collect();
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(9)).unwrap(), &expected[..9], 1e-14);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(9)).unwrap(), &expected[..9], 1e-14);
         // No more modes than places with mass.
-        check(&k, &m, &modes(&k, &m, Wanted::Lowest(150)).unwrap(), &expected, 1e-14);
+        check(&k, &m, &modes(&k, &m, ModeSelection::Lowest(150)).unwrap(), &expected, 1e-14);
         let none = matrix(n, []);
-        assert_eq!(modes(&k, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+        assert_eq!(modes(&k, &none, ModeSelection::Lowest(3)).unwrap().count(), 0);
     }
 
     #[test]
-    fn what_has_no_modes_says_why() {
+    fn errors_of_systems_without_modes() {
         let n = 30;
         let (free, m) = (springs(n, (1..n).map(|i| (i - 1, i))), identity(n));
         let unstable = matrix(n, free.entries().chain([(4, 4, -0.5)]));
-        for wanted in [Wanted::Lowest(2), Wanted::UpTo { value: 100.0, most: n }] {
+        for wanted in [ModeSelection::Lowest(2), ModeSelection::UpTo { value: 100.0, most: n }] {
             assert!(matches!(modes(&unstable, &m, wanted), Err(ModesError::Negative { count: 1, .. })), "{wanted:?}");
         }
         let massless = matrix(n, m.entries().filter(|(i, ..)| *i < n - 2));
         let loose = springs(n, (1..n - 2).map(|i| (i - 1, i)));
-        assert!(matches!(modes(&loose, &massless, Wanted::Lowest(2)), Err(ModesError::Massless(_))));
+        assert!(matches!(modes(&loose, &massless, ModeSelection::Lowest(2)), Err(ModesError::Massless(_))));
         let negative = matrix(n, m.entries().map(|(i, k, v)| (i, k, if i == 3 { -v } else { v })));
         let held = springs(n, (1..n).map(|i| (i - 1, i)).chain([(0, 0)]));
-        let wrong = modes(&held, &negative, Wanted::Lowest(2));
+        let wrong = modes(&held, &negative, ModeSelection::Lowest(2));
         assert!(matches!(wrong, Err(ModesError::NegativeMass | ModesError::Negative { .. })), "{wrong:?}");
         let none = matrix(0, []);
-        assert_eq!(modes(&none, &none, Wanted::Lowest(3)).unwrap().count(), 0);
+        assert_eq!(modes(&none, &none, ModeSelection::Lowest(3)).unwrap().count(), 0);
     }
 
     /// Two sets of three masses. All modes fill the space, and further vectors are rounding:
@@ -552,7 +567,7 @@ mod tests {
             let both = (0..2).flat_map(|set| (0..9).map(move |at| (set, at / 3, at % 3)));
             let k = matrix(6, both.map(|(set, i, l)| (3 * set + i, 3 * set + l, k[i][l])));
             let m = matrix(6, (0..6).map(|i| (i, i, masses[i % 3])));
-            let found = modes(&k, &m, Wanted::Lowest(6)).unwrap();
+            let found = modes(&k, &m, ModeSelection::Lowest(6)).unwrap();
             assert_eq!(found.count(), 6, "{step}");
             assert!(found.values.chunks(2).all(|pair| (pair[1] / pair[0] - 1.0).abs() < 1e-9), "{:?}", found.values);
         }
@@ -562,7 +577,7 @@ mod tests {
     fn same_bits_on_every_thread() {
         let solve = || {
             let (k, m) = (springs(500, (0..500).map(|i| (i, (i + 1) % 500))), identity(500));
-            modes(&k, &m, Wanted::Lowest(21)).unwrap()
+            modes(&k, &m, ModeSelection::Lowest(21)).unwrap()
         };
         let here = solve();
         let there: Vec<_> = (0..3).map(|_| std::thread::spawn(solve)).collect();
@@ -598,7 +613,7 @@ mod tests {
             let all = |a: &DMatrix<f64>| matrix(size, (0..size * size).map(|at| (at / size, at % size, a[at])));
             let (k, m) = (all(&k), all(&m));
             for count in [1, rank, rank + 1, size + 3] {
-                let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
+                let found = modes(&k, &m, ModeSelection::Lowest(count)).unwrap();
                 prop_assert_eq!(found.count(), count.min(rank), "{:?} of {:?}", found.values, thetas);
                 for (value, theta) in found.values.iter().zip(&thetas) {
                     // The relative error of a mode grows with its eigenvalue
@@ -627,16 +642,16 @@ mod tests {
             let k = matrix(n, links.iter().flat_map(spring));
             let coupled = links.iter().take(8).flat_map(|(i, k, v)| [(*i, *i, *v), (*k, *k, *v), (*i, *k, 0.5 * v), (*k, *i, 0.5 * v)]);
             let m = matrix(n, (0..n).map(|i| (i, i, masses[i])).chain(coupled));
-            let dense = |a: &Matrix| DMatrix::from_fn(n, n, |i, k| a.get(i, k));
+            let dense = |a: &SparseMatrix| DMatrix::from_fn(n, n, |i, k| a.get(i, k));
             let l = dense(&m).cholesky().unwrap().l();
             let inverse = l.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap();
             let mut expected: Vec<f64> = (&inverse * dense(&k) * inverse.transpose()).symmetric_eigenvalues().iter().copied().collect();
             expected.sort_by(f64::total_cmp);
-            let found = modes(&k, &m, Wanted::Lowest(count)).unwrap();
+            let found = modes(&k, &m, ModeSelection::Lowest(count)).unwrap();
             check(&k, &m, &found, &expected[..count.min(n)], 1e-11 * expected[n - 1]);
             let bound = 0.5 * (expected[count.min(n) - 1] + expected.get(count).copied().unwrap_or(1e3 * expected[n - 1]));
             prop_assume!(expected.iter().all(|e| (e - bound).abs() > 1e-9 * expected[n - 1]));
-            let found = modes(&k, &m, Wanted::UpTo { value: bound, most: n }).unwrap();
+            let found = modes(&k, &m, ModeSelection::UpTo { value: bound, most: n }).unwrap();
             prop_assert_eq!(found.count(), count.min(n));
         }
     }

@@ -3,7 +3,7 @@
 
 use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
 use std::convert::Infallible;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::golden_section;
 
 /// A part of the curve that turns back. Below `at`, the motion does not continue the motion at
 /// `at`.
@@ -346,7 +346,7 @@ impl ModeCurve {
             damping
         };
         let Ok(_) =
-            maximum((high, low), |above, below| above - below <= LOCATED, |at| Ok::<_, Infallible>(damping(at)));
+            golden_section((high, low), |above, below| above - below <= LOCATED, |at| Ok::<_, Infallible>(damping(at)));
         Some(top)
     }
 

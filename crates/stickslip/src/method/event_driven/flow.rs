@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::interrupt;
-use stickslip_numerics::signal::{Basis, Begin, FirstZero, Scratch, real_dot};
+use stickslip_numerics::signal::{ExponentialBasis, FirstZero, InitialSign, ZeroScratch, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -58,7 +58,7 @@ impl Segment {
     }
 
     /// Returns the basis of its signals.
-    pub fn basis(&self) -> &Basis {
+    pub fn basis(&self) -> &ExponentialBasis {
         &self.driven.basis
     }
 }
@@ -79,12 +79,12 @@ pub(crate) struct SegmentedMotion {
     switches: usize,
     decision: Decision,
     work: Work,
-    scratch: Scratch,
+    scratch: ZeroScratch,
     values: Vec<Complex64>,
     velocity: Vec<Complex64>,
     acceleration: Vec<Complex64>,
     signals: Vec<Complex64>,
-    begins: Vec<Begin>,
+    begins: Vec<InitialSign>,
     watched: Vec<usize>,
     /// Marks parts that are monitored for a switch in the forward and in the backward
     /// direction.
@@ -116,7 +116,7 @@ impl SegmentedMotion {
             switches: 0,
             decision,
             work,
-            scratch: Scratch::default(),
+            scratch: ZeroScratch::default(),
             values: Vec::new(),
             velocity: Vec::new(),
             acceleration: Vec::new(),
@@ -181,7 +181,7 @@ impl SegmentedMotion {
             let zero = basis.first_zero(&self.signals, &self.begins, rest, &mut self.scratch);
             let (length, event) = match zero {
                 FirstZero::None => (rest, None),
-                FirstZero::At { index, time } => (time, Some(self.watched[index])),
+                FirstZero::Found { index, time } => (time, Some(self.watched[index])),
                 FirstZero::TooManySteps => return Err(Breakdown::TooFast { time }),
             };
             self.finish_segment(&pattern, length, state, sensitivity.as_deref_mut());
@@ -553,14 +553,14 @@ fn add(sum: &mut [Complex64], signal: &[Complex64], factor: f64) {
 
 /// Returns the initial sign of a signal, from its value and the tolerance for zero. If `eased`,
 /// a signal that begins at zero is raised above zero through its constant part.
-fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Begin {
+fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> InitialSign {
     if value > zero {
-        Begin::Positive
+        InitialSign::Positive
     } else if eased {
         constant.re += 2.0 * zero;
-        Begin::Positive
+        InitialSign::Positive
     } else {
-        Begin::Zero
+        InitialSign::Zero
     }
 }
 

@@ -11,7 +11,7 @@ use crate::law::Contact;
 use crate::method::drive::Drive;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stickslip_numerics::modes::Defective;
+use stickslip_numerics::quadratic_modes::DefectiveModes;
 
 /// Memory limit of the cache, bytes, for each of the flows that run in parallel. A return of a
 /// ring of 48 blades uses one to two hundred patterns of a quarter of a megabyte.
@@ -49,7 +49,7 @@ impl Memory {
         mechanics: &Mechanics,
         drive: &Drive,
         contacts: &[Contact],
-    ) -> Result<(Arc<Pattern>, Arc<Driven>), Defective> {
+    ) -> Result<(Arc<Pattern>, Arc<Driven>), DefectiveModes> {
         self.stuck.clear();
         self.stuck.extend(contacts.iter().map(|contact| *contact == Contact::Stick));
         self.uses += 1;

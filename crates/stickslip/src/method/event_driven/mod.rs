@@ -195,7 +195,7 @@ impl<'a> Exact<'a> {
         if force.amax() == 0.0 || mechanics.parts.iter().any(|part| !part.is_slider()) {
             return false;
         }
-        let at_rest = eigen::singular(mechanics.stiffness.clone())
+        let at_rest = eigen::svd(mechanics.stiffness.clone())
             .and_then(|svd| svd.solve(force, UNHELD * svd.singular_values.amax()).ok());
         at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > UNHELD * force.amax())
     }

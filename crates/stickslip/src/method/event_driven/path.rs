@@ -13,8 +13,8 @@ use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetr
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
-use stickslip_numerics::extremes::{Extremes, Range};
-use stickslip_numerics::signal::{Basis, FourierIntegrals, Products, real_dot};
+use stickslip_numerics::signal::{ExponentialBasis, FourierIntegrals, ProductIntegrals, real_dot};
+use stickslip_numerics::signal_range::{RangeScratch, SignalSegment, ValueRange};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -224,11 +224,11 @@ struct Measuring<'a> {
     axes: Vec<&'a Axis>,
     /// First index of each piece's coefficients in a signal, and the total length.
     cuts: Vec<usize>,
-    products: Vec<Products>,
+    products: Vec<ProductIntegrals>,
     /// Entries by frequency, rad/s: the phase factor at the start of each piece, and the
     /// integrals over it.
     fourier: RefCell<Vec<(f64, Turning)>>,
-    memory: RefCell<Extremes>,
+    memory: RefCell<RangeScratch>,
 }
 
 type Turning = Vec<(Complex64, FourierIntegrals)>;
@@ -239,7 +239,8 @@ impl<'a> Measuring<'a> {
         for piece in &path.pieces {
             cuts.push(cuts[cuts.len() - 1] + piece.basis().len());
         }
-        let products = |piece: &Piece| Products::new(piece.basis(), &piece.segment.at_end, piece.segment.length);
+        let products =
+            |piece: &Piece| ProductIntegrals::new(piece.basis(), &piece.segment.at_end, piece.segment.length);
         Measuring {
             path,
             axes: path.system.axes().map(|(_, axis)| axis).collect(),
@@ -278,16 +279,17 @@ impl<'a> Measuring<'a> {
     /// Returns the least and the largest value of a signal.
     fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), Breakdown> {
         let mut memory = self.memory.borrow_mut();
-        let mut range = Range::new(self.path.symmetry == Symmetry::HalfPeriod);
+        let mut range = ValueRange::new(self.path.symmetry == Symmetry::HalfPeriod);
         // values known from all pieces reduce the search in each of them
         for (piece, coefficients) in self.pieces() {
-            range.take(piece.basis().beginning(&signal[coefficients]));
+            range.include(piece.basis().initial_value(&signal[coefficients]));
         }
         for (piece, coefficients) in self.pieces() {
             let Segment { start, length, at_end, .. } = &piece.segment;
+            let segment = SignalSegment { coefficients: &signal[coefficients], at_end, length: *length };
             piece
                 .basis()
-                .extend(&mut range, (&signal[coefficients], at_end), *length, &mut memory)
+                .extend_range(&mut range, segment, &mut memory)
                 .map_err(|_| Breakdown::TooFast { time: *start })?;
         }
         Ok((range.low, range.high))
@@ -336,7 +338,7 @@ impl Signals for Measuring<'_> {
         to.iter_mut().zip(signal).for_each(|(to, value)| *to += value * factor);
     }
     fn product(&self, a: &Vec<Complex64>, b: &Vec<Complex64>) -> f64 {
-        let integral = |((piece, range), products): ((&Piece, std::ops::Range<usize>), &Products)| {
+        let integral = |((piece, range), products): ((&Piece, std::ops::Range<usize>), &ProductIntegrals)| {
             products.integral(piece.basis(), &a[range.clone()], &b[range])
         };
         self.pieces().zip(&self.products).map(integral).sum()
@@ -366,7 +368,7 @@ impl Signals for Measuring<'_> {
         let mut sum = 0.0;
         for (piece, range) in self.pieces() {
             let u = &u[range];
-            let travel = real_dot(u, &piece.segment.at_end) - piece.basis().beginning(u);
+            let travel = real_dot(u, &piece.segment.at_end) - piece.basis().initial_value(u);
             for share in self.path.of_joint(axis) {
                 let contact = piece.segment.contacts[share.part];
                 sum += contact.sign() * self.path.parts[share.part].limit() * share.of(contact) * travel;
@@ -396,7 +398,7 @@ impl Signals for Measuring<'_> {
 }
 
 /// Returns the derivatives of consecutive signals.
-fn derivative(basis: &Basis, signals: &[Complex64]) -> Vec<Complex64> {
+fn derivative(basis: &ExponentialBasis, signals: &[Complex64]) -> Vec<Complex64> {
     let mut out = vec![ZERO; signals.len()];
     for (signal, out) in signals.chunks_exact(basis.len()).zip(out.chunks_exact_mut(basis.len())) {
         basis.differentiate(signal, out);
@@ -405,7 +407,7 @@ fn derivative(basis: &Basis, signals: &[Complex64]) -> Vec<Complex64> {
 }
 
 impl Piece {
-    fn basis(&self) -> &Basis {
+    fn basis(&self) -> &ExponentialBasis {
         self.segment.basis()
     }
 }

@@ -4,7 +4,7 @@
 //! springs in series with sliders, and stops are forces that are constant or linear in `x`. Let
 //! `N` be an M-orthonormal basis of the remaining free directions and `S = M⁻¹Wₛ(WₛᵀM⁻¹Wₛ)⁺`.
 //! The motion is `x = N q + S (c - g)` with `q'' + NᵀCN q' + NᵀKₚN q = Nᵀ(forces)`, which the
-//! modes of [`stickslip_numerics::modes`] solve in closed form.
+//! modes of [`stickslip_numerics::quadratic_modes`] solve in closed form.
 //!
 //! A pattern does not depend on time, excitation frequency or slip direction. Its key is the
 //! set of stuck and closed parts.
@@ -14,17 +14,17 @@ use crate::law::Contact;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use stickslip_numerics::dense::multiply;
+use stickslip_numerics::dense::{ProductShape, multiply};
 use stickslip_numerics::eigen;
-use stickslip_numerics::modes::{Defective, Modes};
-use stickslip_numerics::signal::Basis;
+use stickslip_numerics::quadratic_modes::{DefectiveModes, QuadraticModes};
+use stickslip_numerics::signal::ExponentialBasis;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Relative eigenvalue of the Delassus matrix below which directions of stuck sliders are
 /// redundant.
 const REDUNDANT: f64 = 1e-11;
-/// Relative eigenvalue below which a mode has frequency zero: the rounding of `Modes`.
+/// Relative eigenvalue below which a mode has frequency zero: the rounding of `QuadraticModes`.
 const STILL: f64 = 1e-13;
 /// Relative distance of a harmonic to a mode below which they are integrated as a resonant
 /// pair. At smaller distances, the ordinary particular solution would lose more than five
@@ -100,7 +100,7 @@ pub(crate) struct Beginning<'a> {
 /// Data of a pattern at one excitation frequency, shared by the segments of the motion.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Driven {
-    pub basis: Basis,
+    pub basis: ExponentialBasis,
     /// Number of exponents of the basis that are modes; those of the excitation follow.
     pub modes: usize,
     /// Steady complex displacement per harmonic, n each.
@@ -130,19 +130,19 @@ impl Driven {
 }
 
 impl Pattern {
-    pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, Defective> {
+    pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, DefectiveModes> {
         let n = mechanics.n;
         let held: Vec<usize> =
             (0..stuck.len()).filter(|&s| stuck[s] && mechanics.parts[s].stiffness().is_none()).collect();
         let w = DMatrix::from_fn(n, held.len(), |i, s| mechanics.parts[held[s]].direction[i]);
-        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
             &held.iter().map(|&s| mechanics.parts[s].holds()).collect::<Vec<_>>(),
         )
         .ok_or(out_of_range)?;
         let redundant = !held.is_empty() && {
-            let values = eigen::singular(inverse_delassus.clone()).ok_or(out_of_range)?.singular_values;
+            let values = eigen::svd(inverse_delassus.clone()).ok_or(out_of_range)?.singular_values;
             let least = REDUNDANT * inverse_delassus.amax();
             values.iter().filter(|value| **value > least).count() < held.len()
         };
@@ -171,8 +171,10 @@ impl Pattern {
         }
 
         let basis = free_directions(&mechanics.mass, &w).ok_or(out_of_range)?;
-        let modes =
-            Modes::new(&(basis.transpose() * &mechanics.damping * &basis), &(basis.transpose() * &stiffness * &basis))?;
+        let modes = QuadraticModes::new(
+            &(basis.transpose() * &mechanics.damping * &basis),
+            &(basis.transpose() * &stiffness * &basis),
+        )?;
         let frozen = mechanics
             .parts
             .iter()
@@ -588,7 +590,7 @@ impl Pattern {
             }
         }
         work.product.resize(2 * n * states, 0.0);
-        multiply(&work.transition, &work.rows, &mut work.product, (2 * n, inner, states));
+        multiply(&work.transition, &work.rows, &mut work.product, ProductShape { rows: 2 * n, inner, columns: states });
         for (c, column) in sensitivity.as_mut_slice().chunks_exact_mut(states).enumerate() {
             let moved = &work.product[c * 2 * n..(c + 1) * 2 * n];
             let (motion, springs) = column.split_at_mut(2 * n);

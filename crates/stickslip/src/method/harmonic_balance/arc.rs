@@ -229,7 +229,7 @@ impl ModeEquations<'_> {
                 right[size] = 0.0;
             }
             let open = if self.mixes { open(&bordered, size + 1) } else { Vec::new() };
-            let mut sign = dense::solve_signed(&mut bordered, size + 1, &mut right)?;
+            let mut sign = dense::solve_with_determinant_sign(&mut bordered, size + 1, &mut right)?;
             if !open.is_empty() {
                 sign = 0.0;
                 shorten(&mut right, open, &|one, other| self.inner(&point, one, other));

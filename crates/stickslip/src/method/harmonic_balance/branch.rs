@@ -17,7 +17,7 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::continuation::Equations;
+use stickslip_numerics::continuation::ParametricEquations;
 
 /// Default number of harmonics, in units of the excitation's greatest common divisor.
 const HARMONICS: usize = 15;
@@ -198,11 +198,11 @@ impl<'a> BranchEquations<'a> {
     /// Returns the orbit at `value` that the solver finds from the nearby point `x`.
     pub fn near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
         let mut x = x.to_vec();
-        self.leap(&mut x, value).then(|| self.orbit(&x, value))?
+        self.jump_kink(&mut x, value).then(|| self.orbit(&x, value))?
     }
 }
 
-impl Equations for BranchEquations<'_> {
+impl ParametricEquations for BranchEquations<'_> {
     fn size(&self) -> usize {
         2 * self.motion.c.len()
     }
@@ -232,7 +232,7 @@ impl Equations for BranchEquations<'_> {
         true
     }
 
-    fn leap(&mut self, x: &mut [f64], p: f64) -> bool {
+    fn jump_kink(&mut self, x: &mut [f64], p: f64) -> bool {
         if !self.set(p) {
             return false;
         }

@@ -20,7 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
-use stickslip_numerics::dense::{Lu, multiply_in_blocks};
+use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_blocked};
 
 /// Receptance of the structure, relative to the compliance of a closed contact, up to which the
 /// structure is well supported. Two digits are lost at this value.
@@ -58,7 +58,7 @@ pub(super) struct Modes {
     structure: Arc<Uncoupled>,
     /// Modal stiffness of the closed contacts, `Φᵀ k Φ`.
     coupling: Vec<f64>,
-    factor: RefCell<Option<(f64, Arc<Lu<f64>>)>>,
+    factor: RefCell<Option<(f64, Arc<DenseLu<f64>>)>>,
 }
 
 impl Modes {
@@ -71,12 +71,18 @@ impl Modes {
         // the columns of `at` are modes, so the first factor is transposed
         let rows: Vec<f64> =
             (0..p).flat_map(|q| (0..n).map(move |m| (q, m))).map(|(q, m)| weighted[m * p + q]).collect();
-        multiply_in_blocks(&rows, &structure.at, &mut coupling, (n, p, n), false);
+        multiply_blocked(
+            &rows,
+            &structure.at,
+            &mut coupling,
+            ProductShape { rows: n, inner: p, columns: n },
+            Transpose::No,
+        );
         Modes { structure: structure.clone(), coupling, factor: RefCell::default() }
     }
 
     /// Returns the factored modal stiffness. It is kept until the excitation frequency changes.
-    pub fn factor(&self, omega: f64) -> Result<Arc<Lu<f64>>, Resonant> {
+    pub fn factor(&self, omega: f64) -> Result<Arc<DenseLu<f64>>, Resonant> {
         let mut kept = self.factor.borrow_mut();
         if let Some((of, factor)) = &*kept
             && *of == omega
@@ -88,7 +94,7 @@ impl Modes {
         for (m, [mass, _, stiffness]) in self.structure.own().iter().enumerate() {
             matrix[m * n + m] += stiffness + (HOLD * omega).powi(2) * mass;
         }
-        let factor = Arc::new(Lu::new(matrix, n).map_err(|_| Resonant)?);
+        let factor = Arc::new(DenseLu::new(matrix, n).map_err(|_| Resonant)?);
         *kept = Some((omega, factor.clone()));
         Ok(factor)
     }
@@ -110,7 +116,7 @@ impl Modes {
         let mut moved: Vec<f64> = (0..p).flat_map(|q| (0..n).map(move |m| at[m * p + q])).collect();
         factor.solve(&mut moved);
         let mut product = vec![0.0; p * p];
-        multiply_in_blocks(at, &moved, &mut product, (p, n, p), false);
+        multiply_blocked(at, &moved, &mut product, ProductShape { rows: p, inner: n, columns: p }, Transpose::No);
         Ok(DMatrix::from_iterator(p, p, product.into_iter().map(|r| Complex64::new(r, 0.0))))
     }
 }

@@ -25,9 +25,9 @@ use super::rest::CACHED;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::dense::{ComplexLu, Lu, multiply_in_blocks};
-use stickslip_numerics::krylov::{Gmres, Limits};
-use stickslip_numerics::pairs::Pairs;
+use stickslip_numerics::complex_gemv::ComplexGemv;
+use stickslip_numerics::dense::{ComplexLu, DenseLu, ProductShape, Transpose, multiply_blocked};
+use stickslip_numerics::gmres::{Gmres, GmresLimits};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -136,7 +136,7 @@ impl Coupled {
         let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
         let (residual, finest) = (near.residual, if near.sketched { FINEST_OF_SKETCHES } else { 0.0 });
         let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED)).max(finest);
-        let limits = Limits { tolerance: wanted, vectors: VECTORS, products: PRODUCTS };
+        let limits = GmresLimits { tolerance: wanted, restart: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let Coupled { gmres, harmonics, split, above, force, moved, parts } = self;
@@ -148,7 +148,7 @@ impl Coupled {
             else {
                 break false;
             };
-            let most = if fresh { limits } else { Limits { products: STALE, vectors: STALE, ..limits } };
+            let most = if fresh { limits } else { GmresLimits { products: STALE, restart: STALE, ..limits } };
             let outcome = gmres.solve(
                 step,
                 most,
@@ -214,7 +214,13 @@ impl Linear<'_> {
             }
             parts.resize(wide, 0.0);
             // the tangent is row-major, so that v multiplies its transpose from the left
-            multiply_in_blocks(v, self.tangent(p, port), parts, (1, wide, wide), false);
+            multiply_blocked(
+                v,
+                self.tangent(p, port),
+                parts,
+                ProductShape { rows: 1, inner: wide, columns: wide },
+                Transpose::No,
+            );
             force.iter_mut().zip(parts.chunks_exact(2)).for_each(|(f, z)| *f = Complex64::new(z[0], z[1]) * unit);
         }
         receptance.apply(force, moved);
@@ -311,7 +317,7 @@ impl Linear<'_> {
         let mut matrix = Vec::new();
         self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
         // the matrix is row-major: its transpose is factored
-        let transposed = Lu::new(matrix, 2 * count * self.ports.count()).ok()?;
+        let transposed = DenseLu::new(matrix, 2 * count * self.ports.count()).ok()?;
         Some(Lowest { count, transposed })
     }
 
@@ -367,7 +373,7 @@ impl Linear<'_> {
 /// of triangular solutions, whose rows are too short for blocks.
 #[derive(Debug, Clone)]
 enum Answer {
-    Inverse(Pairs),
+    Inverse(ComplexGemv),
     Factor(ComplexLu),
 }
 
@@ -379,7 +385,7 @@ impl Answer {
         let mut inverse = vec![ZERO; size * size];
         inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
         factor.solve(&mut inverse);
-        Answer::Inverse(Pairs::new(&inverse, size))
+        Answer::Inverse(ComplexGemv::new(&inverse, size))
     }
 
     fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
@@ -395,7 +401,7 @@ impl Answer {
 struct Lowest {
     count: usize,
     /// The transposed Jacobian, in units.
-    transposed: Lu<f64>,
+    transposed: DenseLu<f64>,
 }
 
 impl Lowest {
@@ -492,7 +498,7 @@ struct Split {
     /// depend on the stiffness of the joints.
     above: Arc<Vec<f64>>,
     /// `1 + S K`, factored.
-    factor: Lu<f64>,
+    factor: DenseLu<f64>,
     /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
     pull: Vec<f64>,
     moved: Vec<f64>,
@@ -529,7 +535,13 @@ impl Split {
             let weighted: Vec<f64> =
                 high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own()[m][2])).collect();
             let mut sum = vec![0.0; p * p];
-            multiply_in_blocks(&weighted, &above, &mut sum, (p, high.len(), p), true);
+            multiply_blocked(
+                &weighted,
+                &above,
+                &mut sum,
+                ProductShape { rows: p, inner: high.len(), columns: p },
+                Transpose::Yes,
+            );
             (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);
             Arc::new(sum)
         });
@@ -548,12 +560,12 @@ impl Split {
             }
         }
         (0..p).for_each(|q| matrix[q * p + q] += 1.0);
-        let factor = Lu::new(matrix, p).ok()?;
+        let factor = DenseLu::new(matrix, p).ok()?;
         let mut moved: Vec<f64> = low.iter().flat_map(|&m| column(m)).copied().collect();
         factor.solve(&mut moved);
         let l = low.len();
         let mut core = vec![0.0; l * l];
-        multiply_in_blocks(&pull, &moved, &mut core, (l, p, l), false);
+        multiply_blocked(&pull, &moved, &mut core, ProductShape { rows: l, inner: p, columns: l }, Transpose::No);
         let closed = modal.closed.is_some();
         Some(Split { bound, closed, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
     }
@@ -589,7 +601,13 @@ impl Split {
         self.factor.solve(&mut columns);
         if l > 0 {
             let mut pulled = vec![0.0; l * wide];
-            multiply_in_blocks(&self.pull, &columns, &mut pulled, (l, p, wide), false);
+            multiply_blocked(
+                &self.pull,
+                &columns,
+                &mut pulled,
+                ProductShape { rows: l, inner: p, columns: wide },
+                Transpose::No,
+            );
             for (k, factor) in self.harmonics.iter().enumerate() {
                 let (re, im) = pulled[2 * k * l..2 * (k + 1) * l].split_at_mut(l);
                 let mut modal: Vec<Complex64> = re.iter().zip(&*im).map(|(re, im)| Complex64::new(*re, *im)).collect();
@@ -599,7 +617,13 @@ impl Split {
                 }
             }
             let mut moved = vec![0.0; p * wide];
-            multiply_in_blocks(&self.moved, &pulled, &mut moved, (p, l, wide), false);
+            multiply_blocked(
+                &self.moved,
+                &pulled,
+                &mut moved,
+                ProductShape { rows: p, inner: l, columns: wide },
+                Transpose::No,
+            );
             columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
         }
         for (q, v) in v.chunks_exact_mut(wide).enumerate() {

@@ -4,7 +4,7 @@ use super::hold::HOLD;
 use crate::model::System;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use stickslip_numerics::modes::Modes;
+use stickslip_numerics::quadratic_modes::QuadraticModes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -32,9 +32,11 @@ impl Modal {
         let factor = system.structure().mass().clone().cholesky()?;
         let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
         let back = to.transpose();
-        let modes =
-            Modes::new(&(&to * system.structure().damping() * &back), &(&to * system.structure().stiffness() * &back))
-                .ok()?;
+        let modes = QuadraticModes::new(
+            &(&to * system.structure().damping() * &back),
+            &(&to * system.structure().stiffness() * &back),
+        )
+        .ok()?;
         let complex = |matrix: &DMatrix<f64>| matrix.map(|w| Complex64::new(w, 0.0));
         let shape = complex(&back) * modes.shape;
         let left = modes.from_velocity * complex(&to);

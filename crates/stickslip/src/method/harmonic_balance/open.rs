@@ -10,7 +10,7 @@
 //! Source: Allgower and Georg, "Introduction to Numerical Continuation Methods"
 //! (2003), Ch. 3 (Moore-Penrose inverse).
 
-use stickslip_numerics::dense::Lu;
+use stickslip_numerics::dense::DenseLu;
 
 /// Change of the equations by a step of one along a null direction, both
 /// relative, at most. Rounding leaves 1e-13. Friction of only 1e-4 of the
@@ -29,7 +29,7 @@ pub(super) fn open(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
     let sizes: Vec<f64> = (0..n).map(|column| size(column).max(f64::MIN_POSITIVE)).collect();
     let scaled: Vec<f64> = matrix[..n * n].iter().enumerate().map(|(at, value)| value / sizes[at % n]).collect();
     // the matrix is row-major: its transpose is factored
-    let Ok(factor) = Lu::new(scaled.clone(), n) else { return Vec::new() };
+    let Ok(factor) = DenseLu::new(scaled.clone(), n) else { return Vec::new() };
     // pseudo-random columns
     let mut found: Vec<Vec<f64>> =
         (0..MOST.min(n)).map(|j| (0..n).map(|i| (1.0 + 7.0 * (i * MOST + j) as f64).sin()).collect()).collect();

@@ -263,7 +263,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
                 let u = relative(axis, &harmonics, x);
                 let velocity: Vec<_> =
                     harmonics.iter().zip(u).map(|(&h, c)| (h, Complex64::new(0.0, h as f64 * omega) * c)).collect();
-                level.alternation.fourier.synthesise(&velocity, &mut level.alternation.signal);
+                level.alternation.fourier.synthesize(&velocity, &mut level.alternation.signal);
                 level.alternation.signal.clone()
             })
             .collect();

@@ -6,8 +6,8 @@ use super::uncoupled::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::dense::{Lu, multiply_in_blocks};
-use stickslip_numerics::pairs::Pairs;
+use stickslip_numerics::complex_gemv::ComplexGemv;
+use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_blocked};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -27,7 +27,7 @@ pub(super) enum Receptance {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Formed {
     pub matrices: Vec<DMatrix<Complex64>>,
-    pairs: Vec<Pairs>,
+    pairs: Vec<ComplexGemv>,
     /// Forces and motions of one harmonic, and scratch memory of its product.
     force: Vec<Complex64>,
     memory: Vec<f64>,
@@ -36,7 +36,8 @@ pub(super) struct Formed {
 impl Formed {
     pub fn new(matrices: Vec<DMatrix<Complex64>>) -> Self {
         let few = |matrix: &&DMatrix<Complex64>| (BLOCKED..=CACHED).contains(&matrix.nrows());
-        let pairs = matrices.iter().filter(few).map(|matrix| Pairs::new(matrix.as_slice(), matrix.nrows())).collect();
+        let pairs =
+            matrices.iter().filter(few).map(|matrix| ComplexGemv::new(matrix.as_slice(), matrix.nrows())).collect();
         Formed { matrices, pairs, ..Formed::default() }
     }
 
@@ -44,7 +45,7 @@ impl Formed {
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.matrices.iter().map(|matrix| size_of_val(matrix.as_slice())).sum::<usize>()
-            + self.pairs.iter().map(Pairs::bytes).sum::<usize>()
+            + self.pairs.iter().map(ComplexGemv::bytes).sum::<usize>()
     }
 
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
@@ -58,7 +59,13 @@ impl Formed {
                 pairs.apply(forces, &mut self.memory);
                 &*forces
             } else if axes >= BLOCKED {
-                multiply_in_blocks(matrix.as_slice(), forces, sum, (axes, axes, 1), false);
+                multiply_blocked(
+                    matrix.as_slice(),
+                    forces,
+                    sum,
+                    ProductShape { rows: axes, inner: axes, columns: 1 },
+                    Transpose::No,
+                );
                 &*sum
             } else {
                 // column by column, the order in memory
@@ -82,7 +89,7 @@ pub(super) struct Modal {
     pub rates: Vec<Complex64>,
     gains: Vec<Vec<Complex64>>,
     /// Factor that replaces the first gains, if the mean has closed contacts.
-    pub closed: Option<Arc<Lu<f64>>>,
+    pub closed: Option<Arc<DenseLu<f64>>>,
     /// Compliances in series with the axes, m/N.
     pub series: Vec<f64>,
     /// Size of the mean motion along each axis under a unit force along it, m/N.
@@ -127,7 +134,13 @@ impl Modal {
         self.forces.clear();
         self.forces.extend(force.iter().flat_map(|f| [f.re, f.im]));
         self.modal.resize(tall * n, 0.0);
-        multiply_in_blocks(&self.forces, &self.structure.at, &mut self.modal, (tall, p, n), false);
+        multiply_blocked(
+            &self.forces,
+            &self.structure.at,
+            &mut self.modal,
+            ProductShape { rows: tall, inner: p, columns: n },
+            Transpose::No,
+        );
         let coupled = usize::from(self.closed.is_some());
         if let Some(closed) = &self.closed {
             let mut mean: Vec<f64> = self.modal.chunks_exact(tall).map(|column| column[0]).collect();
@@ -141,7 +154,13 @@ impl Modal {
             }
         }
         self.moved.resize(tall * p, 0.0);
-        multiply_in_blocks(&self.modal, &self.structure.at, &mut self.moved, (tall, n, p), true);
+        multiply_blocked(
+            &self.modal,
+            &self.structure.at,
+            &mut self.moved,
+            ProductShape { rows: tall, inner: n, columns: p },
+            Transpose::Yes,
+        );
         for (at, (u, pair)) in moved.iter_mut().zip(self.moved.chunks_exact(2)).enumerate() {
             *u = Complex64::new(pair[0], pair[1]) + force[at] * self.series[at / nh];
         }

@@ -23,7 +23,7 @@ use num_complex::Complex64;
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stickslip_numerics::dense::Lu;
+use stickslip_numerics::dense::DenseLu;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -115,7 +115,7 @@ enum Form {
 
 impl Closed {
     /// Returns the factored stiffness between modes, if the structure is in modes.
-    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<Lu<f64>>, Resonant>> {
+    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<DenseLu<f64>>, Resonant>> {
         match &self.form {
             Form::Rows(_) => None,
             Form::Modes(modes) => Some(modes.factor(omega)),

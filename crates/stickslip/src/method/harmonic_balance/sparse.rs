@@ -12,7 +12,7 @@ use super::hold::HOLD;
 use super::ports::Ports;
 use crate::model::System;
 use num_complex::Complex64;
-use stickslip_numerics::banded::{Banded, order};
+use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
 
 /// Number of degrees of freedom from which the banded form is considered.
 const LARGE: usize = 16;
@@ -46,10 +46,10 @@ pub(super) struct Sparse {
     harmonics: Vec<f64>,
     omega: f64,
     /// Z per harmonic, factored.
-    factors: Vec<Banded>,
-    tangent: Banded,
+    factors: Vec<BandedMatrix>,
+    tangent: BandedMatrix,
     /// The structure at a real rate.
-    smooth: Banded,
+    smooth: BandedMatrix,
     right: Vec<f64>,
     whole: Vec<f64>,
 }
@@ -92,7 +92,7 @@ impl Sparse {
             links.extend(touched.iter().flat_map(|a| touched.iter().map(|b| (*a, *b))));
         }
         let whole = n + unknown;
-        let position = order(whole, &links);
+        let position = cuthill_mckee(whole, &links);
         let band = links.iter().map(|&(a, b)| position[a].abs_diff(position[b])).max().unwrap_or(0);
         if is_dearer(whole, band) {
             return None;
@@ -109,9 +109,9 @@ impl Sparse {
             springs: Vec::new(),
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
-            factors: vec![Banded::new(factor.0, factor.1); nh],
-            smooth: Banded::new(whole, band),
-            tangent: Banded::new(tangent.0, tangent.1),
+            factors: vec![BandedMatrix::new(factor.0, factor.1); nh],
+            smooth: BandedMatrix::new(whole, band),
+            tangent: BandedMatrix::new(tangent.0, tangent.1),
             right: vec![0.0; 2 * whole],
             whole: vec![0.0; 2 * whole * nh],
         })
@@ -120,7 +120,7 @@ impl Sparse {
     /// Returns the memory of the banded form with a number of harmonics, bytes.
     pub fn memory(&self, harmonics: usize) -> f64 {
         let (factor, tangent) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
-        harmonics as f64 * Banded::bytes(factor.0, factor.1) + Banded::bytes(tangent.0, tangent.1)
+        harmonics as f64 * BandedMatrix::bytes(factor.0, factor.1) + BandedMatrix::bytes(tangent.0, tangent.1)
     }
 
     /// Returns the multiplications in the elimination of a step with a number of harmonics.
@@ -347,7 +347,7 @@ impl Sparse {
 
     /// Adds the structure's dynamic stiffness at all harmonics, between the
     /// places that have a number.
-    pub fn add_structure(&self, number: impl Fn(usize) -> Option<usize>, matrix: &mut Banded) {
+    pub fn add_structure(&self, number: impl Fn(usize) -> Option<usize>, matrix: &mut BandedMatrix) {
         let size = self.unknowns();
         for &(i, l, entry) in &self.entries {
             let (Some(i), Some(l)) = (number(i), number(l)) else { continue };

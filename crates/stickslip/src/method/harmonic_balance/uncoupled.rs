@@ -10,7 +10,7 @@ use crate::structure::{Structure, UncoupledModes};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -42,7 +42,13 @@ impl Uncoupled {
         }
         if let Some(shapes) = &modes.shapes {
             let along = std::mem::replace(&mut at, vec![0.0; axes * n]);
-            multiply_in_blocks(&along, shapes.as_slice(), &mut at, (axes, n, n), false);
+            multiply_blocked(
+                &along,
+                shapes.as_slice(),
+                &mut at,
+                ProductShape { rows: axes, inner: n, columns: n },
+                Transpose::No,
+            );
         }
         Some(Uncoupled { modes, at, axes })
     }
@@ -78,7 +84,13 @@ impl Uncoupled {
             let columns = self.at.chunks_exact(p.max(1)).zip(&gains);
             let weighted: Vec<f64> = columns.flat_map(|(at, g)| at.iter().map(move |a| a * read(g))).collect();
             let mut product = vec![0.0; p * p];
-            multiply_in_blocks(&weighted, &self.at, &mut product, (p, n, p), true);
+            multiply_blocked(
+                &weighted,
+                &self.at,
+                &mut product,
+                ProductShape { rows: p, inner: n, columns: p },
+                Transpose::Yes,
+            );
             product
         };
         let re = part(|g| g.re);

@@ -2,7 +2,7 @@
 
 use super::ports::{Ports, block};
 use super::sparse::Sparse;
-use stickslip_numerics::banded::Banded;
+use stickslip_numerics::banded::BandedMatrix;
 
 /// Adjacency of ports and places.
 #[derive(Debug, Clone)]
@@ -116,11 +116,11 @@ pub(super) struct Window {
     /// Number of unknowns of a place.
     size: usize,
     /// The structure alone, factored.
-    alone: Banded,
+    alone: BandedMatrix,
     /// The equations, their factor, and the factor with changed derivatives of the cluster.
-    matrix: Banded,
-    factored: Banded,
-    changed: Banded,
+    matrix: BandedMatrix,
+    factored: BandedMatrix,
+    changed: BandedMatrix,
     right: Vec<f64>,
 }
 
@@ -151,7 +151,7 @@ impl Window {
             let coupled = neighbours.links[*place].iter().chain(by_ports).filter_map(|near| number[*near]);
             band = coupled.map(|l| i.abs_diff(l)).fold(band, usize::max);
         }
-        let mut matrix = Banded::new(places.len() * size, (band + 1) * size - 1);
+        let mut matrix = BandedMatrix::new(places.len() * size, (band + 1) * size - 1);
         sparse.add_structure(|place| number[place], &mut matrix);
         let mut alone = matrix.clone();
         if !alone.factor() {
@@ -209,7 +209,7 @@ impl Window {
 }
 
 /// Replaces forces along axes by the motions along them.
-fn through(ends: &[Vec<(usize, f64)>], size: usize, (matrix, right): (&Banded, &mut [f64]), forces: &mut [f64]) {
+fn through(ends: &[Vec<(usize, f64)>], size: usize, (matrix, right): (&BandedMatrix, &mut [f64]), forces: &mut [f64]) {
     right.fill(0.0);
     for (ends, forces) in ends.iter().zip(forces.chunks_exact(size)) {
         for &(i, w) in ends {
@@ -226,7 +226,7 @@ fn through(ends: &[Vec<(usize, f64)>], size: usize, (matrix, right): (&Banded, &
 }
 
 /// Adds the derivative of a port with the given ends.
-fn add_port(ends: &[Vec<(usize, f64)>], tangent: &[f64], size: usize, matrix: &mut Banded) {
+fn add_port(ends: &[Vec<(usize, f64)>], tangent: &[f64], size: usize, matrix: &mut BandedMatrix) {
     for (a, row) in tangent.chunks_exact(size * ends.len()).enumerate() {
         for &(i, w) in &ends[a / size] {
             for (ends, row) in ends.iter().zip(row.chunks_exact(size)) {

@@ -8,7 +8,7 @@ use super::law::Follower;
 use super::step::Eliminated;
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::DMatrix;
-use stickslip_numerics::lu::Lu;
+use stickslip_numerics::small_lu::SmallLu;
 
 /// Derivatives with respect to the initial state of a run. Each matrix has one column per
 /// coordinate.
@@ -70,7 +70,7 @@ impl Carried {
     }
 
     /// Carries the derivatives over the last step of the laws, whose equations are factored.
-    pub fn advance(&mut self, assembly: &Assembly, eliminated: &Eliminated, laws: &[Follower], lu: &Lu) {
+    pub fn advance(&mut self, assembly: &Assembly, eliminated: &Eliminated, laws: &[Follower], lu: &SmallLu) {
         let (n, axes, h) = (assembly.n, assembly.axes.len(), eliminated.length);
         let columns = self.state.nrows();
         if columns == 0 {

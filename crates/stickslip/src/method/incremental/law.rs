@@ -8,7 +8,7 @@
 
 use crate::law::{Contact, MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, StepPoint};
 use crate::method::assembly::PlacedLaw;
-use stickslip_numerics::lu::Lu;
+use stickslip_numerics::small_lu::SmallLu;
 
 /// The view used to evaluate a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,7 +135,7 @@ pub(super) struct Follower {
     halves: [StepPoint; 2],
     before: RatePoint,
     after: RatePoint,
-    lu: Lu,
+    lu: SmallLu,
     change: Vec<f64>,
 }
 
@@ -167,7 +167,7 @@ impl Follower {
             halves: std::array::from_fn(|_| StepPoint::new(directions, states)),
             before: RatePoint::new(directions, states),
             after: RatePoint::new(directions, states),
-            lu: Lu::default(),
+            lu: SmallLu::default(),
             change: vec![0.0; states],
         }
     }
@@ -361,7 +361,7 @@ impl Follower {
                 }
                 self.change[s] = from.z[s] + half * (self.before.rate[s] + self.after.rate[s]) - self.state[s];
             }
-            if !self.lu.factorise() {
+            if !self.lu.factor() {
                 return false;
             }
             if found {

@@ -11,7 +11,7 @@ use crate::method::assembly::{Assembly, PlacedLaw};
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
-use stickslip_numerics::lu::Lu;
+use stickslip_numerics::small_lu::SmallLu;
 
 /// The eliminated structure for one step size.
 #[derive(Debug, Clone)]
@@ -76,7 +76,7 @@ pub(super) struct Step {
     sum: DVector<f64>,
     residual: Vec<f64>,
     /// The factored equations at the end.
-    pub lu: Lu,
+    pub lu: SmallLu,
     z: Vec<f64>,
 }
 
@@ -107,7 +107,7 @@ impl Step {
             load: DVector::zeros(n),
             sum: DVector::zeros(n),
             residual: vec![0.0; j],
-            lu: Lu::default(),
+            lu: SmallLu::default(),
             z: vec![0.0; assembly.internal],
         }
     }
@@ -161,7 +161,7 @@ impl Step {
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
             interrupt::check();
-            if !self.evaluate(assembly, eliminated, drive, (time, &state[n..2 * n])) || !self.lu.factorise() {
+            if !self.evaluate(assembly, eliminated, drive, (time, &state[n..2 * n])) || !self.lu.factor() {
                 return false;
             }
             if converged {

@@ -16,7 +16,7 @@ use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-use stickslip_numerics::radau::{A, C, ERROR, ESTIMATE, REAL, STAGES};
+use stickslip_numerics::radau::{BUTCHER_MATRIX, ERROR_WEIGHTS, ESTIMATE_ORDER, NODES, REAL_EIGENVALUE, STAGES};
 
 /// The time interval has `2^LEVELS` ticks. The finest layers of the arctan law need about
 /// `2^20` steps per half period.
@@ -99,7 +99,7 @@ pub(crate) struct SmoothFlow {
 impl SmoothFlow {
     pub fn new(assembly: Assembly, tolerance: f64) -> Self {
         let (states, n, j) = (assembly.states(), assembly.n, assembly.axes.len());
-        let nodes = C.into_iter().zip(A[STAGES - 1]).collect();
+        let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
         SmoothFlow {
             drive: Drive::default(),
             tolerance,
@@ -142,7 +142,7 @@ impl SmoothFlow {
             self.loads.force.resize_vertically_mut(STAGES * n, 0.0);
         }
         self.loads.stage.clear();
-        for (i, c) in C.iter().enumerate() {
+        for (i, c) in NODES.iter().enumerate() {
             let at = time + c * h;
             self.drive.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
             for axis in 0..j {
@@ -167,7 +167,7 @@ impl SmoothFlow {
             return;
         };
         let onward =
-            self.onward[LEVELS + self.level - level].get_or_insert_with(|| C.map(|c| onward(1.0 + c * h / length)));
+            self.onward[LEVELS + self.level - level].get_or_insert_with(|| NODES.map(|c| onward(1.0 + c * h / length)));
         for (i, weights) in onward.iter().enumerate() {
             for (offset, count) in [(0, j), (STAGES * j, internal)] {
                 for k in 0..count {
@@ -271,14 +271,14 @@ impl SmoothFlow {
             for (d, axis) in joint.axes().enumerate() {
                 let power = |k: usize| self.step.unknown[k * j + axis] * self.step.force[k * j + axis];
                 let mut raw = point.force[d] * self.drive.relative_at(axis, time).1;
-                for (weight, row) in ERROR.iter().zip(A) {
+                for (weight, row) in ERROR_WEIGHTS.iter().zip(BUTCHER_MATRIX) {
                     raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
                 }
                 // the reference of an unbounded law is its present force
                 let limit = joint.law.scale();
                 let force = if limit.is_finite() { limit } else { self.step.force.amax().max(point.force[d].abs()) };
                 if raw != 0.0 {
-                    largest = largest.max((raw * h / REAL).abs() / (force * travel * self.tolerance));
+                    largest = largest.max((raw * h / REAL_EIGENVALUE).abs() / (force * travel * self.tolerance));
                 }
             }
         }
@@ -362,7 +362,7 @@ impl SmoothFlow {
         }
         // number of halvings that bring the error below one
         let halvings = if error.is_finite() {
-            ((error / SAFETY).log2() / f64::from(ESTIMATE)).ceil().clamp(1.0, 4.0) as usize
+            ((error / SAFETY).log2() / f64::from(ESTIMATE_ORDER)).ceil().clamp(1.0, 4.0) as usize
         } else {
             2
         };
@@ -374,7 +374,7 @@ impl SmoothFlow {
 /// Returns the weights of the stages in the collocation polynomial of a step at `s`, where `s`
 /// is relative to the step size.
 pub(in crate::method) fn onward(s: f64) -> [f64; STAGES] {
-    std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - C[r]) / (C[q] - C[r])).product())
+    std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - NODES[r]) / (NODES[q] - NODES[r])).product())
 }
 
 /// Collects the forces along the axes.
@@ -523,7 +523,7 @@ impl Flow for SmoothFlow {
             // error passes
             if self.level > COARSEST
                 && position.is_multiple_of(1u64 << (LEVELS - self.level + 1))
-                && error * 2f64.powi(ESTIMATE) < SAFETY
+                && error * 2f64.powi(ESTIMATE_ORDER) < SAFETY
             {
                 self.level -= 1;
             }

@@ -11,9 +11,9 @@ use crate::law::{RatePoint, Relative};
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
-use stickslip_numerics::lu::Lu;
-use stickslip_numerics::radau::{A, C, ERROR, REAL, STAGES, squared};
-use stickslip_numerics::short::{add, add_product, add_product_of_rows};
+use stickslip_numerics::radau::{BUTCHER_MATRIX, ERROR_WEIGHTS, NODES, REAL_EIGENVALUE, STAGES, matrix_squared};
+use stickslip_numerics::small_lu::SmallLu;
+use stickslip_numerics::small_matvec::{add_matmul_row_major, add_matvec, axpy};
 
 /// The eliminated structure for one step size.
 #[derive(Debug, Clone)]
@@ -36,27 +36,27 @@ pub(crate) struct Eliminated {
     end: [DMatrix<f64>; 3],
     /// The weighted increments of the error estimate, in the same form, 2n rows.
     increments: [DMatrix<f64>; 3],
-    /// `P = (γM + C + K/γ)⁻¹` of the filter, with `γ = REAL/h`; `P W` and `Wᵀ P W`.
+    /// `P = (γM + C + K/γ)⁻¹` of the filter, with `γ = REAL_EIGENVALUE/h`; `P W` and `Wᵀ P W`.
     filter: [DMatrix<f64>; 3],
 }
 
 impl Eliminated {
     pub fn new(assembly: &Assembly, h: f64) -> Self {
         let (n, j) = (assembly.n, assembly.axes.len());
-        let a2 = squared();
+        let a2 = matrix_squared();
         // (M + h C A + h² K A²) acc = load - W f - C v - K (x + c h v)
         let mut left = DMatrix::zeros(STAGES * n, STAGES * n);
         let mut from_state = DMatrix::zeros(STAGES * n, 2 * n);
         for i in 0..STAGES {
             for k in 0..STAGES {
                 let mut block = left.view_mut((i * n, k * n), (n, n));
-                block += &assembly.damping * (h * A[i][k]) + &assembly.stiffness * (h * h * a2[i][k]);
+                block += &assembly.damping * (h * BUTCHER_MATRIX[i][k]) + &assembly.stiffness * (h * h * a2[i][k]);
                 if i == k {
                     block += &assembly.mass;
                 }
             }
             from_state.view_mut((i * n, 0), (n, n)).copy_from(&(-&assembly.stiffness));
-            let v = -(&assembly.damping + &assembly.stiffness * (C[i] * h));
+            let v = -(&assembly.damping + &assembly.stiffness * (NODES[i] * h));
             from_state.view_mut((i * n, n), (n, n)).copy_from(&v);
         }
         let inverse = inverted(left);
@@ -72,7 +72,7 @@ impl Eliminated {
             for i in 0..STAGES {
                 for k in 0..STAGES {
                     let rows = acceleration.view((k * n, 0), (n, acceleration.ncols()));
-                    for (first, share) in [(i * n, h * h * a2[i][k]), ((STAGES + i) * n, h * A[i][k])] {
+                    for (first, share) in [(i * n, h * h * a2[i][k]), ((STAGES + i) * n, h * BUTCHER_MATRIX[i][k])] {
                         let mut sum = out.view_mut((first, 0), (n, acceleration.ncols()));
                         sum.zip_apply(&rows, |sum, a| *sum += a * share);
                     }
@@ -84,7 +84,7 @@ impl Eliminated {
         for i in 0..STAGES {
             for row in 0..n {
                 stage_from_state[(i * n + row, row)] += 1.0;
-                stage_from_state[(i * n + row, n + row)] += C[i] * h;
+                stage_from_state[(i * n + row, n + row)] += NODES[i] * h;
                 stage_from_state[((STAGES + i) * n + row, n + row)] += 1.0;
             }
         }
@@ -102,16 +102,16 @@ impl Eliminated {
             }
             out
         };
-        let mut increments = all.map(|stage| weighted(stage, ERROR.map(|weight| weight / h)));
+        let mut increments = all.map(|stage| weighted(stage, ERROR_WEIGHTS.map(|weight| weight / h)));
         for row in 0..2 * n {
-            increments[0][(row, row)] -= ERROR.iter().sum::<f64>() / h;
+            increments[0][(row, row)] -= ERROR_WEIGHTS.iter().sum::<f64>() / h;
         }
-        let rate = REAL / h;
+        let rate = REAL_EIGENVALUE / h;
         let p = inverted(&assembly.mass * rate + &assembly.damping + &assembly.stiffness / rate);
         let pw = &p * &assembly.directions;
         Eliminated {
             length: h,
-            weights: A.map(|row| row.map(|a| h * a)),
+            weights: BUTCHER_MATRIX.map(|row| row.map(|a| h * a)),
             velocity_from_state: velocity(&stage_from_state),
             velocity_from_load: velocity(&stage_from_load),
             velocity_from_force: velocity(&stage_from_force),
@@ -164,7 +164,7 @@ pub(crate) struct Step {
     /// Structural stage velocities without the imposed ones, axis by axis.
     moving: Vec<[f64; STAGES]>,
     residual: Vec<f64>,
-    lu: Lu,
+    lu: SmallLu,
     /// Scratch memory for a sensitivity: stage velocities and internal states, forces of the
     /// laws, end of the step.
     right: Vec<f64>,
@@ -209,7 +209,7 @@ impl Step {
             structural: vec![0.0; j],
             moving: vec![[0.0; STAGES]; j],
             residual: vec![0.0; unknowns],
-            lu: Lu::default(),
+            lu: SmallLu::default(),
             right: Vec::new(),
             answer: Vec::new(),
             carried: Vec::new(),
@@ -232,8 +232,8 @@ impl Step {
         let (n, j, internal) = (assembly.n, assembly.axes.len(), assembly.internal);
         self.linear.copy_from_slice(&state[..2 * n]);
         self.free.fill(0.0);
-        add_product(eliminated.velocity_from_state.as_slice(), self.linear.as_slice(), self.free.as_mut_slice());
-        add_product(eliminated.velocity_from_load.as_slice(), loads.force.as_slice(), self.free.as_mut_slice());
+        add_matvec(eliminated.velocity_from_state.as_slice(), self.linear.as_slice(), self.free.as_mut_slice());
+        add_matvec(eliminated.velocity_from_load.as_slice(), loads.force.as_slice(), self.free.as_mut_slice());
         for (free, (_, velocity)) in self.free.iter_mut().zip(&loads.stage) {
             *free += velocity;
         }
@@ -245,7 +245,7 @@ impl Step {
             interrupt::check();
             self.evaluate(assembly, eliminated, loads);
             self.linearise(assembly, eliminated, state);
-            if !self.lu.factorise() {
+            if !self.lu.factor() {
                 return false;
             }
             self.lu.solve(&mut self.residual);
@@ -271,7 +271,7 @@ impl Step {
                 self.evaluate(assembly, eliminated, loads);
                 if derivatives {
                     self.linearise(assembly, eliminated, state);
-                    return self.lu.factorise();
+                    return self.lu.factor();
                 }
                 return true;
             }
@@ -369,7 +369,7 @@ impl Step {
                         if slope[e] != 0.0 {
                             for k in 0..STAGES {
                                 subtract(jacobian, unknowns, k * j + moved, gains, |gain| {
-                                    gain * slope[e] * h * A[stage][k]
+                                    gain * slope[e] * h * BUTCHER_MATRIX[stage][k]
                                 });
                             }
                         }
@@ -389,7 +389,7 @@ impl Step {
                     self.residual[row] = self.unknown[row] - state[2 * n + joint.first_state + s];
                     let entries = &mut jacobian[row * unknowns..(row + 1) * unknowns];
                     for k in 0..STAGES {
-                        let weight = h * A[stage][k];
+                        let weight = h * BUTCHER_MATRIX[stage][k];
                         let point = &self.points[k * joints + q];
                         let slope = point.rate_slope(s);
                         self.residual[row] -= weight * point.rate[s];
@@ -397,7 +397,8 @@ impl Step {
                             entries[k * j + joint.first_axis + e] -= weight * slope[directions + e];
                             if slope[e] != 0.0 {
                                 for l in 0..STAGES {
-                                    entries[l * j + joint.first_axis + e] -= weight * slope[e] * h * A[k][l];
+                                    entries[l * j + joint.first_axis + e] -=
+                                        weight * slope[e] * h * BUTCHER_MATRIX[k][l];
                                 }
                             }
                         }
@@ -429,9 +430,9 @@ impl Step {
 
     fn combine(&self, [state, load, force]: &[DMatrix<f64>; 3], loads: &StageLoads, out: &mut [f64]) {
         out.fill(0.0);
-        add_product(state.as_slice(), self.linear.as_slice(), out);
-        add_product(load.as_slice(), loads.force.as_slice(), out);
-        add_product(force.as_slice(), self.force.as_slice(), out);
+        add_matvec(state.as_slice(), self.linear.as_slice(), out);
+        add_matvec(load.as_slice(), loads.force.as_slice(), out);
+        add_matvec(force.as_slice(), self.force.as_slice(), out);
     }
 
     /// Carries a sensitivity over the last solved step: row by row, states × columns. The
@@ -472,19 +473,20 @@ impl Step {
                     let out = row_mut(&mut self.answer, stage * j + axis, columns);
                     for (e, moved) in joint.axes().enumerate() {
                         for &(place, weight) in assembly.axes[moved].rows() {
-                            add(slope[e] * weight, row(start, place, columns), out);
+                            axpy(slope[e] * weight, row(start, place, columns), out);
                         }
                     }
                 }
                 for s in 0..joint.states {
                     let at = at_state(assembly, stage, joint.first_state + s);
                     let out = row_mut(&mut self.right, at, columns);
-                    add(1.0, row(start, 2 * n + joint.first_state + s, columns), out);
+                    axpy(1.0, row(start, 2 * n + joint.first_state + s, columns), out);
                     for (e, moved) in joint.axes().enumerate() {
-                        let slope = |k: usize| h * A[stage][k] * self.points[k * joints + q].rate_slope(s)[e];
+                        let slope =
+                            |k: usize| h * BUTCHER_MATRIX[stage][k] * self.points[k * joints + q].rate_slope(s)[e];
                         let through: f64 = (0..STAGES).map(slope).sum();
                         for &(place, weight) in assembly.axes[moved].rows() {
-                            add(through * weight, row(start, place, columns), out);
+                            axpy(through * weight, row(start, place, columns), out);
                         }
                     }
                 }
@@ -502,15 +504,19 @@ impl Step {
                     let slope = self.points[stage * joints + q].force_slope(d);
                     let out = row_mut(&mut self.answer, stage * j + axis, columns);
                     for (e, other) in joint.axes().enumerate() {
-                        add(slope[joint.directions + e], row(&self.right, stage * j + other, columns), out);
+                        axpy(slope[joint.directions + e], row(&self.right, stage * j + other, columns), out);
                         if slope[e] != 0.0 {
                             for k in 0..STAGES {
-                                add(slope[e] * h * A[stage][k], row(&self.right, k * j + other, columns), out);
+                                axpy(
+                                    slope[e] * h * BUTCHER_MATRIX[stage][k],
+                                    row(&self.right, k * j + other, columns),
+                                    out,
+                                );
                             }
                         }
                     }
                     for s in 0..joint.states {
-                        add(slope[2 * joint.directions + s], row(&self.right, first + s, columns), out);
+                        axpy(slope[2 * joint.directions + s], row(&self.right, first + s, columns), out);
                     }
                 }
             }
@@ -530,7 +536,7 @@ impl Step {
         let n = assembly.n;
         self.combine(&eliminated.increments, loads, &mut out[..2 * n]);
         for s in 0..assembly.internal {
-            let increments = ERROR.iter().enumerate().map(|(i, weight)| {
+            let increments = ERROR_WEIGHTS.iter().enumerate().map(|(i, weight)| {
                 weight / eliminated.length * (self.unknown[at_state(assembly, i, s)] - state[2 * n + s])
             });
             out[2 * n + s] = increments.sum();
@@ -571,7 +577,7 @@ fn row_mut(matrix: &mut [f64], at: usize, columns: usize) -> &mut [f64] {
 
 /// Adds `matrix x` to the first rows of `out`; `x` and `out` are stored row by row.
 fn add_rows(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
-    add_product_of_rows(matrix.as_slice(), matrix.nrows(), x, out, columns);
+    add_matmul_row_major(matrix.as_slice(), matrix.nrows(), x, out, columns);
 }
 
 /// Creates one evaluation point per law.
@@ -586,10 +592,10 @@ pub(crate) fn points(assembly: &Assembly) -> Vec<RatePoint> {
 #[derive(Debug, Clone)]
 struct Filter {
     /// Elimination of the internal states of every law.
-    states: Vec<Lu>,
+    states: Vec<SmallLu>,
     /// The matrix `T` of every law, directions × directions.
     answers: Vec<Vec<f64>>,
-    axes: Lu,
+    axes: SmallLu,
     rate: f64,
     z: Vec<f64>,
     b: DVector<f64>,
@@ -602,9 +608,9 @@ impl Filter {
     fn new(assembly: &Assembly) -> Self {
         let most = assembly.joints.iter().map(|joint| joint.states).max().unwrap_or(0);
         Filter {
-            states: vec![Lu::default(); assembly.joints.len()],
+            states: vec![SmallLu::default(); assembly.joints.len()],
             answers: assembly.joints.iter().map(|joint| vec![0.0; joint.directions * joint.directions]).collect(),
-            axes: Lu::default(),
+            axes: SmallLu::default(),
             rate: 1.0,
             z: vec![0.0; most],
             b: DVector::zeros(assembly.n),
@@ -615,7 +621,7 @@ impl Filter {
     }
 
     fn prepare(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], held: &[bool]) -> bool {
-        let (rate, j) = (REAL / eliminated.length, assembly.axes.len());
+        let (rate, j) = (REAL_EIGENVALUE / eliminated.length, assembly.axes.len());
         self.rate = rate;
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
             let (directions, states) = (joint.directions, joint.states);
@@ -626,7 +632,7 @@ impl Filter {
                     matrix[s * states + t] = f64::from(u8::from(s == t)) * rate - slope[2 * directions + t];
                 }
             }
-            if !self.states[q].factorise() {
+            if !self.states[q].factor() {
                 return false;
             }
             for e in 0..directions {
@@ -653,7 +659,7 @@ impl Filter {
                 }
             }
         }
-        self.axes.factorise()
+        self.axes.factor()
     }
 
     fn apply(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
@@ -742,7 +748,7 @@ mod tests {
         let mut derivative = DMatrix::<f64>::identity(states, states).as_slice().to_vec();
         for k in 0..count {
             let loads = StageLoads {
-                force: DVector::from_fn(STAGES, |i, _| load((k as f64 + C[i]) * h)),
+                force: DVector::from_fn(STAGES, |i, _| load((k as f64 + NODES[i]) * h)),
                 stage: vec![(0.0, 0.0); STAGES * assembly.axes.len()],
             };
             assert!(step.solve(assembly, &eliminated, &loads, &state, (1.0, true)));

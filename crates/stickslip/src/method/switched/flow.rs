@@ -25,7 +25,7 @@ use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
-use stickslip_numerics::radau::{A, C, ESTIMATE, STAGES};
+use stickslip_numerics::radau::{BUTCHER_MATRIX, ESTIMATE_ORDER, NODES, STAGES};
 
 /// The time interval has `2^LEVELS` ticks.
 const LEVELS: usize = 40;
@@ -137,7 +137,7 @@ impl SwitchedFlow {
         });
         let frictions = frictions.collect();
         let (states, n, j) = (plain.states(), plain.n, plain.axes.len());
-        let nodes = C.into_iter().zip(A[STAGES - 1]).collect();
+        let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
         Ok(SwitchedFlow {
             assembly: plain.clone(),
             drive: Drive::default(),
@@ -301,7 +301,7 @@ impl SwitchedFlow {
             self.loads.force = DVector::zeros(STAGES * n);
         }
         self.loads.stage.clear();
-        for (i, c) in C.iter().enumerate() {
+        for (i, c) in NODES.iter().enumerate() {
             let at = time + c * h;
             self.drive.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
             for axis in 0..j {
@@ -315,7 +315,7 @@ impl SwitchedFlow {
     fn predict(&mut self, state: &[f64], (time, h): (f64, f64), last: Option<f64>) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         if let Some(length) = last {
-            for (i, c) in C.iter().enumerate() {
+            for (i, c) in NODES.iter().enumerate() {
                 let weights = onward(1.0 + c * h / length);
                 for (offset, count) in [(0, j), (STAGES * j, internal)] {
                     for k in 0..count {
@@ -389,7 +389,7 @@ impl SwitchedFlow {
     fn margin(&self, friction: &Friction, start: f64, s: f64, scale: f64) -> f64 {
         let j = self.assembly.axes.len();
         // the polynomial through the start and the stages
-        let node = |i: usize| if i == 0 { 0.0 } else { C[i - 1] };
+        let node = |i: usize| if i == 0 { 0.0 } else { NODES[i - 1] };
         let value = |i: usize| if i == 0 { start } else { self.step.unknown[(i - 1) * j + friction.axis] };
         let weight = |i: usize| {
             let others = (0..=STAGES).filter(|k| *k != i);
@@ -620,7 +620,7 @@ impl SwitchedFlow {
             let solved = self.attempt(&eliminated, state, (begin, last), (scale.1, columns > 0));
             let error = if solved { self.error(&eliminated, state, scale) } else { f64::INFINITY };
             if error.is_nan() || error > 1.0 {
-                let halvings = (error / SAFETY).log2() / f64::from(ESTIMATE);
+                let halvings = (error / SAFETY).log2() / f64::from(ESTIMATE_ORDER);
                 self.level += if error.is_finite() { halvings.ceil().clamp(1.0, 4.0) as usize } else { 2 };
                 self.give_back(begin, eliminated, level);
                 continue;
@@ -630,7 +630,7 @@ impl SwitchedFlow {
                 self.accept(&eliminated, state, (begin.time, time), columns)?;
                 self.give_back(begin, eliminated, level);
                 let aligned = end.is_multiple_of(1 << (LEVELS - self.level + 1).min(LEVELS));
-                if self.level > COARSEST && aligned && error * 2f64.powi(ESTIMATE) < SAFETY {
+                if self.level > COARSEST && aligned && error * 2f64.powi(ESTIMATE_ORDER) < SAFETY {
                     self.level -= 1;
                 }
                 let tick = self.stretch / (1u64 << LEVELS) as f64;

@@ -6,7 +6,7 @@ use super::{Onset, Survey};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::golden_section;
 
 /// Limit of complex multiplications for an estimate of first slip: about 0.1 s.
 const WORK: f64 = 2.5e7;
@@ -306,7 +306,7 @@ impl Survey {
         if refined && omegas.len() > 1 && best.1.is_finite() {
             let (low, high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
             let close = |a: f64, b: f64| b - a <= LOCATED * (high - low);
-            let found = maximum((low, high), close, |omega| at(omega).ok_or(())).ok()?;
+            let found = golden_section((low, high), close, |omega| at(omega).ok_or(())).ok()?;
             if found.1 > best.1 {
                 best = found;
             }

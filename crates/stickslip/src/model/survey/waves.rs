@@ -14,8 +14,8 @@ use crate::structure::{Sector, Structure, turn};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
-use stickslip_numerics::leading::leading;
-use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
+use stickslip_numerics::tie_break::first_largest;
 
 /// The modes of one nodal diameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -168,7 +168,7 @@ impl Turned {
             place.iter().map(term).sum()
         };
         let mut at: Vec<Complex64> = places.iter().map(at).collect();
-        if let Some(first) = leading(at.iter().map(|x| x.norm())).map(|first| at[first]) {
+        if let Some(first) = first_largest(at.iter().map(|x| x.norm())).map(|first| at[first]) {
             at.iter_mut().for_each(|x| *x *= first.conj() / first.norm());
         }
         at
@@ -321,7 +321,7 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
             }
             let (mass, modes, shapes) =
                 of_large(structure, links, if double { lowest.saturating_mul(2) } else { lowest })?;
-            Some(turned.once(modes, Some(shapes), lowest, &|x| DVector::from_vec(mass.times(x.as_slice()))))
+            Some(turned.once(modes, Some(shapes), lowest, &|x| DVector::from_vec(mass.multiply(x.as_slice()))))
         };
         Some(turned.modes(modes(&dampers, &[])?, modes(&held, &rigid)?, places))
     };
@@ -330,11 +330,11 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
 
 /// Returns the mass matrix and the lowest modes of a large structure, with both modes of each
 /// pair and their shapes.
-fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
+fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(SparseMatrix, Modes, DMatrix<f64>)> {
     let n = structure.dofs();
     let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
         let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
-        Matrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
+        SparseMatrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
     };
     let along = |value: fn(&Link) -> f64| {
         let entries = |link: &Link| {
@@ -346,12 +346,12 @@ fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matr
     let mass = part(0, Vec::new())?;
     let (damping, stiffness) = (part(1, along(|link| link.damping))?, part(2, along(|link| link.stiffness))?);
     // free motions come on top of the requested elastic modes
-    let wanted = Wanted::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
-    let found = NaturalModes::new(&Analysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
-    let free = found.free();
+    let wanted = ModeSelection::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
+    let found = NaturalModes::new(&SymbolicAnalysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
+    let free = found.rigid_body_count();
     let mode = |k: usize| {
         let (omega, shape) = (found.values[k].max(0.0).sqrt(), found.shape(k));
-        let power: f64 = damping.times(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
+        let power: f64 = damping.multiply(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
         let power = power + structure.damped_modes().map_or(0.0, |modes| modes.power(shape));
         LinearMode { omega, damping: power / (2.0 * omega) }
     };

@@ -12,7 +12,7 @@
 use super::free::independent;
 use super::{Deviation, Reduced, ReductionError, Reference, Whole};
 use nalgebra::DMatrix;
-use stickslip_numerics::sparse::{Matrix, columns};
+use stickslip_numerics::sparse::{SparseMatrix, multi_vector};
 
 /// Values of s at which a basis is compared with the whole structure.
 const HELD: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
@@ -37,7 +37,7 @@ impl Whole {
     /// `reduce` returns a reduction and the frequency (rad/s) up to which it is intended.
     pub(in crate::structure) fn between(
         &self,
-        there: &Matrix,
+        there: &SparseMatrix,
         reduce: impl Fn(&Whole) -> Result<(Reduced, f64), ReductionError>,
         tolerance: f64,
     ) -> Result<Between, ReductionError> {
@@ -86,21 +86,22 @@ impl Whole {
     }
 
     /// Returns the structure with a fraction of the difference to another stiffness.
-    fn with_share(&self, there: &Matrix, share: f64) -> Result<Whole, ReductionError> {
+    fn with_share(&self, there: &SparseMatrix, share: f64) -> Result<Whole, ReductionError> {
         let own = self.stiffness.entries().map(|(row, column, value)| (row, column, (1.0 - share) * value));
         let other = there.entries().map(|(row, column, value)| (row, column, share * value));
-        let stiffness = Matrix::from_triplets(self.dofs(), own.chain(other)).map_err(|_| ReductionError::OutOfRange)?;
+        let stiffness =
+            SparseMatrix::from_triplets(self.dofs(), own.chain(other)).map_err(|_| ReductionError::OutOfRange)?;
         Whole::new((*self.mass).clone(), self.damping.clone(), stiffness, self.ports.clone())
     }
 
     /// Returns independent combinations of columns.
     fn common(&self, vectors: &[f64], up_to: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.dofs();
-        let mut energies = columns::products(n, vectors, &self.stiffness.times_columns(vectors));
+        let mut energies = multi_vector::inner_products(n, vectors, &self.stiffness.multiply_columns(vectors));
         // free motions have kinetic energy only
-        energies += columns::products(n, vectors, &self.mass.times_columns(vectors)) * (up_to * up_to);
+        energies += multi_vector::inner_products(n, vectors, &self.mass.multiply_columns(vectors)) * (up_to * up_to);
         let all = energies.ncols();
         let weights = independent(&DMatrix::identity(all, all), &energies).ok_or(ReductionError::OutOfRange)?;
-        Ok(columns::combination(n, vectors, &weights))
+        Ok(multi_vector::combine(n, vectors, &weights))
     }
 }

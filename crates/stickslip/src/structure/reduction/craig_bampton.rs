@@ -8,7 +8,7 @@
 //! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
 
 use super::{MOST_MODES, Reduced, ReductionError, Whole};
-use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
 
 impl Whole {
     /// Reduces the structure to the degrees of freedom of its ports and all fixed-interface
@@ -17,11 +17,11 @@ impl Whole {
     /// # Errors
     /// [`ReductionError`]: free motions remain with fixed ports, or the mode computation fails.
     pub fn craig_bampton(&self, omega: f64) -> Result<Reduced, ReductionError> {
-        self.held(Wanted::UpTo { value: omega * omega, most: MOST_MODES })
+        self.held(ModeSelection::UpTo { value: omega * omega, most: MOST_MODES })
     }
 
     /// Reduces the structure with the modes that `wanted` specifies.
-    pub(in crate::structure) fn held(&self, wanted: Wanted) -> Result<Reduced, ReductionError> {
+    pub(in crate::structure) fn held(&self, wanted: ModeSelection) -> Result<Reduced, ReductionError> {
         let n = self.dofs();
         let mut boundary: Vec<usize> = self.ports.iter().flatten().map(|(at, _)| *at).collect();
         boundary.sort_unstable();
@@ -30,17 +30,17 @@ impl Whole {
         let interior: Vec<usize> = (0..n).filter(|i| boundary.binary_search(i).is_err()).collect();
         let mut row = vec![usize::MAX; n];
         interior.iter().enumerate().for_each(|(at, &i)| row[i] = at);
-        let part = |matrix: &Matrix| {
+        let part = |matrix: &SparseMatrix| {
             let inner = matrix.entries().filter(|(i, k, _)| row[*i] != usize::MAX && row[*k] != usize::MAX);
-            Matrix::from_triplets(interior.len(), inner.map(|(i, k, v)| (row[i], row[k], v)))
+            SparseMatrix::from_triplets(interior.len(), inner.map(|(i, k, v)| (row[i], row[k], v)))
         };
         let out_of_range = |_| ReductionError::OutOfRange;
         let stiffness = part(&self.stiffness).map_err(out_of_range)?;
         let mass = part(&self.mass).map_err(out_of_range)?;
-        let analysis = Analysis::new(&[&stiffness, &mass]);
+        let analysis = SymbolicAnalysis::new(&[&stiffness, &mass]);
         let modes = NaturalModes::new(&analysis, &stiffness, &mass, wanted)?;
-        if modes.free() > 0 {
-            return Err(ReductionError::NotHeld { count: modes.free() });
+        if modes.rigid_body_count() > 0 {
+            return Err(ReductionError::NotHeld { count: modes.rigid_body_count() });
         }
         let (inner, outer) = (interior.len(), boundary.len());
         let mut answers = vec![0.0; inner * outer];

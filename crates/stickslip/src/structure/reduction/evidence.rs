@@ -12,7 +12,7 @@
 
 use super::{Damping, Reduced, ReductionError, Series, Whole};
 use nalgebra::{Complex, DMatrix};
-use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes};
+use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
 /// Largest number of samples; each needs a factorization of the whole structure.
 const SAMPLES: usize = 9;
@@ -140,7 +140,7 @@ impl Reference {
 struct Factors<'a> {
     whole: &'a Whole,
     /// The last factor, whose memory the next one reuses.
-    last: Option<Factor>,
+    last: Option<LdlFactor>,
 }
 
 impl Factors<'_> {
@@ -164,7 +164,7 @@ impl Factors<'_> {
         together: Option<&DMatrix<f64>>,
     ) -> Result<DMatrix<Complex<f64>>, ReductionError> {
         let whole = self.whole;
-        let (mass, stiffness): (&Matrix, &Matrix) = (&whole.mass, &whole.stiffness);
+        let (mass, stiffness): (&SparseMatrix, &SparseMatrix) = (&whole.mass, &whole.stiffness);
         let singular = |singular| ReductionError::Singular { omega, singular };
         let see = |columns: usize, value: &dyn Fn(usize) -> Complex<f64>| {
             DMatrix::from_fn(whole.ports.len(), columns, |i, k| {
@@ -182,7 +182,7 @@ impl Factors<'_> {
         }
         let sum = [(1.0, stiffness), (-omega * omega, mass)];
         let factor = match self.last.take() {
-            Some(last) => last.again(&sum),
+            Some(last) => last.refactor(&sum),
             None => whole.analysis.factor(&sum),
         };
         let factor = self.last.insert(factor.map_err(singular)?);

@@ -17,9 +17,9 @@
 use super::{AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual, symmetric};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
-use stickslip_numerics::dense::{cholesky_in_blocks, solve_lower_in_blocks};
+use stickslip_numerics::dense::{Transpose, cholesky_blocked, solve_lower_blocked};
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
+use stickslip_numerics::sparse::{NaturalModes, SparseMatrix, multi_vector};
 
 /// Relative stiffness below which residual vectors of unit size are linearly dependent. This
 /// occurs for ports that observe the same motion, up to rounding. A port whose residual
@@ -56,7 +56,7 @@ impl<'a> Free<'a> {
         let n = whole.dofs();
         let (basis, shift) = residual::basis(whole, modes, shift, order)?;
         let own = match &whole.damping {
-            Damping::Matrix(c) => Some(columns::products(n, &basis, &c.times_columns(&basis))),
+            Damping::Matrix(c) => Some(multi_vector::inner_products(n, &basis, &c.multiply_columns(&basis))),
             _ => None,
         };
         let mass = square(&whole.mass, &basis);
@@ -66,7 +66,7 @@ impl<'a> Free<'a> {
         // a nonzero value from rounding would restrain the free motion, and a constant load
         // would displace it by kilometres
         let mut values = modes.values.clone();
-        values[..modes.free()].fill(0.0);
+        values[..modes.rigid_body_count()].fill(0.0);
         Ok(Free { whole, values, shift, counts, basis: Arc::new(basis), mass, stiffness, damping: own, ports })
     }
 
@@ -118,7 +118,7 @@ impl<'a> Free<'a> {
         let own = self
             .damping
             .as_ref()
-            .map(|c| columns::products(c.nrows(), small.as_slice(), product(c, &small).as_slice()));
+            .map(|c| multi_vector::inner_products(c.nrows(), small.as_slice(), product(c, &small).as_slice()));
         let damping = damping(&self.whole.damping, &mass, &stiffness, own)?;
         let n = self.whole.dofs();
         let (residual, plural) = (small.ncols() - modes, |count: usize| if count == 1 { "" } else { "s" });
@@ -141,7 +141,7 @@ impl<'a> Free<'a> {
     fn combination(&self, modes: usize, order: usize) -> Option<(DMatrix<f64>, Vec<[f64; 2]>)> {
         let all = self.mass.nrows();
         let along = |a: &DMatrix<f64>, matrix: &DMatrix<f64>, b: &DMatrix<f64>| {
-            columns::products(all, a.as_slice(), product(matrix, b).as_slice())
+            multi_vector::inner_products(all, a.as_slice(), product(matrix, b).as_slice())
         };
         let mut vectors = DMatrix::zeros(all, 0);
         for order in 0..order {
@@ -164,14 +164,14 @@ impl<'a> Free<'a> {
 }
 
 /// Returns `Bᵀ A B` of a symmetric matrix, computed in blocks of columns.
-fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
+fn square(matrix: &SparseMatrix, basis: &[f64]) -> DMatrix<f64> {
     let n = matrix.n().max(1);
     let all = basis.len() / n;
     let mut square = DMatrix::zeros(all, all);
     for first in (0..all).step_by(AT_ONCE) {
         let last = all.min(first + AT_ONCE);
-        let moved = matrix.times_columns(&basis[first * n..last * n]);
-        let below = columns::products(n, &basis[first * n..], &moved);
+        let moved = matrix.multiply_columns(&basis[first * n..last * n]);
+        let below = multi_vector::inner_products(n, &basis[first * n..], &moved);
         for (k, i) in (first..last).flat_map(|k| (k..all).map(move |i| (k, i))) {
             let value = below[(i - first, k - first)];
             (square[(i, k)], square[(k, i)]) = (value, value);
@@ -193,7 +193,8 @@ fn join(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 /// Returns combinations of columns that are orthonormal in `stiffness`, without linearly
 /// dependent ones.
 pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let energies = columns::products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
+    let energies =
+        multi_vector::inner_products(vectors.nrows(), vectors.as_slice(), product(stiffness, vectors).as_slice());
     let energies = symmetric(energies);
     let size = |i: usize| energies[(i, i)].max(0.0).sqrt();
     let moving: Vec<usize> = (0..vectors.ncols()).filter(|&i| size(i) > 0.0).collect();
@@ -220,18 +221,18 @@ pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> O
 fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = unit.nrows();
     let mut lower = unit.clone();
-    if !cholesky_in_blocks(lower.as_mut_slice(), n) {
+    if !cholesky_blocked(lower.as_mut_slice(), n) {
         return None;
     }
     let mut inverse = DMatrix::identity(n, n);
-    solve_lower_in_blocks(lower.as_slice(), n, inverse.as_mut_slice(), true);
+    solve_lower_blocked(lower.as_slice(), n, inverse.as_mut_slice(), Transpose::Yes);
     (DEPENDENT * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
 }
 
 /// Returns eigenvectors divided by the square roots of their eigenvalues, without those at the
 /// level of rounding. They are independent combinations of vectors with these products.
 pub(super) fn leading(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (values, vectors) = eigen::symmetric_in_blocks(products)?;
+    let (values, vectors) = eigen::symmetric_blocked(products)?;
     let least = DEPENDENT * values.last().copied().unwrap_or(0.0);
     let kept: Vec<usize> = (0..values.len()).filter(|&k| values[k] > least).collect();
     let mut vectors = vectors.select_columns(&kept);

@@ -26,7 +26,7 @@ use crate::structure::sector::is_real;
 use crate::structure::turn;
 use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::columns;
+use stickslip_numerics::sparse::multi_vector;
 
 /// Refinement level of the nodal diameters whose forms are computed.
 const LEVEL: usize = 1;
@@ -92,7 +92,7 @@ impl Lacking {
             if !(lowest..=highest).contains(&value) {
                 continue;
             }
-            let waves = columns::combination(r, shape, &phases);
+            let waves = multi_vector::combine(r, shape, &phases);
             let inertia = -(value + shift(self.up_to)) / highest;
             let mut beyond = 0.0;
             for (diameter, wave) in waves.chunks_exact(4 * r).enumerate() {
@@ -148,7 +148,8 @@ impl Form {
             .collect()
         };
         let basis = lifted(&reduced.basis);
-        let mut forces: Vec<f64> = whole.mass.times_columns(&basis).iter().map(|force| force * up_to * up_to).collect();
+        let mut forces: Vec<f64> =
+            whole.mass.multiply_columns(&basis).iter().map(|force| force * up_to * up_to).collect();
         forces
             .extend(lifted(&reduced.basis.chunks_exact(n).flat_map(|column| blade.times(column)).collect::<Vec<_>>()));
         let sum = [(1.0, &*whole.stiffness), (shift(up_to), &*whole.mass)];
@@ -157,14 +158,14 @@ impl Form {
         let mut moved = forces.clone();
         factor.solve(&mut moved);
         let tall = copies * n;
-        let size = columns::products(tall, &moved, &forces).diagonal().amax();
+        let size = multi_vector::inner_products(tall, &moved, &forces).diagonal().amax();
         // subtract the part that the coordinates represent
-        let mut own = columns::products(tall, &basis, &whole.stiffness.times_columns(&basis));
-        own += columns::products(tall, &basis, &whole.mass.times_columns(&basis)) * shift(up_to);
+        let mut own = multi_vector::inner_products(tall, &basis, &whole.stiffness.multiply_columns(&basis));
+        own += multi_vector::inner_products(tall, &basis, &whole.mass.multiply_columns(&basis)) * shift(up_to);
         let own = ((&own + own.transpose()) * 0.5).cholesky().ok_or(ReductionError::OutOfRange)?;
-        let answered = own.solve(&columns::products(tall, &basis, &forces));
-        columns::add(tall, &mut moved, -1.0, &basis, &answered);
-        let energy = columns::products(tall, &moved, &forces);
+        let answered = own.solve(&multi_vector::inner_products(tall, &basis, &forces));
+        multi_vector::add(tall, &mut moved, -1.0, &basis, &answered);
+        let energy = multi_vector::inner_products(tall, &moved, &forces);
         let eigen = eigen::symmetric((&energy + energy.transpose()) * 0.5).ok_or(ReductionError::OutOfRange)?;
         let kept: Vec<usize> = (0..energy.nrows()).filter(|&k| eigen.eigenvalues[k] > ROUNDED * size).collect();
         let row = |i: usize, k: usize| eigen.eigenvectors[(k, kept[i])] * eigen.eigenvalues[kept[i]].sqrt();

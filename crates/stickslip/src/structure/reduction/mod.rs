@@ -51,9 +51,11 @@ pub use series::Series;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
-use stickslip_numerics::dense::{ComplexLu, Lu};
+use stickslip_numerics::dense::{ComplexLu, DenseLu};
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Analysis, Matrix, ModesError, NaturalModes, Singular, Wanted, columns};
+use stickslip_numerics::sparse::{
+    ModeSelection, ModesError, NaturalModes, Singular, SparseMatrix, SymbolicAnalysis, multi_vector,
+};
 
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
 pub type Row = Vec<(usize, f64)>;
@@ -98,7 +100,7 @@ pub enum Damping {
         stiffness: f64,
     },
     /// `C`, kg/s; it may have a gyroscopic part.
-    Matrix(Matrix),
+    Matrix(SparseMatrix),
 }
 
 impl Damping {
@@ -144,11 +146,11 @@ impl Damping {
 /// A structure before its reduction, with its ports.
 #[derive(Debug, Clone)]
 pub struct Whole {
-    pub(super) mass: Arc<Matrix>,
+    pub(super) mass: Arc<SparseMatrix>,
     pub(super) damping: Damping,
-    pub(super) stiffness: Arc<Matrix>,
+    pub(super) stiffness: Arc<SparseMatrix>,
     ports: Vec<Row>,
-    pub(super) analysis: Arc<Analysis>,
+    pub(super) analysis: Arc<SymbolicAnalysis>,
 }
 
 /// The reason why a structure cannot be reduced.
@@ -271,12 +273,21 @@ impl Whole {
     /// # Errors
     /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a
     /// negative damping ratio.
-    pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
+    pub fn new(
+        mass: SparseMatrix,
+        damping: Damping,
+        stiffness: SparseMatrix,
+        ports: Vec<Row>,
+    ) -> Result<Self, ReductionError> {
         Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
     }
 
     /// Creates a structure without ports.
-    pub(super) fn unseen(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
+    pub(super) fn unseen(
+        mass: SparseMatrix,
+        damping: Damping,
+        stiffness: SparseMatrix,
+    ) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
             Damping::Matrix(c) => Some(c),
@@ -288,14 +299,14 @@ impl Whole {
                 return Err(ReductionError::Size { matrix: name, rows: matrix.n(), n });
             }
             if name != "damping"
-                && let Some(pair) = matrix.asymmetry(SYMMETRIC * matrix.largest())
+                && let Some(pair) = matrix.asymmetry(SYMMETRIC * matrix.max_abs())
             {
                 return Err(ReductionError::NotSymmetric { matrix: name, row: pair.row, column: pair.column });
             }
         }
         damping.check()?;
-        let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
-        let analysis = Arc::new(Analysis::new(&analysed));
+        let analysed: Vec<&SparseMatrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
+        let analysis = Arc::new(SymbolicAnalysis::new(&analysed));
         Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
     }
 
@@ -341,7 +352,7 @@ impl Whole {
         if highest > 0.0 && omega > ABOVE_ALL * highest {
             return Err(ReductionError::AboveAll { omega, highest });
         }
-        let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
+        let wanted = ModeSelection::UpTo { value: omega * omega, most: MOST_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
     }
 
@@ -354,7 +365,7 @@ impl Whole {
             let must = "a whole number from 1 to 600";
             return Err(ReductionError::Number { what: "the number of modes", value: count as f64, must });
         }
-        Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
+        Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, ModeSelection::Lowest(count))?)
     }
 
     /// Computes the damping of [`Damping::Ratio`] over all degrees of freedom: `β K + U Uᵀ`.
@@ -371,9 +382,10 @@ impl Whole {
         for (k, value) in modes.values.iter().enumerate() {
             let omega = value.max(0.0).sqrt();
             // a free motion has none, although rounding would give it some
-            let more = law.of_mode(omega).filter(|_| k >= modes.free()).map_or(0.0, |c| c - beta * omega * omega);
+            let more =
+                law.of_mode(omega).filter(|_| k >= modes.rigid_body_count()).map_or(0.0, |c| c - beta * omega * omega);
             if more > 0.0 {
-                columns.extend(self.mass.times(modes.shape(k)).iter().map(|u| more.sqrt() * u));
+                columns.extend(self.mass.multiply(modes.shape(k)).iter().map(|u| more.sqrt() * u));
             }
         }
         Ok((beta, columns))
@@ -418,7 +430,7 @@ impl Reduced {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
     fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
-        let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
+        let square = |matrix: &SparseMatrix| multi_vector::inner_products(n, &basis, &matrix.multiply_columns(&basis));
         let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
         let own = match &whole.damping {
             Damping::Matrix(c) => Some(square(c)),
@@ -461,7 +473,7 @@ impl Reduced {
                 port
             } else {
                 let largest =
-                    most(&columns::combination(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
+                    most(&multi_vector::combine(self.n, &self.basis, &self.weights.columns(k, 1).into_owned()));
                 if port > UNSEEN * largest { port } else { largest }
             };
             if size == 0.0 {
@@ -490,7 +502,7 @@ impl Reduced {
 
     /// Returns all displacements of the whole structure, n × r.
     fn columns(&self) -> DMatrix<f64> {
-        DMatrix::from_vec(self.n, self.dofs(), columns::combination(self.n, &self.basis, &self.weights))
+        DMatrix::from_vec(self.n, self.dofs(), multi_vector::combine(self.n, &self.basis, &self.weights))
     }
 
     /// Returns all displacements of the whole structure for coordinates `q`.
@@ -499,7 +511,7 @@ impl Reduced {
     /// If `q` does not have r entries.
     pub fn expand(&self, q: &[f64]) -> Vec<f64> {
         let weights = product(&self.weights, &DMatrix::from_column_slice(q.len(), 1, q));
-        columns::combination(self.n, &self.basis, &weights)
+        multi_vector::combine(self.n, &self.basis, &weights)
     }
 
     /// Returns the natural frequencies of the reduced structure, rad/s, in ascending order.
@@ -524,7 +536,7 @@ impl Reduced {
             Complex::new(s - omega * omega * m, omega * c)
         };
         let free = ReductionError::Singular { omega, singular: Singular { row: 0 } };
-        let forces = columns::products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
+        let forces = multi_vector::inner_products(self.ports.nrows(), self.ports.as_slice(), loads.as_slice());
         let moved = if [&self.mass, &self.damping, &self.stiffness].into_iter().all(is_diagonal) {
             let own: Vec<Complex<f64>> = (0..self.dofs()).map(|i| at(i, i)).collect();
             if own.contains(&Complex::new(0.0, 0.0)) {
@@ -544,7 +556,7 @@ impl Reduced {
         let n = self.dofs();
         let bare = (self.stiffness.iter().zip(self.mass.iter())).map(|(k, m)| k - omega * omega * m);
         if self.damping.iter().all(|c| *c == 0.0) {
-            Lu::new(bare.collect(), n)?.solve(forces.as_mut_slice());
+            DenseLu::new(bare.collect(), n)?.solve(forces.as_mut_slice());
             return Ok(forces.map(|v| Complex::new(v, 0.0)));
         }
         let damped = bare.zip(self.damping.iter()).map(|(re, c)| Complex::new(re, omega * c));
@@ -560,7 +572,7 @@ fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if a.is_empty() || b.is_empty() {
         return DMatrix::zeros(a.nrows(), b.ncols());
     }
-    DMatrix::from_vec(a.nrows(), b.ncols(), columns::combination(a.nrows(), a.as_slice(), b))
+    DMatrix::from_vec(a.nrows(), b.ncols(), multi_vector::combine(a.nrows(), a.as_slice(), b))
 }
 
 fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
@@ -621,7 +633,7 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
     let shift = SHIFT * ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
-    let (thetas, mut shapes) = eigen::symmetric_pair(mass, &(stiffness + mass * shift))?;
+    let (thetas, mut shapes) = eigen::generalized_symmetric(mass, &(stiffness + mass * shift))?;
     let largest = thetas.iter().fold(0.0f64, |most, theta| most.max(theta.abs()));
     let massless = |theta: f64| theta <= MASSLESS * largest;
     let free = |value: f64| value.abs() <= FREE * shift;

@@ -29,7 +29,7 @@ use crate::structure::{RingEntry, turn};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{Analysis, Factor, Matrix, ModesError, columns};
+use stickslip_numerics::sparse::{LdlFactor, ModesError, SparseMatrix, SymbolicAnalysis, multi_vector};
 
 /// Multiples of the frequency of interest up to which modes of the tuned ring start the
 /// iteration. Modes above that frequency leave an almost static remainder to the residual
@@ -54,12 +54,12 @@ pub(in crate::structure) struct NominalRing {
     sectors: usize,
     /// Highest frequency of interest, rad/s.
     up_to: f64,
-    mass: Matrix,
-    damping: Option<Matrix>,
-    stiffness: Matrix,
+    mass: SparseMatrix,
+    damping: Option<SparseMatrix>,
+    stiffness: SparseMatrix,
     /// Stiffness of a sector per unit relative deviation of its blade.
     of_blade: Vec<(usize, usize, f64)>,
-    analysis: Analysis,
+    analysis: SymbolicAnalysis,
     /// Modes of the tuned ring up to the first of [`EXTENTS`], by columns.
     nominal: Vec<f64>,
     /// Observed displacements of every sector, one sector after the other.
@@ -73,9 +73,9 @@ pub(in crate::structure) struct Mixed {
     pub values: Vec<f64>,
     /// Shapes of unit mass over the coordinates of all sectors.
     pub shapes: Vec<f64>,
-    factor: Factor,
+    factor: LdlFactor,
     /// Factor at the highest frequency of interest.
-    at_highest: Factor,
+    at_highest: LdlFactor,
 }
 
 /// A ring in its own modes, each scaled to one metre at the place that moves most.
@@ -103,12 +103,12 @@ impl NominalRing {
         let r = sector.dofs();
         let ring = |entries: &[RingEntry]| around(entries, [r, r], sectors);
         let matrix = |entries: &[RingEntry]| {
-            Matrix::from_triplets(sectors * r, ring(entries)).map_err(|_| ReductionError::OutOfRange)
+            SparseMatrix::from_triplets(sectors * r, ring(entries)).map_err(|_| ReductionError::OutOfRange)
         };
         let (mass, stiffness) = (matrix(&sector.mass)?, matrix(&sector.stiffness)?);
         let damping = sector.damping.as_ref().map(|own| matrix(own)).transpose()?;
         let blades = all_blades(&of_blade, &vec![1.0; sectors], r)?;
-        let analysis = Analysis::new(&[&stiffness, &mass, &blades]);
+        let analysis = SymbolicAnalysis::new(&[&stiffness, &mass, &blades]);
         let mut seen = vec![Row::new(); sectors * sector.port_count];
         for (port, at, weight) in around(&sector.ports, [sector.port_count, r], sectors) {
             seen[port].push((at, weight));
@@ -126,8 +126,8 @@ impl NominalRing {
         let sum = [(1.0, &self.stiffness), (1.0, &blades), (shift, &self.mass)];
         let factor = self.analysis.factor(&sum);
         let factor = factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?;
-        if factor.negative() > 0 {
-            return Err(ModesError::Negative { count: factor.negative(), below: -shift }.into());
+        if factor.negative_pivots() > 0 {
+            return Err(ModesError::Negative { count: factor.negative_pivots(), below: -shift }.into());
         }
         let mut shapes = match extent > EXTENTS[0] {
             true => nominal_modes(&self.sector, self.sectors, extent * self.up_to)?,
@@ -135,20 +135,21 @@ impl NominalRing {
         };
         let (mut values, mut begun): (Vec<f64>, bool) = (Vec::new(), false);
         for _ in 0..STEPS {
-            let forces = self.mass.times_columns(&shapes);
+            let forces = self.mass.multiply_columns(&shapes);
             let mut moved = forces.clone();
             factor.solve(&mut moved);
-            let held = columns::products(n, &moved, &forces);
-            let mass = columns::products(n, &moved, &self.mass.times_columns(&moved));
+            let held = multi_vector::inner_products(n, &moved, &forces);
+            let mass = multi_vector::inner_products(n, &moved, &self.mass.multiply_columns(&moved));
             // the largest θ has the lowest frequency
-            let found = eigen::symmetric_pair(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
+            let found =
+                eigen::generalized_symmetric(&symmetric(mass), &symmetric(held)).ok_or(ReductionError::OutOfRange)?;
             let rising: Vec<usize> = (0..found.0.len()).rev().collect();
             let thetas: Vec<f64> = rising.iter().map(|&k| found.0[k]).collect();
             let mut mixing = found.1.select_columns(&rising);
             for (mut column, theta) in mixing.column_iter_mut().zip(&thetas) {
                 column.unscale_mut(theta.sqrt());
             }
-            shapes = columns::combination(n, &moved, &mixing);
+            shapes = multi_vector::combine(n, &moved, &mixing);
             let before = std::mem::replace(&mut values, thetas.iter().map(|theta| 1.0 / theta - shift).collect());
             let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= SETTLED * (now + shift);
             let inside = values.partition_point(|value| *value <= highest);
@@ -160,7 +161,7 @@ impl NominalRing {
             let at_highest = self.analysis.factor(&sum);
             let singular = |singular| ReductionError::Singular { omega: self.up_to, singular };
             let at_highest = at_highest.map_err(singular)?;
-            if at_highest.negative() == inside {
+            if at_highest.negative_pivots() == inside {
                 return Ok(Mixed { values, shapes, factor, at_highest });
             }
         }
@@ -193,16 +194,17 @@ impl NominalRing {
         for (mut row, root) in answered.row_iter_mut().zip(&root) {
             row.unscale_mut(*root);
         }
-        columns::add(n, &mut moved, -1.0, shapes, &answered);
+        multi_vector::add(n, &mut moved, -1.0, shapes, &answered);
         let flexible = self.rows_of(&moved);
         let independent = independent(&flexible, &whole)?;
         // inertia of both, over vectors normalized in A
-        let heavy = self.mass.times_columns(&moved);
-        let mut coupling = product(&columns::products(n, shapes, &heavy), &independent);
+        let heavy = self.mass.multiply_columns(&moved);
+        let mut coupling = product(&multi_vector::inner_products(n, shapes, &heavy), &independent);
         for (mut row, root) in coupling.row_iter_mut().zip(&root) {
             row.unscale_mut(*root);
         }
-        let residual = product(&independent.transpose(), &product(&columns::products(n, &moved, &heavy), &independent));
+        let residual =
+            product(&independent.transpose(), &product(&multi_vector::inner_products(n, &moved, &heavy), &independent));
         let all = low + independent.ncols();
         let inertia = DMatrix::from_fn(all, all, |i, k| match (i.min(k), i.max(k)) {
             (i, k) if k < low => {
@@ -215,7 +217,7 @@ impl NominalRing {
             (i, k) if i < low => coupling[(i, k - low)],
             (i, k) => 0.5 * (residual[(i - low, k - low)] + residual[(k - low, i - low)]),
         });
-        let (thetas, mixing) = eigen::symmetric_in_blocks(&inertia).ok_or(ReductionError::OutOfRange)?;
+        let (thetas, mixing) = eigen::symmetric_blocked(&inertia).ok_or(ReductionError::OutOfRange)?;
         let [of_modes, of_rest] = [mixing.rows(0, low), mixing.rows(low, all - low)].map(|rows| rows.into_owned());
         let seen_rest = product(&flexible, &independent);
         let mut seen = product(&seen_low, &of_modes) + product(&seen_rest, &of_rest);
@@ -243,13 +245,13 @@ impl NominalRing {
             for (mut row, root) in of_modes.row_iter_mut().zip(&root) {
                 row.unscale_mut(*root);
             }
-            let mut whole = columns::combination(n, shapes, &of_modes);
-            columns::add(n, &mut whole, 1.0, &moved, &product(&independent, &of_rest));
+            let mut whole = multi_vector::combine(n, shapes, &of_modes);
+            multi_vector::add(n, &mut whole, 1.0, &moved, &product(&independent, &of_rest));
             whole
                 .chunks_exact_mut(n.max(1))
                 .zip(&sizes)
                 .for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
-            columns::products(n, &whole, &damping.times_columns(&whole))
+            multi_vector::inner_products(n, &whole, &damping.multiply_columns(&whole))
         });
         let kind = format!("modes of the mistuned ring; {}", self.sector.kind);
         Ok((RingModes { kind, own, damping, seen }, Deviation { error, omega: self.up_to }))
@@ -257,7 +259,7 @@ impl NominalRing {
 
     /// Returns the relative error of a modal response under loads of random signs. Each place
     /// is scaled by its flexibility.
-    fn left_out(&self, (own, seen): (&[[f64; 2]], &DMatrix<f64>), flexibility: &[f64], at_highest: &Factor) -> f64 {
+    fn left_out(&self, (own, seen): (&[[f64; 2]], &DMatrix<f64>), flexibility: &[f64], at_highest: &LdlFactor) -> f64 {
         let scale = |place: usize| if flexibility[place] > 0.0 { flexibility[place].sqrt().recip() } else { 0.0 };
         let loads = DVector::from_fn(self.seen.len(), |place, _| sign(place) * scale(place));
         let mut moved = vec![0.0; self.mass.n()];
@@ -377,11 +379,15 @@ fn around(entries: &[RingEntry], [rows, of]: [usize; 2], sectors: usize) -> Vec<
 }
 
 /// Returns the change of stiffness due to the deviations of all blades.
-fn all_blades(of_blade: &[(usize, usize, f64)], deviations: &[f64], dofs: usize) -> Result<Matrix, ReductionError> {
+fn all_blades(
+    of_blade: &[(usize, usize, f64)],
+    deviations: &[f64],
+    dofs: usize,
+) -> Result<SparseMatrix, ReductionError> {
     let all = deviations.iter().enumerate().flat_map(|(s, deviation)| {
         of_blade.iter().map(move |&(row, column, value)| (s * dofs + row, s * dofs + column, deviation * value))
     });
-    Matrix::from_triplets(deviations.len() * dofs, all).map_err(|_| ReductionError::OutOfRange)
+    SparseMatrix::from_triplets(deviations.len() * dofs, all).map_err(|_| ReductionError::OutOfRange)
 }
 
 fn along(row: &Row, column: &[f64]) -> f64 {

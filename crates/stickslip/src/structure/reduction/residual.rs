@@ -17,7 +17,7 @@
 //! augmentation methods for modal response analysis".
 
 use super::{AT_ONCE, ReductionError, Whole};
-use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
+use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix, multi_vector};
 
 /// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
 /// `STEP`.
@@ -34,10 +34,10 @@ pub(super) fn basis(
 ) -> Result<(Vec<f64>, f64), ReductionError> {
     let (n, ports) = (whole.dofs(), whole.ports().len());
     let (factor, shift) = factor(whole, modes, shift)?;
-    let heavy = whole.mass.times_columns(&modes.shapes);
+    let heavy = whole.mass.multiply_columns(&modes.shapes);
     let clear = |some: &mut [f64]| {
-        let along = columns::products(n, &heavy, some);
-        columns::add(n, some, -1.0, &modes.shapes, &along);
+        let along = multi_vector::inner_products(n, &heavy, some);
+        multi_vector::add(n, some, -1.0, &modes.shapes, &along);
     };
     let mut basis = Vec::with_capacity(modes.shapes.len() + n * ports * order);
     basis.extend_from_slice(&modes.shapes);
@@ -47,14 +47,14 @@ pub(super) fn basis(
             let mut some = match block.checked_sub(1) {
                 Some(last) => {
                     let at = modes.shapes.len() + last * ports * n;
-                    whole.mass.times_columns(&basis[at + numbers.start * n..at + numbers.end * n])
+                    whole.mass.multiply_columns(&basis[at + numbers.start * n..at + numbers.end * n])
                 }
                 None => whole.forces(numbers),
             };
             // removes the modal part of the forces, A F = (1 - M Φ Φᵀ) F, which makes them
             // self-equilibrated
-            let along = columns::products(n, &modes.shapes, &some);
-            columns::add(n, &mut some, -1.0, &heavy, &along);
+            let along = multi_vector::inner_products(n, &modes.shapes, &some);
+            multi_vector::add(n, &mut some, -1.0, &heavy, &along);
             factor.solve(&mut some);
             clear(&mut some);
             clear(&mut some);
@@ -65,10 +65,10 @@ pub(super) fn basis(
 }
 
 /// Factors `K - σM`. At zero shift, it adds springs where the free motions are largest.
-fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
+fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(LdlFactor, f64), ReductionError> {
     if shift == 0.0 {
         let supports = supports(whole, modes)?;
-        let sum: [(f64, &Matrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];
+        let sum: [(f64, &SparseMatrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];
         let factor = whole.analysis.factor(&sum);
         return Ok((factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?, 0.0));
     }
@@ -86,10 +86,10 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f6
 /// Returns springs that fix each free motion once. The first spring is at the degree of freedom
 /// that moves most. The next one is at that with the largest motion when the first is fixed,
 /// and so on.
-fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
+fn supports(whole: &Whole, modes: &NaturalModes) -> Result<SparseMatrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);
-    let mut motions: Vec<Vec<f64>> = (0..modes.free()).map(|mode| modes.shape(mode).to_vec()).collect();
+    let mut motions: Vec<Vec<f64>> = (0..modes.rigid_body_count()).map(|mode| modes.shape(mode).to_vec()).collect();
     let mut springs = Vec::new();
     while !motions.is_empty() {
         let places = (0..motions.len()).flat_map(|k| (0..n).map(move |i| (k, i)));
@@ -103,5 +103,5 @@ fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionErro
         // as stiff as its surroundings
         springs.push((at, at, stiffness.get(at, at).max(modes.scale * mass.get(at, at))));
     }
-    Matrix::from_triplets(n, springs).map_err(|_| ReductionError::OutOfRange)
+    SparseMatrix::from_triplets(n, springs).map_err(|_| ReductionError::OutOfRange)
 }

@@ -26,7 +26,7 @@ use crate::structure::{CyclicSector, RingEntry, turn};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{NaturalModes, Wanted, columns};
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, multi_vector};
 
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
 /// which a combination is dropped. They are tried in this sequence.
@@ -232,7 +232,7 @@ impl Waves<'_> {
         for wave in &self.met {
             let step = if is_real(wave.diameter, self.sector.sectors) { 1 } else { 2 };
             frequencies.extend(wave.modes.values.iter().step_by(step).map(|value| value.max(0.0).sqrt()));
-            free += wave.modes.free() / step;
+            free += wave.modes.rigid_body_count() / step;
         }
         frequencies.sort_by(f64::total_cmp);
         ChosenSector { reduced, deviation, frequencies, free, up_to, serves }
@@ -253,7 +253,7 @@ impl Waves<'_> {
                 ReductionKind::Rubin => Free::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
                 ReductionKind::CraigBampton => {
                     let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
-                    let wanted = Wanted::UpTo { value: omega * omega, most: super::MOST_MODES };
+                    let wanted = ModeSelection::UpTo { value: omega * omega, most: super::MOST_MODES };
                     Arc::unwrap_or_clone(wave.whole.held(wanted)?.basis)
                 }
             };
@@ -280,7 +280,7 @@ impl Waves<'_> {
     fn relieved(&self, wave: &Computed, blade: &Blade, up_to: f64, order: usize) -> Result<Vec<f64>, ReductionError> {
         let (n, modes) = (self.sector.dofs, &wave.modes);
         let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
-        let forces = (modes.free()..inside).map(|mode| -> Row {
+        let forces = (modes.rigid_body_count()..inside).map(|mode| -> Row {
             let parts = modes.shape(mode).chunks_exact(n).flat_map(|part| blade.times(part));
             parts.enumerate().filter(|(_, force)| *force != 0.0).collect()
         });
@@ -299,8 +299,8 @@ impl Waves<'_> {
         let n = self.sector.dofs;
         let (mass, stiffness) = (self.sector.alone(&self.sector.mass)?, self.sector.alone(&self.sector.stiffness)?);
         let highest = self.met.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
-        let mut energies = columns::products(n, vectors, &stiffness.times_columns(vectors));
-        energies += columns::products(n, vectors, &mass.times_columns(vectors)) * highest;
+        let mut energies = multi_vector::inner_products(n, vectors, &stiffness.multiply_columns(vectors));
+        energies += multi_vector::inner_products(n, vectors, &mass.multiply_columns(vectors)) * highest;
         let size: Vec<f64> = energies.diagonal().iter().map(|e| e.max(0.0).sqrt()).collect();
         let moving: Vec<usize> = (0..size.len()).filter(|&k| size[k] > 0.0).collect();
         let gram = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
@@ -317,7 +317,7 @@ impl Waves<'_> {
                 weights[(row, column)] = eigen.eigenvectors[(i, k)] / (eigen.eigenvalues[k].sqrt() * size[row]);
             }
         }
-        let mut basis = columns::combination(n, vectors, &weights);
+        let mut basis = multi_vector::combine(n, vectors, &weights);
         let seen: Vec<_> = self.seen.iter().map(|row| self.sector.row(row)).collect();
         for column in basis.chunks_exact_mut(n.max(1)) {
             let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -364,7 +364,13 @@ impl Waves<'_> {
             let small = reduced.wave(wave.diameter, self.sector.sectors)?;
             let deviation = wave.reference.deviation(&small);
             let own = small.frequencies().unwrap_or_default();
-            let found = wave.modes.values.iter().map(|value| value.max(0.0).sqrt()).enumerate().skip(wave.modes.free());
+            let found = wave
+                .modes
+                .values
+                .iter()
+                .map(|value| value.max(0.0).sqrt())
+                .enumerate()
+                .skip(wave.modes.rigid_body_count());
             let shifts = found.take_while(|(_, omega)| *omega <= up_to).map(|(k, omega)| {
                 let error = own.get(k).map_or(f64::INFINITY, |own| (own / omega - 1.0).abs() / HALF_WIDTH);
                 Deviation { error, omega }
@@ -391,7 +397,7 @@ fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
                 moved[k * n + row] += value * basis[k * n + column];
             }
         }
-        let product = columns::products(n, basis, &moved);
+        let product = multi_vector::inner_products(n, basis, &moved);
         let all = (0..r).flat_map(|row| (0..r).map(move |column| (row, column)));
         out.extend(all.map(|at| (at.0, at.1, shift, product[at])).filter(|entry| entry.3 != 0.0));
     }

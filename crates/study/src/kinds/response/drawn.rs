@@ -8,7 +8,7 @@ use crate::drawing::{Drawing, Stretch, join, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
-use stickslip_numerics::leading::{EQUAL, leading};
+use stickslip_numerics::tie_break::{RELATIVE_TIE, first_largest};
 
 /// Largest number of places drawn one by one. For more places, the largest amplitude is drawn,
 /// with pale curves behind it.
@@ -114,15 +114,15 @@ impl Drawn<'_> {
         let all = self.all(stretch);
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut heights: Vec<f64> = all.iter().map(|values| highest(values)).collect();
-        let alike = leading(heights.iter().copied())
-            .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - EQUAL) * heights[worst]));
+        let alike = first_largest(heights.iter().copied())
+            .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - RELATIVE_TIE) * heights[worst]));
         // a refined peak may be higher than all points of the curve
         for peak in self.peaks_of(stretch).filter(|peak| !peak.way_back) {
             if let Some(i) = self.shown.iter().position(|(name, _)| *name == peak.mass) {
                 heights[i] = heights[i].max(peak.at.1);
             }
         }
-        let worst = leading(heights.into_iter()).filter(|_| !alike);
+        let worst = first_largest(heights.into_iter()).filter(|_| !alike);
         let points = self.largest_at(stretch, &all);
         let below = |omega: f64| {
             let at = points.partition_point(|point| point.0 < omega).clamp(1, points.len().max(2) - 1);

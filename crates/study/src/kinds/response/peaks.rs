@@ -7,7 +7,7 @@ use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
 use stickslip::model::System;
 use stickslip::orbit::{Orbit, PlaceMotion};
-use stickslip_numerics::leading::leading;
+use stickslip_numerics::tie_break::first_largest;
 
 /// Amplitudes below this share of the largest are rounding.
 const ROUNDING: f64 = 1e-10;
@@ -78,7 +78,7 @@ impl Sought {
     /// Returns the place that has the peak of a quantity.
     fn mass(&self, quantity: usize, values: &[f64]) -> usize {
         let amplitudes = &values[..self.amplitudes_count()];
-        let worst = || leading(amplitudes.iter().skip(1).copied()).unwrap_or(0);
+        let worst = || first_largest(amplitudes.iter().skip(1).copied()).unwrap_or(0);
         if self.named.is_empty() { quantity } else { self.named[worst()] }
     }
 }
@@ -97,7 +97,7 @@ impl Found {
     /// Returns true if no place moves more at the peak; the first of equal places counts.
     pub(super) fn leads(&self, system: &System) -> bool {
         let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
-        leading(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
+        first_largest(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
             == Some(self.mass)
     }
 }

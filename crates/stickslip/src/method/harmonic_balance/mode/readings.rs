@@ -5,7 +5,7 @@ use super::{ModeEquations, ModeState, ZERO};
 use crate::model::Axis;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::maximum::maximum;
+use stickslip_numerics::golden_section::golden_section;
 
 /// Samples per wave of the highest harmonic in which the extremes of a motion are bracketed.
 const SAMPLES: f64 = 16.0;
@@ -22,7 +22,7 @@ fn half_range(terms: &[(f64, Complex64)]) -> f64 {
         let sampled = (0..count).map(|i| (i, sign * value(i as f64 * step)));
         let (top, best) = sampled.fold((0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
         let bracket = ((top as f64 - 1.0) * step, (top as f64 + 1.0) * step);
-        let found = maximum(bracket, |a, b| b - a <= CLOSE * step, |t| Ok::<f64, ()>(sign * value(t)));
+        let found = golden_section(bracket, |a, b| b - a <= CLOSE * step, |t| Ok::<f64, ()>(sign * value(t)));
         found.map_or(best, |found| found.1.max(best))
     };
     0.5 * (end(1.0) + end(-1.0))

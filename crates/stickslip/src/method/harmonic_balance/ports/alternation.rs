@@ -6,7 +6,7 @@ use super::{Port, StaticState};
 use crate::law::MOST_DIRECTIONS;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use stickslip_numerics::fourier::Fourier;
+use stickslip_numerics::fourier::FourierPlan;
 
 pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -21,7 +21,7 @@ pub(in super::super) struct Alternation {
     /// Change of the states over a period, relative to their size, at which they count as periodic.
     pub repeats: f64,
     pub harmonics: Vec<usize>,
-    pub fourier: Fourier,
+    pub fourier: FourierPlan,
     pairs: Vec<(usize, Complex64)>,
     /// A scratch signal.
     pub signal: Vec<f64>,
@@ -93,7 +93,7 @@ impl Alternation {
             static_share: 1.0,
             marched: 0,
             repeats: REPEATS,
-            fourier: Fourier::new(samples),
+            fourier: FourierPlan::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
             signal: zeros.clone(),
             force: three(),
@@ -131,7 +131,7 @@ impl Alternation {
         for (pair, value) in self.pairs.iter_mut().zip(c) {
             pair.1 = value * factor(pair.0);
         }
-        self.fourier.synthesise(&self.pairs, &mut self.signal);
+        self.fourier.synthesize(&self.pairs, &mut self.signal);
     }
 
     /// Returns the static equilibrium of a port: displacements (m) along its axes, and states.
@@ -145,7 +145,7 @@ impl Alternation {
     pub fn add_harmonics(&mut self, axis: usize, wanted: &[usize], mut add: impl FnMut(usize, Complex64)) {
         let n = self.samples();
         self.work.copy_from_slice(&self.force[axis]);
-        let sums = self.fourier.sums(&mut self.work);
+        let sums = self.fourier.transform(&mut self.work);
         for (k, &h) in wanted.iter().enumerate().filter(|(_, h)| 2 * **h < n) {
             add(k, sums[h] * 2.0 / n as f64);
         }
@@ -162,7 +162,7 @@ impl Alternation {
     /// Adds the harmonics of a signal to `to`. The transform overwrites the signal.
     pub fn add_signal(&mut self, signal: &mut [f64], to: &mut [Complex64]) {
         let n = self.samples();
-        let sums = self.fourier.sums(signal);
+        let sums = self.fourier.transform(signal);
         for (to, &h) in to.iter_mut().zip(&self.harmonics) {
             *to += sums[h] * share(h, n);
         }
@@ -185,7 +185,7 @@ impl Alternation {
         }
         let n = self.samples();
         self.work.copy_from_slice(&self.slopes[slope]);
-        let sums = self.fourier.sums(&mut self.work);
+        let sums = self.fourier.transform(&mut self.work);
         for (m, value) in self.spectra[to].iter_mut().enumerate() {
             *value = sums[m] / n as f64;
         }

@@ -2,7 +2,7 @@
 //! slider's force is linear in it.
 
 use num_complex::Complex64;
-use stickslip_numerics::fourier::Fourier;
+use stickslip_numerics::fourier::FourierPlan;
 
 /// A part of the period in which the force is `stiffness u + offset`.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +35,7 @@ pub(in super::super) struct Extreme {
 /// Samples of a motion that separate its turning points.
 #[derive(Debug, Clone)]
 pub(in super::super) struct Grid {
-    pub(super) fourier: Fourier,
+    pub(super) fourier: FourierPlan,
     pub(super) pairs: Vec<(usize, Complex64)>,
     pub(super) value: Vec<f64>,
     pub(super) slope: Vec<f64>,
@@ -49,6 +49,11 @@ impl Grid {
     /// Creates a grid for harmonics up to `top`.
     pub fn new(top: usize) -> Self {
         let points = (POINTS * (top + 1)).next_power_of_two();
-        Grid { fourier: Fourier::new(points), pairs: Vec::new(), value: vec![0.0; points], slope: vec![0.0; points] }
+        Grid {
+            fourier: FourierPlan::new(points),
+            pairs: Vec::new(),
+            value: vec![0.0; points],
+            slope: vec![0.0; points],
+        }
     }
 }

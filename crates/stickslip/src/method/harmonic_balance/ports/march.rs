@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::ops::Range;
-use stickslip_numerics::dense::multiply_in_blocks;
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::interrupt;
 
 /// Replaces [`REPEATS`] if the change over a period no longer decreases.
@@ -264,8 +264,8 @@ impl Alternation {
         if few {
             self.fill_projection(&mut memory.projection);
             memory.of_states.resize(wide * d * m, 0.0);
-            let sizes = (d * m, n, wide);
-            multiply_in_blocks(&memory.by_state, &memory.projection, &mut memory.of_states, sizes, true);
+            let shape = ProductShape { rows: d * m, inner: n, columns: wide };
+            multiply_blocked(&memory.by_state, &memory.projection, &mut memory.of_states, shape, Transpose::Yes);
         }
         // a force that depends only on the end of the step has a slope at every sample
         let one = Complex64::new(1.0, 0.0);
@@ -288,8 +288,8 @@ impl Alternation {
                 if few {
                     // [sample][axis][column] times the projection on the harmonics
                     memory.spectrum.resize(own * tall * wide, 0.0);
-                    let sizes = (own * tall, n, wide);
-                    multiply_in_blocks(&memory.columns, &memory.projection, &mut memory.spectrum, sizes, true);
+                    let shape = ProductShape { rows: own * tall, inner: n, columns: wide };
+                    multiply_blocked(&memory.columns, &memory.projection, &mut memory.spectrum, shape, Transpose::Yes);
                     for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
                         for (a, values) in values.chunks_exact(tall).enumerate() {
                             let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
@@ -306,7 +306,7 @@ impl Alternation {
                     for i in 0..n {
                         memory.signal[i] = memory.columns[(i * d + a) * tall + column];
                     }
-                    let sums = self.fourier.sums(&mut memory.signal);
+                    let sums = self.fourier.transform(&mut memory.signal);
                     for (l, &to) in self.harmonics.iter().enumerate() {
                         let value = sums[to] * share(to, n);
                         let at = (a * wide + 2 * l) * size + first * wide + 2 * range.start + column;

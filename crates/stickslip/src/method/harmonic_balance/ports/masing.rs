@@ -280,7 +280,7 @@ impl Alternation {
             let length = width / count;
             for k in 0..count as usize {
                 let begin = branch.begin + k as f64 * length;
-                for (node, weight) in quadrature::EIGHT {
+                for (node, weight) in quadrature::GAUSS_8 {
                     let (s, weight) = (0.5 * (1.0 + node), 0.5 * length * weight);
                     match k == 0 && branch.turns {
                         true => add(begin + length * s * s, 2.0 * s * weight),

@@ -176,7 +176,7 @@ impl Alternation {
         self.add_force(0, image);
         if mean {
             self.work.copy_from_slice(&self.moment);
-            let sums = self.fourier.sums(&mut self.work);
+            let sums = self.fourier.transform(&mut self.work);
             for (f, &h) in image.iter_mut().zip(&self.harmonics) {
                 *f += sums[h] * share(h, n) * change(h, n).conj();
             }

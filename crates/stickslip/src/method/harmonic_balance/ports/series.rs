@@ -96,7 +96,7 @@ impl Alternation {
         let Grid { fourier, pairs, value, .. } = &mut self.grid;
         pairs.clear();
         pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
-        fourier.synthesise(pairs, value);
+        fourier.synthesize(pairs, value);
         let series = Series { harmonics: &self.harmonics, c };
         let angle = TAU / value.len() as f64;
         let bend: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum();

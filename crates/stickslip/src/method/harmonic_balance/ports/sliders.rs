@@ -129,11 +129,11 @@ impl Alternation {
         let Grid { fourier, pairs, value, slope } = &mut self.grid;
         pairs.clear();
         pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
-        fourier.synthesise(pairs, value);
+        fourier.synthesize(pairs, value);
         for pair in pairs.iter_mut() {
             pair.1 *= Complex64::new(0.0, pair.0 as f64);
         }
-        fourier.synthesise(pairs, slope);
+        fourier.synthesize(pairs, slope);
         let series = Series { harmonics: &self.harmonics, c };
         let n = value.len();
         let angle = TAU / n as f64;

@@ -1,6 +1,6 @@
 //! Sparsity pattern of several matrices, their elimination order, and the symbolic factors.
 
-use super::matrix::Matrix;
+use super::matrix::SparseMatrix;
 use faer::Side;
 use faer::perm::PermRef;
 use faer::sparse::SymbolicSparseColMatRef;
@@ -28,6 +28,13 @@ pub(super) struct Pattern {
     unsymmetric: OnceLock<SymbolicLu<u32>>,
 }
 
+/// The rows of the entries of each column, rising.
+struct Columns {
+    /// Start of each column in `rows`, n + 1 numbers.
+    starts: Vec<u32>,
+    rows: Vec<u32>,
+}
+
 /// The lower triangle of the pattern and its symbolic factor.
 #[derive(Debug)]
 pub(super) struct Symbolic {
@@ -38,21 +45,22 @@ pub(super) struct Symbolic {
 
 impl Pattern {
     /// Builds the pattern of matrices of one size, with mirrored entries added, and orders it.
-    pub fn new(matrices: &[&Matrix]) -> Self {
+    pub fn new(matrices: &[&SparseMatrix]) -> Self {
         let n = matrices.first().map_or(0, |matrix| matrix.n());
-        let (starts, rows) = union(n, matrices);
-        let order = order(n, &starts, &rows);
-        Pattern::ordered(n, (starts, rows), &order)
+        let union = union(n, matrices);
+        let order = order(n, &union.starts, &union.rows);
+        Pattern::ordered(n, union, &order)
     }
 
     /// Builds the pattern of other matrices with the order of this one,
     /// rearranged by their elimination tree.
-    pub fn in_order(&self, matrices: &[&Matrix]) -> Self {
+    pub fn with_order(&self, matrices: &[&SparseMatrix]) -> Self {
         Pattern::ordered(self.n, union(self.n, matrices), &self.order)
     }
 
-    fn ordered(n: usize, (starts, rows): (Vec<u32>, Vec<u32>), order: &[u32]) -> Self {
-        let order = by_tree(order, &starts, &rows);
+    fn ordered(n: usize, columns: Columns, order: &[u32]) -> Self {
+        let Columns { starts, rows } = columns;
+        let order = postordered(order, &starts, &rows);
         let mut inverse = vec![0; n];
         order.iter().enumerate().for_each(|(at, &row)| inverse[row as usize] = at as u32);
         let (real, complex, unsymmetric) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
@@ -60,7 +68,7 @@ impl Pattern {
     }
 
     /// Returns the entries of a sum, in the storage order of the pattern.
-    pub fn sum<T: Copy + Default + AddAssign + Mul<f64, Output = T>>(&self, sum: &[(T, &Matrix)]) -> Vec<T> {
+    pub fn sum<T: Copy + Default + AddAssign + Mul<f64, Output = T>>(&self, sum: &[(T, &SparseMatrix)]) -> Vec<T> {
         let mut values = vec![T::default(); self.rows.len()];
         for &(factor, matrix) in sum {
             assert_eq!(matrix.n(), self.n, "the matrices of a sum must have the size of the analysed matrices");
@@ -82,7 +90,7 @@ impl Pattern {
     }
 
     /// Returns the lower triangle of a sum, in the storage order of the real factor.
-    pub fn lower_sum(&self, sum: &[(f64, &Matrix)]) -> Vec<f64> {
+    pub fn lower_sum(&self, sum: &[(f64, &SparseMatrix)]) -> Vec<f64> {
         let symbolic = self.real();
         let mut values = vec![0.0; symbolic.rows.len()];
         for &(factor, matrix) in sum {
@@ -107,11 +115,11 @@ impl Pattern {
     /// Returns the symbolic real factor.
     pub fn real(&self) -> &Symbolic {
         self.real.get_or_init(|| {
-            let mut lower = (vec![0], Vec::new());
+            let mut lower = Columns { starts: vec![0], rows: Vec::new() };
             for column in 0..self.n {
                 let rows = &self.rows[self.starts[column] as usize..self.starts[column + 1] as usize];
-                lower.1.extend(rows.iter().copied().filter(|row| *row as usize >= column));
-                lower.0.push(lower.1.len() as u32);
+                lower.rows.extend(rows.iter().copied().filter(|row| *row as usize >= column));
+                lower.starts.push(lower.rows.len() as u32);
             }
             self.symbolic(lower, &self.order, &self.inverse)
         })
@@ -123,16 +131,16 @@ impl Pattern {
     /// solution is the conjugate of the complex solution.
     pub fn complex(&self) -> &Symbolic {
         self.complex.get_or_init(|| {
-            let mut lower = (vec![0], Vec::new());
+            let mut lower = Columns { starts: vec![0], rows: Vec::new() };
             for column in 0..self.n {
                 let rows = &self.rows[self.starts[column] as usize..self.starts[column + 1] as usize];
                 for part in 0..2 {
                     for &row in rows.iter().filter(|row| **row as usize >= column) {
                         // On the diagonal the upper entry belongs to the other triangle.
                         let first = if row as usize == column { part } else { 0 };
-                        lower.1.extend((first..2).map(|other| 2 * row + other));
+                        lower.rows.extend((first..2).map(|other| 2 * row + other));
                     }
-                    lower.0.push(lower.1.len() as u32);
+                    lower.starts.push(lower.rows.len() as u32);
                 }
             }
             let double = |order: &[u32]| order.iter().flat_map(|row| [2 * row, 2 * row + 1]).collect::<Vec<u32>>();
@@ -140,7 +148,8 @@ impl Pattern {
         })
     }
 
-    fn symbolic(&self, (starts, rows): (Vec<u32>, Vec<u32>), order: &[u32], inverse: &[u32]) -> Symbolic {
+    fn symbolic(&self, columns: Columns, order: &[u32], inverse: &[u32]) -> Symbolic {
+        let Columns { starts, rows } = columns;
         let n = order.len();
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(order, inverse, n));
@@ -166,14 +175,14 @@ impl Pattern {
 
 /// Returns the union of the patterns, the mirrored patterns and the diagonal,
 /// by columns with rising rows.
-fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
+fn union(n: usize, matrices: &[&SparseMatrix]) -> Columns {
     assert!(matrices.iter().all(|matrix| matrix.n() == n), "the matrices of a sum must have one size");
-    let mirrored: Vec<_> = matrices.iter().map(|matrix| mirrored(n, &matrix.starts, &matrix.rows)).collect();
+    let transposed: Vec<_> = matrices.iter().map(|matrix| transposed(n, &matrix.starts, &matrix.rows)).collect();
     let most = matrices.iter().map(|matrix| matrix.rows.len()).max().unwrap_or(0);
     let (mut starts, mut rows) = (Vec::with_capacity(n + 1), Vec::with_capacity(most + n));
     starts.push(0);
     // The last column in which a row was added.
-    let mut met = vec![NONE; n];
+    let mut met = vec![NO_ROW; n];
     for column in 0..n {
         let first = rows.len();
         let mut meet = |some: &[u32]| {
@@ -184,7 +193,7 @@ fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
                 }
             }
         };
-        for (matrix, (starts, rows)) in matrices.iter().zip(&mirrored) {
+        for (matrix, (starts, rows)) in matrices.iter().zip(&transposed) {
             meet(&matrix.rows[matrix.range(column)]);
             meet(&rows[starts[column] as usize..starts[column + 1] as usize]);
         }
@@ -192,11 +201,11 @@ fn union(n: usize, matrices: &[&Matrix]) -> (Vec<u32>, Vec<u32>) {
         rows[first..].sort_unstable();
         starts.push(rows.len() as u32);
     }
-    (starts, rows)
+    Columns { starts, rows }
 }
 
 /// Returns the transposed pattern, by columns with rising rows.
-fn mirrored(n: usize, starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
+fn transposed(n: usize, starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let mut next = vec![0; n + 1];
     rows.iter().for_each(|row| next[*row as usize + 1] += 1);
     (0..n).for_each(|row| next[row + 1] += next[row]);
@@ -218,16 +227,16 @@ fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
     // The first row with the same pattern. The diagonal is whole, so this row
     // is one of the row's entries.
     let mut first: Vec<u32> = (0..n as u32).collect();
-    let mut alike = vec![0u32; n];
+    let mut vertex_of = vec![0u32; n];
     let mut number = 0;
     for row in 0..n as u32 {
         let own = column(row);
         let same = own.iter().take_while(|other| **other < row);
         let same = same.filter(|other| first[**other as usize] == **other).find(|other| column(**other) == own);
         match same {
-            Some(&other) => (first[row as usize], alike[row as usize]) = (other, alike[other as usize]),
+            Some(&other) => (first[row as usize], vertex_of[row as usize]) = (other, vertex_of[other as usize]),
             None => {
-                alike[row as usize] = number;
+                vertex_of[row as usize] = number;
                 number += 1;
             }
         }
@@ -235,18 +244,18 @@ fn order(n: usize, starts: &[u32], rows: &[u32]) -> Vec<u32> {
     let (mut among, mut links) = (vec![0i32], Vec::new());
     for row in (0..n as u32).filter(|row| first[*row as usize] == *row) {
         let others = column(row).iter().filter(|other| first[**other as usize] == **other);
-        links.extend(others.map(|other| alike[*other as usize] as i32));
+        links.extend(others.map(|other| vertex_of[*other as usize] as i32));
         among.push(links.len() as i32);
     }
     let pattern = CscPattern::new(number as usize, &among, &links).expect("the union of patterns is a pattern");
     let order = metis_order(&pattern).unwrap_or_else(|error| panic!("{n} rows, {} entries: {error:?}", rows.len()));
     let mut members = vec![Vec::new(); number as usize];
-    alike.iter().enumerate().for_each(|(row, &number)| members[number as usize].push(row as u32));
+    vertex_of.iter().enumerate().for_each(|(row, &number)| members[number as usize].push(row as u32));
     order.iter().flat_map(|number| members[*number as usize].iter().copied()).collect()
 }
 
 /// Marks the absence of a row.
-const NONE: u32 = u32::MAX;
+const NO_ROW: u32 = u32::MAX;
 
 /// Returns the order sorted by the elimination tree, children before parents.
 ///
@@ -254,11 +263,11 @@ const NONE: u32 = u32::MAX;
 /// and form the largest possible supernodes.
 ///
 /// Source: Liu (1990), "The role of elimination trees in sparse factorization".
-fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
+fn postordered(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
     let n = order.len();
     let mut at = vec![0u32; n];
     order.iter().enumerate().for_each(|(place, &row)| at[row as usize] = place as u32);
-    let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
+    let (mut parent, mut ancestor) = (vec![NO_ROW; n], vec![NO_ROW; n]);
     for place in 0..n as u32 {
         let row = order[place as usize] as usize;
         for other in &rows[starts[row] as usize..starts[row + 1] as usize] {
@@ -266,7 +275,7 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
             // Path compression: visited paths lead directly to this place.
             while below < place {
                 let next = std::mem::replace(&mut ancestor[below as usize], place);
-                if next == NONE {
+                if next == NO_ROW {
                     parent[below as usize] = place;
                     break;
                 }
@@ -275,16 +284,16 @@ fn by_tree(order: &[u32], starts: &[u32], rows: &[u32]) -> Vec<u32> {
         }
     }
     // The children of each row as a linked list, the lowest first.
-    let (mut child, mut next) = (vec![NONE; n + 1], vec![NONE; n]);
+    let (mut child, mut next) = (vec![NO_ROW; n + 1], vec![NO_ROW; n]);
     for place in (0..n).rev() {
-        let of = if parent[place] == NONE { n } else { parent[place] as usize };
-        (next[place], child[of]) = (child[of], place as u32);
+        let owner = if parent[place] == NO_ROW { n } else { parent[place] as usize };
+        (next[place], child[owner]) = (child[owner], place as u32);
     }
     let mut sorted = Vec::with_capacity(n);
     let mut path = vec![n];
     while let Some(&last) = path.last() {
         match child[last] {
-            NONE => {
+            NO_ROW => {
                 path.pop();
                 sorted.extend(order.get(last));
             }
@@ -308,16 +317,16 @@ mod tests {
         let (wide, n) = (12, 3 * 12 * 12);
         let linked = |a: usize, b: usize| (a / wide).abs_diff(b / wide) <= 1 && (a % wide).abs_diff(b % wide) <= 1;
         let pairs = (0..n).flat_map(|i| (0..n).filter(move |k| linked(i / 3, k / 3)).map(move |k| (i, k, 1.0)));
-        let matrix = Matrix::from_triplets(n, pairs).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, pairs).unwrap();
         let pattern = Pattern::new(&[&matrix]);
         let mut sorted = pattern.order.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().enumerate().all(|(at, row)| at == *row as usize));
         assert!(pattern.order.chunks(3).all(|rows| rows.iter().all(|row| row / 3 == rows[0] / 3)));
         // An order that follows the tree does not change.
-        assert_eq!(by_tree(&pattern.order, &pattern.starts, &pattern.rows), pattern.order);
+        assert_eq!(postordered(&pattern.order, &pattern.starts, &pattern.rows), pattern.order);
         // A diagonal matrix has an elimination tree without edges, so the order does not change.
-        let one = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap();
-        assert_eq!(pattern.in_order(&[&one]).order, pattern.order);
+        let one = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 1.0))).unwrap();
+        assert_eq!(pattern.with_order(&[&one]).order, pattern.order);
     }
 }

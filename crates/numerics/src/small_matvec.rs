@@ -7,10 +7,10 @@
 /// # Example
 /// ```
 /// let mut out = [1.0, 0.0];
-/// stickslip_numerics::short::add_product(&[1.0, 2.0, 3.0, 4.0], &[1.0, 10.0], &mut out);
+/// stickslip_numerics::small_matvec::add_matvec(&[1.0, 2.0, 3.0, 4.0], &[1.0, 10.0], &mut out);
 /// assert_eq!(out, [32.0, 42.0]);
 /// ```
-pub fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
+pub fn add_matvec(matrix: &[f64], x: &[f64], out: &mut [f64]) {
     match out.len() {
         2 => add_columns::<2>(matrix, x, out),
         4 => add_columns::<4>(matrix, x, out),
@@ -18,7 +18,7 @@ pub fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
         6 => add_columns::<6>(matrix, x, out),
         rows => {
             for (column, factor) in matrix.chunks_exact(rows.max(1)).zip(x) {
-                add(*factor, column, out);
+                axpy(*factor, column, out);
             }
         }
     }
@@ -32,10 +32,10 @@ pub fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
 /// ```
 /// let mut out = [0.0; 4];
 /// // twice the identity matrix, and rows of two columns
-/// stickslip_numerics::short::add_product_of_rows(&[2.0, 0.0, 0.0, 2.0], 2, &[1.0, 2.0, 3.0, 4.0], &mut out, 2);
+/// stickslip_numerics::small_matvec::add_matmul_row_major(&[2.0, 0.0, 0.0, 2.0], 2, &[1.0, 2.0, 3.0, 4.0], &mut out, 2);
 /// assert_eq!(out, [2.0, 4.0, 6.0, 8.0]);
 /// ```
-pub fn add_product_of_rows(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64], columns: usize) {
+pub fn add_matmul_row_major(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64], columns: usize) {
     match columns {
         0 => {}
         2 => add_rows::<2>(matrix, rows, x, out),
@@ -44,7 +44,7 @@ pub fn add_product_of_rows(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f6
         _ => {
             for (i, out) in out.chunks_exact_mut(columns).take(rows).enumerate() {
                 for (column, row) in matrix.chunks_exact(rows).zip(x.chunks_exact(columns)) {
-                    add(column[i], row, out);
+                    axpy(column[i], row, out);
                 }
             }
         }
@@ -52,7 +52,7 @@ pub fn add_product_of_rows(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f6
 }
 
 /// Adds `factor` times `row` to `out`.
-pub fn add(factor: f64, row: &[f64], out: &mut [f64]) {
+pub fn axpy(factor: f64, row: &[f64], out: &mut [f64]) {
     out.iter_mut().zip(row).for_each(|(out, entry)| *out += factor * entry);
 }
 
@@ -92,10 +92,10 @@ mod tests {
                 let expected = &matrix * &x;
                 let mut by_rows = vec![0.0; (rows + 1) * columns];
                 let x_rows = x.transpose();
-                add_product_of_rows(matrix.as_slice(), rows, x_rows.as_slice(), &mut by_rows, columns);
+                add_matmul_row_major(matrix.as_slice(), rows, x_rows.as_slice(), &mut by_rows, columns);
                 for k in 0..columns {
                     let mut column = vec![1.0; rows];
-                    add_product(matrix.as_slice(), x.column(k).as_slice(), &mut column);
+                    add_matvec(matrix.as_slice(), x.column(k).as_slice(), &mut column);
                     for i in 0..rows {
                         assert!((column[i] - 1.0 - expected[(i, k)]).abs() < 1e-14, "{rows} by {columns}");
                         assert!((by_rows[i * columns + k] - expected[(i, k)]).abs() < 1e-14, "{rows} by {columns}");

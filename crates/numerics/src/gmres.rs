@@ -10,19 +10,19 @@ use crate::interrupt;
 
 /// Tolerance and work limits of one solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct GmresLimits {
     /// Residual relative to the right side at which the equations count as solved.
     pub tolerance: f64,
     /// Number of basis vectors. After this number of products the iteration
     /// restarts from its current solution.
-    pub vectors: usize,
+    pub restart: usize,
     /// Maximum number of products. A final check of the residual may add one.
     pub products: usize,
 }
 
 /// The result of a solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct GmresOutcome {
     /// Number of products with the matrix.
     pub products: usize,
     /// Residual relative to the right side: recomputed by a product, or from
@@ -36,17 +36,18 @@ pub struct Outcome {
 #[derive(Debug, Clone, Default)]
 pub struct Gmres {
     basis: Vec<f64>,
-    /// Columns of the triangular factor, each of `vectors + 1` entries.
+    /// Columns of the triangular factor, each of `restart + 1` entries.
     triangle: Vec<f64>,
-    turns: Vec<(f64, f64)>,
-    rest: Vec<f64>,
+    rotations: Vec<(f64, f64)>,
+    /// Right side of the least-squares problem; its last entry is the residual.
+    rotated_rhs: Vec<f64>,
     sum: Vec<f64>,
     product: Vec<f64>,
 }
 
 /// A new vector shorter than this fraction of the product it comes from is
 /// rounding: the Krylov space is exhausted.
-const EXHAUSTED: f64 = 1e-14;
+const BREAKDOWN: f64 = 1e-14;
 
 impl Gmres {
     /// Solves `A x = b`.
@@ -57,37 +58,40 @@ impl Gmres {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::krylov::{Gmres, Limits};
+    /// use stickslip_numerics::gmres::{Gmres, GmresLimits};
     /// let mut x = [3.0, 4.0];
     /// let multiply = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 2.0 * v[1]]);
-    /// let limits = Limits { tolerance: 1e-12, vectors: 5, products: 10 };
+    /// let limits = GmresLimits { tolerance: 1e-12, restart: 5, products: 10 };
     /// assert!(Gmres::default().solve(&mut x, limits, multiply, |_| ()).solved);
     /// assert!((x[0] - 1.0).abs() < 1e-12 && (x[1] - 2.0).abs() < 1e-12);
     /// ```
     pub fn solve(
         &mut self,
         x: &mut [f64],
-        limits: Limits,
+        limits: GmresLimits,
         mut multiply: impl FnMut(&[f64], &mut [f64]),
         mut precondition: impl FnMut(&mut [f64]),
-    ) -> Outcome {
+    ) -> GmresOutcome {
         let n = x.len();
-        let most = limits.vectors.clamp(1, n.max(1));
-        let right = x.to_vec();
-        let size = norm(&right);
+        let most = limits.restart.clamp(1, n.max(1));
+        let rhs = x.to_vec();
+        let size = norm(&rhs);
         x.fill(0.0);
-        let mut outcome = Outcome { products: 0, residual: 0.0, solved: true };
+        let mut outcome = GmresOutcome { products: 0, residual: 0.0, solved: true };
         if size == 0.0 {
             return outcome;
         }
-        let mut residual = right.clone();
+        let mut residual = rhs.clone();
         let mut left = size;
         loop {
             let columns = self.cycle(
                 &residual,
                 left,
-                (most, limits.products - outcome.products),
-                limits.tolerance * size,
+                GmresLimits {
+                    tolerance: limits.tolerance * size,
+                    restart: most,
+                    products: limits.products - outcome.products,
+                },
                 &mut multiply,
                 &mut precondition,
             );
@@ -105,14 +109,14 @@ impl Gmres {
             }
             precondition(&mut self.sum);
             x.iter_mut().zip(&self.sum).for_each(|(x, sum)| *x += sum);
-            let expected = self.rest.last().map_or(left, |rest| rest.abs());
-            if limits.tolerance >= UNCHECKED && expected <= limits.tolerance * size {
+            let expected = self.rotated_rhs.last().map_or(left, |entry| entry.abs());
+            if limits.tolerance >= TRUSTED_TOLERANCE && expected <= limits.tolerance * size {
                 outcome.residual = expected / size;
                 return outcome;
             }
             multiply(x, &mut self.product);
             outcome.products += 1;
-            residual.iter_mut().zip(&right).zip(&self.product).for_each(|((r, b), ax)| *r = b - ax);
+            residual.iter_mut().zip(&rhs).zip(&self.product).for_each(|((r, b), ax)| *r = b - ax);
             let before = left;
             left = norm(&residual);
             outcome.residual = left / size;
@@ -125,27 +129,28 @@ impl Gmres {
         }
     }
 
-    /// Runs one cycle from a residual. Returns the weights of its basis vectors.
+    /// Runs one cycle from a residual, up to an absolute `tolerance`. Returns the weights of its
+    /// basis vectors.
     fn cycle(
         &mut self,
         residual: &[f64],
         size: f64,
-        (vectors, products): (usize, usize),
-        goal: f64,
+        limits: GmresLimits,
         multiply: &mut impl FnMut(&[f64], &mut [f64]),
         precondition: &mut impl FnMut(&mut [f64]),
     ) -> Vec<f64> {
         let n = residual.len();
-        let tall = vectors + 1;
+        let GmresLimits { tolerance, restart, products } = limits;
+        let tall = restart + 1;
         self.basis.clear();
         self.basis.extend(residual.iter().map(|r| r / size));
         self.triangle.clear();
-        self.turns.clear();
-        self.rest.clear();
-        self.rest.push(size);
+        self.rotations.clear();
+        self.rotated_rhs.clear();
+        self.rotated_rhs.push(size);
         self.product.resize(n, 0.0);
         let mut count = 0;
-        while count < vectors.min(products) {
+        while count < restart.min(products) {
             interrupt::check();
             self.sum.clear();
             self.sum.extend_from_slice(&self.basis[count * n..]);
@@ -157,14 +162,14 @@ impl Gmres {
             // Orthogonalize twice, to remove the rounding of the first projection.
             for _ in 0..2 {
                 for (i, v) in self.basis.chunks_exact(n).enumerate() {
-                    let share = dot(v, &self.product);
-                    self.triangle[start + i] += share;
-                    self.product.iter_mut().zip(v).for_each(|(p, v)| *p -= share * v);
+                    let component = dot(v, &self.product);
+                    self.triangle[start + i] += component;
+                    self.product.iter_mut().zip(v).for_each(|(p, v)| *p -= component * v);
                 }
             }
             let next = norm(&self.product);
             let column = &mut self.triangle[start..start + tall];
-            for (i, &(c, s)) in self.turns.iter().enumerate() {
+            for (i, &(c, s)) in self.rotations.iter().enumerate() {
                 (column[i], column[i + 1]) = (c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]);
             }
             let length = column[count].hypot(next);
@@ -173,17 +178,17 @@ impl Gmres {
             }
             let (c, s) = (column[count] / length, next / length);
             column[count] = length;
-            self.turns.push((c, s));
-            let left = self.rest[count];
-            self.rest[count] = c * left;
-            self.rest.push(-s * left);
+            self.rotations.push((c, s));
+            let left = self.rotated_rhs[count];
+            self.rotated_rhs[count] = c * left;
+            self.rotated_rhs.push(-s * left);
             count += 1;
-            if (s * left).abs() <= goal || next <= EXHAUSTED * whole {
+            if (s * left).abs() <= tolerance || next <= BREAKDOWN * whole {
                 break;
             }
             self.basis.extend(self.product.iter().map(|p| p / next));
         }
-        let mut weights = self.rest[..count].to_vec();
+        let mut weights = self.rotated_rhs[..count].to_vec();
         for i in (0..count).rev() {
             let sum: f64 = (i + 1..count).map(|j| self.triangle[j * tall + i] * weights[j]).sum();
             weights[i] = (weights[i] - sum) / self.triangle[i * tall + i];
@@ -194,7 +199,7 @@ impl Gmres {
 
 /// Tolerance from which the residual of the recurrence is trusted. With few
 /// vectors it differs from the true residual by rounding only.
-const UNCHECKED: f64 = 1e-4;
+const TRUSTED_TOLERANCE: f64 = 1e-4;
 /// Factor on the tolerance by which the true residual may exceed that of the
 /// recurrence, because of rounding in the products.
 const SLACK: f64 = 2.0;
@@ -226,7 +231,7 @@ mod tests {
         if i == k { 1.0 + i as f64 / n as f64 + noise } else { noise }
     }
 
-    fn solve(n: usize, limits: Limits, diagonal: bool) -> (Outcome, f64) {
+    fn solve(n: usize, limits: GmresLimits, diagonal: bool) -> (GmresOutcome, f64) {
         let wanted: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).cos()).collect();
         let product = |v: &[f64], out: &mut [f64]| {
             for (i, out) in out.iter_mut().enumerate() {
@@ -248,28 +253,28 @@ mod tests {
     #[test]
     fn the_solution_is_found() {
         for n in [1, 5, 80] {
-            let whole = Limits { tolerance: 1e-12, vectors: n, products: 2 * n + 2 };
+            let whole = GmresLimits { tolerance: 1e-12, restart: n, products: 2 * n + 2 };
             let (outcome, error) = solve(n, whole, false);
             assert!(outcome.solved && error < 1e-9, "{n}: {outcome:?} {error:.1e}");
         }
-        let limits = Limits { tolerance: 1e-10, vectors: 60, products: 400 };
+        let limits = GmresLimits { tolerance: 1e-10, restart: 60, products: 400 };
         let (plain, error) = solve(80, limits, false);
         assert!(plain.solved && error < 1e-7, "{plain:?} {error:.1e}");
-        let (restarted, error) = solve(80, Limits { vectors: 25, ..limits }, true);
+        let (restarted, error) = solve(80, GmresLimits { restart: 25, ..limits }, true);
         assert!(restarted.solved && error < 1e-7, "{restarted:?} {error:.1e}");
     }
 
     /// Without a solution, or with too few products, the outcome is not solved.
     #[test]
-    fn what_is_not_solved_is_told() {
-        let limits = Limits { tolerance: 1e-12, vectors: 10, products: 4 };
+    fn unsolved_systems_are_reported() {
+        let limits = GmresLimits { tolerance: 1e-12, restart: 10, products: 4 };
         let (outcome, _) = solve(80, limits, false);
         assert!(!outcome.solved && outcome.products <= 5, "{outcome:?}");
         assert!(outcome.residual > 1e-12 && outcome.residual < 1.0);
         let mut x = [1.0, 1.0];
         let singular = |v: &[f64], out: &mut [f64]| out.copy_from_slice(&[v[0] + v[1], 0.0]);
         let outcome =
-            Gmres::default().solve(&mut x, Limits { tolerance: 1e-9, vectors: 9, products: 30 }, singular, |_| ());
+            Gmres::default().solve(&mut x, GmresLimits { tolerance: 1e-9, restart: 9, products: 30 }, singular, |_| ());
         assert!(!outcome.solved && outcome.residual > 0.5, "{outcome:?}");
         let mut x = [1.0; 3];
         let none = Gmres::default().solve(&mut x, limits, |_, out| out.fill(f64::NAN), |_| ());

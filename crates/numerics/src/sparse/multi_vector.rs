@@ -1,6 +1,6 @@
 //! Products with blocks of vectors, stored column by column in one slice.
 
-use super::matrix::Matrix;
+use super::matrix::SparseMatrix;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
@@ -12,11 +12,11 @@ use nalgebra::DMatrix;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::sparse::columns;
-/// let product = columns::products(2, &[1.0, 2.0], &[3.0, 4.0, 5.0, 6.0]);
+/// use stickslip_numerics::sparse::multi_vector;
+/// let product = multi_vector::inner_products(2, &[1.0, 2.0], &[3.0, 4.0, 5.0, 6.0]);
 /// assert_eq!((product[(0, 0)], product[(0, 1)]), (11.0, 17.0));
 /// ```
-pub fn products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
+pub fn inner_products(n: usize, v: &[f64], w: &[f64]) -> DMatrix<f64> {
     let (rows, columns) = (count(n, v), count(n, w));
     let mut product = DMatrix::zeros(rows, columns);
     if rows * columns > 0 {
@@ -56,38 +56,38 @@ pub fn add(n: usize, w: &mut [f64], factor: f64, v: &[f64], s: &DMatrix<f64>) {
 ///
 /// # Panics
 /// Under the conditions of [`add`].
-pub fn combination(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
+pub fn combine(n: usize, v: &[f64], s: &DMatrix<f64>) -> Vec<f64> {
     let mut w = vec![0.0; n * s.ncols()];
     add(n, &mut w, 1.0, v, s);
     w
 }
 
-impl Matrix {
+impl SparseMatrix {
     /// Returns `A V` of columns of length n.
     ///
     /// # Panics
     /// If the length of `v` is not a multiple of n.
-    pub fn times_columns(&self, v: &[f64]) -> Vec<f64> {
+    pub fn multiply_columns(&self, v: &[f64]) -> Vec<f64> {
         let n = self.n();
         let all = count(n, v);
         let mut product = vec![0.0; n * all];
         let at = |column: usize| column * n;
-        let whole = all / TOGETHER * TOGETHER;
-        self.times_side_by_side::<TOGETHER>(&v[..at(whole)], &mut product[..at(whole)]);
+        let whole = all / COLUMNS_AT_ONCE * COLUMNS_AT_ONCE;
+        self.multiply_n::<COLUMNS_AT_ONCE>(&v[..at(whole)], &mut product[..at(whole)]);
         let rest = (&v[at(whole)..], &mut product[at(whole)..]);
         match all - whole {
             0 => {}
-            1 => self.times_side_by_side::<1>(rest.0, rest.1),
-            2 => self.times_side_by_side::<2>(rest.0, rest.1),
-            3 | 4 => self.times_side_by_side::<4>(rest.0, rest.1),
-            _ => self.times_side_by_side::<TOGETHER>(rest.0, rest.1),
+            1 => self.multiply_n::<1>(rest.0, rest.1),
+            2 => self.multiply_n::<2>(rest.0, rest.1),
+            3 | 4 => self.multiply_n::<4>(rest.0, rest.1),
+            _ => self.multiply_n::<COLUMNS_AT_ONCE>(rest.0, rest.1),
         }
         product
     }
 
     /// Computes `A V` for `N` columns at once, with zeros in place of missing columns. The columns
     /// are stored row by row, so an entry meets one row of all columns in consecutive memory.
-    fn times_side_by_side<const N: usize>(&self, v: &[f64], product: &mut [f64]) {
+    fn multiply_n<const N: usize>(&self, v: &[f64], product: &mut [f64]) {
         let n = self.n();
         if v.is_empty() {
             return;
@@ -127,7 +127,7 @@ fn add_column<const N: usize>(from: [f64; N], rows: &[u32], values: &[f64], to: 
 }
 
 /// Number of columns multiplied at once: the entries are read once for all of them.
-const TOGETHER: usize = 8;
+const COLUMNS_AT_ONCE: usize = 8;
 
 /// Returns the number of columns of length `n`.
 fn count(n: usize, v: &[f64]) -> usize {
@@ -149,14 +149,14 @@ mod tests {
         let n = 9;
         let noise = |i: usize| ((i * 7919 + 13) as f64).sin();
         let entries = (0..40).map(|i| ((i * 5) % n, (i * 7 + 3) % n, noise(i)));
-        let matrix = Matrix::from_triplets(n, entries).unwrap();
+        let matrix = SparseMatrix::from_triplets(n, entries).unwrap();
         for columns in 0..20 {
             let v: Vec<f64> = (0..n * columns).map(|i| noise(i + 100)).collect();
-            let together = matrix.times_columns(&v);
+            let together = matrix.multiply_columns(&v);
             for (v, w) in v.chunks_exact(n).zip(together.chunks_exact(n)) {
-                assert_eq!(matrix.times_columns(v), w);
+                assert_eq!(matrix.multiply_columns(v), w);
             }
         }
-        assert!(Matrix::from_triplets(0, []).unwrap().times_columns(&[]).is_empty());
+        assert!(SparseMatrix::from_triplets(0, []).unwrap().multiply_columns(&[]).is_empty());
     }
 }

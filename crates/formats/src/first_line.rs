@@ -9,8 +9,8 @@
 //! Sizes are integers that no later index exceeds, and the stated number of lines follows them.
 //! Reading sizes as an entry would silently change the matrix.
 
-use crate::error::{Error, Kind};
-use crate::text::{Line, Lines, integer, shown};
+use crate::error::{Error, ErrorKind};
+use crate::text::{Line, Lines, integer, quoted};
 
 /// The meaning of the first line.
 pub(crate) enum FirstLine<'a> {
@@ -19,12 +19,12 @@ pub(crate) enum FirstLine<'a> {
     /// Rows, columns and number of entries.
     Sizes,
     /// An entry, or sizes followed by another number of lines.
-    Unclear(Line<'a>),
+    Ambiguous(Line<'a>),
 }
 
 impl<'a> FirstLine<'a> {
     /// Classifies the first line of a file of lines with three fields. Comments begin with `%`.
-    pub fn of(bytes: &'a [u8]) -> Self {
+    pub fn classify(bytes: &'a [u8]) -> Self {
         let mut lines = Lines::new(bytes).filter(|line| !line.text.trim_ascii().is_empty() && !is_comment(line));
         let Some((first, [rows, columns, entries])) = lines.next().and_then(|line| Some((line, whole(&line)?))) else {
             return FirstLine::Entry;
@@ -41,7 +41,7 @@ impl<'a> FirstLine<'a> {
             _ if count == entries => FirstLine::Sizes,
             // A single line is an entry.
             0 => FirstLine::Entry,
-            _ => FirstLine::Unclear(first),
+            _ => FirstLine::Ambiguous(first),
         }
     }
 }
@@ -58,13 +58,13 @@ pub(crate) fn is_comment(line: &Line) -> bool {
 }
 
 /// Creates the error for a first line that may be sizes or an entry.
-pub(crate) fn unclear(line: &Line) -> Error {
+pub(crate) fn ambiguous(line: &Line) -> Error {
     Error::new(
-        Kind::Malformed,
+        ErrorKind::Malformed,
         line.location(),
         format!(
             "{} is either an entry, or the sizes of a Matrix Market file with a wrong number of entries",
-            shown(line.text)
+            quoted(line.text)
         ),
         "for sizes, correct the number of entries and add the line `%%MatrixMarket matrix coordinate real general` \
          above; for an entry, write its value with a decimal point",

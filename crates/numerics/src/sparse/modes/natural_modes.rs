@@ -9,10 +9,10 @@ use crate::sparse::Singular;
 pub(super) const BLOCK: usize = 4;
 /// Eigenvalues below this fraction of a typical `k_ii / m_ii` may be rigid-body
 /// modes, in matrices of ten digits.
-const FREE: f64 = 1e-10;
+const RIGID_BODY: f64 = 1e-10;
 /// The first elastic eigenvalue exceeds those of the rigid-body modes by more than this factor.
 /// Consecutive eigenvalues of a slender beam, however small, have a smaller ratio.
-const APART: f64 = 1e3;
+const SEPARATION: f64 = 1e3;
 
 /// The lowest natural modes, without gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,12 +29,12 @@ pub struct NaturalModes {
     /// A typical `k_ii / m_ii`, rad²/s². The rounding of λ is far below it.
     pub scale: f64,
     /// Cost of the search.
-    pub effort: Effort,
+    pub cost: ModesCost,
 }
 
 /// Cost of a search for modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Effort {
+pub struct ModesCost {
     /// Number of factorizations.
     pub factors: usize,
     /// Number of Lanczos vectors.
@@ -102,8 +102,8 @@ pub enum ModesError {
 }
 
 impl NaturalModes {
-    pub(super) fn none() -> Self {
-        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, effort: Effort::default() }
+    pub(super) fn empty() -> Self {
+        NaturalModes { values: vec![], shapes: vec![], residuals: vec![], scale: 0.0, cost: ModesCost::default() }
     }
 
     /// Returns the number of modes.
@@ -113,10 +113,10 @@ impl NaturalModes {
 
     /// Returns the number of rigid-body modes: eigenvalues that are zero to the
     /// ten digits of a file, and far below the next.
-    pub fn free(&self) -> usize {
+    pub fn rigid_body_count(&self) -> usize {
         let values = &self.values;
-        let apart = |k: &usize| *k == 0 || *k == values.len() || values[*k] > APART * values[*k - 1].abs();
-        (0..=self.below(FREE * self.scale)).rev().find(apart).unwrap_or(0)
+        let separated = |k: &usize| *k == 0 || *k == values.len() || values[*k] > SEPARATION * values[*k - 1].abs();
+        (0..=self.below(RIGID_BODY * self.scale)).rev().find(separated).unwrap_or(0)
     }
 
     /// Returns the shape φ of a mode, counted from 0.
@@ -144,7 +144,7 @@ impl NaturalModes {
     }
 
     /// Adds modes and sorts all by eigenvalue.
-    pub(super) fn join(&mut self, n: usize, other: NaturalModes) {
+    pub(super) fn merge(&mut self, n: usize, other: NaturalModes) {
         self.values.extend(other.values);
         self.shapes.extend(other.shapes);
         self.residuals.extend(other.residuals);

@@ -18,7 +18,7 @@ use num_complex::Complex64;
 
 /// The modes of a system with unit mass matrix.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Modes {
+pub struct QuadraticModes {
     /// Exponents λ, one of every complex pair, rad/s.
     pub lambda: Vec<Complex64>,
     /// Columns φ times their weight (2 for a complex pair, 1 for a real mode), m × modes.
@@ -39,7 +39,7 @@ pub struct Modes {
 #[error(
     "two modes coincide at {lambda:.6} rad/s (critical damping); change the coefficient of one damper by a factor of 1.000001"
 )]
-pub struct Defective {
+pub struct DefectiveModes {
     /// Eigenvalue at which two modes coincide, rad/s.
     pub lambda: Complex64,
 }
@@ -57,27 +57,27 @@ const CLUSTER: f64 = 1e-7;
 const DEFECTIVE: f64 = 1e-7;
 /// A damping matrix is not symmetric if mirrored entries differ by more than
 /// this fraction of the largest entry.
-const SKEW: f64 = 1e-12;
+const UNSYMMETRIC: f64 = 1e-12;
 /// Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
 const SCHUR_STEPS: usize = 40;
 
-impl Modes {
+impl QuadraticModes {
     /// Computes the modes of `q'' + C q' + K q`. Both matrices are m × m; K is
     /// symmetric, C may have a gyroscopic part.
     ///
     /// # Errors
-    /// [`Defective`] at (nearly) critical damping, or if the numbers are out of range.
+    /// [`DefectiveModes`] at (nearly) critical damping, or if the numbers are out of range.
     ///
     /// # Example
     /// ```
     /// use nalgebra::dmatrix;
-    /// use stickslip_numerics::modes::Modes;
-    /// let modes = Modes::new(&dmatrix![0.02], &dmatrix![1.0]).unwrap();
+    /// use stickslip_numerics::quadratic_modes::QuadraticModes;
+    /// let modes = QuadraticModes::new(&dmatrix![0.02], &dmatrix![1.0]).unwrap();
     /// assert!((modes.lambda[0].re + 0.01).abs() < 1e-15);
     /// ```
-    pub fn new(damping: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<Modes, Defective> {
+    pub fn new(damping: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<QuadraticModes, DefectiveModes> {
         let m = damping.nrows();
-        let mut modes = Modes {
+        let mut modes = QuadraticModes {
             lambda: Vec::new(),
             shape: DMatrix::zeros(m, 0),
             from_displacement: DMatrix::zeros(0, m),
@@ -87,32 +87,31 @@ impl Modes {
         if m == 0 {
             return Ok(modes);
         }
-        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
+        let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let undamped = eigen::symmetric((stiffness + stiffness.transpose()) * 0.5).ok_or(out_of_range)?;
         let basis = split_free(damping, &undamped, &mut modes.free).ok_or(out_of_range)?;
         let (c, k) = (basis.transpose() * damping * &basis, basis.transpose() * stiffness * &basis);
-        for component in components(&c, &k) {
-            let part = DMatrix::from_fn(m, component.len(), |i, j| basis[(i, component[j])]);
-            let select = |matrix: &DMatrix<f64>| {
-                DMatrix::from_fn(component.len(), component.len(), |i, j| matrix[(component[i], component[j])])
-            };
-            modes.add_component(&part, &select(&c), &select(&k))?;
+        for group in coupled_groups(&c, &k) {
+            let part = DMatrix::from_fn(m, group.len(), |i, j| basis[(i, group[j])]);
+            let select =
+                |matrix: &DMatrix<f64>| DMatrix::from_fn(group.len(), group.len(), |i, j| matrix[(group[i], group[j])]);
+            modes.add_group(&part, &select(&c), &select(&k))?;
         }
         Ok(modes)
     }
 
     /// Adds the modes of a coupled group of coordinates. The columns of `part` span the group.
-    fn add_component(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), Defective> {
+    fn add_group(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), DefectiveModes> {
         let r = c.nrows();
-        let out_of_range = Defective { lambda: Complex64::new(f64::NAN, 0.0) };
-        let eigenvalues = if r == 1 { Some(single(c[0], k[0])) } else { companion_eigenvalues(c, k) };
+        let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
+        let eigenvalues = if r == 1 { Some(quadratic_roots(c[0], k[0])) } else { companion_eigenvalues(c, k) };
         let eigenvalues =
             eigenvalues.filter(|all| all.iter().all(|l| l.re.is_finite() && l.im.is_finite())).ok_or(out_of_range)?;
         let scale = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let mut done = vec![false; eigenvalues.len()];
         let part = part.map(|x| Complex64::new(x, 0.0));
         let cc = c.map(|x| Complex64::new(x, 0.0));
-        let skew = is_skew(c);
+        let unsymmetric = is_unsymmetric(c);
         for i in 0..eigenvalues.len() {
             // Keep the eigenvalue above the real axis of each pair. An
             // eigenvalue within rounding of the axis is real.
@@ -130,13 +129,13 @@ impl Modes {
             }
             // A value has at most as many eigenvectors as there are coordinates.
             if members.len() > r {
-                return Err(Defective { lambda });
+                return Err(DefectiveModes { lambda });
             }
             // φ and ψ.
             let vectors = |lambda: Complex64| {
                 let matrix = quadratic(&cc, k, lambda);
                 let phi = null_space(&matrix, members.len())?;
-                let psi = if skew { null_space(&matrix.transpose(), members.len())? } else { phi.clone() };
+                let psi = if unsymmetric { null_space(&matrix.transpose(), members.len())? } else { phi.clone() };
                 Some((phi, psi))
             };
             let (mut phi, mut psi) = vectors(lambda).ok_or(out_of_range)?;
@@ -152,14 +151,14 @@ impl Modes {
             }
             if real {
                 phi = real_basis(&phi).ok_or(out_of_range)?;
-                psi = if skew { real_basis(&psi).ok_or(out_of_range)? } else { phi.clone() };
+                psi = if unsymmetric { real_basis(&psi).ok_or(out_of_range)? } else { phi.clone() };
                 theta = psi.transpose() * two_lambda_c(lambda) * &phi;
             }
             let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
-            let values = eigen::singular(theta.clone()).ok_or(out_of_range)?.singular_values;
+            let values = eigen::svd(theta.clone()).ok_or(out_of_range)?.singular_values;
             let singular = values.min() <= DEFECTIVE * size;
             let inverse = if singular { None } else { theta.try_inverse() };
-            let Some(inverse) = inverse else { return Err(Defective { lambda }) };
+            let Some(inverse) = inverse else { return Err(DefectiveModes { lambda }) };
             let left = inverse * psi.transpose();
             let weight = if real { 1.0 } else { 2.0 };
             let lambda_c = DMatrix::from_diagonal_element(r, r, lambda) + &cc;
@@ -202,7 +201,7 @@ fn split_free(
         let null = undamped.eigenvectors.select_columns(&soft);
         // The quadratic form of a gyroscopic matrix vanishes. Instead, the test uses the
         // products of the direction with the matrix and its transpose.
-        let (resists, threshold) = if is_skew(damping) {
+        let (resists, threshold) = if is_unsymmetric(damping) {
             (damping.transpose() * damping + damping * damping.transpose(), (RIGID * damping.amax()).powi(2))
         } else {
             (damping.clone(), RIGID * damping.amax())
@@ -221,12 +220,12 @@ fn split_free(
 }
 
 /// Returns true if a damping matrix is not symmetric.
-fn is_skew(damping: &DMatrix<f64>) -> bool {
-    (damping - damping.transpose()).amax() > SKEW * damping.amax()
+fn is_unsymmetric(damping: &DMatrix<f64>) -> bool {
+    (damping - damping.transpose()).amax() > UNSYMMETRIC * damping.amax()
 }
 
 /// Returns the groups of coordinates that damping or stiffness couples.
-fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
+fn coupled_groups(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let r = c.nrows();
     let (c_scale, k_scale) = (COUPLED * c.amax(), 10.0 * RIGID * k.amax());
     let one_way = |i: usize, j: usize| c[(i, j)].abs() > c_scale || k[(i, j)].abs() > k_scale;
@@ -250,7 +249,7 @@ fn components(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
 }
 
 /// Returns the roots of λ² + cλ + k without cancellation.
-fn single(c: f64, k: f64) -> Vec<Complex64> {
+fn quadratic_roots(c: f64, k: f64) -> Vec<Complex64> {
     let discriminant = 0.25 * c * c - k;
     if discriminant < 0.0 {
         let root = (-discriminant).sqrt();
@@ -293,7 +292,7 @@ fn real_basis(columns: &DMatrix<Complex64>) -> Option<DMatrix<Complex64>> {
     let (r, count) = columns.shape();
     let parts =
         DMatrix::from_fn(r, 2 * count, |i, j| if j < count { columns[(i, j)].re } else { columns[(i, j - count)].im });
-    let svd = eigen::singular(parts)?;
+    let svd = eigen::svd(parts)?;
     let u = svd.u.expect("asked for");
     let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
     order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
@@ -308,7 +307,7 @@ mod tests {
     /// The modal coordinates recover `q` and `q'` and satisfy the equation of the system.
     fn check(c: &DMatrix<f64>, k: &DMatrix<f64>, tolerance: f64) {
         let m = c.nrows();
-        let modes = Modes::new(c, k).unwrap();
+        let modes = QuadraticModes::new(c, k).unwrap();
         let count: usize = modes.lambda.iter().map(|l| if l.im == 0.0 { 1 } else { 2 }).sum();
         assert_eq!(count + 2 * modes.free.ncols(), 2 * m);
         let (q, v) = (DVector::from_fn(m, |i, _| 1.0 + i as f64), DVector::from_fn(m, |i, _| 0.3 - 0.2 * i as f64));
@@ -344,13 +343,13 @@ mod tests {
         let h = 0.5f64.sqrt();
         let turn = dmatrix![h, 0.0, h, 0.0; 0.0, h, 0.0, h; -h, 0.0, h, 0.0; 0.0, -h, 0.0, h];
         check(&(&turn * twice(&c) * turn.transpose()), &(&turn * twice(&k) * turn.transpose()), 1e-10);
-        assert!(Modes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
+        assert!(QuadraticModes::new(&dmatrix![2.0], &dmatrix![1.0]).is_err(), "critical damping is defective");
     }
 
     /// A chain of many masses with dampers that couple all of its modes; then two such chains
     /// in parallel, with pairs of equal modes.
     #[test]
-    fn chains_with_dampers_of_their_own() {
+    fn chains_with_nonproportional_damping() {
         let n = 24;
         let chain = |of: fn(usize) -> f64| {
             DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {

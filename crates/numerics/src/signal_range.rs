@@ -6,7 +6,7 @@
 //! Subintervals that cannot extend the known range are skipped. If the curvature has one sign,
 //! Newton's method finds the single turning point. All other subintervals are halved.
 
-use crate::signal::{Basis, bounded_by, real_dot, size_of};
+use crate::signal::{ExponentialBasis, magnitude, magnitude_bound, real_dot};
 use num_complex::Complex64;
 
 /// A mode below this fraction of a signal is rounding. It does not change an
@@ -19,14 +19,14 @@ const ROUNDING: f64 = 2.0 * f64::EPSILON;
 ///
 /// A turning point takes about three. A mode that vibrates undamped at a hundred times the
 /// excitation frequency has two hundred turning points in a period.
-const MOST_TIMES: usize = 20_000;
+const MAX_SUBDIVISIONS: usize = 20_000;
 /// Maximum number of steps towards one turning point. They converge cubically
 /// in value; bisection is the fallback.
 const STEPS: usize = 60;
 
 /// The range of the values that signals are known to take.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub struct ValueRange {
     /// Least value.
     pub low: f64,
     /// Largest value.
@@ -35,15 +35,15 @@ pub struct Range {
     mirrored: bool,
 }
 
-impl Range {
+impl ValueRange {
     /// Creates an empty range. If `mirrored`, every value also adds its negative.
     pub fn new(mirrored: bool) -> Self {
-        Range { low: f64::INFINITY, high: f64::NEG_INFINITY, mirrored }
+        ValueRange { low: f64::INFINITY, high: f64::NEG_INFINITY, mirrored }
     }
 
     /// Extends the range by a value.
     #[inline]
-    pub fn take(&mut self, value: f64) {
+    pub fn include(&mut self, value: f64) {
         (self.low, self.high) = (self.low.min(value), self.high.max(value));
         if self.mirrored {
             self.high = self.high.max(-self.low);
@@ -52,28 +52,39 @@ impl Range {
     }
 }
 
+/// A signal over the time interval `[0, length]`.
+#[derive(Debug, Clone, Copy)]
+pub struct SignalSegment<'a> {
+    /// Coefficients of the signal.
+    pub coefficients: &'a [Complex64],
+    /// Basis functions at the end of the interval.
+    pub at_end: &'a [Complex64],
+    /// Length of the interval, s.
+    pub length: f64,
+}
+
 /// Error: the signal has too many turning points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooFast;
 
-/// Scratch memory of [`Basis::extend`], reused between calls.
+/// Scratch memory of [`ExponentialBasis::extend_range`], reused between calls.
 #[derive(Debug, Clone, Default)]
-pub struct Extremes {
+pub struct RangeScratch {
     values: Vec<Complex64>,
     /// The signal without negligible modes, and its first two derivatives.
     slopes: [Vec<Complex64>; 3],
     /// Bounds on the basis functions.
     magnitudes: Vec<f64>,
     /// Magnitudes of the exponents.
-    speeds: Vec<f64>,
+    exponent_magnitudes: Vec<f64>,
     /// Magnitudes of the coefficients of the second derivative, and bounds on those of the third.
     sizes: [Vec<f64>; 2],
-    open: Vec<[At; 2]>,
+    intervals: Vec<[SignalSample; 2]>,
 }
 
 /// A signal and its derivatives at one time.
 #[derive(Debug, Clone, Copy)]
-struct At {
+struct SignalSample {
     time: f64,
     value: f64,
     slope: f64,
@@ -83,25 +94,31 @@ struct At {
     third: f64,
 }
 
-impl Extremes {
+impl RangeScratch {
     fn prepare(&mut self, nb: usize) {
         let zero = Complex64::new(0.0, 0.0);
         self.values.resize(nb, zero);
         self.slopes.iter_mut().for_each(|slope| slope.resize(nb, zero));
         self.magnitudes.resize(nb, 0.0);
-        self.speeds.resize(nb, 0.0);
+        self.exponent_magnitudes.resize(nb, 0.0);
         self.sizes.iter_mut().for_each(|sizes| sizes.resize(nb, 0.0));
-        self.open.clear();
+        self.intervals.clear();
     }
 
     /// Computes the derivatives of the signal without negligible modes, and their bounds.
     /// Returns the size of the signal's terms.
-    fn differentiate(&mut self, basis: &Basis, signal: &[Complex64], length: f64) -> f64 {
+    fn differentiate(&mut self, basis: &ExponentialBasis, signal: &[Complex64], length: f64) -> f64 {
         self.prepare(basis.len());
-        let Extremes { slopes: [kept, first, second], magnitudes, speeds, sizes: [weights, third], .. } = self;
+        let RangeScratch {
+            slopes: [kept, first, second],
+            magnitudes,
+            exponent_magnitudes,
+            sizes: [weights, third],
+            ..
+        } = self;
         basis.magnitudes(length, magnitudes);
-        weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = size_of(c));
-        let size = bounded_by(weights, magnitudes);
+        weights.iter_mut().zip(signal).for_each(|(weight, c)| *weight = magnitude(c));
+        let size = magnitude_bound(weights, magnitudes);
         kept.copy_from_slice(signal);
         for ((kept, weight), exponent) in kept.iter_mut().zip(&*weights).zip(&basis.exponents) {
             if exponent.re <= 0.0 && *weight <= NEGLIGIBLE * size {
@@ -110,43 +127,49 @@ impl Extremes {
         }
         basis.differentiate(kept, first);
         basis.differentiate(first, second);
-        weights.iter_mut().zip(&*second).for_each(|(weight, c)| *weight = size_of(c));
-        basis.speeds(speeds);
-        basis.differentiate_sizes(weights, speeds, third);
+        weights.iter_mut().zip(&*second).for_each(|(weight, c)| *weight = magnitude(c));
+        basis.exponent_magnitudes(exponent_magnitudes);
+        basis.differentiate_sizes(weights, exponent_magnitudes, third);
         size
     }
 
-    fn at(&mut self, basis: &Basis, signal: &[Complex64], time: f64) -> At {
-        let Extremes { values, slopes: [_, first, second], magnitudes, sizes: [weights, third], .. } = self;
+    fn sample(&mut self, basis: &ExponentialBasis, signal: &[Complex64], time: f64) -> SignalSample {
+        let RangeScratch { values, slopes: [_, first, second], magnitudes, sizes: [weights, third], .. } = self;
         basis.evaluate_and(time, values, |b, size| {
             if basis.exponents[b].re < 0.0 {
                 magnitudes[b] = size; // it decays from then on
             }
         });
-        At {
+        SignalSample {
             time,
             value: real_dot(signal, values),
             slope: real_dot(first, values),
             curvature: real_dot(second, values),
-            second: bounded_by(weights, magnitudes),
-            third: bounded_by(third, magnitudes),
+            second: magnitude_bound(weights, magnitudes),
+            third: magnitude_bound(third, magnitudes),
         }
     }
 
     /// Returns the extreme value between two times with slopes of opposite sign
     /// and a curvature of one sign.
-    fn turning(&mut self, basis: &Basis, signal: &[Complex64], [left, right]: [At; 2], rounding: f64) -> f64 {
+    fn turning_value(
+        &mut self,
+        basis: &ExponentialBasis,
+        signal: &[Complex64],
+        [left, right]: [SignalSample; 2],
+        rounding: f64,
+    ) -> f64 {
         let (mut from, mut to) = (left.time, right.time);
         let mut time = from + (to - from) * first_guess(&left, &right);
         let mut value = left.value;
         for _ in 0..STEPS {
-            let at = self.at(basis, signal, time);
-            let step = -at.slope / at.curvature;
-            value = at.value + 0.5 * at.slope * step;
+            let sample = self.sample(basis, signal, time);
+            let step = -sample.slope / sample.curvature;
+            value = sample.value + 0.5 * sample.slope * step;
             if left.third * step.abs().powi(3) <= rounding {
                 break;
             }
-            if at.slope * left.slope > 0.0 {
+            if sample.slope * left.slope > 0.0 {
                 from = time
             } else {
                 to = time
@@ -162,7 +185,7 @@ impl Extremes {
 
 /// Returns the zero of the cubic with these slopes and curvatures as a fraction of the
 /// interval. It takes one Newton step from the zero of the chord.
-fn first_guess(left: &At, right: &At) -> f64 {
+fn first_guess(left: &SignalSample, right: &SignalSample) -> f64 {
     let h = right.time - left.time;
     let s = left.slope / (left.slope - right.slope);
     // The cubic deviates from the chord by s (1 - s) (p (1 - s) - q s).
@@ -178,7 +201,7 @@ fn first_guess(left: &At, right: &At) -> f64 {
 ///
 /// `left` and `right` are value and slope at the ends. The curvature is at most `most`, so the
 /// signal lies below the parabolas that start at the ends.
-fn highest(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
+fn upper_bound(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
     let curvature = most.max(0.0);
     let opening = left.1 - right.1 + curvature * h;
     if opening <= 0.0 {
@@ -189,23 +212,22 @@ fn highest(h: f64, left: (f64, f64), right: (f64, f64), most: f64) -> f64 {
     (left.0 + meet * (left.1 + 0.5 * curvature * meet)).max(left.0).max(right.0)
 }
 
-impl Basis {
-    /// Extends a range by the values of a signal over `[0, length]`. `at_end`
-    /// contains the basis functions at `length`.
+impl ExponentialBasis {
+    /// Extends a range by the values of a signal over a time interval.
     ///
     /// # Errors
     /// [`TooFast`] if the signal has too many turning points.
-    pub fn extend(
+    pub fn extend_range(
         &self,
-        range: &mut Range,
-        (signal, at_end): (&[Complex64], &[Complex64]),
-        length: f64,
-        memory: &mut Extremes,
+        range: &mut ValueRange,
+        segment: SignalSegment,
+        memory: &mut RangeScratch,
     ) -> Result<(), TooFast> {
+        let SignalSegment { coefficients: signal, at_end, length } = segment;
         let rounding = ROUNDING * memory.differentiate(self, signal, length);
-        let begin = memory.at(self, signal, 0.0);
+        let begin = memory.sample(self, signal, 0.0);
         let [_, first, second] = &memory.slopes;
-        let end = At {
+        let end = SignalSample {
             time: length,
             value: real_dot(signal, at_end),
             slope: real_dot(first, at_end),
@@ -213,24 +235,24 @@ impl Basis {
             second: 0.0,
             third: 0.0,
         };
-        range.take(begin.value);
-        range.take(end.value);
-        memory.open.push([begin, end]);
+        range.include(begin.value);
+        range.include(end.value);
+        memory.intervals.push([begin, end]);
         let mut times = 0;
-        while let Some([left, right]) = memory.open.pop() {
+        while let Some([left, right]) = memory.intervals.pop() {
             let h = right.time - left.time;
             let (middle, change) = (0.5 * (left.curvature + right.curvature), 0.5 * left.third * h);
             let (least, most) = ((middle - change).max(-left.second), (middle + change).min(left.second));
-            let above = highest(h, (left.value, left.slope), (right.value, right.slope), most);
-            let below = -highest(h, (-left.value, -left.slope), (-right.value, -right.slope), -least);
+            let above = upper_bound(h, (left.value, left.slope), (right.value, right.slope), most);
+            let below = -upper_bound(h, (-left.value, -left.slope), (-right.value, -right.slope), -least);
             if above <= range.high + rounding && below >= range.low - rounding {
                 continue;
             }
             let turned = left.slope * right.slope <= 0.0;
             if most < 0.0 || least > 0.0 {
                 if turned {
-                    let value = memory.turning(self, signal, [left, right], rounding);
-                    range.take(value);
+                    let value = memory.turning_value(self, signal, [left, right], rounding);
+                    range.include(value);
                 }
                 continue;
             }
@@ -243,13 +265,13 @@ impl Basis {
                 continue; // no number lies in between
             }
             times += 1;
-            if times > MOST_TIMES {
+            if times > MAX_SUBDIVISIONS {
                 return Err(TooFast);
             }
-            let between = memory.at(self, signal, time);
-            range.take(between.value);
-            memory.open.push([left, between]);
-            memory.open.push([between, right]);
+            let between = memory.sample(self, signal, time);
+            range.include(between.value);
+            memory.intervals.push([left, between]);
+            memory.intervals.push([between, right]);
         }
         Ok(())
     }
@@ -266,7 +288,7 @@ mod tests {
     fn ranges_hold_all_values_and_no_more() {
         let c = Complex64::new;
         let (random, mut drawn) = (Stream::new(7), 0);
-        let mut memory = Extremes::default();
+        let mut memory = RangeScratch::default();
         for case in 0..200 {
             let mut draw = |scale: f64| {
                 drawn += 1;
@@ -277,20 +299,22 @@ mod tests {
                 .to_vec();
             exponents[2] = exponents[0] + c(0.0, 1e-6);
             let resonant = vec![(exponents[0], c(0.0, 1e-6))];
-            let basis = Basis { resonant, driven_by: vec![2], exponents, drifts: case % 2 == 0 };
+            let basis = ExponentialBasis { resonant, driven_by: vec![2], exponents, drifts: case % 2 == 0 };
             let mut signal: Vec<Complex64> = (0..basis.len()).map(|_| c(draw(1.0), draw(1.0))).collect();
             signal[3] *= [0.0, 1e-3, 1e-17][case % 3];
             let length = 0.1 + draw(5.0).abs();
             let mut values = signal.clone();
-            let mut seen = Range::new(case % 2 == 0);
+            let mut seen = ValueRange::new(case % 2 == 0);
             const SAMPLES: usize = 20_000;
             for k in 0..=SAMPLES {
                 basis.evaluate(length * k as f64 / SAMPLES as f64, &mut values);
-                seen.take(real_dot(&signal, &values));
+                seen.include(real_dot(&signal, &values));
             }
             basis.evaluate(length, &mut values);
-            let mut range = Range::new(case % 2 == 0);
-            basis.extend(&mut range, (&signal, &values), length, &mut memory).unwrap();
+            let mut range = ValueRange::new(case % 2 == 0);
+            basis
+                .extend_range(&mut range, SignalSegment { coefficients: &signal, at_end: &values, length }, &mut memory)
+                .unwrap();
             // At the nearest sample the signal is lower than its maximum by its curvature.
             let (digits, missed) = (1e-14, 10.0 * (length / SAMPLES as f64).powi(2));
             assert!(range.high >= seen.high - digits && range.high <= seen.high + missed, "{case}: {range:?} {seen:?}");
@@ -302,15 +326,19 @@ mod tests {
     /// with a fast mode that is not.
     #[test]
     fn fast_modes_are_followed_only_where_they_count() {
-        let basis = Basis { exponents: vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, 1e9)], ..Basis::default() };
+        let basis = ExponentialBasis {
+            exponents: vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, 1e9)],
+            ..ExponentialBasis::default()
+        };
         let zero = Complex64::new(0.0, 0.0);
-        let mut memory = Extremes::default();
+        let mut memory = RangeScratch::default();
         let mut of = |amplitude: f64| {
             let signal = [Complex64::new(0.0, -1.0), Complex64::new(amplitude, 0.0), zero];
             let mut values = [zero; 3];
             basis.evaluate(100.0, &mut values);
-            let mut range = Range::new(false);
-            basis.extend(&mut range, (&signal, &values), 100.0, &mut memory).map(|()| range)
+            let mut range = ValueRange::new(false);
+            let segment = SignalSegment { coefficients: &signal, at_end: &values, length: 100.0 };
+            basis.extend_range(&mut range, segment, &mut memory).map(|()| range)
         };
         let range = of(1e-17).unwrap();
         assert!((range.high - 1.0).abs() < 1e-15 && (range.low + 1.0).abs() < 1e-15, "{range:?}");

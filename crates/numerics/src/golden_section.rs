@@ -9,7 +9,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Returns the place and the value of the largest function value that the search evaluates.
 ///
-/// The search takes place between `ends`, in either order. It stops when `close`
+/// The search takes place between `ends`, in either order. It stops when `converged`
 /// accepts the two ends of the remaining interval, or when rounding leaves no
 /// number between them. Of equal values the first one evaluated counts. A
 /// function without a value at some place returns negative infinity there.
@@ -22,37 +22,37 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 ///
 /// # Example
 /// ```
-/// use stickslip_numerics::maximum::maximum;
-/// let close = |a: f64, b: f64| (b - a).abs() < 1e-6;
-/// let (at, height) = maximum((0.0, 3.0), close, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
+/// use stickslip_numerics::golden_section::golden_section;
+/// let converged = |a: f64, b: f64| (b - a).abs() < 1e-6;
+/// let (at, height) = golden_section((0.0, 3.0), converged, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
 /// assert!((at - 2.0).abs() < 1e-6 && (height - 1.0).abs() < 1e-6);
 /// ```
-pub fn maximum<E>(
+pub fn golden_section<E>(
     ends: (f64, f64),
-    close: impl Fn(f64, f64) -> bool,
+    converged: impl Fn(f64, f64) -> bool,
     mut value: impl FnMut(f64) -> Result<f64, E>,
 ) -> Result<(f64, f64), E> {
     let (mut a, mut b) = ends;
     let (mut left, mut right) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
-    let (mut at_left, mut at_right) = (value(left)?, value(right)?);
-    let mut best = if at_right > at_left { (right, at_right) } else { (left, at_left) };
-    let apart = |a: f64, left: f64, right: f64, b: f64| {
+    let (mut value_left, mut value_right) = (value(left)?, value(right)?);
+    let mut best = if value_right > value_left { (right, value_right) } else { (left, value_left) };
+    let distinct = |a: f64, left: f64, right: f64, b: f64| {
         (a < left && left < right && right < b) || (a > left && left > right && right > b)
     };
-    while apart(a, left, right, b) && !close(a, b) {
-        let met = if at_left >= at_right {
-            (b, right, at_right) = (right, left, at_left);
+    while distinct(a, left, right, b) && !converged(a, b) {
+        let candidate = if value_left >= value_right {
+            (b, right, value_right) = (right, left, value_left);
             left = b - GOLDEN * (b - a);
-            at_left = value(left)?;
-            (left, at_left)
+            value_left = value(left)?;
+            (left, value_left)
         } else {
-            (a, left, at_left) = (left, right, at_right);
+            (a, left, value_left) = (left, right, value_right);
             right = a + GOLDEN * (b - a);
-            at_right = value(right)?;
-            (right, at_right)
+            value_right = value(right)?;
+            (right, value_right)
         };
-        if met.1 > best.1 {
-            best = met;
+        if candidate.1 > best.1 {
+            best = candidate;
         }
     }
     Ok(best)
@@ -67,7 +67,7 @@ mod tests {
     const FLAT: f64 = 1e-7;
 
     fn found(ends: (f64, f64), f: impl Fn(f64) -> f64) -> (f64, f64) {
-        maximum(ends, |a, b| (b - a).abs() < 1e-9, |x| Ok::<_, ()>(f(x))).unwrap()
+        golden_section(ends, |a, b| (b - a).abs() < 1e-9, |x| Ok::<_, ()>(f(x))).unwrap()
     }
 
     #[test]
@@ -96,12 +96,12 @@ mod tests {
                     values += 1;
                     Ok::<_, ()>(x)
                 };
-                let (at, _) = maximum(ends, |_, _| false, counted).unwrap();
+                let (at, _) = golden_section(ends, |_, _| false, counted).unwrap();
                 let (low, high) = (ends.0.min(ends.1), ends.0.max(ends.1));
                 assert!((low..=high).contains(&at) && values < 12, "{ends:?}: {at} after {values}");
             }
         }
-        let (at, _) = maximum((0.0, 3.0), |_, _| false, |x: f64| Ok::<_, ()>(-(x - 2.0).abs())).unwrap();
+        let (at, _) = golden_section((0.0, 3.0), |_, _| false, |x: f64| Ok::<_, ()>(-(x - 2.0).abs())).unwrap();
         assert!((at - 2.0).abs() < 1e-14, "{at}");
     }
 
@@ -113,7 +113,7 @@ mod tests {
             Ok::<_, ()>(-x * x)
         };
         // 1/φ^20 = 6.6e-5 and 1/φ^21 = 4.1e-5 of the interval.
-        maximum((-1.0, 1.0), |a, b| b - a < 2.0 * 5e-5, value).unwrap();
+        golden_section((-1.0, 1.0), |a, b| b - a < 2.0 * 5e-5, value).unwrap();
         assert_eq!(places.len(), 2 + 21);
         assert!((places[1] - (5f64.sqrt() - 2.0)).abs() < 1e-15 && places[0] == -places[1], "{places:?}");
     }
@@ -127,6 +127,6 @@ mod tests {
             left -= 1;
             if left == 0 { Err("three are enough") } else { Ok(x) }
         };
-        assert_eq!(maximum((0.0, 1.0), |_, _| false, fails), Err("three are enough"));
+        assert_eq!(golden_section((0.0, 1.0), |_, _| false, fails), Err("three are enough"));
     }
 }
