@@ -5,21 +5,21 @@
 //! spring `k0 + k1*speed^2` stiffens. On a tuned disk an engine order `e` excites the modes of
 //! one nodal diameter: the distance from `e` to the nearest multiple of the sector count.
 
-use super::keys::anything;
 use super::nodal_diameter::{STATES, waves};
-use crate::columns::FREQUENCY;
-use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Figure, Panel, Series, Style, Table};
-use crate::drawing::{Drawing, Stretch, largest, numbers, words};
-use crate::draws;
-use crate::info::{Complaint, KindInfo};
-use crate::key::SPEEDS;
-use crate::key::{Takes, default, required};
-use crate::kind::Kind;
-use crate::note::Note;
-use crate::rows::Rows;
-use crate::values::{Values, hertz};
-use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use super::shared::keys::anything;
+use crate::case::values::{Values, hertz};
+use crate::check::cost::{Cost, Costing, Shape};
+use crate::kinds::info::{Complaint, KindInfo};
+use crate::kinds::kind::Kind;
+use crate::results::columns::FREQUENCY;
+use crate::results::dataset::{Figure, Panel, Series, Style, Table};
+use crate::results::drawing::{Drawing, Stretch, largest, numbers, words};
+use crate::results::draws;
+use crate::results::note::Note;
+use crate::results::rows::Rows;
+use crate::run::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use crate::syntax::key::SPEEDS;
+use crate::syntax::key::{Takes, default, required};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, ReductionEvidence};
@@ -77,7 +77,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 fn check(values: &Values, _: &Model, _: usize) -> Result<(), Complaint> {
-    let speeds = values.frequencies("speed").map_or(0, crate::values::Frequencies::len);
+    let speeds = values.frequencies("speed").map_or(0, crate::case::values::Frequencies::len);
     if speeds >= 2 {
         return Ok(());
     }
@@ -90,7 +90,7 @@ const EIGEN: f64 = 1e-8;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let values = &costing.case.values;
-    let speeds = values.frequencies("speed").map_or(2, crate::values::Frequencies::len) as f64;
+    let speeds = values.frequencies("speed").map_or(2, crate::case::values::Frequencies::len) as f64;
     let count = |key: &str, or: u64| values.count(key).unwrap_or(or) as f64;
     let sectors = costing.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors as f64);
     let waves = sectors.map_or(1.0, |sectors| sectors / 2.0 + 1.0);

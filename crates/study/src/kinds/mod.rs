@@ -1,28 +1,30 @@
-//! Study kinds: the available computations. Each kind is one file and one line in [`TABLE`].
+//! Study kinds: the available computations. Each kind is one file or folder and one line in [`TABLE`].
 //!
 //! A kind states its keys of `[study]`; the reader checks them and passes their
 //! [`Values`](crate::Values) for every case.
+//!
+//! - `info`: the description of a kind: keys and conditions;
+//! - `kind`: a row of the table: how studies of the kind are divided, computed and drawn;
+//! - `shared`: shared by several kinds.
 
 mod branch;
 mod campbell;
 pub mod hysteresis;
-mod keys;
+pub(crate) mod info;
+pub(crate) mod kind;
 mod modes;
 mod nodal_diameter;
 mod orbit;
-mod orbits;
-mod peak_of;
 pub mod performance;
 pub mod response;
-mod shares;
+mod shared;
 mod transient;
-mod wheel;
 
-use crate::extra;
-use crate::study::Study;
+use crate::case::study::Study;
+use crate::run::extra;
 
-pub use crate::info::{Complaint, KindInfo};
-pub use crate::kind::Kind;
+pub use crate::kinds::info::{Complaint, KindInfo};
+pub use crate::kinds::kind::Kind;
 
 /// All study kinds, in the order in which lists show them.
 pub const TABLE: &[Kind] = &[

@@ -1,20 +1,20 @@
 //! Frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck,
 //! and mode shapes.
 
-use super::keys::anything;
-use super::wheel::{self, Around, of_sector};
-use crate::columns::{FREQUENCY, phase_of, shape_of};
-use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Axis, Figure, Panel, Series, Style, Table};
-use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers, words};
-use crate::draws;
-use crate::info::{Complaint, KindInfo};
-use crate::key::{Takes, default, optional};
-use crate::kind::Kind;
-use crate::rows::Rows;
-use crate::values::{Values, hertz};
-use crate::words::significant;
-use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use super::shared::keys::anything;
+use super::shared::wheel::{self, Around, of_sector};
+use crate::case::values::{Values, hertz};
+use crate::check::cost::{Cost, Costing, Shape};
+use crate::kinds::info::{Complaint, KindInfo};
+use crate::kinds::kind::Kind;
+use crate::results::columns::{FREQUENCY, phase_of, shape_of};
+use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
+use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers, words};
+use crate::results::draws;
+use crate::results::rows::Rows;
+use crate::run::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use crate::syntax::key::{Takes, default, optional};
+use crate::syntax::words::significant;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, WaveModes};
 

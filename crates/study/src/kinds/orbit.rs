@@ -1,21 +1,21 @@
 //! Orbits over one period, in time.
 
-use super::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
-use super::orbits;
-use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Axis, Figure, Panel, Series};
-use crate::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
-use crate::draws;
-use crate::info::KindInfo;
-use crate::key::{Takes, default};
-use crate::kind::Kind;
-use crate::note::Note;
-use crate::point::{Summary, location_of};
-use crate::rows::Rows;
-use crate::values::hertz;
-use crate::warnings::driven;
-use crate::words::{display_unit, shown_hertz};
-use crate::work::{Computed, Part, Prepared, Work};
+use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
+use super::shared::orbits;
+use crate::case::values::hertz;
+use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::warnings::driven;
+use crate::kinds::info::KindInfo;
+use crate::kinds::kind::Kind;
+use crate::results::dataset::{Axis, Figure, Panel, Series};
+use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
+use crate::results::draws;
+use crate::results::note::Note;
+use crate::results::rows::Rows;
+use crate::run::point::{Summary, location_of};
+use crate::run::work::{Computed, Part, Prepared, Work};
+use crate::syntax::key::{Takes, default};
+use crate::syntax::words::{display_unit, shown_hertz};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};

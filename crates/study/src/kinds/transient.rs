@@ -1,27 +1,27 @@
 //! Transients: the motion in time from rest or from given displacements; free decay,
 //! switched-on excitation, or run-up.
 
-use super::keys::MOST_SAMPLES;
 use super::orbit::write_sample;
-use crate::cost::{Cost, Costing, Shape};
-use crate::dataset::{Axis, Figure, Panel, Series, Table};
-use crate::decay::{Decay, Motion};
-use crate::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, largest, numbers, thinned, words};
-use crate::draws;
-use crate::info::Complaint;
-use crate::info::KindInfo;
-use crate::key::RANGE;
-use crate::key::{Key, Takes, Within, default, optional, required};
-use crate::kind::Kind;
-use crate::names::Names;
-use crate::note::{Note, WARNING};
-use crate::point::location_of;
-use crate::rows::Rows;
-use crate::start::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
-use crate::values::{Values, hertz};
-use crate::warnings::moved;
-use crate::words::{display_unit, shown_hertz};
-use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use super::shared::keys::MOST_SAMPLES;
+use crate::case::names::Names;
+use crate::case::start::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
+use crate::case::values::{Values, hertz};
+use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::warnings::moved;
+use crate::kinds::info::Complaint;
+use crate::kinds::info::KindInfo;
+use crate::kinds::kind::Kind;
+use crate::results::dataset::{Axis, Figure, Panel, Series, Table};
+use crate::results::decay::{Decay, Motion};
+use crate::results::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, largest, numbers, thinned, words};
+use crate::results::draws;
+use crate::results::note::{Note, WARNING};
+use crate::results::rows::Rows;
+use crate::run::point::location_of;
+use crate::run::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use crate::syntax::key::RANGE;
+use crate::syntax::key::{Key, Takes, Within, default, optional, required};
+use crate::syntax::words::{display_unit, shown_hertz};
 use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip::dimension::Dimension;

@@ -1,10 +1,10 @@
 //! The tables of hysteresis loops: names, columns, and their content as typed values.
 
-use crate::columns::FREQUENCY;
-use crate::dataset::{Dataset, Table};
+use crate::case::study::{Study, VariedValue};
+use crate::case::values::hertz;
+use crate::results::columns::FREQUENCY;
+use crate::results::dataset::{Dataset, Table};
 use crate::results::{Results, ResultsError};
-use crate::study::{Study, VariedValue};
-use crate::values::hertz;
 use std::ops::Range;
 
 /// Name of the kind.
@@ -126,7 +126,7 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{Column, Values};
+    use crate::results::dataset::{Column, Values};
 
     /// A loop ends where joint, frequency or period end, even if the next loop has equal
     /// values.

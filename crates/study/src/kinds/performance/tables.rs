@@ -1,9 +1,9 @@
 //! The tables of performance curves: names, columns, and their content as typed values.
 
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
-use crate::dataset::Dataset;
+use crate::case::study::{Study, VariedValue};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
+use crate::results::dataset::Dataset;
 use crate::results::{Peak, Results, ResultsError};
-use crate::study::{Study, VariedValue};
 
 /// Name of the kind.
 pub(super) const NAME: &str = "performance";

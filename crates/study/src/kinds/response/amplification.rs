@@ -1,20 +1,20 @@
 //! Amplification: the largest amplitude of a mistuned disk over that of the tuned disk, each at
 //! its peak.
 
-use super::super::peak_of::{displacements, named_places, worst};
 use super::peaks::Found;
 use super::tables;
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
-use crate::dataset::{Axis, Panel};
-use crate::drawing::{Drawing, Stretch, numbers};
-use crate::histogram;
-use crate::info::Complaint;
-use crate::key::{Key, Takes, default};
-use crate::rows::Rows;
-use crate::study::varied_text;
-use crate::survey::Surveyed;
-use crate::values::{Frequencies, Values, hertz};
-use crate::work::Work;
+use crate::case::study::varied_text;
+use crate::case::values::{Frequencies, Values, hertz};
+use crate::check::survey::Surveyed;
+use crate::kinds::info::Complaint;
+use crate::kinds::shared::peak_of::{displacements, named_places, worst};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
+use crate::results::dataset::{Axis, Panel};
+use crate::results::drawing::{Drawing, Stretch, numbers};
+use crate::results::histogram;
+use crate::results::rows::Rows;
+use crate::run::work::Work;
+use crate::syntax::key::{Key, Takes, default};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::method::advised;

@@ -1,13 +1,13 @@
 //! Panels of a response case by case: curves of places, sectors of a disk, forces and contact
 //! states of joints.
 
-use super::super::shares;
-use super::super::wheel::{self, Around};
 use super::drawn::Drawn;
-use crate::columns::FREQUENCY as DRIVE;
-use crate::dataset::{Axis, Panel, Series, Style};
-use crate::drawing::{MOST_PANELS, Stretch, join, numbers};
-use crate::words::significant;
+use crate::kinds::shared::shares;
+use crate::kinds::shared::wheel::{self, Around};
+use crate::results::columns::FREQUENCY as DRIVE;
+use crate::results::dataset::{Axis, Panel, Series, Style};
+use crate::results::drawing::{MOST_PANELS, Stretch, join, numbers};
+use crate::syntax::words::significant;
 
 /// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
 /// paper.

@@ -1,13 +1,13 @@
 //! Panels of a response place by place and joint by joint: a curve for every case, or
 //! percentiles of draws.
 
-use super::super::shares::{self, State};
 use super::drawn::{Drawn, SINGLE};
-use crate::columns::{FREQUENCY as DRIVE, amplitude_of};
-use crate::dataset::{Panel, Series};
-use crate::drawing::{MOST_CURVES, MOST_PANELS, Stretch, join, numbers, thinned};
-use crate::percentiles::percentiles;
-use crate::study::varied_text;
+use crate::case::study::varied_text;
+use crate::kinds::shared::shares::{self, State};
+use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of};
+use crate::results::dataset::{Panel, Series};
+use crate::results::drawing::{MOST_CURVES, MOST_PANELS, Stretch, join, numbers, thinned};
+use crate::results::percentiles::percentiles;
 
 /// Returns x and y of one draw.
 type CurveOf<'a> = &'a dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>);

@@ -1,10 +1,10 @@
 //! Data of a response figure: curves of places and joints, read from the tables.
 
-use super::super::shares::{self, State};
-use super::super::wheel::{self, of_sector};
-use crate::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
-use crate::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
-use crate::drawing::{Drawing, Stretch, join, numbers};
+use crate::kinds::shared::shares::{self, State};
+use crate::kinds::shared::wheel::{self, of_sector};
+use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
+use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
+use crate::results::drawing::{Drawing, Stretch, join, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
@@ -254,7 +254,7 @@ impl Drawn<'_> {
     pub(super) fn missing(&self, stretch: &Stretch, row: usize, colour: usize) -> Option<Series> {
         let x = self.without_orbit(stretch);
         let count = self.failed;
-        let label = format!("{count} point{} without an orbit", crate::words::plural(count));
+        let label = format!("{count} point{} without an orbit", crate::syntax::words::plural(count));
         (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
     }
 

@@ -1,13 +1,13 @@
 //! The figure of a response.
 
-use super::super::shares;
 use super::drawn::{Drawn, PeakOf, force};
 use super::{amplification, tables};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
-use crate::dataset::{Axis, Figure, Panel, Sharing, Table};
-use crate::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
-use crate::histogram;
-use crate::words::display_unit;
+use crate::kinds::shared::shares;
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
+use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
+use crate::results::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
+use crate::results::histogram;
+use crate::syntax::words::display_unit;
 
 pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {

@@ -1,7 +1,7 @@
 //! The peaks of a range of a response curve.
 
-use super::super::peak_of::{named_places, worst};
-use crate::work::{Prepared, Work};
+use crate::kinds::shared::peak_of::{named_places, worst};
+use crate::run::work::{Prepared, Work};
 use stickslip::curve::both_ways::stretches;
 use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;

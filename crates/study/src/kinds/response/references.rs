@@ -1,13 +1,13 @@
 //! The linear references of a response: the same structure with all joints free, and with all
 //! joints stuck.
 
-use crate::columns::{FREQUENCY as DRIVE, amplitude_in};
-use crate::linear::Reference;
-use crate::note::WARNING;
-use crate::rows::Rows;
-use crate::study::{Case, Study};
-use crate::values::hertz;
-use crate::work::{Prepared, Work};
+use crate::case::linear::Reference;
+use crate::case::study::{Case, Study};
+use crate::case::values::hertz;
+use crate::results::columns::{FREQUENCY as DRIVE, amplitude_in};
+use crate::results::note::WARNING;
+use crate::results::rows::Rows;
+use crate::run::work::{Prepared, Work};
 use stickslip::method::{self, MethodError, Options, Solver};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;

@@ -1,0 +1,283 @@
+//! Summary of a study before its run: linear modes, first slip of the joints, likely mistakes,
+//! memory and time.
+//!
+//! All results come from the linear structure and from counting; no orbit is computed.
+
+mod bodies;
+mod structure;
+mod text;
+mod warnings;
+
+pub use structure::{DIRECTIONS, StructureSummary, mass_along};
+
+use crate::case::study::Study;
+use crate::check::cost::{Cost, Costing, Size};
+use crate::check::survey::{Surveyed, range};
+use crate::kinds;
+use crate::run::work::Units;
+use crate::syntax::error::StudyError;
+use serde_json::{Value as Json, json};
+use std::f64::consts::TAU;
+use stickslip::model::{Modes, Onset, System};
+
+/// Summary of a study before it is run.
+#[derive(Debug, Clone)]
+pub struct ModelSummary {
+    /// The case that the summary shows: its varied parameters in words, empty if nothing is
+    /// varied.
+    pub case: String,
+    /// Number of cases.
+    pub cases: usize,
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// The structure given by matrices, if there is one.
+    pub structure: Option<StructureSummary>,
+    /// The rigid bodies in words; on a disk, those of the first sector.
+    pub bodies: Vec<String>,
+    /// True if the model has too many degrees of freedom for the modes, which are then absent.
+    pub too_large: bool,
+    /// Modes with all joints free.
+    pub free: Modes,
+    /// Modes with all joints stuck.
+    pub stuck: Modes,
+    /// The joints, in the order of the model.
+    pub joints: Vec<JointSummary>,
+    /// Number of orbits at one frequency, with the reason if there may be several. `None` if
+    /// the study has no excitation or no joint, or if the structure is too large for a quick
+    /// answer.
+    pub orbits: Option<Orbits>,
+    /// Lowest and highest excitation frequency of the study, rad/s.
+    pub range: Option<(f64, f64)>,
+    /// Likely mistakes: sentences that begin with `warning: `.
+    pub warnings: Vec<String>,
+    /// Size of the results and the memory.
+    pub size: Size,
+    /// Usual time on one thread, s; a rough estimate.
+    pub usual_seconds: f64,
+    /// Time without the work that only some results need, s, and the condition for it, in
+    /// words.
+    pub spared: Option<(f64, &'static str)>,
+    /// Time if orbits are hard to find, s; a rough estimate on the high side.
+    pub seconds: f64,
+}
+
+/// Number of orbits at one frequency.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Orbits {
+    /// One orbit, except for the offsets of stuck contacts: no two motions under the same
+    /// excitation separate.
+    One,
+    /// Possibly several, for this reason.
+    Several(String),
+}
+
+impl Orbits {
+    fn new(system: &System) -> Option<Orbits> {
+        let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
+        let mut of: Vec<String> =
+            separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
+        if of.is_empty() {
+            // on a large structure the answer takes three factorizations
+            return match system.structure().is_sparse() {
+                true => None,
+                false if system.contracts() => Some(Orbits::One),
+                false => Some(Orbits::Several("the structure feeds energy into some motion".to_owned())),
+            };
+        }
+        if let Some(more @ 1..) = of.len().checked_sub(NAMED) {
+            of.truncate(NAMED);
+            of.push(format!("{more} more"));
+        }
+        Some(Orbits::Several(of.join(", ")))
+    }
+}
+
+/// Number of joints that are named as the reason for several orbits.
+const NAMED: usize = 2;
+
+/// State of a joint at rest, and its first slip.
+#[derive(Debug, Clone)]
+pub struct JointSummary {
+    /// Name of the joint.
+    pub name: String,
+    /// Slip limit, N.
+    pub limit: f64,
+    /// Relative displacement at which it begins to slip, m; `None` if it is rigid until then.
+    pub displacement: Option<f64>,
+    /// True if it slips gradually before: micro-slip first, macro-slip at the limit.
+    pub gradual: bool,
+    /// For the normal direction of a contact: its force if nothing deforms, N, zero if it is
+    /// open. `None` for directions that slip.
+    pub pressed: Option<f64>,
+    /// The normal force at rest, after the structure has deformed, N; `None` if it is unknown.
+    pub at_rest: Option<f64>,
+    /// Load by the excitation while all joints stick. `None` if the study has no excitation or
+    /// the model is too large for a quick answer.
+    pub onset: Option<Onset>,
+}
+
+/// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
+/// the model is true for all of them.
+const LOOKED_AT: usize = 9;
+/// The summary states the longest time if it exceeds the usual time by the factor [`WIDE`] and
+/// exceeds [`SOON`], s.
+const WIDE: f64 = 3.0;
+const SOON: f64 = 5.0;
+/// Duration above which a run announces its expected time at the start, s.
+const LONG_RUN: f64 = 3600.0;
+/// Degrees of freedom above which only the first case is checked, so that a summary takes at
+/// most a second.
+const LARGE: usize = 60;
+
+/// Factor on the excitation above which the first slip is due to rounding. Symmetry keeps the
+/// load from some joints, but rounding errors of the other loads remain. A load above this
+/// multiple of the slip limit comes from an undamped resonance, which has no bound.
+const UNLOADED: f64 = 1e6;
+
+/// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
+/// rounding.
+fn load(onset: &Onset) -> f64 {
+    if onset.largest * UNLOADED < 1.0 { 0.0 } else { onset.largest }
+}
+
+impl ModelSummary {
+    /// Summarizes a study.
+    ///
+    /// # Errors
+    /// [`StudyError`]: a case cannot be resolved. The cases of a study that was read have been
+    /// checked.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_study::{read_study, summary::ModelSummary, templates};
+    /// let text = templates::find("blade-couple").unwrap().study;
+    /// let summary = ModelSummary::new(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
+    /// assert_eq!((summary.dofs, summary.free.elastic.len(), summary.warnings.len()), (3, 3, 0));
+    /// assert!(summary.to_string().contains("120.94"));   // a stuck mode, Hz
+    /// ```
+    pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
+        let mut cases = vec![Surveyed::new(study, 0)?];
+        let last = study.cases().saturating_sub(1);
+        let others = if cases[0].survey.dofs() > LARGE { 0 } else { last.min(LOOKED_AT - 1) };
+        for i in 1..=others {
+            cases.push(Surveyed::new(study, last * i / others)?);
+        }
+        // the first case in which the most joints have a positive limit: zero limits tell
+        // nothing
+        let holds = |one: &Surveyed| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
+        let most = cases.iter().map(holds).max().unwrap_or(0);
+        let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
+        let range = range(&shown.case);
+        let first = &shown.survey;
+        let onsets = range.and_then(|(from, to)| first.onset(from, to));
+        let joints = first.first_slip().into_iter().enumerate().map(|(index, slip)| JointSummary {
+            name: slip.joint,
+            limit: slip.limit,
+            displacement: slip.displacement,
+            gradual: slip.gradual,
+            pressed: slip.pressed,
+            at_rest: slip.at_rest,
+            onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
+        });
+        let joints = joints.collect();
+        let kind = kinds::of(study);
+        let costings: Vec<Costing<'_>> = cases.iter().map(|one| Costing::new(study, one)).collect();
+        // the time of all cases if they were like this one
+        let time = |costing: &Costing<'_>| costing.seconds(&(kind.cost)(costing));
+        let mean =
+            |times: &dyn Fn(&Costing<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
+        let (usual_seconds, seconds) = (mean(&|one| time(&one.usual())), mean(&time));
+        let (slow, usual) = (&costings[0], costings[0].usual());
+        let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
+        let whole = usual.seconds(&usual_cost);
+        let spared = usual_cost.spared.map(|(work, place)| {
+            let rest = Cost { work: usual_cost.work - work, ..usual_cost };
+            (usual_seconds * usual.seconds(&rest) / whole, place)
+        });
+        Ok(ModelSummary {
+            case: shown.case.label(),
+            cases: study.cases(),
+            dofs: first.dofs(),
+            structure: StructureSummary::new(study, &cases[0]),
+            bodies: bodies::described(&cases[0].case.model),
+            too_large: first.is_too_large(),
+            free: first.free().clone(),
+            stuck: first.stuck().clone(),
+            joints,
+            orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| Orbits::new(first.system())),
+            range,
+            warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
+            size: slow.size(&cost, Units::of(study, (kind.grain)(study)).len()),
+            usual_seconds,
+            spared,
+            seconds: seconds.max(usual_seconds),
+        })
+    }
+
+    /// Returns the announcement of a long run; `None` for a short one. The estimate is rough
+    /// and for one thread.
+    pub fn long_run(&self) -> Option<String> {
+        (self.seconds >= LONG_RUN).then(|| {
+            let time = self.time();
+            format!(
+                "this run takes {time}; `check` estimates this in advance; Ctrl-C ends the run and keeps the \
+                finished points"
+            )
+        })
+    }
+
+    /// Describes the expected time in words.
+    pub(crate) fn time(&self) -> String {
+        let mut usual = format!("{} on one thread", crate::syntax::words::about(self.usual_seconds));
+        if let Some((seconds, place)) = self.spared
+            && self.usual_seconds >= (WIDE * seconds).max(SOON)
+        {
+            usual += &format!(", {} {place}", crate::syntax::words::about(seconds));
+        }
+        if self.seconds < WIDE * self.usual_seconds || self.seconds < SOON {
+            return usual;
+        }
+        format!("{usual}, up to {} if orbits are hard to find", crate::syntax::words::duration(self.seconds))
+    }
+
+    /// Returns the summary for the record of a run, in SI except frequencies in Hz.
+    pub fn to_json(&self) -> Json {
+        let modes = |modes: &Modes| {
+            json!({
+                "frequencies_Hz": modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>(),
+                "damping_ratios": modes.elastic.iter().map(|mode| mode.damping).collect::<Vec<_>>(),
+                "rigid": modes.rigid,
+                "lost": modes.lost,
+            })
+        };
+        let joint = |joint: &JointSummary| {
+            json!({
+                "name": joint.name,
+                "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
+                "slips_gradually": joint.gradual,
+                "pressed_N": joint.pressed,
+                "pressed_at_rest_N": joint.at_rest,
+                "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
+                "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / load(onset)).filter(|x| x.is_finite()),
+                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| load(onset) > 0.0).map(|onset| onset.at / TAU),
+                "slips_Hz": joint.onset.as_ref()
+                    .map(|onset| onset.slips.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
+            })
+        };
+        json!({
+            "case": self.case,
+            "degrees_of_freedom": self.dofs,
+            "bodies": self.bodies,
+            "structure": self.structure.as_ref().map(StructureSummary::to_json),
+            "joints_free": modes(&self.free),
+            "joints_stuck": modes(&self.stuck),
+            "joints": self.joints.iter().map(joint).collect::<Vec<_>>(),
+            "one_orbit_at_a_frequency": self.orbits.as_ref().map(|orbits| *orbits == Orbits::One),
+            "rows": self.size.rows,
+            "result_bytes": self.size.results,
+            "memory_bytes": self.size.memory,
+            "usual_time_s": self.usual_seconds,
+            "estimated_time_s": self.seconds,
+        })
+    }
+}

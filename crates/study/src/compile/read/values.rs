@@ -1,0 +1,432 @@
+//! Converts nodes of the document to stated values: unknown and missing keys, types, names,
+//! quantities, ranges.
+
+use super::kinds::homes;
+use super::reader::Reader;
+use crate::case::values::Given;
+use crate::compile::mixed::mixed;
+use crate::compile::statement::{Order, Quantity, Stated, StatedEntry, StatedTable, Weights};
+use crate::syntax::document::{Content, Entry, Node, Table};
+use crate::syntax::error::{Location, Problem};
+use crate::syntax::expression::Expression;
+use crate::syntax::near::{nearest, one_of, shown};
+use crate::syntax::schema::{self, Key, MOST_POINTS, Presence, Takes, Within};
+use std::ops::RangeInclusive;
+use stickslip::model::{NEXT, is_identifier, is_place};
+
+impl Reader {
+    /// Reports unknown and missing keys.
+    pub(super) fn check_keys(&mut self, table: &Table, keys: &[Key], owner: &str) {
+        for entry in &table.entries {
+            if !keys.iter().any(|key| key.name == entry.key) {
+                let help = match nearest(&entry.key, keys.iter().map(|key| key.name)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => {
+                        let taken = keys.iter().filter(|key| key.is_taken()).map(|key| key.name);
+                        let taken = format!("the keys of {owner} are {}", one_of(taken).replace(" or ", ", "));
+                        match homes(&entry.key, keys)[..] {
+                            [] => taken,
+                            ref homes => format!("`{}` is a key of {}; {taken}", entry.key, homes.join(" and of ")),
+                        }
+                    }
+                };
+                let help = self.by_steps(table, entry, keys).unwrap_or(help);
+                let message = format!("{owner} has no key `{}`", shown(&entry.key));
+                self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message).help(help));
+            }
+        }
+        for key in keys.iter().filter(|key| key.presence == Presence::Required) {
+            if table.get(key.name).is_none() {
+                let message = format!("`{}` is missing in {owner}: {}", key.name, schema::described(&key.takes));
+                let help = match key.takes {
+                    Takes::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
+                    _ => format!("add {} = {}", key.name, key.example),
+                };
+                self.problems.push(Problem::new(&table.location, key.name, message).help(help));
+            }
+        }
+    }
+
+    /// Returns the help for a `step` in a range, which has a number of points or a tolerance
+    /// instead.
+    fn by_steps(&self, table: &Table, entry: &Entry, keys: &[Key]) -> Option<String> {
+        let is_range = keys.iter().any(|key| key.name == "from") && keys.iter().any(|key| key.name == "to");
+        if !is_range || nearest(&entry.key, ["step", "steps", "increment", "spacing"]).is_none() {
+            return None;
+        }
+        let number = |key: &str| match &table.get(key)?.node.value {
+            Content::Text { text, .. } => self.compile(text).ok()?.evaluate(&[]).ok().map(|value| value.si),
+            Content::Number { value, .. } => Some(*value),
+            _ => None,
+        };
+        let steps = || Some((number("to")? - number("from")?) / number(&entry.key)?);
+        let count = steps().filter(|steps| steps.is_finite() && *steps >= 1.0).map(|steps| steps.round() + 1.0);
+        let points = count.map_or_else(|| "`points`".to_owned(), |count| format!("points = {count}"));
+        Some(match table.get("tolerance") {
+            Some(_) => format!(
+                "with `tolerance` the solver chooses the points, so there is no step; for equal steps remove both \
+                 keys and write {points}"
+            ),
+            None => format!("write the number of values, both ends included: {points}"),
+        })
+    }
+
+    pub(super) fn table(&mut self, table: &Table, keys: &[Key], owner: &str) -> StatedTable {
+        self.check_keys(table, keys, owner);
+        self.stated(table, keys)
+    }
+
+    /// Reads the values of known keys. [`Reader::check_keys`] reports unknown and missing keys.
+    pub(super) fn stated(&mut self, table: &Table, keys: &[Key]) -> StatedTable {
+        let mut entries = Vec::with_capacity(keys.len());
+        for key in keys {
+            let (location, value) = match (table.get(key.name), key.presence) {
+                (Some(entry), _) => (entry.node.location.clone(), self.value(key, &entry.node)),
+                (None, Presence::Default(text)) => {
+                    (table.location.clone(), self.standing_for(key, text, &table.location))
+                }
+                (None, _) => continue,
+            };
+            entries.extend(value.map(|value| StatedEntry { key: key.name, location, value }));
+        }
+        StatedTable { location: table.location.clone(), turn: String::new(), entries }
+    }
+
+    /// Reads the default value of an absent key.
+    fn standing_for(&mut self, key: &Key, text: &str, location: &Location) -> Option<Stated> {
+        let value = match key.takes {
+            Takes::Count(..) => {
+                let whole = text.parse::<i64>().ok();
+                Content::Number { value: whole.unwrap_or(0) as f64, whole }
+            }
+            Takes::Flag => Content::Flag(text == "true"),
+            _ => Content::Text { text: text.to_owned(), inner: None },
+        };
+        self.value(key, &Node { location: location.clone(), value })
+    }
+
+    pub(super) fn wrong_type(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+        let expected = schema::described(&key.takes);
+        self.problems.push(
+            Problem::new(&node.location, key.name, format!("expected {expected}, found {}", node.value.described()))
+                .help(format!("write it as in {} = {}", key.name, key.example)),
+        );
+        None
+    }
+
+    pub(super) fn value(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+        match (&key.takes, &node.value) {
+            (Takes::Text, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
+            (Takes::Name, Content::Text { text, inner }) => {
+                Some(Stated::Fixed(Given::Text(self.name(key.name, text, *inner, &node.location)?)))
+            }
+            (Takes::Names, Content::Text { text, inner }) => {
+                Some(Stated::Names(vec![(self.name(key.name, text, *inner, &node.location)?, node.location.clone())]))
+            }
+            (Takes::Refused(why), _) => {
+                self.problems.push(Problem::new(&node.location, key.name, *why).help(key.doc));
+                None
+            }
+            (Takes::Repeat, _) => None, // read before the other keys, whose values depend on it
+            (Takes::Names, Content::List(list)) if !list.is_empty() => self.names(key, list),
+            (Takes::Pair, Content::List(list)) if list.len() == 2 => self.names(key, list),
+            (Takes::Pair, Content::List(list)) => {
+                let message = format!("expected two names of places, found {}", list.len());
+                let help = format!("write it as in {} = {}", key.name, key.example);
+                self.problems.push(Problem::new(&node.location, key.name, message).help(help));
+                None
+            }
+            (Takes::Quantity(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+                let quantity = self.quantity(key.name, node)?;
+                let (dimension, within, example) = (*dimension, *within, key.example);
+                Some(Stated::Quantity { quantity, dimension, within, example })
+            }
+            (Takes::Count(from, to), Content::Number { whole: Some(whole), .. }) => {
+                self.count(key, *whole, *from..=*to, &node.location)
+            }
+            (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
+            (Takes::Frequencies(keys), Content::Text { .. } | Content::Number { .. }) => {
+                Some(Stated::List(vec![self.quantity(key.name, node)?], within(keys)))
+            }
+            (Takes::Frequencies(keys), Content::List(list)) => {
+                Some(Stated::List(self.quantities(key.name, list, &node.location)?, within(keys)))
+            }
+            (Takes::Frequencies(_), Content::Table(table)) if table.get("tolerance").is_some() => {
+                self.adaptive(key, table)
+            }
+            (Takes::Frequencies(keys), Content::Table(table)) => {
+                let (from, to, points) = self.range(table, keys, key.name)?;
+                // if only the ends matter, their order gives the direction
+                let ends = |key: &Key| key.name == "points" && matches!(key.presence, Presence::Default(_));
+                let order = if keys.iter().any(ends) { Order::Any } else { Order::Rising };
+                Some(Stated::Range { from, to, points, within: within(keys), order })
+            }
+            (Takes::ByName(dimension), Content::Table(table)) => {
+                let mut names = Vec::new();
+                for entry in &table.entries {
+                    let quantity = self.quantity(&entry.key, &entry.node)?;
+                    names.push((entry.key.clone(), entry.key_location.clone(), quantity));
+                }
+                Some(Stated::ByName(names, *dimension))
+            }
+            (Takes::File, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
+            (Takes::File, Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, schema::FILE_KEYS, &format!("`{}`", key.name))))
+            }
+            (Takes::TableOrNone(_), Content::Flag(false)) => Some(Stated::Fixed(Given::Flag(false))),
+            (Takes::TableOrNone(keys), Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            }
+            (Takes::Row, Content::Text { .. } | Content::Number { whole: Some(_), .. }) => {
+                Some(Stated::Names(vec![(self.row(key, node)?, node.location.clone())]))
+            }
+            (Takes::Rows, Content::List(list)) if !list.is_empty() => {
+                let rows = list.iter().map(|node| Some((self.row(key, node)?, node.location.clone())));
+                Some(Stated::Names(rows.collect::<Option<_>>()?))
+            }
+            (Takes::Weights, Content::Table(table)) if !table.entries.is_empty() => {
+                Some(Stated::Sums(vec![self.weights(key, table)?]))
+            }
+            (Takes::Weights, Content::List(list)) if !list.is_empty() => {
+                let sum = |node: &Node| match &node.value {
+                    Content::Table(table) if !table.entries.is_empty() => self.weights(key, table),
+                    _ => {
+                        self.wrong_type(key, node);
+                        None
+                    }
+                };
+                Some(Stated::Sums(list.iter().map(sum).collect::<Option<_>>()?))
+            }
+            (Takes::Vector(dimension), Content::List(list)) if list.len() == 3 => {
+                Some(Stated::Vector(self.quantities(key.name, list, &node.location)?, *dimension, key.example))
+            }
+            (Takes::Quantities(dimension, within), Content::List(list)) => {
+                let list = self.quantities(key.name, list, &node.location)?;
+                Some(Stated::Quantities(list, *dimension, *within, key.example))
+            }
+            (Takes::Quantities(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+                let one = self.quantity(key.name, node)?;
+                Some(Stated::Quantities(vec![one], *dimension, *within, key.example))
+            }
+            (Takes::Table(keys), Content::Table(table)) => {
+                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            }
+            (Takes::Law, Content::Table(table)) => self.law(table),
+            (Takes::Choice(words), Content::Text { text, .. }) => {
+                let words = words();
+                if words.iter().any(|(word, _)| word == text) {
+                    return Some(Stated::Fixed(Given::Text(text.clone())));
+                }
+                self.unknown_word(key.name, text, &node.location, words.iter().map(|(word, _)| *word).collect());
+                None
+            }
+            _ => self.wrong_type(key, node),
+        }
+    }
+
+    /// Reads a whole number within limits.
+    fn count(&mut self, key: &Key, whole: i64, within: RangeInclusive<i64>, location: &Location) -> Option<Stated> {
+        if within.contains(&whole) {
+            return Some(Stated::Fixed(Given::Count(u64::try_from(whole).unwrap_or(0))));
+        }
+        let message = format!("expected {}, found {whole}", schema::described(&key.takes));
+        let problem = Problem::new(location, key.name, message);
+        let most = *within.end();
+        let limit = key.name == "points" && most == MOST_POINTS as i64 && whole > most;
+        let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
+        self.problems.push(problem.maybe_help(help));
+        None
+    }
+
+    /// Reads a range with adaptive points.
+    fn adaptive(&mut self, key: &Key, table: &Table) -> Option<Stated> {
+        let before = self.problems.len();
+        if let Some(entry) = table.entries.iter().find(|entry| entry.key == "points") {
+            let message = format!("`points` and `tolerance` in the range of `{}` exclude each other", shown(key.name));
+            let help = "remove one of them: with `tolerance` the solver chooses the points";
+            self.problems.push(Problem::new(&entry.key_location, "points", message).help(help));
+            return None;
+        }
+        let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
+        let mut take = |key: &str| {
+            let at = stated.entries.iter().position(|entry| entry.key == key)?;
+            match stated.entries.swap_remove(at).value {
+                Stated::Quantity { quantity, .. } => Some(quantity),
+                _ => None,
+            }
+        };
+        let (from, to, tolerance) = (take("from"), take("to"), take("tolerance"));
+        if self.problems.len() > before {
+            return None;
+        }
+        Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
+    }
+
+    pub(super) fn unknown_word(&mut self, key: &str, word: &str, location: &Location, words: Vec<&str>) {
+        let message = format!("unknown value `{}`, expected {}", shown(word), one_of(words.iter().copied()));
+        let help = nearest(word, words).map(|near| format!("did you mean `{near}`?"));
+        self.problems.push(Problem::new(location, key, message).maybe_help(help));
+    }
+
+    /// Reads a name and fills in the indices of a repetition.
+    ///
+    /// The name of a place may be a direction of a node, `node.direction`.
+    fn name(&mut self, key: &str, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
+        let problem = match self.turn().name(text) {
+            Ok(name) if is_identifier(&name) => return Some(name),
+            // a place of the next sector of a disk is allowed too
+            Ok(name) if !matches!(key, "name" | "directions") && is_place(name.strip_prefix(NEXT).unwrap_or(&name)) => {
+                return Some(name);
+            }
+            Ok(name) => {
+                let message =
+                    format!("`{}` is not a valid name: use a letter first, then letters, digits and `_`", shown(&name));
+                Problem::new(location, key, message)
+            }
+            Err(fault) if self.repetition.indices.is_empty() => {
+                let help = "braces need an index in the same entry: repeat = { i = 12 }";
+                Problem::fault(location, inner, key, fault).help(help)
+            }
+            Err(fault) => Problem::fault(location, inner, key, fault),
+        };
+        self.problems.push(problem);
+        None
+    }
+
+    /// Reads the name or number of a row, and fills in the indices of a repetition.
+    fn row(&mut self, key: &Key, node: &Node) -> Option<String> {
+        match &node.value {
+            Content::Text { text, inner } => self.filled(key, text, *inner, &node.location),
+            Content::Number { whole: Some(number), .. } => Some(number.to_string()),
+            _ => self.wrong_type(key, node).and(None),
+        }
+    }
+
+    /// Reads rows with their weights.
+    fn weights(&mut self, key: &Key, table: &Table) -> Option<Weights> {
+        let one = |entry: &Entry| {
+            let name = self.filled(key, &entry.key, None, &entry.key_location)?;
+            Some((name, entry.key_location.clone(), self.quantity(&entry.key, &entry.node)?))
+        };
+        table.entries.iter().map(one).collect()
+    }
+
+    fn filled(&mut self, key: &Key, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
+        match self.turn().name(text) {
+            Ok(name) => Some(name),
+            Err(fault) => {
+                self.problems.push(Problem::fault(location, inner, key.name, fault));
+                None
+            }
+        }
+    }
+
+    fn names(&mut self, key: &Key, list: &[Node]) -> Option<Stated> {
+        let mut names = Vec::with_capacity(list.len());
+        for node in list {
+            let Content::Text { text, inner } = &node.value else { return self.wrong_type(key, node) };
+            names.push((self.name(key.name, text, *inner, &node.location)?, node.location.clone()));
+        }
+        Some(Stated::Names(names))
+    }
+
+    pub(super) fn quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+        let before = self.problems.len();
+        let quantity = self.any_quantity(key, node);
+        if let (None, Content::Text { text, .. }) = (&quantity, &node.value)
+            && let Some((from, to)) = self.two_quantities(text)
+        {
+            self.problems.truncate(before);
+            let message = "expected one quantity, but this looks like a range";
+            let help = format!(
+                "if this key takes a range, write {{ from = \"{}\", to = \"{}\", points = 101 }}",
+                shown(from),
+                shown(to)
+            );
+            self.problems.push(Problem::new(&node.location, key, message).help(help));
+        }
+        quantity
+    }
+
+    /// Splits `14 Hz to 19 Hz`, or other spellings of a range, into its two quantities.
+    fn two_quantities<'a>(&self, text: &'a str) -> Option<(&'a str, &'a str)> {
+        [" to ", "...", "..", "…", "–", " - ", "; "].iter().find_map(|word| {
+            let (from, to) = text.split_once(word)?;
+            let (from, to) = (from.trim(), to.trim());
+            (self.compile(from).is_ok() && self.compile(to).is_ok()).then_some((from, to))
+        })
+    }
+
+    fn any_quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+        let location = &node.location;
+        let problem = match &node.value {
+            Content::Text { text, inner } => match self.compile(text) {
+                Ok(expression) => {
+                    return Some(Quantity {
+                        location: location.clone(),
+                        inner: *inner,
+                        text: text.clone(),
+                        expression,
+                    });
+                }
+                Err(fault) => Problem::fault(location, *inner, key, fault),
+            },
+            Content::Number { value, .. } if value.is_finite() => {
+                let text = value.to_string();
+                return Some(Quantity {
+                    location: location.clone(),
+                    inner: None,
+                    text,
+                    expression: Expression::number(*value),
+                });
+            }
+            Content::Number { value, .. } => {
+                Problem::new(location, key, format!("expected a finite number, found {value}"))
+            }
+            other => Problem::new(location, key, format!("expected a quantity, found {}", other.described()))
+                .help("write a number with its unit in quotes, as in \"2 N\""),
+        };
+        self.problems.push(problem);
+        None
+    }
+
+    pub(super) fn quantities(&mut self, key: &str, list: &[Node], location: &Location) -> Option<Vec<Quantity>> {
+        if list.is_empty() {
+            let problem = Problem::new(location, key, "the list is empty: write at least one value");
+            self.problems.push(problem);
+            return None;
+        }
+        let quantities: Vec<Quantity> = list.iter().map(|node| self.quantity(key, node)).collect::<Option<_>>()?;
+        self.problems.extend(mixed(key, &quantities));
+        Some(quantities)
+    }
+
+    pub(super) fn range(&mut self, table: &Table, keys: &[Key], owner: &str) -> Option<(Quantity, Quantity, usize)> {
+        let before = self.problems.len();
+        let mut stated = self.table(table, keys, &format!("the range of `{}`", shown(owner)));
+        if self.problems.len() > before {
+            return None;
+        }
+        let mut take = |key: &str| {
+            let at = stated.entries.iter().position(|entry| entry.key == key)?;
+            Some(stated.entries.swap_remove(at).value)
+        };
+        match (take("from")?, take("to")?, take("points")?) {
+            (
+                Stated::Quantity { quantity: from, .. },
+                Stated::Quantity { quantity: to, .. },
+                Stated::Fixed(Given::Count(points)),
+            ) => {
+                self.problems.extend(mixed(owner, [&from, &to]));
+                Some((from, to, usize::try_from(points).ok()?))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Returns the limits of the frequencies in a range with these keys.
+fn within(keys: &[Key]) -> Within {
+    let first = keys.iter().find(|key| key.name == "from").map(|key| key.takes);
+    if let Some(Takes::Quantity(_, within)) = first { within } else { Within::Positive }
+}

@@ -1,0 +1,27 @@
+//! A study kind: its description, and how its studies are divided, computed and drawn.
+
+use crate::case::study::Study;
+use crate::check::cost::{Cost, Costing};
+use crate::check::survey::Surveyed;
+use crate::kinds::info::KindInfo;
+use crate::results::dataset::Figure;
+use crate::results::drawing::Drawing;
+use crate::run::work::{Computed, Grain, Work};
+
+/// A row of the table of study kinds.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind {
+    /// Description of the kind.
+    pub info: KindInfo,
+    /// Divides its studies into units of work.
+    pub grain: fn(&Study) -> Grain,
+    /// Estimate of the size and the time of its studies; errs on the high side.
+    pub cost: fn(&Costing<'_>) -> Cost,
+    /// Likely mistakes in a study of this kind, as sentences. The argument is a sample of
+    /// cases, spread over the study.
+    pub warnings: fn(&[Surveyed]) -> Vec<String>,
+    /// Computes one unit: the rows of its tables.
+    pub compute: fn(&Work<'_>) -> Computed,
+    /// Draws the figure of finished tables. The caller sets the title.
+    pub draw: fn(&Drawing<'_>) -> Figure,
+}

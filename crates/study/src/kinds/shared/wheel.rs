@@ -1,0 +1,172 @@
+//! Pictures of a disk at the instant of the largest displacement of its worst place.
+//!
+//! Displacements are drawn as distances from a circle, sector by sector. The picture shows
+//! nodal diameters and the participating blades.
+
+use crate::results::dataset::{Axis, Panel, Series};
+use crate::results::drawing::join;
+use std::f64::consts::TAU;
+use stickslip_numerics::leading::leading;
+
+/// A place of every sector: its name, and sector, amplitude and phase (degrees) of each.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::kinds) struct Around {
+    pub(in crate::kinds) place: String,
+    pub(in crate::kinds) of: Vec<(usize, f64, f64)>,
+}
+
+impl Around {
+    /// Returns a place of every sector in a travelling wave; each sector leads the previous one
+    /// by `diameter / sectors` of a turn.
+    pub(in crate::kinds) fn of_wave(
+        place: String,
+        (size, phase): (f64, f64),
+        diameter: usize,
+        sectors: usize,
+    ) -> Around {
+        let lead = |sector: usize| 360.0 * (diameter * sector % sectors) as f64 / sectors as f64;
+        Around { place, of: (0..sectors).map(|sector| (sector, size, phase + lead(sector))).collect() }
+    }
+
+    /// Groups places of a ring, with amplitude and phase, by their name in the sector.
+    ///
+    /// Returns `None` if a place belongs to no sector.
+    pub(in crate::kinds) fn of_ring<'a>(places: impl IntoIterator<Item = (&'a str, f64, f64)>) -> Option<Vec<Around>> {
+        let mut all: Vec<Around> = Vec::new();
+        for (name, size, phase) in places {
+            let (place, sector) = of_sector(name)?;
+            match all.iter_mut().find(|around| around.place == place) {
+                Some(around) => around.of.push((sector, size, phase)),
+                None => all.push(Around { place, of: vec![(sector, size, phase)] }),
+            }
+        }
+        Some(all)
+    }
+
+    fn largest(&self) -> f64 {
+        self.of.iter().map(|(_, size, _)| *size).filter(|size| size.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+/// Returns the name of a ring place in its sector, and the sector number: `blade` and 3 for
+/// `blade_3`, `blade.x` and 3 for `blade_3.x`.
+pub(in crate::kinds) fn of_sector(name: &str) -> Option<(String, usize)> {
+    let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
+    let (place, sector) = node.rsplit_once('_')?;
+    let place = along.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}"));
+    Some((place, sector.parse().ok()?))
+}
+
+/// Length of the largest displacement as a share of the radius of the circle.
+const LARGEST: f64 = 0.35;
+/// Half the width of the picture in radii of the circle; all pictures have the same size.
+const ROOM: f64 = 1.0 + LARGEST + 0.05;
+/// Smallest number of sectors for a picture.
+const LEAST: usize = 3;
+/// Number of points of the circle at rest.
+const CIRCLE: usize = 180;
+/// Largest number of places in a picture: those that move most. More places hide each other.
+pub(in crate::kinds) const MOST: usize = 4;
+
+/// Returns the indices of at most `most` places that move most, in ascending order.
+pub(in crate::kinds) fn leaders(places: &[Around], most: usize) -> Vec<usize> {
+    let mut leaders: Vec<usize> = (0..places.len()).collect();
+    leaders.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
+    leaders.truncate(most);
+    leaders.sort_unstable();
+    leaders
+}
+
+/// States how many of the places are shown, if not all.
+pub(in crate::kinds) fn left_out(shown: usize, places: usize) -> String {
+    if shown < places { format!("{shown} of {places} places") } else { String::new() }
+}
+
+/// Draws some places of a ring in colours from `colour`. Sector 0 is at the top, and sector 1
+/// follows clockwise.
+pub(in crate::kinds) fn panel(places: &[Around], sectors: usize, title: String, colour: usize) -> Option<Panel> {
+    let largest = places.iter().map(Around::largest).fold(0.0, f64::max);
+    let all = places.iter().flat_map(|around| &around.of);
+    // the first of equal displacements determines the instant
+    let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
+    if sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
+        return None;
+    }
+    let shown = leaders(places, MOST);
+    let left_out = left_out(shown.len(), places.len());
+    let at = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
+    let rest = (0..=CIRCLE).map(|i| at(i as f64 / CIRCLE as f64, 1.0)).unzip();
+    let (x, y): (Vec<f64>, Vec<f64>) = rest;
+    let mut series = vec![Series::line("at rest", x, y, 0).reference()];
+    for place in shown {
+        let tip = |(sector, size, phase): &(usize, f64, f64)| {
+            let out = size / largest * (phase - now).to_radians().cos();
+            let turn = *sector as f64 / sectors as f64;
+            (at(turn, 1.0), at(turn, 1.0 + LARGEST * out))
+        };
+        let Around { place: name, of } = &places[place];
+        let mut tips: Vec<_> = of.iter().map(tip).collect();
+        // spokes from the circle at rest
+        let nothing = (f64::NAN, f64::NAN);
+        let (x, y) = tips.iter().flat_map(|(foot, tip)| [*foot, *tip, nothing]).unzip();
+        series.push(Series::line("", x, y, colour + place).pale());
+        if of.len() == sectors {
+            tips.extend(tips.first().copied());
+        }
+        let (x, y) = tips.iter().map(|(_, tip)| *tip).unzip();
+        series.push(Series::line(name, x, y, colour + place));
+    }
+    let first = series.iter().rev().find_map(|line| Some((*line.x.first()?, *line.y.first()?)))?;
+    series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
+    let title = join([title, left_out]);
+    let axis = || Axis::default().between(-ROOM, ROOM);
+    Some(Panel { title, x: axis(), y: axis(), series, picture: true })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wave of two nodal diameters on eight sectors has the displacements `cos(2·2π s/8)`.
+    ///
+    /// The first of equal displacements determines the instant.
+    #[test]
+    fn a_wave_has_its_nodal_diameters() {
+        let wave = Around::of_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
+        let found = panel(&[wave], 8, String::new(), 0).unwrap();
+        let line = found.series.iter().find(|line| line.label == "blade").unwrap();
+        let radii: Vec<f64> = line.x.iter().zip(&line.y).map(|(x, y)| x.hypot(*y)).collect();
+        for (sector, radius) in radii.iter().enumerate() {
+            let out = (std::f64::consts::FRAC_PI_2 * sector as f64).cos();
+            assert!((radius - 1.0 - 0.35 * out).abs() < 1e-12, "{sector}: {radius}");
+        }
+        assert_eq!(radii.len(), 9);
+        // sector 2 of 8 is at the right
+        assert!(line.x[2] > 0.6 && line.y[2].abs() < 1e-12);
+    }
+
+    /// The picture shows the four places that move most, each in its usual colour.
+    #[test]
+    fn a_wheel_is_not_crowded() {
+        let size = [1.0, 5.0, 2.0, 0.5, 3.0, 4.0];
+        let all: Vec<Around> =
+            size.iter().map(|size| Around::of_wave(format!("p{size}"), (*size, 0.0), 1, 6)).collect();
+        let found = panel(&all, 6, "mode 1".to_owned(), 2).unwrap();
+        let drawn: Vec<(&str, usize)> =
+            found.series.iter().filter(|s| s.label.starts_with('p')).map(|s| (s.label.as_str(), s.colour)).collect();
+        assert_eq!(drawn, [("p5", 3), ("p2", 4), ("p3", 6), ("p4", 7)]);
+        assert_eq!(found.title, "mode 1, 4 of 6 places");
+    }
+
+    #[test]
+    fn places_of_a_ring_by_their_sector() {
+        assert_eq!(of_sector("tip_12.x"), Some(("tip.x".to_owned(), 12)));
+        assert_eq!(of_sector("blade"), None);
+        let all = Around::of_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
+        assert_eq!(
+            all.iter().map(|around| (around.place.as_str(), around.of.len())).collect::<Vec<_>>(),
+            [("a", 2), ("b", 1)]
+        );
+        assert!(Around::of_ring([("rotor", 1.0, 0.0)]).is_none());
+    }
+}
