@@ -17,10 +17,10 @@ use stickslip_report::journal::{Journal, JournalError};
 use stickslip_report::stream::{self, Shard, Start, StreamError};
 use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
+use stickslip_study::decimation::MOST_ROWS;
 use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
 use stickslip_study::schema::MOST_BYTES;
 use stickslip_study::summary::ModelSummary;
-use stickslip_study::thinning::MOST_ROWS;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
 /// The studies named on the command line.

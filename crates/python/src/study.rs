@@ -12,8 +12,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
-use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::{self, Column, Values};
+use stickslip_study::result_block::{Block, Tally};
 use stickslip_study::run::{Checked, check, redrawn, units};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
 

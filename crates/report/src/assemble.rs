@@ -12,10 +12,10 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stickslip_study::Study;
-use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::Dataset;
+use stickslip_study::decimation::Thinning;
+use stickslip_study::result_block::{Block, Tally};
 use stickslip_study::run::drawn;
-use stickslip_study::thinning::Thinning;
 
 /// Reason why results cannot be assembled from journals.
 #[derive(Debug, thiserror::Error)]

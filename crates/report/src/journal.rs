@@ -26,8 +26,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stickslip_study::StudyError;
-use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::Dataset;
+use stickslip_study::result_block::{Block, Tally};
 use stickslip_study::run::Checked;
 
 /// Name of the file in its folder.

@@ -11,7 +11,7 @@ use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use stickslip_study::block::Block;
+use stickslip_study::result_block::Block;
 use stickslip_study::run::{Checked, Context};
 
 /// One of several parts of the units of a study: number and total.

@@ -21,13 +21,13 @@ pub mod results;
 pub mod run;
 mod syntax;
 
-pub use case::stiffened::Exports;
+pub use case::stress_stiffening::Exports;
 pub use case::study::{Case, MethodChoice, Study, VariedValue};
 pub use case::values::{Frequencies, Values, hertz};
-pub use check::{cost, memory, summary};
+pub use check::{cost, memory_limit, summary};
 pub use compile::read::{TemplateParameter, read_bytes, read_document, read_file, read_stored, read_study};
 pub use compile::templates;
-pub use results::{dataset, thinning};
-pub use run::{block, work};
+pub use results::{dataset, decimation};
+pub use run::{result_block, work};
 pub use syntax::error::StudyError;
 pub use syntax::{book, expression, schema, unit_sets, units};

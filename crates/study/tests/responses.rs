@@ -950,7 +950,7 @@ fn a_unit_without_its_peaks_is_not_whole() {
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     let text = stickslip_study::templates::find("blade-couple").unwrap().study.replace("points = 241", "points = 41");
     let checked = stickslip_study::run::check(&read_study("couple.toml", &text, &[]).unwrap()).unwrap();
-    let rows = |block: &stickslip_study::block::Block, name: &str| {
+    let rows = |block: &stickslip_study::result_block::Block, name: &str| {
         block.tables.iter().find(|table| table.name == name).unwrap().rows()
     };
     let whole = checked.block(0..1, &Context::unwatched(1)).unwrap();

@@ -1,7 +1,7 @@
 //! Binary form of a result block: numbers by their bits, equal consecutive texts once.
 
-use stickslip_study::block::Block;
 use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::result_block::Block;
 
 /// Appends a block and its wall time in s.
 pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {

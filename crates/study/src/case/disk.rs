@@ -1,13 +1,13 @@
 //! `[disk]`: the ring of a model that states one sector, tuned or mistuned.
 
-use crate::case::sector::{sector_of, whole};
+use crate::case::model_builder::{sector_of, whole};
 use crate::case::values::{Given, Values};
-use crate::compile::stated::{ModelStatement, StatedDisk, problem_of};
-use crate::compile::statement::{Environment, Stated, StatedTable};
+use crate::compile::compiled::{Environment, Stated, StatedTable};
+use crate::compile::source_model::{ModelStatement, StatedDisk, problem_of};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::Value;
 use crate::syntax::key::MOST_MASSES;
-use crate::syntax::near::{nearest, shown};
+use crate::syntax::suggest::{nearest, shown};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Mistuned, Model, normal_pattern, too_far};

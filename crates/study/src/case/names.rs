@@ -5,7 +5,7 @@
 //! takes one place refuses such a name and lists the directions.
 
 use crate::kinds::info::Complaint;
-use crate::syntax::near::{nearest, one_of, shown};
+use crate::syntax::suggest::{nearest, one_of, shown};
 use std::collections::BTreeSet;
 use stickslip::model::Model;
 

@@ -1,23 +1,23 @@
 //! A study that was read: its cases, each with its model and the values of its kind.
 
 use crate::case::disk::{self, Again};
+use crate::case::model_builder::{none_around, sector_of};
 use crate::case::sample::{Drawn, Sample};
-use crate::case::sector::{none_around, sector_of};
-use crate::case::stiffened::Exports;
+use crate::case::stress_stiffening::Exports;
 use crate::case::substructure;
 use crate::case::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
 use crate::check::figure;
-use crate::check::immovable::{immovable, too_slow, too_soft};
-use crate::check::memory;
-use crate::compile::cause;
-use crate::compile::mixed::with_unit;
-use crate::compile::stated::{Matrices, ModelStatement, problem_of};
-use crate::compile::statement::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
+use crate::check::memory_limit;
+use crate::check::overstiff::{immovable, too_slow, too_soft};
+use crate::compile::bare_numbers::with_unit;
+use crate::compile::compiled::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
+use crate::compile::source_model::{Matrices, ModelStatement, problem_of};
+use crate::compile::template_errors;
 use crate::kinds::info::{Complaint, KindInfo};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::expression::{Value, displayed};
 use crate::syntax::key::VERSION;
-use crate::syntax::near::{nearest, one_of, shown};
+use crate::syntax::suggest::{nearest, one_of, shown};
 use crate::syntax::units;
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
@@ -302,9 +302,9 @@ impl Study {
     }
 
     /// Returns the memory limit of a run, bytes: the limit that was set, or
-    /// [`MEMORY_LIMIT`](memory::MEMORY_LIMIT), or the machine's free memory if that is less.
+    /// [`MEMORY_LIMIT`](memory_limit::MEMORY_LIMIT), or the machine's free memory if that is less.
     pub fn memory_limit(&self) -> u64 {
-        self.memory.unwrap_or_else(memory::default_limit)
+        self.memory.unwrap_or_else(memory_limit::default_limit)
     }
 
     /// Returns the number of points: cases times frequencies.
@@ -675,7 +675,12 @@ impl Study {
             Ok(values) => values,
             Err(problem) => {
                 let template = self.structure.template.as_ref().map(|template| template.source);
-                problems.push(cause::blame(problem, template, &self.names, &stated(&self.parameters, &choice)));
+                problems.push(template_errors::blame(
+                    problem,
+                    template,
+                    &self.names,
+                    &stated(&self.parameters, &choice),
+                ));
                 return None;
             }
         };
@@ -813,15 +818,17 @@ pub(crate) fn evaluate(
 pub(crate) fn stated<'a>(
     parameters: &'a [Parameter],
     choice: &HashMap<usize, (&'a Varied, usize)>,
-) -> Vec<cause::Stated<'a>> {
+) -> Vec<template_errors::Stated<'a>> {
     let of = |quantity: &'a Quantity| {
         let Quantity { text, location, expression, .. } = quantity;
-        cause::Stated { text, location, expression: Some(expression) }
+        template_errors::Stated { text, location, expression: Some(expression) }
     };
     let one = |(index, parameter): (usize, &'a Parameter)| match choice.get(&index) {
         None => of(&parameter.quantity),
         Some((Varied { points: VariedPoints::List(list), .. }, point)) => of(&list[*point]),
-        Some((varied, _)) => cause::Stated { text: "one of its values", location: &varied.location, expression: None },
+        Some((varied, _)) => {
+            template_errors::Stated { text: "one of its values", location: &varied.location, expression: None }
+        }
     };
     parameters.iter().enumerate().map(one).collect()
 }

@@ -1,10 +1,10 @@
 //! Converts `[structure]` and `[[place]]` to parts of a model.
 
 use crate::case::values::Values;
-use crate::compile::stated::Matrices;
-use crate::compile::statement::{Environment, StatedTable};
+use crate::compile::compiled::{Environment, StatedTable};
+use crate::compile::source_model::Matrices;
 use crate::syntax::error::Problem;
-use crate::syntax::near::{nearest, one_of, shown};
+use crate::syntax::suggest::{nearest, one_of, shown};
 use stickslip::method::WIDTH;
 use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;

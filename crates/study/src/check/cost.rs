@@ -5,12 +5,12 @@
 
 use crate::case::study::{Case, Study};
 use crate::check::survey::{Surveyed, range};
-use crate::results::thinning::MOST_ROWS;
-use crate::run::extra;
-use crate::run::farther;
+use crate::results::decimation::MOST_ROWS;
+use crate::run::basis_check;
+use crate::run::output_columns;
 use crate::run::work::AHEAD;
 use crate::syntax::error::{Problem, StudyError};
-use crate::syntax::words::bytes_text;
+use crate::syntax::format::bytes_text;
 use std::collections::BTreeSet;
 use std::f64::consts::{LN_10, TAU};
 use stickslip::curve::sweep::BLOCK;
@@ -239,7 +239,7 @@ impl<'a> Costing<'a> {
     /// The columns are frequency; amplitude, mean and phase of each place; dissipation and slip
     /// of each joint; the columns of `output`; evidence; status.
     pub fn orbits(&self, rows: f64) -> Shape {
-        let extra = extra::columns(self.case, self.system()).len() as f64;
+        let extra = output_columns::columns(self.case, self.system()).len() as f64;
         let numbers = self.varied + 3.0 * self.places + 2.0 * self.joints + extra + 6.0;
         Shape { rows, numbers, words: 1.0 }
     }
@@ -404,10 +404,10 @@ impl Costing<'_> {
         let harmonics = self.case.method.options.get("harmonics").filter(|_| self.is_series());
         let highest = harmonics.zip(self.range()).map(|(harmonics, (_, drive))| harmonics * drive);
         let within = highest.is_some_and(|highest| highest <= reduced.up_to());
-        if self.joints == 0.0 || within || rows > farther::ROWS || !self.study.kind().uses_method {
+        if self.joints == 0.0 || within || rows > basis_check::ROWS || !self.study.kind().uses_method {
             return 0.0;
         }
-        AGAIN.0 * self.matrices() + AGAIN.1 * farther::count(self.points(), self.cases) * self.orbit()
+        AGAIN.0 * self.matrices() + AGAIN.1 * basis_check::count(self.points(), self.cases) * self.orbit()
     }
 }
 
@@ -880,7 +880,7 @@ impl Costing<'_> {
     pub fn extra(&self) -> f64 {
         match self.case.values.names("output").unwrap_or_default().len() {
             0 => 0.0,
-            some => self.reading(some as f64 * extra::INSTANTS as f64),
+            some => self.reading(some as f64 * output_columns::INSTANTS as f64),
         }
     }
 }

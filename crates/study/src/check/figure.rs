@@ -3,7 +3,7 @@
 use crate::case::names::Names;
 use crate::case::values::Values;
 use crate::kinds::info::{Complaint, KindInfo};
-use crate::syntax::near;
+use crate::syntax::suggest;
 use crate::syntax::units;
 use stickslip::model::Model;
 
@@ -30,7 +30,7 @@ pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(
             found => {
                 let what = if found.is_some() { "a unit of another quantity" } else { "not a known unit" };
                 let help = format!("write a unit such as {example}");
-                return Err(Complaint::new(key, format!("`{}` is {what}", near::shown(text)), help));
+                return Err(Complaint::new(key, format!("`{}` is {what}", suggest::shown(text)), help));
             }
         }
     }

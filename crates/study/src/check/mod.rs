@@ -4,14 +4,14 @@
 //! - `summary`: linear modes, first slip, likely mistakes, memory and time of a study;
 //! - `warnings`: likely mistakes, selected by the study kinds;
 //! - `cost`: estimates of size and time;
-//! - `memory`: the memory limit of a run;
+//! - `memory_limit`: the memory limit of a run;
 //! - `figure`: checks of `[figure]`;
-//! - `immovable`: refuses a stiffness that makes the inertia of a mass vanish.
+//! - `overstiff`: refuses a stiffness that makes the inertia of a mass vanish.
 
 pub mod cost;
 pub(crate) mod figure;
-pub(crate) mod immovable;
-pub mod memory;
+pub mod memory_limit;
+pub(crate) mod overstiff;
 pub mod summary;
 pub(crate) mod survey;
 pub(crate) mod warnings;

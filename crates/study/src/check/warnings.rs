@@ -2,8 +2,8 @@
 
 use crate::case::values::{Frequencies, Values};
 use crate::check::survey::{Surveyed, range};
+use crate::syntax::format::{quantity, significant};
 use crate::syntax::key::MOST_POINTS;
-use crate::syntax::words::{quantity, significant};
 use std::f64::consts::TAU;
 use stickslip::curve::modes::unit;
 use stickslip::model::{Cyclic, LinearMode, Modes};

@@ -1,17 +1,17 @@
 //! From the tree of a study file to compiled statements. Nothing is evaluated here.
 //!
 //! - `read`: the reader of study files;
-//! - `statement`: compiled values, tables and laws;
-//! - `stated`: the model as stated, and the location of a model error in it;
+//! - `compiled`: compiled values, tables and laws;
+//! - `source_model`: the model as stated, and the location of a model error in it;
 //! - `templates`: ready models that other studies use;
 //! - `repeat`: one list entry that states several elements;
-//! - `mixed`: refuses bare numbers next to quantities with a unit;
-//! - `cause`: the user's values that make an expression of a template wrong.
+//! - `bare_numbers`: refuses bare numbers next to quantities with a unit;
+//! - `template_errors`: the user's values that make an expression of a template wrong.
 
-pub(crate) mod cause;
-pub(crate) mod mixed;
+pub(crate) mod bare_numbers;
+pub(crate) mod compiled;
 pub(crate) mod read;
 pub(crate) mod repeat;
-pub(crate) mod stated;
-pub(crate) mod statement;
+pub(crate) mod source_model;
+pub(crate) mod template_errors;
 pub mod templates;

@@ -55,7 +55,7 @@ pub fn find(name: &str) -> Option<&'static Template> {
 /// assert_eq!(templates::nearest("bicycle"), None);
 /// ```
 pub fn nearest(name: &str) -> Option<&'static str> {
-    crate::syntax::near::nearest(name, TABLE.iter().map(|template| template.name))
+    crate::syntax::suggest::nearest(name, TABLE.iter().map(|template| template.name))
 }
 
 impl Template {

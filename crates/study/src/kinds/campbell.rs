@@ -13,10 +13,10 @@ use crate::kinds::info::{Complaint, KindInfo};
 use crate::kinds::kind::Kind;
 use crate::results::columns::FREQUENCY;
 use crate::results::dataset::{Figure, Panel, Series, Style, Table};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, Stretch, largest, numbers, words};
-use crate::results::draws;
-use crate::results::note::Note;
-use crate::results::rows::Rows;
+use crate::results::notes::Note;
+use crate::results::table_builder::Rows;
 use crate::run::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use crate::syntax::key::SPEEDS;
 use crate::syntax::key::{Takes, default, required};
@@ -364,7 +364,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         }
         vec![Panel { title, x: x.clone(), y: y.clone().between(0.0, top), series, ..Panel::default() }]
     };
-    Figure { panels: draws::panels(drawing, &drawing.stretches(table), &panel), ..Figure::default() }
+    Figure { panels: draw_panels::panels(drawing, &drawing.stretches(table), &panel), ..Figure::default() }
 }
 
 /// Top of the panel as a multiple of the highest frequency.

@@ -3,7 +3,7 @@
 
 use crate::case::values::Values;
 use crate::syntax::key::Key;
-use crate::syntax::near;
+use crate::syntax::suggest;
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, Options};
 use stickslip::model::{Model, System};
@@ -58,12 +58,12 @@ impl Complaint {
     /// Returns the complaint about a name in the value of `key` that is not one of
     /// `candidates`.
     pub(crate) fn unknown(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
-        let help = match near::nearest(name, candidates.iter().copied()) {
+        let help = match suggest::nearest(name, candidates.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
             None if candidates.is_empty() => format!("the model has no {what}"),
-            None => format!("choose {}", near::one_of(candidates.iter().take(12).copied())),
+            None => format!("choose {}", suggest::one_of(candidates.iter().take(12).copied())),
         };
-        let message = format!("there is no {what} `{}`", near::shown(name));
+        let message = format!("there is no {what} `{}`", suggest::shown(name));
         Complaint { key, name: Some(name.to_owned()), message, help: Some(help) }
     }
 }

@@ -21,7 +21,7 @@ mod shared;
 mod transient;
 
 use crate::case::study::Study;
-use crate::run::extra;
+use crate::run::output_columns;
 
 pub use crate::kinds::info::{Complaint, KindInfo};
 pub use crate::kinds::kind::Kind;
@@ -52,5 +52,5 @@ pub(crate) fn of(study: &Study) -> &'static Kind {
 
 /// Returns the choices of `output`: name and one-line description.
 pub fn outputs() -> Vec<(&'static str, &'static str)> {
-    extra::TABLE.iter().map(|extra| (extra.name, extra.doc)).collect()
+    output_columns::TABLE.iter().map(|extra| (extra.name, extra.doc)).collect()
 }

@@ -1,7 +1,7 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
+use super::shared::disk_shape::{self, Around};
 use super::shared::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
-use super::shared::wheel::{self, Around};
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, Costing, Shape};
 use crate::check::warnings::of_mode;
@@ -10,13 +10,13 @@ use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{amplitude_in, amplitude_of, first_harmonic_in, first_harmonic_of, phase_of};
 use crate::results::dataset::{Axis, Figure, Panel, Series, Table, Values as Cells};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
-use crate::results::draws;
-use crate::results::note::Note;
-use crate::results::rows::Rows;
+use crate::results::notes::Note;
+use crate::results::table_builder::Rows;
 use crate::run::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use crate::syntax::format::{display_unit, significant};
 use crate::syntax::key::{Key, Takes, Within, default, required};
-use crate::syntax::words::{display_unit, significant};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode, unit};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
@@ -317,7 +317,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     if drawing.study.draws().is_some() {
         let of_draw = |stretch: &Stretch, title: String| both(std::slice::from_ref(stretch), &title);
-        return Figure { panels: draws::panels(drawing, &stretches, &of_draw), ..Figure::default() };
+        return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
     }
     let mut panels = both(&stretches, "");
     if panels.len() + 2 * stretches.len() <= MOST_PANELS {
@@ -350,7 +350,7 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cas
             None => at(&amplitude_of(name)),
         };
         let moves = shown.iter().map(|name| (name.as_str(), size(name), at(&phase_of(name))));
-        wheel::panel(&Around::of_ring(moves)?, ring.sectors, join([stretch.label(), words, frequency]), cases)
+        disk_shape::panel(&Around::of_ring(moves)?, ring.sectors, join([stretch.label(), words, frequency]), cases)
     };
     ends.into_iter().filter_map(wheel).collect()
 }

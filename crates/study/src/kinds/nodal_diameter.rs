@@ -1,20 +1,20 @@
 //! Frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck,
 //! and mode shapes.
 
+use super::shared::disk_shape::{self, Around, of_sector};
 use super::shared::keys::anything;
-use super::shared::wheel::{self, Around, of_sector};
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, Costing, Shape};
 use crate::kinds::info::{Complaint, KindInfo};
 use crate::kinds::kind::Kind;
 use crate::results::columns::{FREQUENCY, phase_of, shape_of};
 use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers, words};
-use crate::results::draws;
-use crate::results::rows::Rows;
+use crate::results::table_builder::Rows;
 use crate::run::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use crate::syntax::format::significant;
 use crate::syntax::key::{Takes, default, optional};
-use crate::syntax::words::significant;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, WaveModes};
 
@@ -221,7 +221,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
         std::iter::once(panel(stretch, title)).chain(shapes).collect::<Vec<_>>()
     };
-    Figure { panels: draws::panels(drawing, &stretches, &of_case), ..Figure::default() }
+    Figure { panels: draw_panels::panels(drawing, &stretches, &of_case), ..Figure::default() }
 }
 
 /// Returns the shapes of a case.
@@ -262,7 +262,7 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel>
         let joints = if state == STATES[0] { String::new() } else { format!("joints {state}") };
         let title =
             [stretch.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
-        wheel::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join(title), STATES.len())
+        disk_shape::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join(title), STATES.len())
     };
     stretch.rows.clone().filter(wanted).take(WHEELS).filter_map(wheel).collect()
 }

@@ -1,21 +1,21 @@
 //! Orbits over one period, in time.
 
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
-use super::shared::orbits;
+use super::shared::orbit_sweep;
 use crate::case::values::hertz;
 use crate::check::cost::{Cost, Costing, Shape};
 use crate::check::warnings::driven;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
-use crate::results::draws;
-use crate::results::note::Note;
-use crate::results::rows::Rows;
-use crate::run::point::{Summary, location_of};
+use crate::results::notes::Note;
+use crate::results::table_builder::Rows;
+use crate::run::point_row::{Summary, location_of};
 use crate::run::work::{Computed, Part, Prepared, Work};
+use crate::syntax::format::{display_unit, shown_hertz};
 use crate::syntax::key::{Takes, default};
-use crate::syntax::words::{display_unit, shown_hertz};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
@@ -48,7 +48,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["orbit", "orbits", "multipliers"],
     },
-    grain: orbits::grain,
+    grain: orbit_sweep::grain,
     cost,
     warnings: driven,
     compute,
@@ -82,7 +82,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let mut part = Part::default();
     let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
     let prepared = work.case();
-    for (orbit, stable) in orbits::found(work, &mut part)? {
+    for (orbit, stable) in orbit_sweep::found(work, &mut part)? {
         let omega = orbit.omega;
         one_of_many(prepared, &orbit).into_iter().for_each(|note| note.join(&mut part.notes));
         summary.varied(&prepared.case);
@@ -114,7 +114,7 @@ fn compute(work: &Work<'_>) -> Computed {
             multipliers.reduced(prepared.system.reduction_evidence());
             multipliers.end();
         }
-        for time in orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {
+        for time in orbit_sweep::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {
             motion.varied(&prepared.case);
             motion.number("frequency_Hz", hertz(omega));
             motion.number("time_s", time);
@@ -220,7 +220,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         };
         runs.flat_map(of_run).collect()
     };
-    let mut panels = draws::panels(drawing, &drawing.stretches(motion), &of_case);
+    let mut panels = draw_panels::panels(drawing, &drawing.stretches(motion), &of_case);
     panels.truncate(MOST_PANELS);
     Figure { panels, ..Figure::default() }
 }

@@ -3,8 +3,8 @@
 
 use super::orbit::write_sample;
 use super::shared::keys::MOST_SAMPLES;
+use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
 use crate::case::names::Names;
-use crate::case::start::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, Costing, Shape};
 use crate::check::warnings::moved;
@@ -13,15 +13,15 @@ use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series, Table};
 use crate::results::decay::{Decay, Motion};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, largest, numbers, thinned, words};
-use crate::results::draws;
-use crate::results::note::{Note, WARNING};
-use crate::results::rows::Rows;
-use crate::run::point::location_of;
+use crate::results::notes::{Note, WARNING};
+use crate::results::table_builder::Rows;
+use crate::run::point_row::location_of;
 use crate::run::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use crate::syntax::format::{display_unit, shown_hertz};
 use crate::syntax::key::RANGE;
 use crate::syntax::key::{Key, Takes, Within, default, optional, required};
-use crate::syntax::words::{display_unit, shown_hertz};
 use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
@@ -419,7 +419,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let runs = drives[stretch.rows.clone()].chunk_by(|a, b| a == b);
         runs.take(MOST_PANELS).map(of_drive).collect()
     };
-    let mut panels = draws::panels(drawing, &drawing.stretches(motion), &of_case);
+    let mut panels = draw_panels::panels(drawing, &drawing.stretches(motion), &of_case);
     panels.truncate(MOST_PANELS);
     if let Some(decay) =
         drawing.table("decay").filter(|_| drawing.study.draws().is_none() && panels.len() < MOST_PANELS)

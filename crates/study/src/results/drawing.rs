@@ -4,8 +4,8 @@
 use crate::case::study::{Study, VariedValue};
 use crate::case::values::Values;
 use crate::results::dataset::{Axis, Table, Values as Cells, column_name};
+use crate::syntax::format::display_unit;
 use crate::syntax::units;
-use crate::syntax::words::display_unit;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use stickslip::model::System;

@@ -3,26 +3,26 @@
 //! - `dataset`: tables, figures and the record of a run, independent of file formats;
 //! - `typed`: reads results back as typed values;
 //! - `columns`: names of columns that several kinds write;
-//! - `rows`: builds tables row by row;
-//! - `note`: notes for the reader;
+//! - `table_builder`: builds tables row by row;
+//! - `notes`: notes for the reader;
 //! - `drawing`: tools for kinds to draw figures from finished tables;
-//! - `draws`: panels of many random draws;
+//! - `draw_panels`: panels of many random draws;
 //! - `percentiles`: bands of many curves;
 //! - `histogram`: histograms, and for maxima the fitted distribution;
 //! - `weibull`: the Weibull distribution of maxima;
 //! - `decay`: damping from a free decay;
-//! - `thinning`: decimation of long tables for their figure.
+//! - `decimation`: decimation of long tables for their figure.
 
 pub(crate) mod columns;
 pub mod dataset;
 pub(crate) mod decay;
+pub mod decimation;
+pub(crate) mod draw_panels;
 pub(crate) mod drawing;
-pub(crate) mod draws;
 pub(crate) mod histogram;
-pub(crate) mod note;
+pub(crate) mod notes;
 pub(crate) mod percentiles;
-pub(crate) mod rows;
-pub mod thinning;
+pub(crate) mod table_builder;
 mod typed;
 pub(crate) mod weibull;
 

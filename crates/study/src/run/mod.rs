@@ -2,15 +2,15 @@
 //!
 //! - `runner`: checks a study, computes its units on all threads, and records the run;
 //! - `work`: units of work, and the results of one unit;
-//! - `block`: the results of consecutive units;
-//! - `point`: the table row of one orbit;
-//! - `extra`: additional columns that `output` selects;
-//! - `farther`: the check of the reduction basis.
+//! - `result_block`: the results of consecutive units;
+//! - `point_row`: the table row of one orbit;
+//! - `output_columns`: additional columns that `output` selects;
+//! - `basis_check`: the check of the reduction basis.
 
-pub mod block;
-pub(crate) mod extra;
-pub(crate) mod farther;
-pub(crate) mod point;
+pub(crate) mod basis_check;
+pub(crate) mod output_columns;
+pub(crate) mod point_row;
+pub mod result_block;
 mod runner;
 pub mod work;
 

@@ -6,8 +6,8 @@
 //! for every division of the work.
 
 use crate::case::study::{Case, Study};
-use crate::results::note::Note;
-use crate::results::rows::Rows;
+use crate::results::notes::Note;
+use crate::results::table_builder::Rows;
 use crate::syntax::error::StudyError;
 use crate::syntax::expression::displayed;
 use std::collections::BTreeMap;

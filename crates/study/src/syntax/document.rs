@@ -1,7 +1,7 @@
 //! A TOML text as a tree in which every key and value knows its location.
 
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::near::shown;
+use crate::syntax::suggest::shown;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 

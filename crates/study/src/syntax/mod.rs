@@ -8,18 +8,18 @@
 //! - `key`: a key of a table and the values that it takes;
 //! - `schema`: all tables and keys, as data;
 //! - `book`: the reference of study files in the book, generated from the schema;
-//! - `near`: suggestions for misspelled words;
-//! - `mistaken`: advice for a quantity of the wrong dimension;
-//! - `words`: formats numbers and times.
+//! - `suggest`: suggestions for misspelled words;
+//! - `dimension_advice`: advice for a quantity of the wrong dimension;
+//! - `format`: formats numbers and times.
 
 pub mod book;
+pub(crate) mod dimension_advice;
 pub(crate) mod document;
 pub(crate) mod error;
 pub mod expression;
+pub(crate) mod format;
 pub(crate) mod key;
-pub(crate) mod mistaken;
-pub(crate) mod near;
 pub mod schema;
+pub(crate) mod suggest;
 pub mod unit_sets;
 pub mod units;
-pub(crate) mod words;

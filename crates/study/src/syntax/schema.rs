@@ -656,19 +656,19 @@ pub fn described(takes: &Takes) -> String {
         }
         Takes::Table(keys) | Takes::List(keys) => {
             let taken = keys.iter().filter(|key| key.is_taken());
-            let names = crate::syntax::near::one_of(taken.map(|key| key.name)).replace(" or ", ", ");
+            let names = crate::syntax::suggest::one_of(taken.map(|key| key.name)).replace(" or ", ", ");
             let many = matches!(takes, Takes::List(_));
             format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
         }
         Takes::Repeat => "a table with a number of repetitions or [first, last] for each index, and `wrap`".to_owned(),
         Takes::Law => "a law: { kind = \"…\", … }".to_owned(),
-        Takes::Choice(words) => format!("one of {}", crate::syntax::near::one_of(words().iter().map(|word| word.0))),
+        Takes::Choice(words) => format!("one of {}", crate::syntax::suggest::one_of(words().iter().map(|word| word.0))),
         Takes::Parameters => "a table of quantities by name".to_owned(),
         Takes::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
         Takes::Sample => "a table with `count`, `of`, `seed` and `design`".to_owned(),
         Takes::Distributions => {
             let all = DISTRIBUTIONS.map(|(name, numbers, _)| format!("{{ {name} = [{numbers}] }}"));
-            let all = crate::syntax::near::one_of(all.iter().map(String::as_str));
+            let all = crate::syntax::suggest::one_of(all.iter().map(String::as_str));
             format!("a table from parameters to {all}, the first two also with {WITHIN} = [least, most]")
         }
         Takes::Method => "a table with `kind` and the options of that method".to_owned(),

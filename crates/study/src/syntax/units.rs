@@ -8,7 +8,7 @@
 //! unit follows; `^2`, `^-1` and `²` are powers. `N s/m` is `(N s)/m`. A space after a `/`
 //! (`N/m s`) is refused, because readers disagree on its meaning.
 
-use crate::syntax::near::{nearest, shown};
+use crate::syntax::suggest::{nearest, shown};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 

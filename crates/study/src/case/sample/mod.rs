@@ -6,7 +6,7 @@ mod distribution;
 pub(crate) use design::{DESIGNS, Design, MOST_SOBOL};
 pub(crate) use distribution::{DISTRIBUTIONS, Distribution, WITHIN};
 
-use crate::compile::statement::{Environment, Quantity};
+use crate::compile::compiled::{Environment, Quantity};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::Value;
 use stickslip::dimension::Dimension;

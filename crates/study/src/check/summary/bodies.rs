@@ -31,6 +31,6 @@ fn line(body: &Body, model: &Model) -> String {
         displayed(body.mass, Some(Dimension::MASS)),
         moments.collect::<Vec<_>>().join(", "),
         body.directions.join(", "),
-        crate::syntax::words::plural(points)
+        crate::syntax::format::plural(points)
     )
 }

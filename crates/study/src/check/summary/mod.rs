@@ -228,16 +228,16 @@ impl ModelSummary {
 
     /// Describes the expected time in words.
     pub(crate) fn time(&self) -> String {
-        let mut usual = format!("{} on one thread", crate::syntax::words::about(self.usual_seconds));
+        let mut usual = format!("{} on one thread", crate::syntax::format::about(self.usual_seconds));
         if let Some((seconds, place)) = self.spared
             && self.usual_seconds >= (WIDE * seconds).max(SOON)
         {
-            usual += &format!(", {} {place}", crate::syntax::words::about(seconds));
+            usual += &format!(", {} {place}", crate::syntax::format::about(seconds));
         }
         if self.seconds < WIDE * self.usual_seconds || self.seconds < SOON {
             return usual;
         }
-        format!("{usual}, up to {} if orbits are hard to find", crate::syntax::words::duration(self.seconds))
+        format!("{usual}, up to {} if orbits are hard to find", crate::syntax::format::duration(self.seconds))
     }
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.

@@ -2,7 +2,7 @@
 
 use crate::case::study::Study;
 use crate::check::survey::Surveyed;
-use crate::syntax::words::{plural, significant};
+use crate::syntax::format::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::model::{ReductionEvidence, Substructure};

@@ -1,7 +1,7 @@
 //! The summary in words, for a terminal.
 
 use super::{JointSummary, ModelSummary, Orbits, UNLOADED, load};
-use crate::syntax::words::{bytes_text, plural, quantity, significant};
+use crate::syntax::format::{bytes_text, plural, quantity, significant};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::fmt;

@@ -1,12 +1,12 @@
 //! Warnings about valid studies that look like mistakes: sentences that begin with `warning: `.
 
-use crate::case::linear::Reference;
+use crate::case::linear_reference::Reference;
 use crate::case::study::{Study, evaluate};
 use crate::check::survey::Surveyed;
-use crate::compile::statement::{Environment, StatedTable};
-use crate::results::note::WARNING;
+use crate::compile::compiled::{Environment, StatedTable};
+use crate::results::notes::WARNING;
 use crate::syntax::expression::displayed;
-use crate::syntax::words::significant;
+use crate::syntax::format::significant;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;

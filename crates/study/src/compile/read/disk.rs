@@ -5,12 +5,12 @@
 
 use super::reader::Reader;
 use crate::case::values::Given;
-use crate::compile::stated::StatedDisk;
-use crate::compile::statement::{Stated, StatedTable};
+use crate::compile::compiled::{Stated, StatedTable};
+use crate::compile::source_model::StatedDisk;
 use crate::syntax::document::Table;
 use crate::syntax::error::Problem;
 use crate::syntax::key::Key;
-use crate::syntax::near::shown;
+use crate::syntax::suggest::shown;
 use std::io::Read;
 use stickslip::structure::Node;
 

@@ -1,13 +1,13 @@
 //! Reads tables whose keys depend on `kind`: laws, `[method]`, `[study]`; and `[figure]`.
 
 use super::reader::Reader;
-use crate::compile::statement::{Stated, StatedTable};
+use crate::compile::compiled::{Stated, StatedTable};
 use crate::kinds;
 use crate::kinds::info::KindInfo;
 use crate::syntax::document::{Content, Entry, Node, Table};
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::near::one_of;
 use crate::syntax::schema::{self, FILE, Key, Presence, STUDY, Takes, Within};
+use crate::syntax::suggest::one_of;
 use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo};
 use stickslip::method;

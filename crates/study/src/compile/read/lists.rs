@@ -2,15 +2,15 @@
 //! several.
 
 use super::reader::Reader;
+use crate::compile::compiled::{Stated, StatedTable};
 use crate::compile::repeat::{Index, Repetition};
-use crate::compile::stated::Lists;
-use crate::compile::statement::{Stated, StatedTable};
+use crate::compile::source_model::Lists;
 use crate::syntax::document::{Content, Entry, Node, Table};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::is_reserved;
 use crate::syntax::key::RATIO;
-use crate::syntax::near::shown;
 use crate::syntax::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes, Within};
+use crate::syntax::suggest::shown;
 use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
 

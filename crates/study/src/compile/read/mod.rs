@@ -23,13 +23,13 @@ pub use template::TemplateParameter;
 
 use crate::case::study::{Study, stated};
 use crate::case::values::Given;
-use crate::compile::cause;
-use crate::compile::stated::ModelStatement;
-use crate::compile::statement::Stated;
+use crate::compile::compiled::Stated;
+use crate::compile::source_model::ModelStatement;
+use crate::compile::template_errors;
 use crate::syntax::document::{self, Content, Node, Table};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
-use crate::syntax::near::nearest;
 use crate::syntax::schema::{self, FILE, MOST_BYTES};
+use crate::syntax::suggest::nearest;
 use reader::Reader;
 use std::io::Read;
 use std::path::Path;
@@ -278,7 +278,7 @@ impl Reader {
         if let Some(template) = &mut structure.template {
             let choice = varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
             let stated = stated(&parameters, &choice);
-            let behind = |index: usize| cause::given(template.source, &stated, [index]);
+            let behind = |index: usize| template_errors::given(template.source, &stated, [index]);
             let names = |index: usize| behind(index).into_iter().map(|index| self.names[index].clone()).collect();
             template.given = (0..parameters.len()).map(names).collect();
         }

@@ -6,14 +6,14 @@ use super::reader::Reader;
 use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, Drawn, MOST_SOBOL, Sample, WITHIN};
 use crate::case::study::{Parameter, Replaced, Varied, VariedPoints, evaluate, stated};
 use crate::case::values::Given;
-use crate::compile::cause;
-use crate::compile::mixed::mixed;
-use crate::compile::statement::{Quantity, Stated, StatedTable};
+use crate::compile::bare_numbers::mixed;
+use crate::compile::compiled::{Quantity, Stated, StatedTable};
+use crate::compile::template_errors;
 use crate::syntax::document::{Content, Entry, Node, Table};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::is_reserved;
-use crate::syntax::near::{nearest, one_of, shown};
 use crate::syntax::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, Takes};
+use crate::syntax::suggest::{nearest, one_of, shown};
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
 
@@ -109,7 +109,7 @@ impl Reader {
             Ok(values) => values,
             Err(problem) => {
                 let stated = stated(parameters, &HashMap::new());
-                let problem = cause::blame(problem, self.template, &self.names, &stated);
+                let problem = template_errors::blame(problem, self.template, &self.names, &stated);
                 self.problems.push(problem);
                 return None;
             }

@@ -5,10 +5,10 @@
 //! left out.
 
 use super::reader::Reader;
-use crate::case::stiffened::Stiffened;
+use crate::case::stress_stiffening::Stiffened;
 use crate::case::values::Given;
-use crate::compile::stated::{Matrices, exchange, sensible};
-use crate::compile::statement::{Stated, StatedTable};
+use crate::compile::compiled::{Stated, StatedTable};
+use crate::compile::source_model::{Matrices, exchange, sensible};
 use crate::syntax::document::Table;
 use crate::syntax::error::Problem;
 use crate::syntax::schema::STRUCTURE;

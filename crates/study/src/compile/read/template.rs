@@ -3,14 +3,14 @@
 
 use super::reader::Reader;
 use crate::case::study::{Parameter, evaluate, model_of};
-use crate::compile::stated::{Lists, ModelStatement, NamedTemplate};
-use crate::compile::statement::Environment;
+use crate::compile::compiled::Environment;
+use crate::compile::source_model::{Lists, ModelStatement, NamedTemplate};
 use crate::compile::templates::{self, Template, comment_behind};
 use crate::syntax::document::{self, Content, Table};
 use crate::syntax::error::{Problem, Source, StudyError};
 use crate::syntax::expression::Value;
-use crate::syntax::near::nearest;
 use crate::syntax::schema::{FILE, Takes};
+use crate::syntax::suggest::nearest;
 use std::collections::HashMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;

@@ -4,13 +4,13 @@
 use super::kinds::homes;
 use super::reader::Reader;
 use crate::case::values::Given;
-use crate::compile::mixed::mixed;
-use crate::compile::statement::{Order, Quantity, Stated, StatedEntry, StatedTable, Weights};
+use crate::compile::bare_numbers::mixed;
+use crate::compile::compiled::{Order, Quantity, Stated, StatedEntry, StatedTable, Weights};
 use crate::syntax::document::{Content, Entry, Node, Table};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
-use crate::syntax::near::{nearest, one_of, shown};
 use crate::syntax::schema::{self, Key, MOST_POINTS, Presence, Takes, Within};
+use crate::syntax::suggest::{nearest, one_of, shown};
 use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
 

@@ -1,11 +1,11 @@
 //! Branches of orbits by continuation, along the excitation frequency or a parameter, around
 //! turning points.
 
-mod standing;
+mod prominence;
 
-use self::standing::Top;
+use self::prominence::Top;
 use super::shared::keys::{HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
-use super::shared::orbits;
+use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of, displacements, peak_places, worst};
 use crate::case::study::{Study, VariedValue, varied_text};
 use crate::case::values::{Frequencies, Values, hertz};
@@ -15,11 +15,11 @@ use crate::kinds::info::Complaint;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, Stretch, largest, numbers};
-use crate::results::draws;
-use crate::results::note::Note;
-use crate::results::rows::Rows;
-use crate::run::point::Summary;
+use crate::results::notes::Note;
+use crate::results::table_builder::Rows;
+use crate::run::point_row::Summary;
 use crate::run::work::{Computed, Grain, Part, Prepared, Work};
 use crate::syntax::key::ENDS;
 use crate::syntax::key::{Takes, Within, default, required};
@@ -187,7 +187,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
     for point in &branch.points {
         let stable = point.orbit.is_stable();
-        orbits::count(&mut part, &prepared.case, &point.orbit, (stable, Note::on_branch));
+        orbit_sweep::count(&mut part, &prepared.case, &point.orbit, (stable, Note::on_branch));
         begin(&mut rows, point.value);
         Summary::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end();
@@ -242,7 +242,7 @@ fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
     let mut rows = 1..heights.len().saturating_sub(1);
     let place = |peak: &(f64, f64)| rows.find(|row| near(*row, *peak)).map(|row| Top { row, height: peak.1 });
     let Some(tops) = branch.peaks.iter().map(place).collect::<Option<Vec<Top>>>() else { return branch.peaks.clone() };
-    let kept = standing::out(&tops, &heights, &errors);
+    let kept = prominence::out(&tops, &heights, &errors);
     branch.peaks.iter().zip(kept).filter(|(_, kept)| *kept).map(|(peak, _)| *peak).collect()
 }
 
@@ -370,7 +370,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
             .iter()
             .map(|stretch| Stretch { varied: stretch.varied[..outer.len()].to_vec(), ..stretch.clone() })
             .collect();
-        return Figure { panels: draws::panels(drawing, &apart, &of_draw), ..Figure::default() };
+        return Figure { panels: draw_panels::panels(drawing, &apart, &of_draw), ..Figure::default() };
     }
     let several = stretches.iter().flat_map(|stretch| shown.iter().map(move |places| (stretch, places)));
     let line = |(colour, (stretch, places)): (usize, (&Stretch, &Vec<usize>))| {

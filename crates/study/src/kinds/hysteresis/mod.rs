@@ -7,7 +7,7 @@ pub use tables::{Loop, loops};
 
 use self::tables::{DAMPING, DISPLACEMENT, DISSIPATION, FORCE, JOINT, LOOPS, STIFFNESS, SUMMARY, TIME};
 use super::shared::keys::{FREQUENCY, SAMPLES, anything};
-use super::shared::orbits;
+use super::shared::orbit_sweep;
 use crate::case::names::Names;
 use crate::case::study::varied_text;
 use crate::case::values::{Values, hertz};
@@ -18,12 +18,12 @@ use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
 use crate::results::dataset::{Figure, Panel, Series};
+use crate::results::draw_panels;
 use crate::results::drawing::{Drawing, Stretch, join, largest, numbers, words};
-use crate::results::draws;
-use crate::results::rows::Rows;
+use crate::results::table_builder::Rows;
 use crate::run::work::{Computed, Grain, Part, Prepared, Work};
+use crate::syntax::format::shown_hertz;
 use crate::syntax::key::{Takes, default, optional};
-use crate::syntax::words::shown_hertz;
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::law::MOST_DIRECTIONS;
@@ -176,9 +176,9 @@ fn compute(work: &Work<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for (orbit, _) in orbits::found(work, &mut part)? {
+    for (orbit, _) in orbit_sweep::found(work, &mut part)? {
         let omega = orbit.omega;
-        let times = orbits::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
+        let times = orbit_sweep::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
         for (name, source) in &sources {
             for (time, sample) in times.iter().zip(&samples) {
@@ -295,7 +295,7 @@ impl First {
     /// Integrates `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement,
     /// and the loss `∮ F du`.
     fn new(orbit: &Orbit, source: &Source) -> Self {
-        let (omega, times) = (orbit.omega, orbits::times(orbit, QUADRATURE));
+        let (omega, times) = (orbit.omega, orbit_sweep::times(orbit, QUADRATURE));
         // u cos, u sin, F cos, F sin
         let mut sums = [0.0; 4];
         let mut corners = Vec::with_capacity(times.len());
@@ -367,7 +367,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let of_draw = |stretch: &Stretch, title: String| {
             panels_of(std::slice::from_ref(stretch), &|_| (title.clone(), String::new()))
         };
-        return Figure { panels: draws::panels(drawing, &stretches, &of_draw), ..Figure::default() };
+        return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
     }
     let split = |stretch: &Stretch| {
         let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));

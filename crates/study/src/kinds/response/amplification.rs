@@ -12,7 +12,7 @@ use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
 use crate::results::dataset::{Axis, Panel};
 use crate::results::drawing::{Drawing, Stretch, numbers};
 use crate::results::histogram;
-use crate::results::rows::Rows;
+use crate::results::table_builder::Rows;
 use crate::run::work::Work;
 use crate::syntax::key::{Key, Takes, default};
 use stickslip::curve::adaptive::Adaptive;

@@ -1,13 +1,13 @@
 //! The figure of a response.
 
-use super::drawn::{Drawn, PeakOf, force};
+use super::figure_data::{Drawn, PeakOf, force};
 use super::{amplification, tables};
-use crate::kinds::shared::shares;
+use crate::kinds::shared::contact_states;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
 use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
 use crate::results::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
 use crate::results::histogram;
-use crate::syntax::words::display_unit;
+use crate::syntax::format::display_unit;
 
 pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
@@ -20,7 +20,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
         names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
     // with `output = "contact"` only
     let names = system.joints().iter().map(|joint| joint.name().to_owned());
-    let faces: Vec<String> = names.filter(|name| drawing.shows(name) && shares::has(curve, name)).collect();
+    let faces: Vec<String> = names.filter(|name| drawing.shows(name) && contact_states::has(curve, name)).collect();
     if shown.is_empty() && joints.is_empty() && faces.is_empty() {
         return Figure::default();
     }
@@ -55,7 +55,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
         Layout::Cases => {
             // the colour scale belongs to maps; the curves of one panel have names
-            let varied = (!drawn.faces.is_empty()).then(|| shares::axis("share of the period"));
+            let varied = (!drawn.faces.is_empty()).then(|| contact_states::axis("share of the period"));
             Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
         }
         Layout::Masses => Figure {

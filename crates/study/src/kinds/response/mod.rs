@@ -1,10 +1,10 @@
 //! Response curves: amplitude over excitation frequency.
 
 mod amplification;
-mod by_case;
-mod by_mass;
-mod drawn;
 mod figure;
+mod figure_data;
+mod panels_by_case;
+mod panels_by_place;
 mod peaks;
 mod references;
 mod tables;
@@ -12,7 +12,7 @@ mod tables;
 pub use tables::{Curve, MassCurve, curves};
 
 use super::shared::keys::{FREQUENCY, OUTPUT, anything, check_output};
-use super::shared::orbits;
+use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of};
 use crate::case::values::{Frequencies, hertz};
 use crate::check::cost::{Cost, Costing, Shape};
@@ -22,12 +22,12 @@ use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_in, phase_of};
 use crate::results::drawing::{MOST_CURVES, MOST_PANELS};
-use crate::results::note::{Note, WARNING};
-use crate::results::rows::Rows;
-use crate::run::point::{Summary, location_of};
+use crate::results::notes::{Note, WARNING};
+use crate::results::table_builder::Rows;
+use crate::run::point_row::{Summary, location_of};
 use crate::run::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use crate::syntax::key::{Key, Takes, default};
-use drawn::SINGLE;
+use figure_data::SINGLE;
 use peaks::{Found, Sought};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
@@ -80,7 +80,7 @@ pub(super) const KIND: Kind = Kind {
     // an amplification needs the whole curve
     grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
         true => Grain::Case,
-        false => orbits::grain(study),
+        false => orbit_sweep::grain(study),
     },
     cost,
     warnings: |cases| {
@@ -318,7 +318,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
     let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
     let mut ways = BothWays::of(&prepared.system);
-    orbits::sweep(work, &mut |omega, outcome| {
+    orbit_sweep::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {

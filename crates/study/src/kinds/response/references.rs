@@ -1,12 +1,12 @@
 //! The linear references of a response: the same structure with all joints free, and with all
 //! joints stuck.
 
-use crate::case::linear::Reference;
+use crate::case::linear_reference::Reference;
 use crate::case::study::{Case, Study};
 use crate::case::values::hertz;
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_in};
-use crate::results::note::WARNING;
-use crate::results::rows::Rows;
+use crate::results::notes::WARNING;
+use crate::results::table_builder::Rows;
 use crate::run::work::{Prepared, Work};
 use stickslip::method::{self, MethodError, Options, Solver};
 use stickslip::model::System;

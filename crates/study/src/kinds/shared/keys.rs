@@ -2,7 +2,7 @@
 
 use crate::case::values::Values;
 use crate::kinds::info::Complaint;
-use crate::run::extra;
+use crate::run::output_columns;
 use crate::syntax::key::RANGE;
 use crate::syntax::key::{Key, Takes, default, optional, required};
 use std::collections::BTreeSet;
@@ -69,7 +69,7 @@ pub(in crate::kinds) const OUTPUT: Key = optional(
 
 /// Checks that `output` contains known names only.
 pub(in crate::kinds) fn check_output(values: &Values) -> Result<(), Complaint> {
-    let known: Vec<&str> = extra::TABLE.iter().map(|extra| extra.name).collect();
+    let known: Vec<&str> = output_columns::TABLE.iter().map(|extra| extra.name).collect();
     match values.names("output").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
         Some(name) => Err(Complaint::unknown("output", "output", name, &known)),
         None => Ok(()),

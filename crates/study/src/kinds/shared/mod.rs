@@ -2,12 +2,12 @@
 //!
 //! - `keys`: keys of `[study]`, and checks of their values;
 //! - `peak_of`: the key `peak_of`;
-//! - `orbits`: the orbits of a unit, their instants, and failures;
-//! - `shares`: panels of contact states;
-//! - `wheel`: pictures of a disk.
+//! - `orbit_sweep`: the orbits of a unit, their instants, and failures;
+//! - `contact_states`: panels of contact states;
+//! - `disk_shape`: pictures of a disk.
 
+pub(super) mod contact_states;
+pub(super) mod disk_shape;
 pub(super) mod keys;
-pub(super) mod orbits;
+pub(super) mod orbit_sweep;
 pub(super) mod peak_of;
-pub(super) mod shares;
-pub(super) mod wheel;

@@ -2,7 +2,7 @@
 
 use super::Value;
 use super::operation::{FUNCTIONS, Operation, is_not_finite};
-use crate::syntax::near::{nearest, shown};
+use crate::syntax::suggest::{nearest, shown};
 use crate::syntax::units::{self, Fault, Names};
 use std::ops::Range;
 use stickslip::dimension::Dimension;

@@ -1,6 +1,6 @@
 //! Numbers with or without a dimension.
 
-use crate::syntax::mistaken;
+use crate::syntax::dimension_advice;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 
@@ -51,7 +51,7 @@ impl Value {
             ),
             (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
             (true, std::cmp::Ordering::Less) => Some("there is one radian too many: divide by `1 rad`".to_owned()),
-            _ => mistaken::advice(expected, found, text),
+            _ => dimension_advice::advice(expected, found, text),
         };
         Err((format!("expected {}, found {}", described(expected), described(found)), help))
     }

@@ -1,9 +1,9 @@
 //! Notes for the reader of the results, as sentences. Notes of one kind from several units
 //! become one sentence.
 
-use crate::run::farther::Slipping;
+use crate::run::basis_check::Slipping;
 use crate::syntax::expression::displayed;
-use crate::syntax::words::significant;
+use crate::syntax::format::significant;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;

@@ -5,7 +5,7 @@
 
 use crate::kinds::info::KindInfo;
 use crate::results::dataset::{Failure, Table};
-use crate::results::note::Note;
+use crate::results::notes::Note;
 use crate::run::work::{NOT_REACHED, Part};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -2,12 +2,12 @@
 //! in them.
 
 use crate::case::names::Names;
-use crate::case::stiffened::Stiffened;
+use crate::case::stress_stiffening::Stiffened;
 use crate::case::values::Given;
-use crate::compile::statement::{Stated, StatedTable};
+use crate::compile::compiled::{Stated, StatedTable};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::displayed;
-use crate::syntax::near::{nearest, one_of};
+use crate::syntax::suggest::{nearest, one_of};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};

@@ -4,7 +4,7 @@
 
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
-use crate::syntax::near::shown;
+use crate::syntax::suggest::shown;
 use std::collections::BTreeSet;
 
 /// The value of a parameter in a case, as stated.

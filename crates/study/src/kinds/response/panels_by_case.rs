@@ -1,13 +1,13 @@
 //! Panels of a response case by case: curves of places, sectors of a disk, forces and contact
 //! states of joints.
 
-use super::drawn::Drawn;
-use crate::kinds::shared::shares;
-use crate::kinds::shared::wheel::{self, Around};
+use super::figure_data::Drawn;
+use crate::kinds::shared::contact_states;
+use crate::kinds::shared::disk_shape::{self, Around};
 use crate::results::columns::FREQUENCY as DRIVE;
 use crate::results::dataset::{Axis, Panel, Series, Style};
 use crate::results::drawing::{MOST_PANELS, Stretch, join, numbers};
-use crate::syntax::words::significant;
+use crate::syntax::format::significant;
 
 /// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
 /// paper.
@@ -53,7 +53,7 @@ impl Drawn<'_> {
                 numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
             let over = (&x[..], &self.axes.0);
             let label = stretch.label();
-            panels.extend(shares::panels(self.curve, &self.faces, &stretch.rows, over, (&label, of_shares)));
+            panels.extend(contact_states::panels(self.curve, &self.faces, &stretch.rows, over, (&label, of_shares)));
         }
         if let Some(first) = panels.first_mut().filter(|_| room < stretches.len()) {
             let some = format!("the first {room} of {} cases", stretches.len());
@@ -66,7 +66,7 @@ impl Drawn<'_> {
     ///
     /// The shape of a disk is not counted, because it is left out if the figure is full.
     pub(super) fn panels_of_a_case(&self) -> usize {
-        let shares = if self.faces.is_empty() { 0 } else { shares::count(self.curve, &self.faces) };
+        let shares = if self.faces.is_empty() { 0 } else { contact_states::count(self.curve, &self.faces) };
         usize::from(!self.shown.is_empty()) + usize::from(self.ring()) + usize::from(!self.joints.is_empty()) + shares
     }
 
@@ -137,14 +137,14 @@ impl Drawn<'_> {
         let all = Around::of_ring(shape)?;
         let places = all.len();
         let shape: Vec<Around> =
-            wheel::leaders(&all, wheel::MOST).into_iter().map(|place| all[place].clone()).collect();
+            disk_shape::leaders(&all, disk_shape::MOST).into_iter().map(|place| all[place].clone()).collect();
         let bars = |colour: usize| {
             let around = &shape[colour];
             let (x, y) = around.of.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&around.place, x, y, first + colour)
         };
-        let fit = (BARS / ring.sectors.max(1)).clamp(1, wheel::MOST);
-        let series: Vec<Series> = wheel::leaders(&shape, fit).into_iter().map(bars).collect();
+        let fit = (BARS / ring.sectors.max(1)).clamp(1, disk_shape::MOST);
+        let series: Vec<Series> = disk_shape::leaders(&shape, fit).into_iter().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
@@ -153,9 +153,9 @@ impl Drawn<'_> {
         let differ = series.iter().any(differ);
         let title = join([stretch.label(), format!("at {} Hz", significant(frequency, 6))]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
-        let of = wheel::left_out(shape.len(), places);
-        let wheel = wheel::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone(), of]), first);
-        let title = join([title, wheel::left_out(series.len(), places)]);
+        let of = disk_shape::left_out(shape.len(), places);
+        let wheel = disk_shape::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone(), of]), first);
+        let title = join([title, disk_shape::left_out(series.len(), places)]);
         Some([differ.then(|| Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
 }

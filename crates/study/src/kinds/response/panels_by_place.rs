@@ -1,9 +1,9 @@
 //! Panels of a response place by place and joint by joint: a curve for every case, or
 //! percentiles of draws.
 
-use super::drawn::{Drawn, SINGLE};
+use super::figure_data::{Drawn, SINGLE};
 use crate::case::study::varied_text;
-use crate::kinds::shared::shares::{self, State};
+use crate::kinds::shared::contact_states::{self, State};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of};
 use crate::results::dataset::{Panel, Series};
 use crate::results::drawing::{MOST_CURVES, MOST_PANELS, Stretch, join, numbers, thinned};
@@ -36,7 +36,7 @@ impl Drawn<'_> {
             joints.map(move |(joint, alone)| self.cases_of_joint(&joint, group, outer, alone))
         });
         let of_faces = groups.iter().flat_map(|(group, outer)| {
-            let groups = shares::groups(&self.faces).into_iter().zip(of_shares..);
+            let groups = contact_states::groups(&self.faces).into_iter().zip(of_shares..);
             groups.flat_map(move |(joints, alone)| self.shares_in_cases(&joints, group, outer, alone))
         });
         of_masses.chain(of_joints).chain(of_faces).take(MOST_PANELS).collect()
@@ -74,7 +74,7 @@ impl Drawn<'_> {
         for (name, joints) in self.pulling() {
             panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
         }
-        for named in shares::groups(&self.faces) {
+        for named in contact_states::groups(&self.faces) {
             let of_case = |stretch: &Stretch| self.share_line(stretch, &named.1, State::Slip);
             let shares = self.share_panel(&named, State::Slip, String::new());
             let title = shares.title.clone();
@@ -168,7 +168,7 @@ impl Drawn<'_> {
             }
             panel
         };
-        let occurs = |state: State| shares::occurs_in(self.curve, joints, state);
+        let occurs = |state: State| contact_states::occurs_in(self.curve, joints, state);
         // the slip of a stop is unknown
         let states: &[State] = match (occurs(State::Slip), occurs(State::Open)) {
             (_, false) => &[State::Slip],

@@ -1,8 +1,8 @@
 //! Shared by the kinds with whole orbits: the orbits of a unit, their instants, and failures.
 
 use crate::case::study::{Case, Study};
-use crate::results::note::Note;
-use crate::run::point::location_of;
+use crate::results::notes::Note;
+use crate::run::point_row::location_of;
 use crate::run::work::{Grain, NOT_REACHED, Part, Work};
 use stickslip::curve::sweep::{See, Watch, solver, stretch};
 use stickslip::method::{MethodError, OrbitError};

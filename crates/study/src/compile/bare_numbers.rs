@@ -1,10 +1,10 @@
 //! Refuses bare numbers next to quantities with a unit, such as `["1100 rpm", 1200]`. A bare
 //! number counts in SI, which is probably not the unit that the user means.
 
-use crate::compile::statement::Quantity;
+use crate::compile::compiled::Quantity;
 use crate::syntax::error::Problem;
 use crate::syntax::expression::displayed;
-use crate::syntax::near::shown;
+use crate::syntax::suggest::shown;
 use crate::syntax::units;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;

@@ -3,8 +3,8 @@
 
 use crate::case::substructure;
 use crate::case::values::{Given, Values};
-use crate::compile::stated::{Lists, ModelStatement};
-use crate::compile::statement::{Environment, Stated, StatedTable};
+use crate::compile::compiled::{Environment, Stated, StatedTable};
+use crate::compile::source_model::{Lists, ModelStatement};
 use crate::syntax::error::Problem;
 use crate::syntax::key::RATIO;
 use std::collections::BTreeMap;

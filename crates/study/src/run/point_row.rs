@@ -2,8 +2,8 @@
 
 use crate::case::study::Case;
 use crate::results::columns;
-use crate::results::rows::Rows;
-use crate::run::extra;
+use crate::results::table_builder::Rows;
+use crate::run::output_columns;
 use crate::run::work::Prepared;
 use stickslip::method::OrbitError;
 use stickslip::orbit::{Orbit, Symmetry};
@@ -63,7 +63,7 @@ impl Summary {
             status: orbit.evidence.accuracy.status().to_owned(),
             failure: None,
             stuck: orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod,
-            extra: extra::values(prepared, orbit),
+            extra: output_columns::values(prepared, orbit),
         }
     }
 
@@ -83,7 +83,7 @@ impl Summary {
             status: status.to_owned(),
             failure: None,
             stuck: false,
-            extra: vec![f64::NAN; extra::columns(&prepared.case, &prepared.system).len()],
+            extra: vec![f64::NAN; output_columns::columns(&prepared.case, &prepared.system).len()],
         }
     }
 
@@ -99,7 +99,7 @@ impl Summary {
             rows.number(&format!("{}_dissipation_J", joint.name()), *dissipation);
             rows.number(&columns::slips(joint.name()), *slip);
         }
-        extra::columns(&prepared.case, &prepared.system)
+        output_columns::columns(&prepared.case, &prepared.system)
             .iter()
             .zip(&self.extra)
             .for_each(|(column, value)| rows.number(column, *value));

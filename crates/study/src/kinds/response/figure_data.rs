@@ -1,7 +1,7 @@
 //! Data of a response figure: curves of places and joints, read from the tables.
 
-use crate::kinds::shared::shares::{self, State};
-use crate::kinds::shared::wheel::{self, of_sector};
+use crate::kinds::shared::contact_states::{self, State};
+use crate::kinds::shared::disk_shape::{self, of_sector};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
 use crate::results::drawing::{Drawing, Stretch, join, numbers};
@@ -254,7 +254,7 @@ impl Drawn<'_> {
     pub(super) fn missing(&self, stretch: &Stretch, row: usize, colour: usize) -> Option<Series> {
         let x = self.without_orbit(stretch);
         let count = self.failed;
-        let label = format!("{count} point{} without an orbit", crate::syntax::words::plural(count));
+        let label = format!("{count} point{} without an orbit", crate::syntax::format::plural(count));
         (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
     }
 
@@ -294,14 +294,14 @@ impl Drawn<'_> {
     pub(super) fn share_panel(&self, (name, joints): &(String, Vec<String>), state: State, more: String) -> Panel {
         let words = state.words();
         let title = if joints.len() == 1 { format!("{name} {words}") } else { format!("{name}, {words}") };
-        Panel { y: shares::axis("share of the period"), ..self.panel(join([title, more])) }
+        Panel { y: contact_states::axis("share of the period"), ..self.panel(join([title, more])) }
     }
 
     /// Returns the share of the period of one state, for example slip, as the mean of the
     /// joints.
     pub(super) fn share_line(&self, stretch: &Stretch, joints: &[String], state: State) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
-        (x, shares::mean(self.curve, joints, &stretch.rows, state))
+        (x, contact_states::mean(self.curve, joints, &stretch.rows, state))
     }
 
     /// Returns the force of a joint, or the largest of several.
@@ -353,7 +353,7 @@ impl Drawn<'_> {
         };
         let in_sector: BTreeSet<String> =
             self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.ring()).collect();
-        let joints = places + in_sector.len().min(wheel::MOST);
+        let joints = places + in_sector.len().min(disk_shape::MOST);
         [places, joints, joints + if self.joints.is_empty() { 0 } else { self.pulling().len() }]
     }
 
