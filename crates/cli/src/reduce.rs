@@ -10,7 +10,7 @@ use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry, names};
 use stickslip_numerics::sparse;
-use stickslip_study::Exports;
+use stickslip_study::StiffnessExports;
 
 /// Name of the file with `[structure]` and `[[place]]`.
 const TABLES: &str = "structure.toml";
@@ -106,7 +106,7 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
 }
 
 /// Reduces with one basis for all speeds up to that of the second export.
-fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<Few, String> {
+fn over_speeds(substructure: &Substructure, places: &[Place], exports: &StiffnessExports) -> Result<Few, String> {
     let seen: Vec<Row> =
         places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
     let few = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);

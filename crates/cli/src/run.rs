@@ -18,7 +18,7 @@ use stickslip_report::stream::{self, Shard, Start, StreamError};
 use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::decimation::MOST_ROWS;
-use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
+use stickslip_study::run::{CONVERGED, CheckedStudy, Context, check as check_study};
 use stickslip_study::schema::MOST_BYTES;
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
@@ -37,7 +37,7 @@ pub struct Request<'a> {
 
 impl Request<'_> {
     /// Reads and checks every file before anything runs.
-    fn read(&self) -> Result<Vec<Checked>, Ending> {
+    fn read(&self) -> Result<Vec<CheckedStudy>, Ending> {
         let mut studies = Vec::new();
         let mut wrong = false;
         for file in self.files {
@@ -140,7 +140,7 @@ pub struct Wanted<'a> {
 }
 
 /// Returns the summary of a study, and prints its warnings on standard error.
-fn warned(checked: &Checked) -> &ModelSummary {
+fn warned(checked: &CheckedStudy) -> &ModelSummary {
     checked.summary().warnings.iter().for_each(|warning| complain!("{warning}"));
     checked.summary()
 }
@@ -226,7 +226,7 @@ fn once(
         Err(ending) => return ending,
     };
     let mut names = BTreeSet::new();
-    if let Some(twice) = studies.iter().map(Checked::study).find(|study| !names.insert(study.name())) {
+    if let Some(twice) = studies.iter().map(CheckedStudy::study).find(|study| !names.insert(study.name())) {
         complain!("error: two files are called `{}`, their results would be in one folder; rename one", twice.name());
         return Ending::WrongInput;
     }
@@ -255,7 +255,7 @@ fn once(
 
 /// Runs one study once.
 fn one(
-    checked: &Checked,
+    checked: &CheckedStudy,
     destination: &Destination,
     outputs: &Outputs,
     wanted: &Wanted<'_>,

@@ -12,9 +12,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
-use stickslip_study::dataset::{self, Column, Values};
+use stickslip_study::dataset::{self, CellValues, Column};
 use stickslip_study::result_block::{Block, Tally};
-use stickslip_study::run::{Checked, check, redrawn, units};
+use stickslip_study::run::{CheckedStudy, check, redrawn, units};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
 
 /// A study, read and checked.
@@ -37,11 +37,11 @@ pub struct PyStudy {
     overrides: Vec<(String, String)>,
     method: Option<String>,
     /// Result of the check, which prepares every case. Computed on the first request.
-    checked: Arc<Mutex<Option<Arc<Checked>>>>,
+    checked: Arc<Mutex<Option<Arc<CheckedStudy>>>>,
 }
 
 impl PyStudy {
-    fn checked(&self, py: Python<'_>) -> PyResult<Arc<Checked>> {
+    fn checked(&self, py: Python<'_>) -> PyResult<Arc<CheckedStudy>> {
         let kept = || self.checked.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(checked) = kept().as_ref() {
             return Ok(checked.clone());
@@ -392,10 +392,12 @@ pub fn _joined<'py>(
     for (name, columns) in tables {
         let column = |(name, kind, values): (String, String, Bound<'py, PyAny>)| {
             let values = match kind.as_str() {
-                "double" => Values::Number(values.extract::<numpy::PyReadonlyArray1<'_, f64>>()?.as_array().to_vec()),
-                "uint64" => Values::Integer(values.extract()?),
-                "bool" => Values::Flag(values.extract()?),
-                _ => Values::Text(values.extract()?),
+                "double" => {
+                    CellValues::Number(values.extract::<numpy::PyReadonlyArray1<'_, f64>>()?.as_array().to_vec())
+                }
+                "uint64" => CellValues::Integer(values.extract()?),
+                "bool" => CellValues::Flag(values.extract()?),
+                _ => CellValues::Text(values.extract()?),
             };
             Ok(Column { name, values })
         };

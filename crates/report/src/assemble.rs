@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stickslip_study::Study;
 use stickslip_study::dataset::Dataset;
-use stickslip_study::decimation::Thinning;
+use stickslip_study::decimation::Decimation;
 use stickslip_study::result_block::{Block, Tally};
 use stickslip_study::run::drawn;
 
@@ -99,8 +99,10 @@ fn written(
     }
     shapes.retain(|shape| !shape.header.columns.is_empty());
 
-    let mut thinning =
-        Thinning::new(study, &shapes.iter().map(|shape| (shape.header.name.as_str(), shape.rows)).collect::<Vec<_>>());
+    let mut thinning = Decimation::new(
+        study,
+        &shapes.iter().map(|shape| (shape.header.name.as_str(), shape.rows)).collect::<Vec<_>>(),
+    );
     let is_whole = thinning.keeps_all();
     let (mut begun, mut names): (Vec<String>, Vec<String>) = Default::default();
     let mut sinks: Vec<(&str, Box<dyn Rows>)> = Vec::new();

@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 use stickslip_study::StudyError;
 use stickslip_study::dataset::Dataset;
 use stickslip_study::result_block::{Block, Tally};
-use stickslip_study::run::Checked;
+use stickslip_study::run::CheckedStudy;
 
 /// Name of the file in its folder.
 pub(crate) const FILE: &str = "journal";
@@ -56,7 +56,7 @@ pub struct Head {
 
 impl Head {
     /// Describes a run of these units.
-    pub fn new(checked: &Checked, range: Range<usize>, threads: usize) -> Head {
+    pub fn new(checked: &CheckedStudy, range: Range<usize>, threads: usize) -> Head {
         Head { outline: checked.outline(threads), units: checked.units(), range }
     }
 
@@ -496,12 +496,12 @@ mod tests {
     use stickslip_study::read_study;
     use stickslip_study::run::{Context, check};
 
-    fn couple() -> Checked {
+    fn couple() -> CheckedStudy {
         let text = stickslip_study::templates::find("blade-couple").unwrap().study;
         check(&read_study("couple.toml", text, &[]).unwrap()).unwrap()
     }
 
-    fn units(checked: &Checked) -> Vec<Block> {
+    fn units(checked: &CheckedStudy) -> Vec<Block> {
         let context = Context::unwatched(1);
         (0..checked.units()).map(|unit| checked.block(unit..unit + 1, &context).unwrap()).collect()
     }

@@ -9,7 +9,7 @@ use crate::folder::{self, RECORD};
 use crate::output::{FIGURES, Outputs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use stickslip_study::dataset::{Column, Dataset, Record, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Dataset, Record, Table};
 use stickslip_study::{Study, StudyError, read_stored, run};
 
 /// Kind of a dataset that compares runs. Such a dataset has no study.
@@ -262,24 +262,24 @@ fn header(names: &[String], cells: &::csv::StringRecord) -> Result<(), String> {
     Ok(())
 }
 
-fn empty(sort: &str) -> Option<Values> {
+fn empty(sort: &str) -> Option<CellValues> {
     Some(match sort {
-        "number" => Values::Number(Vec::new()),
-        "integer" => Values::Integer(Vec::new()),
-        "text" => Values::Text(Vec::new()),
-        "flag" => Values::Flag(Vec::new()),
+        "number" => CellValues::Number(Vec::new()),
+        "integer" => CellValues::Integer(Vec::new()),
+        "text" => CellValues::Text(Vec::new()),
+        "flag" => CellValues::Flag(Vec::new()),
         _ => return None,
     })
 }
 
 /// Adds a cell, or returns the name of the expected type.
-fn push(values: &mut Values, cell: &str) -> Result<(), &'static str> {
+fn push(values: &mut CellValues, cell: &str) -> Result<(), &'static str> {
     match values {
-        Values::Number(v) if cell.is_empty() => v.push(f64::NAN),
-        Values::Number(v) => v.push(cell.parse().map_err(|_| "number")?),
-        Values::Integer(v) => v.push(cell.parse().map_err(|_| "count")?),
-        Values::Text(v) => v.push(cell.to_owned()),
-        Values::Flag(v) => v.push(match cell {
+        CellValues::Number(v) if cell.is_empty() => v.push(f64::NAN),
+        CellValues::Number(v) => v.push(cell.parse().map_err(|_| "number")?),
+        CellValues::Integer(v) => v.push(cell.parse().map_err(|_| "count")?),
+        CellValues::Text(v) => v.push(cell.to_owned()),
+        CellValues::Flag(v) => v.push(match cell {
             "" => None,
             "true" => Some(true),
             "false" => Some(false),

@@ -12,7 +12,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use stickslip_study::result_block::Block;
-use stickslip_study::run::{Checked, Context};
+use stickslip_study::run::{CheckedStudy, Context};
 
 /// One of several parts of the units of a study: number and total.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,7 +136,7 @@ pub fn folder(out: &Path, name: &str, shard: Option<Shard>) -> Result<PathBuf, R
 /// [`StreamError`] if the file system fails, if another run is in progress, or if the journal
 /// belongs to a different run.
 pub fn begin(
-    checked: &Checked,
+    checked: &CheckedStudy,
     out: &Path,
     shard: Option<Shard>,
     start: Start,
@@ -180,7 +180,7 @@ pub fn begin(
 /// [`StreamError`] if the study cannot be computed or the file system fails. Earlier units
 /// stay.
 pub fn compute(
-    checked: &Checked,
+    checked: &CheckedStudy,
     journal: &mut Journal,
     context: &Context,
     kept: &dyn Fn(&Journal),

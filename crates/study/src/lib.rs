@@ -21,7 +21,7 @@ pub mod results;
 pub mod run;
 mod syntax;
 
-pub use case::stress_stiffening::Exports;
+pub use case::stress_stiffening::StiffnessExports;
 pub use case::study::{Case, MethodChoice, Study, VariedValue};
 pub use case::values::{Frequencies, Values, hertz};
 pub use check::{cost, memory_limit, summary};

@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use stickslip_study::dataset::Dataset;
 use stickslip_study::read_file;
-use stickslip_study::run::{Checked, Context, check};
+use stickslip_study::run::{CheckedStudy, Context, check};
 
 /// Returns the checked study, next to these files of matrices.
-fn checked(files: &[(&str, &str)], text: &str) -> Checked {
+fn checked(files: &[(&str, &str)], text: &str) -> CheckedStudy {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
         std::fs::write(folder.path().join(name), content).unwrap();
@@ -18,14 +18,14 @@ fn checked(files: &[(&str, &str)], text: &str) -> Checked {
     check(&read_file(&path, &[]).unwrap_or_else(|error| panic!("{error:?}\n{text}"))).unwrap()
 }
 
-fn run(checked: &Checked) -> Dataset {
+fn run(checked: &CheckedStudy) -> Dataset {
     let data = checked.run(&Context::unwatched(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     data
 }
 
 /// Returns the natural frequencies with all joints free, Hz.
-fn frequencies(checked: &Checked) -> Vec<f64> {
+fn frequencies(checked: &CheckedStudy) -> Vec<f64> {
     checked.summary().free.elastic.iter().map(|mode| mode.omega / TAU).collect()
 }
 

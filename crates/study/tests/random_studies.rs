@@ -21,7 +21,7 @@ use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::{self, Method, Options};
 use stickslip::orbit::{Accuracy, Orbit};
-use stickslip_study::dataset::{Dataset, Table, Values};
+use stickslip_study::dataset::{CellValues, Dataset, Table};
 use stickslip_study::run::{CONVERGED, Context, check, run};
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, read_study};
@@ -127,7 +127,7 @@ fn not_finite(table: &Table) -> Option<String> {
     let status = table.columns.iter().find(|column| column.name == "status");
     let all: Vec<String>;
     let status = match status.map(|column| &column.values) {
-        Some(Values::Text(status)) => status,
+        Some(CellValues::Text(status)) => status,
         // tables without a status contain converged orbits only
         _ => {
             all = vec![CONVERGED.to_owned(); table.rows()];
@@ -136,7 +136,7 @@ fn not_finite(table: &Table) -> Option<String> {
     };
     let timed = ["orbit", "loops", "motion"].contains(&table.name.as_str());
     for column in &table.columns {
-        let Values::Number(values) = &column.values else { continue };
+        let CellValues::Number(values) = &column.values else { continue };
         if !timed && !must_be_finite(&column.name) {
             continue;
         }

@@ -2,7 +2,7 @@
 //! single loops.
 
 use std::f64::consts::TAU;
-use stickslip_study::dataset::{Dataset, Emphasis, Panel, Style, Table, Values};
+use stickslip_study::dataset::{CellValues, Dataset, Emphasis, Panel, Style, Table};
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
@@ -337,7 +337,7 @@ peak_of = "all"
     let single = dataset(&text.replace("peak_of = \"all\"", ""));
     let all = table(&single, "peaks");
     let (limits, heights) = (numbers(&single, "peaks", "Ft_N"), numbers(&single, "peaks", "amplitude_m"));
-    let Values::Text(masses) = &table(&found, "peaks").columns[1].values else { panic!() };
+    let CellValues::Text(masses) = &table(&found, "peaks").columns[1].values else { panic!() };
     for limit in [2.0, 8.0] {
         let highest = (0..all.rows()).filter(|&row| limits[row] == limit).map(|row| heights[row]).fold(0.0, f64::max);
         let rows = (0..masses.len()).filter(|&row| numbers(&found, "peaks", "Ft_N")[row] == limit);

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, atomic::AtomicBool};
-use stickslip_study::dataset::{Dataset, Values};
+use stickslip_study::dataset::{CellValues, Dataset};
 use stickslip_study::kinds::{hysteresis, performance, response};
 use stickslip_study::results::{ResultsError, worst_evidence};
 use stickslip_study::run::{Context, run};
@@ -264,7 +264,7 @@ fn what_is_not_the_result_of_the_study_is_refused() {
     let column = response::curves(&study, &broken).unwrap_err();
     assert!(column.to_string().contains("`curve` of `study` lacks the column `fast_amplitude_m`"), "{column}");
     let mut broken = dataset.clone();
-    let Values::Number(values) = &mut broken.tables[1].columns[3].values else {
+    let CellValues::Number(values) = &mut broken.tables[1].columns[3].values else {
         panic!("k, c, mass, then the frequency")
     };
     values.pop();
@@ -281,7 +281,7 @@ fn the_worst_evidence_is_the_largest() {
     let (_, mut dataset) = oscillators(SWEEP);
     let (mut largest, mut least) = (0.0f64, f64::INFINITY);
     for column in dataset.tables[0].columns.iter_mut().filter(|column| column.name == "energy_gap") {
-        let Values::Number(values) = &mut column.values else { panic!("a gap is a number") };
+        let CellValues::Number(values) = &mut column.values else { panic!("a gap is a number") };
         values[3] = 0.5;
         values[4] = f64::NAN;
         values.iter().for_each(|value| (largest, least) = (largest.max(*value), least.min(*value)));

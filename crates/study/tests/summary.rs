@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use stickslip_study::run::{Context, check, run};
-use stickslip_study::summary::{ModelSummary, Orbits};
+use stickslip_study::summary::{ModelSummary, OrbitCount};
 use stickslip_study::{Study, read_study, templates};
 
 fn study(text: &str) -> Study {
@@ -699,13 +699,13 @@ fn transients_usually_die_with_the_modes_that_are_driven() {
 #[test]
 fn several_orbits_are_announced() {
     let coulomb = r#"law = { kind = "coulomb", limit = "Ft" }"#;
-    assert_eq!(summary(&template("blade-couple", &[])).orbits, Some(Orbits::One));
+    assert_eq!(summary(&template("blade-couple", &[])).orbits, Some(OrbitCount::One));
     let falling = r#"law = { kind = "stribeck", limit = "Ft", static_limit = "1.5*Ft", velocity = "1 mm/s" }"#;
     let falling = summary(&template("blade-couple", &[(coulomb, falling)]));
-    assert_eq!(falling.orbits, Some(Orbits::Several("`stribeck` of shroud".to_owned())));
+    assert_eq!(falling.orbits, Some(OrbitCount::Several("`stribeck` of shroud".to_owned())));
     assert!(falling.to_string().contains("several may exist at one frequency (`stribeck` of shroud)"), "{falling}");
     let stop = summary(&stop(r#"kind = "gap", gap = "1 mm", stiffness = "1e5 N/m""#, ""));
-    assert_eq!(stop.orbits, Some(Orbits::Several("`gap` of j".to_owned())));
+    assert_eq!(stop.orbits, Some(OrbitCount::Several("`gap` of j".to_owned())));
 }
 
 /// A stop for a mass of 1 kg, with a gap as a bare number, and a figure with references.

@@ -1,11 +1,11 @@
 //! `[disk]`: the ring of a model that states one sector, tuned or mistuned.
 
 use crate::case::model_builder::{sector_of, whole};
-use crate::case::values::{Given, Values};
-use crate::compile::compiled::{Environment, Stated, StatedTable};
-use crate::compile::source_model::{ModelStatement, StatedDisk, problem_of};
+use crate::case::values::{ResolvedValue, Values};
+use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
+use crate::compile::source_model::{DiskSource, SourceModel, problem_of};
 use crate::syntax::error::Problem;
-use crate::syntax::expression::Value;
+use crate::syntax::expression::ExpressionValue;
 use crate::syntax::key::MOST_MASSES;
 use crate::syntax::suggest::{nearest, shown};
 use std::borrow::Cow;
@@ -14,7 +14,7 @@ use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Mistuned, Model, 
 use stickslip::structure::{Axis, Boundary, Component, Faces, FacesError, Node, Reduction};
 
 /// The quantity that differs from sector to sector.
-enum Differs {
+enum MistunedQuantity {
     /// A parameter, by index.
     Parameter(usize),
     /// A part of the sector.
@@ -29,14 +29,14 @@ const OF_BLADE: [(&str, Mistuned); 2] =
 const MOST_ROWS: usize = 1_000_000;
 
 /// Evaluates the parameters with some of them changed: (index, value in SI).
-pub(crate) type Again<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<Value>, Problem>;
+pub(crate) type Reevaluate<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<ExpressionValue>, Problem>;
 
 /// Builds the model of the ring.
 pub(crate) fn ring_of(
-    structure: &ModelStatement,
-    disk: &StatedDisk,
+    structure: &SourceModel,
+    disk: &DiskSource,
     environment: &Environment<'_>,
-    again: Again<'_>,
+    again: Reevaluate<'_>,
     problems: &mut Vec<Problem>,
 ) -> Model {
     let before = problems.len();
@@ -83,7 +83,7 @@ pub(crate) fn ring_of(
 }
 
 /// Ties a sector given by matrices to the next sector.
-fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
+fn tied(structure: &SourceModel, disk: &DiskSource, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
     let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     if structure.matrices.is_none() {
@@ -99,7 +99,7 @@ fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &
     // only names are known
     let Some(substructure) = &mut sector.substructure else { return Ok(()) };
     let axis = match table.entry("axis").map(|entry| &entry.value) {
-        Some(Stated::Fixed(Given::Text(axis))) => [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
+        Some(CompiledValue::Fixed(ResolvedValue::Text(axis))) => [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
             .into_iter()
             .find_map(|(name, known)| (name == axis).then_some(known)),
         _ => None,
@@ -133,7 +133,7 @@ fn tied(structure: &ModelStatement, disk: &StatedDisk, sectors: usize, sector: &
 /// Named pairs are checked against the node coordinates if these are known. Without named
 /// pairs, the coordinates determine them.
 fn pairs<'a>(
-    disk: &'a StatedDisk,
+    disk: &'a DiskSource,
     component: &Component,
     axis: Option<Axis>,
     sectors: usize,
@@ -189,7 +189,7 @@ fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usiz
     nodes.iter().find(|node| !met[node.as_str()]).map_or(Ok(rows), |node| Err(node))
 }
 
-fn sectors(disk: &StatedDisk, values: &Values) -> Result<usize, Vec<Problem>> {
+fn sectors(disk: &DiskSource, values: &Values) -> Result<usize, Vec<Problem>> {
     let sectors = whole(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
     usize::try_from(sectors).ok().filter(|sectors| *sectors >= LEAST_SECTORS).ok_or_else(|| {
         let message = format!("a disk needs at least {LEAST_SECTORS} sectors, found {sectors}");
@@ -198,7 +198,7 @@ fn sectors(disk: &StatedDisk, values: &Values) -> Result<usize, Vec<Problem>> {
 }
 
 /// Returns the deviation of every sector; `None` for a tuned disk.
-fn deviations(disk: &StatedDisk, values: &Values, sectors: usize) -> Result<Option<Vec<f64>>, Vec<Problem>> {
+fn deviations(disk: &DiskSource, values: &Values, sectors: usize) -> Result<Option<Vec<f64>>, Vec<Problem>> {
     let Some((table, mistuning)) = mistuning(disk, values) else { return Ok(None) };
     if let Some(pattern) = &disk.pattern {
         if pattern.len() != sectors {
@@ -212,20 +212,20 @@ fn deviations(disk: &StatedDisk, values: &Values, sectors: usize) -> Result<Opti
     Ok(Some(normal_pattern(sectors, deviation, seed as u64)))
 }
 
-fn mistuning<'a>(disk: &'a StatedDisk, values: &'a Values) -> Option<(&'a StatedTable, &'a Values)> {
-    let Stated::Table(table) = &disk.table.entry("mistuning")?.value else { return None };
+fn mistuning<'a>(disk: &'a DiskSource, values: &'a Values) -> Option<(&'a CompiledTable, &'a Values)> {
+    let CompiledValue::Table(table) = &disk.table.entry("mistuning")?.value else { return None };
     Some((table, values.table("mistuning")?))
 }
 
 /// Returns the sectors, each with its deviation.
 fn mistuned(
-    structure: &ModelStatement,
-    disk: &StatedDisk,
+    structure: &SourceModel,
+    disk: &DiskSource,
     environment: &Environment<'_>,
-    again: Again<'_>,
+    again: Reevaluate<'_>,
     (first, deviations): (&Model, &[f64]),
 ) -> Result<Vec<Model>, Vec<Problem>> {
-    let Some(Stated::Table(table)) = disk.table.entry("mistuning").map(|entry| &entry.value) else {
+    let Some(CompiledValue::Table(table)) = disk.table.entry("mistuning").map(|entry| &entry.value) else {
         return Ok(Vec::new());
     };
     let of = target(disk, table, environment, first).map_err(|problem| vec![problem])?;
@@ -237,8 +237,8 @@ fn mistuned(
     let mut models = Vec::with_capacity(deviations.len());
     for (sector, deviation) in deviations.iter().enumerate() {
         models.push(match &of {
-            Differs::Part(part) => part.deviated(first, *deviation),
-            Differs::Parameter(index) => {
+            MistunedQuantity::Part(part) => part.deviated(first, *deviation),
+            MistunedQuantity::Parameter(index) => {
                 let changed = environment.values[*index].si * (1.0 + deviation);
                 let values = again(&[(*index, changed)]).map_err(|problem| vec![problem])?;
                 let mut problems = Vec::new();
@@ -271,13 +271,13 @@ fn mistuned(
 
 /// Finds the quantity that `of` names.
 fn target(
-    disk: &StatedDisk,
-    table: &StatedTable,
+    disk: &DiskSource,
+    table: &CompiledTable,
     environment: &Environment<'_>,
     sector: &Model,
-) -> Result<Differs, Problem> {
+) -> Result<MistunedQuantity, Problem> {
     let names = match table.entry("of").map(|entry| &entry.value) {
-        Some(Stated::Names(names)) => names.iter().map(|(name, _)| name.clone()).collect(),
+        Some(CompiledValue::Names(names)) => names.iter().map(|(name, _)| name.clone()).collect(),
         _ => Vec::new(),
     };
     let place = table.location_of("of", None);
@@ -285,18 +285,18 @@ fn target(
         [name] => {
             if let Some((_, part)) = OF_BLADE.into_iter().find(|(known, _)| known == name) {
                 if disk.table.entry("blade").is_some() {
-                    return Ok(Differs::Part(part));
+                    return Ok(MistunedQuantity::Part(part));
                 }
                 let message = format!("`{name}` needs the nodes of the blade");
                 let help = "add blade = \"blade_nodes.csv\" to [disk], a file with the column node";
                 return Err(Problem::new(place, "of", message).help(help));
             }
             if let Some(index) = environment.names.iter().position(|known| known == name) {
-                return Ok(Differs::Parameter(index));
+                return Ok(MistunedQuantity::Parameter(index));
             }
             let mass = Mistuned::Mass(name.clone());
             if mass.is_in(sector) {
-                return Ok(Differs::Part(mass));
+                return Ok(MistunedQuantity::Part(mass));
             }
             let known = environment.names.iter().chain(sector.masses.iter().map(|mass| &mass.name));
             let help = match nearest(name, known.map(String::as_str)) {
@@ -311,7 +311,7 @@ fn target(
         [a, b] => {
             let spring = Mistuned::Spring([a.clone(), b.clone()]);
             if spring.is_in(sector) {
-                return Ok(Differs::Part(spring));
+                return Ok(MistunedQuantity::Part(spring));
             }
             let message = format!("there is no spring between `{}` and `{}`", shown(a), shown(b));
             Err(Problem::new(place, "of", message).help("write the ends as in [[spring]]"))

@@ -5,22 +5,22 @@ use stickslip::model::Model;
 
 /// A linear reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Reference {
+pub(crate) enum LinearReference {
     /// No joint carries a force.
     Free,
     /// No joint slips or opens.
     Stuck,
 }
 
-impl Reference {
+impl LinearReference {
     /// Both references.
-    pub const ALL: [Reference; 2] = [Reference::Free, Reference::Stuck];
+    pub const ALL: [LinearReference; 2] = [LinearReference::Free, LinearReference::Stuck];
 
     /// Returns the state of its joints as a word.
     pub fn name(self) -> &'static str {
         match self {
-            Reference::Free => "free",
-            Reference::Stuck => "stuck",
+            LinearReference::Free => "free",
+            LinearReference::Stuck => "stuck",
         }
     }
 
@@ -31,8 +31,8 @@ impl Reference {
         for joint in &mut model.joints {
             let law: &dyn Law = &*joint.law;
             let changed: Option<SharedLaw> = match self {
-                Reference::Free => law.free(),
-                Reference::Stuck => law.stuck(),
+                LinearReference::Free => law.free(),
+                LinearReference::Stuck => law.stuck(),
             };
             let none =
                 || self.missing(&format!("the law `{}` of joint `{}` has no slip limit", law.name(), joint.name));

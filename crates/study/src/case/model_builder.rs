@@ -2,9 +2,9 @@
 //! its excitation pattern.
 
 use crate::case::substructure;
-use crate::case::values::{Given, Values};
-use crate::compile::compiled::{Environment, Stated, StatedTable};
-use crate::compile::source_model::{Lists, ModelStatement};
+use crate::case::values::{ResolvedValue, Values};
+use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
+use crate::compile::source_model::{ModelLists, SourceModel};
 use crate::syntax::error::Problem;
 use crate::syntax::key::RATIO;
 use std::collections::BTreeMap;
@@ -14,18 +14,18 @@ use stickslip::model::{
 };
 
 /// Returns the places of the structure given by matrices.
-fn own(lists: &Lists) -> impl Iterator<Item = &StatedTable> {
+fn own(lists: &ModelLists) -> impl Iterator<Item = &CompiledTable> {
     lists.place.iter().filter(|table| table.entry("of").is_none())
 }
 
 /// Builds the model that the lists state, and the distribution of its forces and imposed
 /// motions over the sectors.
 pub(crate) fn sector_of(
-    structure: &ModelStatement,
+    structure: &SourceModel,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
 ) -> (Model, Vec<Around>, Vec<Around>) {
-    let ModelStatement { lists, template, matrices } = structure;
+    let SourceModel { lists, template, matrices } = structure;
     let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     let mut model = Model::default();
     let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
@@ -51,7 +51,7 @@ pub(crate) fn sector_of(
             }
         }
     }
-    let mut resolve = |element: Element, table: &StatedTable| {
+    let mut resolve = |element: Element, table: &CompiledTable| {
         let before = problems.len();
         let values = table.values(environment, problems);
         if let Some(template) = template {
@@ -144,7 +144,7 @@ pub(crate) fn sector_of(
 }
 
 /// Returns the inertia matrix of a body with these directions.
-fn inertia(table: &StatedTable, directions: &[String], stated: &[f64]) -> Result<[[f64; 3]; 3], Problem> {
+fn inertia(table: &CompiledTable, directions: &[String], stated: &[f64]) -> Result<[[f64; 3]; 3], Problem> {
     let turns = |axis: &usize| directions.iter().any(|along| along == ROTATIONS[*axis]);
     let about: Vec<usize> = (0..ROTATIONS.len()).filter(turns).collect();
     let mut matrix = [[0.0; 3]; 3];
@@ -176,11 +176,11 @@ fn plural(moments: usize) -> String {
 
 /// Returns the critical damping `2 sqrt(k m)` of a spring, kg/s, with `m` the mass at its end.
 /// Between two masses, `m = m1 m2/(m1 + m2)`. The error says in words which value is missing.
-fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f64, String> {
+fn critical_damping(spring: &Spring, lists: &ModelLists, masses: &[Mass]) -> Result<f64, String> {
     let node = |name: &str| name.strip_prefix(NEXT).unwrap_or(name).split('.').next().unwrap_or_default().to_owned();
     let moved = |name: &str| {
         lists.motion.iter().any(
-            |table| matches!(table.entry("on").map(|on| &on.value), Some(Stated::Fixed(Given::Text(on))) if on == name),
+            |table| matches!(table.entry("on").map(|on| &on.value), Some(CompiledValue::Fixed(ResolvedValue::Text(on))) if on == name),
         )
     };
     let inverse_mass = |name: &String| match masses.iter().find(|mass| mass.name == node(name)) {
@@ -200,7 +200,7 @@ fn critical_damping(spring: &Spring, lists: &Lists, masses: &[Mass]) -> Result<f
 }
 
 /// Returns the problem that a damping ratio has no meaning at this spring.
-fn no_ratio(table: &StatedTable, why: &str) -> Problem {
+fn no_ratio(table: &CompiledTable, why: &str) -> Problem {
     let message = format!("a damping ratio needs a stiffness and a mass, but {why}");
     Problem::new(table.location_of(RATIO, None), RATIO, table.with_turn(&message)).help(
         "write damping = \"2*zeta*sqrt(k*m)\" with the parameters zeta, k and the moving mass m; for a structure \
@@ -212,12 +212,12 @@ fn no_ratio(table: &StatedTable, why: &str) -> Problem {
 /// directions except the normal. A number in the file takes precedence.
 fn for_nodes(
     law: &SharedLaw,
-    joint: &StatedTable,
+    joint: &CompiledTable,
     between: &[String; 2],
     nodes: &BTreeMap<String, usize>,
 ) -> SharedLaw {
     let stated = match joint.entry("law").map(|entry| &entry.value) {
-        Some(Stated::Law(_, table)) => table.entry(TANGENTS).is_some(),
+        Some(CompiledValue::Law(_, table)) => table.entry(TANGENTS).is_some(),
         _ => true,
     };
     let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();
@@ -228,7 +228,7 @@ fn for_nodes(
 }
 
 /// Returns the distribution of an entry of a list over the sectors.
-pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
+pub(crate) fn around(table: &CompiledTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
     let mut found = Vec::new();
     for key in ["engine_order", "nodal_diameter", "sector"] {
         match whole(table, values, key) {
@@ -253,7 +253,7 @@ pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Pr
 }
 
 /// Reports an entry that states a distribution over sectors although the study has no disk.
-pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
+pub(crate) fn none_around(table: &CompiledTable, problems: &mut Vec<Problem>) {
     for key in ["engine_order", "nodal_diameter", "sector"] {
         if let Some(entry) = table.entry(key) {
             let message = format!("`{key}` needs a bladed disk, but the study has no [disk]");
@@ -267,7 +267,7 @@ pub(crate) fn none_around(table: &StatedTable, problems: &mut Vec<Problem>) {
 const MOST: f64 = 1e9;
 
 /// Returns the value of a key, which must be a whole number; `None` if the key is absent.
-pub(crate) fn whole(table: &StatedTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
+pub(crate) fn whole(table: &CompiledTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
     let Some(value) = values.quantity(key) else { return Ok(None) };
     if value.fract() == 0.0 && value.abs() <= MOST {
         return Ok(Some(value as i64));

@@ -4,7 +4,7 @@
 //! nodes. On a disk, a name of the sector stands for that element in all sectors. A key that
 //! takes one place refuses such a name and lists the directions.
 
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::syntax::suggest::{nearest, one_of, shown};
 use std::collections::BTreeSet;
 use stickslip::model::Model;
@@ -14,7 +14,7 @@ const LISTED: usize = 12;
 
 /// The names that a key may take, each with the labels that it stands for.
 #[derive(Debug, Default)]
-pub(crate) struct Names {
+pub(crate) struct ModelNames {
     known: Vec<(String, Vec<String>)>,
 }
 
@@ -36,11 +36,11 @@ fn of_masses(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places()))
 }
 
-impl Names {
+impl ModelNames {
     /// The places of the structure, of masses and of bodies, and their nodes.
-    pub fn of_places(model: &Model) -> Names {
+    pub fn of_places(model: &Model) -> ModelNames {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
-        let mut names = Names { known: places.chain(of_masses(model)).chain(of_bodies(model)).collect() };
+        let mut names = ModelNames { known: places.chain(of_masses(model)).chain(of_bodies(model)).collect() };
         names.around(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
         names.around(model, model.bodies.iter().map(|body| (body.name.as_str(), body.places())).collect());
         names.around(model, model.places.iter().map(|place| (place.name.as_str(), place.places())).collect());
@@ -67,21 +67,21 @@ impl Names {
     }
 
     /// The places that are displacements, not rotations: their amplitudes can be compared.
-    pub fn of_displacements(model: &Model) -> Names {
-        let mut names = Names::of_places(model);
+    pub fn of_displacements(model: &Model) -> ModelNames {
+        let mut names = ModelNames::of_places(model);
         names.known.iter_mut().for_each(|(_, places)| places.retain(|place| !model.is_rotation(place)));
         names.known.retain(|(_, places)| !places.is_empty());
         names
     }
 
     /// The displacements of masses and bodies whose motion is not imposed.
-    pub fn of_free_masses(model: &Model) -> Names {
+    pub fn of_free_masses(model: &Model) -> ModelNames {
         let displacements = of_bodies(model).map(|(name, mut places)| {
             places.retain(|place| !model.is_rotation(place));
             (name, places)
         });
         let of_bodies = displacements.filter(|(_, places)| !places.is_empty());
-        let mut names = Names { known: of_masses(model).chain(of_bodies).collect() };
+        let mut names = ModelNames { known: of_masses(model).chain(of_bodies).collect() };
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
@@ -89,7 +89,7 @@ impl Names {
 
     /// Adds the joints and their directions.
     #[must_use]
-    pub fn and_joints(mut self, model: &Model) -> Names {
+    pub fn and_joints(mut self, model: &Model) -> ModelNames {
         let labels = model.joint_labels();
         let all: Vec<(&str, Vec<String>)> = model.joints.iter().map(|joint| joint.name.as_str()).zip(labels).collect();
         self.known.extend(all.iter().flat_map(|(name, labels)| entries(name, labels.clone())));
@@ -99,7 +99,7 @@ impl Names {
 
     /// Adds the places with an imposed motion, except rotations.
     #[must_use]
-    pub fn and_moved(mut self, model: &Model) -> Names {
+    pub fn and_moved(mut self, model: &Model) -> ModelNames {
         let moved = model.motions.iter().filter(|motion| !model.is_rotation(&motion.on));
         self.known.extend(moved.map(|motion| (motion.on.clone(), vec![motion.on.clone()])));
         self
@@ -112,7 +112,7 @@ impl Names {
 
     /// Returns the labels that a name stands for: itself, or all its directions. `what` names
     /// the expected object for the message.
-    pub fn all(&self, key: &'static str, what: &str, name: &str) -> Result<&[String], Complaint> {
+    pub fn all(&self, key: &'static str, what: &str, name: &str) -> Result<&[String], KeyError> {
         let found = self.known.iter().find(|(known, _)| known == name).map(|(_, labels)| labels.as_slice());
         found.ok_or_else(|| {
             let words = || self.known.iter().map(|(known, _)| known.as_str());
@@ -124,12 +124,12 @@ impl Names {
                     None => format!("choose {}", one_of(words().take(LISTED))),
                 },
             };
-            Complaint { name: Some(name.to_owned()), ..Complaint::new(key, self.missing(what, name), help) }
+            KeyError { name: Some(name.to_owned()), ..KeyError::new(key, self.missing(what, name), help) }
         })
     }
 
     /// Returns the one place or joint that a name stands for.
-    pub fn one(&self, key: &'static str, what: &str, name: &str) -> Result<&str, Complaint> {
+    pub fn one(&self, key: &'static str, what: &str, name: &str) -> Result<&str, KeyError> {
         match self.all(key, what, name)? {
             [one] => Ok(one),
             several => {
@@ -141,7 +141,7 @@ impl Names {
                     false => format!("`{name}` stands for {} places; this key needs one of them", several.len()),
                 };
                 let help = format!("write {}", one_of(several.iter().take(LISTED).map(String::as_str)));
-                Err(Complaint { name: Some(name.to_owned()), ..Complaint::new(key, message, help) })
+                Err(KeyError { name: Some(name.to_owned()), ..KeyError::new(key, message, help) })
             }
         }
     }
@@ -185,14 +185,14 @@ mod tests {
 
     #[test]
     fn a_node_stands_for_its_directions_or_names_them() {
-        let names = Names::of_places(&model()).and_joints(&model());
+        let names = ModelNames::of_places(&model()).and_joints(&model());
         assert_eq!(names.all("only", "mass", "tip").unwrap(), ["tip.x", "tip.z"]);
         assert_eq!(names.all("only", "mass", "rub").unwrap(), ["rub.x", "rub.z"]);
         assert_eq!(
             (names.one("start", "mass", "tip.z"), names.one("start", "mass", "root")),
             (Ok("tip.z"), Ok("root"))
         );
-        let help = |found: Result<&str, Complaint>| found.unwrap_err().help.unwrap();
+        let help = |found: Result<&str, KeyError>| found.unwrap_err().help.unwrap();
         for wrong in ["tip", "tip.y"] {
             assert_eq!(help(names.one("start", "mass", wrong)), "write `tip.x` or `tip.z`", "{wrong}");
         }

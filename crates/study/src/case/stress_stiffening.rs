@@ -15,7 +15,7 @@ const KEPT: usize = 16;
 
 /// Both exports of a study's structure.
 #[derive(Debug, Clone)]
-pub struct Exports {
+pub struct StiffnessExports {
     /// The structure at rest.
     pub rest: Component,
     /// The stiffness at the speed `at`, N/m.
@@ -28,19 +28,19 @@ pub struct Exports {
 
 /// Difference between the stiffness of the second export and that at rest.
 #[derive(Debug, Clone)]
-pub(crate) struct Stiffened {
+pub(crate) struct StressStiffening {
     more: Matrix,
     /// Components by the bits of their factor `(Ω/Ω₁)²`.
     kept: Arc<Mutex<Vec<(u64, Component)>>>,
 }
 
-impl Stiffened {
+impl StressStiffening {
     /// Computes the difference from the stiffness at rest and that at the speed of the second
     /// export.
     pub fn new(rest: &Matrix, there: &Matrix) -> Result<Self, MatrixError> {
         let less = rest.entries().map(|(row, column, value)| (row, column, -value));
         let more = Matrix::from_triplets(rest.n(), there.entries().chain(less))?;
-        Ok(Stiffened { more, kept: Arc::default() })
+        Ok(StressStiffening { more, kept: Arc::default() })
     }
 
     /// Returns the component with `share` times the difference added, where `share` is

@@ -1,21 +1,21 @@
 //! A study that was read: its cases, each with its model and the values of its kind.
 
-use crate::case::disk::{self, Again};
+use crate::case::disk::{self, Reevaluate};
 use crate::case::model_builder::{none_around, sector_of};
-use crate::case::sample::{Drawn, Sample};
-use crate::case::stress_stiffening::Exports;
+use crate::case::sample::{DrawnParameter, SampleSettings};
+use crate::case::stress_stiffening::StiffnessExports;
 use crate::case::substructure;
-use crate::case::values::{Frequencies, Given, Values, between, in_table_unit, quantity_json, table_unit};
+use crate::case::values::{Frequencies, ResolvedValue, Values, between, in_table_unit, quantity_json, table_unit};
 use crate::check::figure;
 use crate::check::memory_limit;
 use crate::check::overstiff::{immovable, too_slow, too_soft};
 use crate::compile::bare_numbers::with_unit;
-use crate::compile::compiled::{Environment, Quantity, Stated, StatedEntry, StatedTable, not_empty};
-use crate::compile::source_model::{Matrices, ModelStatement, problem_of};
+use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, not_empty};
+use crate::compile::source_model::{MatrixSource, SourceModel, problem_of};
 use crate::compile::template_errors;
-use crate::kinds::info::{Complaint, KindInfo};
+use crate::kinds::info::{KeyError, KindInfo};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
-use crate::syntax::expression::{Value, displayed};
+use crate::syntax::expression::{ExpressionValue, displayed};
 use crate::syntax::key::VERSION;
 use crate::syntax::suggest::{nearest, one_of, shown};
 use crate::syntax::units;
@@ -40,13 +40,13 @@ pub struct Study {
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) order: Vec<usize>,
     /// Drawn parameters come first; they change together, and slowest.
-    pub(crate) varied: Vec<Varied>,
-    pub(crate) sample: Option<Sample>,
-    pub(crate) replaced: Vec<Replaced>,
-    pub(crate) structure: ModelStatement,
-    pub(crate) study: StatedTable,
-    pub(crate) method: StatedTable,
-    pub(crate) figure: StatedTable,
+    pub(crate) varied: Vec<VariedParameter>,
+    pub(crate) sample: Option<SampleSettings>,
+    pub(crate) replaced: Vec<ReplacedParameter>,
+    pub(crate) structure: SourceModel,
+    pub(crate) study: CompiledTable,
+    pub(crate) method: CompiledTable,
+    pub(crate) figure: CompiledTable,
     /// Memory limit of a run, bytes, if the user set one.
     pub(crate) memory: Option<u64>,
 }
@@ -54,21 +54,21 @@ pub struct Study {
 /// A parameter: its value as stated, and its required dimension if that is known.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameter {
-    pub quantity: Quantity,
+    pub quantity: CompiledQuantity,
     pub dimension: Option<Dimension>,
 }
 
 /// A parameter of `vary` or `[sample]`.
 #[derive(Debug, Clone)]
-pub(crate) struct Varied {
+pub(crate) struct VariedParameter {
     pub index: usize,
     pub location: Location,
-    pub points: VariedPoints,
+    pub points: ParameterValues,
 }
 
 /// A parameter of `vary` that an override replaced.
 #[derive(Debug, Clone)]
-pub(crate) struct Replaced {
+pub(crate) struct ReplacedParameter {
     pub name: String,
     /// The value as it was typed.
     pub text: String,
@@ -77,32 +77,33 @@ pub(crate) struct Replaced {
 }
 
 #[derive(Debug, Clone)]
-pub(crate) enum VariedPoints {
-    List(Vec<Quantity>),
-    Range { from: Quantity, to: Quantity, points: usize },
-    Drawn(Drawn),
+pub(crate) enum ParameterValues {
+    List(Vec<CompiledQuantity>),
+    Range { from: CompiledQuantity, to: CompiledQuantity, points: usize },
+    Drawn(DrawnParameter),
 }
 
-impl VariedPoints {
+impl ParameterValues {
     pub fn len(&self) -> usize {
         match self {
-            VariedPoints::Drawn(drawn) => drawn.sample.count,
-            VariedPoints::List(list) => list.len(),
-            VariedPoints::Range { points, .. } => *points,
+            ParameterValues::Drawn(drawn) => drawn.sample.count,
+            ParameterValues::List(list) => list.len(),
+            ParameterValues::Range { points, .. } => *points,
         }
     }
 
-    pub fn quantities(&self) -> impl Iterator<Item = &Quantity> {
-        let (list, ends, drawn): (&[Quantity], [Option<&Quantity>; 2], Option<&Drawn>) = match self {
-            VariedPoints::List(list) => (list, [None, None], None),
-            VariedPoints::Range { from, to, .. } => (&[], [Some(from), Some(to)], None),
-            VariedPoints::Drawn(drawn) => (&[], [None, None], Some(drawn)),
-        };
-        list.iter().chain(ends.into_iter().flatten()).chain(drawn.into_iter().flat_map(Drawn::quantities))
+    pub fn quantities(&self) -> impl Iterator<Item = &CompiledQuantity> {
+        let (list, ends, drawn): (&[CompiledQuantity], [Option<&CompiledQuantity>; 2], Option<&DrawnParameter>) =
+            match self {
+                ParameterValues::List(list) => (list, [None, None], None),
+                ParameterValues::Range { from, to, .. } => (&[], [Some(from), Some(to)], None),
+                ParameterValues::Drawn(drawn) => (&[], [None, None], Some(drawn)),
+            };
+        list.iter().chain(ends.into_iter().flatten()).chain(drawn.into_iter().flat_map(DrawnParameter::quantities))
     }
 
     fn is_drawn(&self) -> bool {
-        matches!(self, VariedPoints::Drawn(_))
+        matches!(self, ParameterValues::Drawn(_))
     }
 }
 
@@ -257,7 +258,7 @@ impl Study {
 
     /// Returns the differences from the file as sentences for the reader of the results.
     pub fn notes(&self) -> Vec<String> {
-        let note = |Replaced { name, text, values }: &Replaced| {
+        let note = |ReplacedParameter { name, text, values }: &ReplacedParameter| {
             let values = if *values == 1 { "the value".to_owned() } else { format!("the {values} values") };
             format!("{name} = {text} from `--set` replaces {values} of `vary`.")
         };
@@ -281,7 +282,7 @@ impl Study {
     }
 
     /// Returns the parameters of `vary`.
-    fn listed(&self) -> impl DoubleEndedIterator<Item = &Varied> {
+    fn listed(&self) -> impl DoubleEndedIterator<Item = &VariedParameter> {
         self.varied.iter().filter(|varied| !varied.points.is_drawn())
     }
 
@@ -310,9 +311,9 @@ impl Study {
     /// Returns the number of points: cases times frequencies.
     pub fn points(&self) -> usize {
         let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
-            Some(Stated::List(list, _)) => list.len(),
-            Some(Stated::Range { points, .. }) => *points,
-            Some(Stated::Adaptive { .. }) => stickslip::curve::adaptive::FIRST + 1,
+            Some(CompiledValue::List(list, _)) => list.len(),
+            Some(CompiledValue::Range { points, .. }) => *points,
+            Some(CompiledValue::Adaptive { .. }) => stickslip::curve::adaptive::FIRST + 1,
             _ => 1,
         };
         self.cases() * frequencies
@@ -335,21 +336,21 @@ impl Study {
     /// Returns whether the frequencies are adaptive, so that their number is unknown before the
     /// run.
     pub fn is_adaptive(&self) -> bool {
-        matches!(self.study.entry("frequency").map(|entry| &entry.value), Some(Stated::Adaptive { .. }))
+        matches!(self.study.entry("frequency").map(|entry| &entry.value), Some(CompiledValue::Adaptive { .. }))
     }
 
     /// Returns both exports of a structure that rotation stiffens (`stiffened`), at the values
     /// of the first case.
-    pub fn stiffened(&self) -> Option<Exports> {
-        let Matrices { table, component, stiffened, .. } = self.structure.matrices.as_ref()?;
-        let Stated::Table(spin) = &table.entry("stiffened")?.value else { return None };
-        let Stated::Quantity { quantity: speed, .. } = &spin.entry("speed")?.value else { return None };
+    pub fn stiffened(&self) -> Option<StiffnessExports> {
+        let MatrixSource { table, component, stiffened, .. } = self.structure.matrices.as_ref()?;
+        let CompiledValue::Table(spin) = &table.entry("stiffened")?.value else { return None };
+        let CompiledValue::Quantity { quantity: speed, .. } = &spin.entry("speed")?.value else { return None };
         let values = evaluate(&self.names, &self.parameters, &self.order, &self.choice(0), &[]).ok()?;
         let environment = Environment { names: &self.names, values };
         let at = spin.values(&environment, &mut Vec::new()).quantity("at")?;
         let rest = component.clone()?;
         let there = stiffened.as_ref()?.at(&rest, 1.0).ok()?.matrices().2.clone();
-        Some(Exports { rest, there, at, speed: speed.text.clone() })
+        Some(StiffnessExports { rest, there, at, speed: speed.text.clone() })
     }
 
     /// Returns the values of `[figure]`.
@@ -389,7 +390,7 @@ impl Study {
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
-        let parts = self.parts(index, Look::Again(fixed), &mut problems);
+        let parts = self.parts(index, CheckScope::Again(fixed), &mut problems);
         let error = StudyError::all(&self.sources, problems);
         match (parts, error) {
             (Some(parts), None) => Ok(self.finished(index, parts)),
@@ -413,18 +414,18 @@ impl Study {
             let help = nearest(name, words).map(|near| format!("did you mean `{near}`?"));
             return Err(StudyError::at(&[source], Problem::new(&location, "method", message).maybe_help(help)));
         };
-        let same = |entry: &StatedEntry| matches!(&entry.value, Stated::Fixed(Given::Text(text)) if text == row.name);
+        let same = |entry: &CompiledEntry| matches!(&entry.value, CompiledValue::Fixed(ResolvedValue::Text(text)) if text == row.name);
         if !self.method.entry("kind").is_some_and(same) {
             let location = self.method.location.clone();
-            let kind = Stated::Fixed(Given::Text(row.name.to_owned()));
-            self.method.entries = vec![StatedEntry { key: "kind", location, value: kind }];
+            let kind = CompiledValue::Fixed(ResolvedValue::Text(row.name.to_owned()));
+            self.method.entries = vec![CompiledEntry { key: "kind", location, value: kind }];
         }
         Ok(self)
     }
 
     /// Returns whether a flag of `[study]` is set.
     pub(crate) fn wants(&self, key: &str) -> bool {
-        matches!(self.study.entry(key).map(|entry| &entry.value), Some(Stated::Fixed(Given::Flag(true))))
+        matches!(self.study.entry(key).map(|entry| &entry.value), Some(CompiledValue::Fixed(ResolvedValue::Flag(true))))
     }
 
     /// Returns the study without the mistuning of its disk.
@@ -491,7 +492,7 @@ impl Study {
     /// Returns a checksum of the matrices of `[structure]` and of the sector's files; `None`
     /// without matrices.
     pub fn matrices_check(&self) -> Option<String> {
-        let own = self.structure.matrices.as_ref().and_then(Matrices::check)?;
+        let own = self.structure.matrices.as_ref().and_then(MatrixSource::check)?;
         let sector = self.structure.lists.disk.as_ref().map_or(0, |disk| {
             let files = format!("{:?} {:?} {:?} {:?}", disk.pattern, disk.boundary, disk.nodes, disk.blade);
             crc32fast::hash(files.as_bytes())
@@ -547,7 +548,7 @@ impl Study {
         let mut sectors = None;
         for index in 0..self.cases() {
             let mut problems = Vec::new();
-            let parts = self.parts(index, Look::First, &mut problems);
+            let parts = self.parts(index, CheckScope::First, &mut problems);
             if let Some(found) = parts.and_then(|parts| parts.model.ring).map(|ring| ring.sectors)
                 && *sectors.get_or_insert(found) != found
             {
@@ -565,7 +566,7 @@ impl Study {
         Ok(())
     }
 
-    fn parts(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
+    fn parts(&self, index: usize, look: CheckScope, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
         let parts = self.resolve(index, look, problems);
         if !problems.is_empty() && self.cases() > 1 {
             // a problem of both the first and the last case does not depend on the case
@@ -591,7 +592,7 @@ impl Study {
             // without values: the texts of the file
             Err(_) => {
                 let words = self.varied.iter().filter_map(|varied| match (&varied.points, choice.get(&varied.index)) {
-                    (VariedPoints::List(list), Some((_, point))) => {
+                    (ParameterValues::List(list), Some((_, point))) => {
                         Some(format!("{} = {}", self.names[varied.index], shown(list[*point].text.trim())))
                     }
                     _ => None,
@@ -604,7 +605,7 @@ impl Study {
     }
 
     /// Returns the index of the point of every varied parameter in a case.
-    fn choice(&self, index: usize) -> HashMap<usize, (&Varied, usize)> {
+    fn choice(&self, index: usize) -> HashMap<usize, (&VariedParameter, usize)> {
         let mut remainder = index;
         let mut choice = HashMap::new();
         for varied in self.listed().rev() {
@@ -617,13 +618,17 @@ impl Study {
         choice
     }
 
-    fn varied_of(&self, environment: &[Value], choice: &HashMap<usize, (&Varied, usize)>) -> Vec<VariedValue> {
+    fn varied_of(
+        &self,
+        environment: &[ExpressionValue],
+        choice: &HashMap<usize, (&VariedParameter, usize)>,
+    ) -> Vec<VariedValue> {
         let values = self.varied.iter().map(|varied| {
             let name = self.names[varied.index].clone();
             let value = environment[varied.index];
             let literal = match &varied.points {
-                VariedPoints::List(list) => choice.get(&varied.index).and_then(|(_, point)| list.get(*point)),
-                VariedPoints::Range { .. } | VariedPoints::Drawn(_) => None,
+                ParameterValues::List(list) => choice.get(&varied.index).and_then(|(_, point)| list.get(*point)),
+                ParameterValues::Range { .. } | ParameterValues::Drawn(_) => None,
             };
             let unit = self.written_unit(varied).filter(|(_, dimension)| value.dimension == Some(*dimension));
             let unit = unit.map(|(unit, _)| unit);
@@ -646,7 +651,7 @@ impl Study {
 
     /// Returns the unit of the values of a varied parameter, or else of the parameter, with its
     /// dimension.
-    fn written_unit(&self, varied: &Varied) -> Option<(String, Dimension)> {
+    fn written_unit(&self, varied: &VariedParameter) -> Option<(String, Dimension)> {
         let own = &self.parameters[varied.index].quantity;
         let mut all = varied.points.quantities().chain([own]);
         all.find_map(with_unit).map(|(unit, _, dimension)| (unit.to_owned(), dimension))
@@ -657,18 +662,18 @@ impl Study {
         let varied = self.varied_values(0).unwrap_or_default();
         let of_varied = varied.iter().filter_map(|value| Some((value.column().0, Json::from(value.unit.clone()?))));
         let frequency = self.study.entry("frequency").and_then(|entry| match &entry.value {
-            Stated::List(list, _) => list.first(),
-            Stated::Range { from, .. } | Stated::Adaptive { from, .. } => Some(from),
+            CompiledValue::List(list, _) => list.first(),
+            CompiledValue::Range { from, .. } | CompiledValue::Adaptive { from, .. } => Some(from),
             _ => None,
         });
         let drive = frequency.and_then(with_unit).map(|(unit, ..)| ("frequency_Hz".to_owned(), Json::from(unit)));
         of_varied.chain(drive).collect()
     }
 
-    fn resolve(&self, index: usize, look: Look, problems: &mut Vec<Problem>) -> Option<Parts> {
+    fn resolve(&self, index: usize, look: CheckScope, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
         let (first_look, fixed) = match look {
-            Look::First => (index == 0, None),
-            Look::Again(fixed) => (false, fixed),
+            CheckScope::First => (index == 0, None),
+            CheckScope::Again(fixed) => (false, fixed),
         };
         let choice = self.choice(index);
         let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
@@ -722,11 +727,11 @@ impl Study {
             problems.push(Problem::new(location, complaint.key, complaint.message).maybe_help(complaint.help));
             return None;
         }
-        Some(Parts { environment: environment.values, model, values, method })
+        Some(ResolvedCase { environment: environment.values, model, values, method })
     }
 
-    fn finished(&self, index: usize, parts: Parts) -> Case {
-        let Parts { environment, model, values, method } = parts;
+    fn finished(&self, index: usize, parts: ResolvedCase) -> Case {
+        let ResolvedCase { environment, model, values, method } = parts;
         let varied = self.varied_of(&environment, &self.choice(index));
         let parameters = self
             .names
@@ -735,8 +740,8 @@ impl Study {
             .map(|(name, value)| (name.clone(), (value.si, value.dimension)))
             .collect();
         let options = method.entries.iter().filter_map(|(key, given)| match given {
-            Given::Quantity(value, _) => Some(((*key).to_owned(), *value)),
-            Given::Count(count) => Some(((*key).to_owned(), *count as f64)),
+            ResolvedValue::Quantity(value, _) => Some(((*key).to_owned(), *value)),
+            ResolvedValue::Count(count) => Some(((*key).to_owned(), *count as f64)),
             _ => None,
         });
         let method =
@@ -756,7 +761,7 @@ impl Study {
         }
     }
 
-    fn complaint(&self, complaint: Complaint) -> Problem {
+    fn complaint(&self, complaint: KeyError) -> Problem {
         let location = self.study.location_of(complaint.key, complaint.name.as_deref());
         Problem::new(location, complaint.key, complaint.message).maybe_help(complaint.help)
     }
@@ -764,7 +769,7 @@ impl Study {
 
 /// Extent of the check of a case.
 #[derive(Debug, Clone, Copy)]
-enum Look {
+enum CheckScope {
     /// First check: the first case is assembled and the figure is checked. The other cases
     /// differ only in numbers.
     First,
@@ -772,8 +777,8 @@ enum Look {
     Again(Option<(usize, f64)>),
 }
 
-struct Parts {
-    environment: Vec<Value>,
+struct ResolvedCase {
+    environment: Vec<ExpressionValue>,
     model: Model,
     values: Values,
     method: Values,
@@ -785,29 +790,29 @@ pub(crate) fn evaluate(
     names: &[String],
     parameters: &[Parameter],
     order: &[usize],
-    choice: &HashMap<usize, (&Varied, usize)>,
+    choice: &HashMap<usize, (&VariedParameter, usize)>,
     fixed: &[(usize, f64)],
-) -> Result<Vec<Value>, Problem> {
-    let mut environment = Environment { names, values: vec![Value::bare(f64::NAN); parameters.len()] };
+) -> Result<Vec<ExpressionValue>, Problem> {
+    let mut environment = Environment { names, values: vec![ExpressionValue::bare(f64::NAN); parameters.len()] };
     for &index in order {
         let (parameter, name) = (&parameters[index], &names[index]);
         let dimension = parameter.dimension;
         let value = match choice.get(&index).map(|(varied, point)| (&varied.points, *point)) {
             None => parameter.quantity.settled(name, dimension, &environment)?,
-            Some((VariedPoints::List(list), point)) => list[point].settled(name, dimension, &environment)?,
-            Some((VariedPoints::Drawn(drawn), point)) => drawn.value(name, dimension, point, &environment)?,
-            Some((VariedPoints::Range { from, to, points }, point)) => {
+            Some((ParameterValues::List(list), point)) => list[point].settled(name, dimension, &environment)?,
+            Some((ParameterValues::Drawn(drawn), point)) => drawn.value(name, dimension, point, &environment)?,
+            Some((ParameterValues::Range { from, to, points }, point)) => {
                 let start = from.value("from", &environment)?;
                 let end = to.value("to", &environment)?;
                 let dimension = dimension.or(start.dimension).or(end.dimension);
                 let start = from.in_dimension(start, name, dimension, &environment)?;
                 let end = to.in_dimension(end, name, dimension, &environment)?;
                 not_empty(start.si, end.si, to, dimension)?;
-                Value { si: between(start.si, end.si, dimension, point, *points), ..start }
+                ExpressionValue { si: between(start.si, end.si, dimension, point, *points), ..start }
             }
         };
         environment.values[index] = match fixed.iter().rfind(|(parameter, _)| *parameter == index) {
-            Some((_, si)) => Value { si: *si, ..value },
+            Some((_, si)) => ExpressionValue { si: *si, ..value },
             None => value,
         };
     }
@@ -817,17 +822,17 @@ pub(crate) fn evaluate(
 /// Returns the parameters as stated, with the chosen points of the varied ones.
 pub(crate) fn stated<'a>(
     parameters: &'a [Parameter],
-    choice: &HashMap<usize, (&'a Varied, usize)>,
-) -> Vec<template_errors::Stated<'a>> {
-    let of = |quantity: &'a Quantity| {
-        let Quantity { text, location, expression, .. } = quantity;
-        template_errors::Stated { text, location, expression: Some(expression) }
+    choice: &HashMap<usize, (&'a VariedParameter, usize)>,
+) -> Vec<template_errors::StatedValue<'a>> {
+    let of = |quantity: &'a CompiledQuantity| {
+        let CompiledQuantity { text, location, expression, .. } = quantity;
+        template_errors::StatedValue { text, location, expression: Some(expression) }
     };
     let one = |(index, parameter): (usize, &'a Parameter)| match choice.get(&index) {
         None => of(&parameter.quantity),
-        Some((Varied { points: VariedPoints::List(list), .. }, point)) => of(&list[*point]),
+        Some((VariedParameter { points: ParameterValues::List(list), .. }, point)) => of(&list[*point]),
         Some((varied, _)) => {
-            template_errors::Stated { text: "one of its values", location: &varied.location, expression: None }
+            template_errors::StatedValue { text: "one of its values", location: &varied.location, expression: None }
         }
     };
     parameters.iter().enumerate().map(one).collect()
@@ -836,9 +841,9 @@ pub(crate) fn stated<'a>(
 /// Builds the model that the lists state, or the ring of the sector that they state. `again`
 /// evaluates the parameters with some of them changed.
 pub(crate) fn model_of(
-    structure: &ModelStatement,
+    structure: &SourceModel,
     environment: &Environment<'_>,
-    again: Again<'_>,
+    again: Reevaluate<'_>,
     problems: &mut Vec<Problem>,
 ) -> Model {
     match &structure.lists.disk {

@@ -1,8 +1,8 @@
 //! Converts `[structure]` and `[[place]]` to parts of a model.
 
 use crate::case::values::Values;
-use crate::compile::compiled::{Environment, StatedTable};
-use crate::compile::source_model::Matrices;
+use crate::compile::compiled::{CompiledTable, Environment};
+use crate::compile::source_model::MatrixSource;
 use crate::syntax::error::Problem;
 use crate::syntax::suggest::{nearest, one_of, shown};
 use stickslip::method::WIDTH;
@@ -64,7 +64,7 @@ const WHOLE: Reduction = Reduction::None { up_to: 0.0 };
 /// Builds the structure of `[structure]`. If the file does not state a reduction, [`settle`]
 /// decides later.
 pub(crate) fn of(
-    Matrices { table, stiffened, .. }: &Matrices,
+    MatrixSource { table, stiffened, .. }: &MatrixSource,
     component: &Component,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
@@ -190,7 +190,7 @@ fn reach(component: &Component, excited: f64) -> f64 {
 
 /// Builds a `[[place]]` of the structure; errors go to `problems`.
 pub(crate) fn place(
-    table: &StatedTable,
+    table: &CompiledTable,
     component: &Component,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
@@ -214,25 +214,25 @@ pub(crate) fn place(
 const IN_PLANE: [&str; 2] = ["t", "n"];
 
 /// The element of which a `[[place]]` with `of` is a point or a face.
-enum Viewed<'a> {
+enum ViewedElement<'a> {
     Mass(&'a Mass),
     Body(&'a Body),
 }
 
-impl Viewed<'_> {
-    fn find<'a>(model: &'a Model, of: &str) -> Option<Viewed<'a>> {
-        let body = || model.bodies.iter().find(|body| body.name == of).map(Viewed::Body);
-        model.masses.iter().find(|mass| mass.name == of).map(Viewed::Mass).or_else(body)
+impl ViewedElement<'_> {
+    fn find<'a>(model: &'a Model, of: &str) -> Option<ViewedElement<'a>> {
+        let body = || model.bodies.iter().find(|body| body.name == of).map(ViewedElement::Body);
+        model.masses.iter().find(|mass| mass.name == of).map(ViewedElement::Mass).or_else(body)
     }
 
     /// Returns the indices of x, y, z along which it moves, in the order of its directions.
     /// Returns `None` for a mass with other directions or with only one.
     fn axes(&self) -> Option<Vec<usize>> {
         let axes: Option<Vec<usize>> = match self {
-            Viewed::Mass(mass) => {
+            ViewedElement::Mass(mass) => {
                 mass.directions.iter().map(|along| CARTESIAN.iter().position(|axis| axis == along)).collect()
             }
-            Viewed::Body(body) => Some(body.axes()),
+            ViewedElement::Body(body) => Some(body.axes()),
         };
         axes.filter(|axes| axes.len() > 1)
     }
@@ -240,8 +240,8 @@ impl Viewed<'_> {
     /// Returns the displacement of the point at `offset` along a unit vector, as a row.
     fn row(&self, axes: &[usize], offset: [f64; 3], along: &[f64; 3]) -> Row {
         match self {
-            Viewed::Mass(_) => axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect(),
-            Viewed::Body(body) => body.row(offset, *along),
+            ViewedElement::Mass(_) => axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect(),
+            ViewedElement::Body(body) => body.row(offset, *along),
         }
     }
 }
@@ -249,7 +249,7 @@ impl Viewed<'_> {
 /// Builds a `[[place]]` that is a rotated frame of a mass or a body, or a point of a body.
 ///
 /// Its directions are those of the body, or one or two tangents and the normal.
-pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Result<Place, Box<Problem>> {
+pub(crate) fn view(table: &CompiledTable, values: &Values, model: &Model) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
     };
@@ -259,7 +259,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         return Err(problem(key, message).map_help("remove one of the two keys"));
     }
     let of = values.text("of").unwrap_or_default();
-    let Some(viewed) = Viewed::find(model, of) else {
+    let Some(viewed) = ViewedElement::find(model, of) else {
         let names = model.masses.iter().map(|mass| &mass.name).chain(model.bodies.iter().map(|body| &body.name));
         let help = match nearest(of, names.map(String::as_str)) {
             Some(near) => format!("did you mean `{near}`?"),
@@ -268,12 +268,12 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         return Err(problem("of", format!("there is no mass and no body `{}`", shown(of))).map_help(&help));
     };
     let offset = values.vector("offset");
-    if let (Viewed::Mass(mass), Some(_)) = (&viewed, offset) {
+    if let (ViewedElement::Mass(mass), Some(_)) = (&viewed, offset) {
         let message = format!("`{}` is a point mass and does not rotate: all its points move alike", mass.name);
         return Err(problem("offset", message).map_help("use a [[body]] with its inertia, or remove `offset`"));
     }
     let name = values.text("name").unwrap_or_default().to_owned();
-    if let (Viewed::Body(body), None) = (&viewed, values.vector("normal")) {
+    if let (ViewedElement::Body(body), None) = (&viewed, values.vector("normal")) {
         if offset.is_none() {
             let help =
                 "add offset = [\"3 mm\", 0, \"-2 mm\"], the position of the point relative to the centre of mass";
@@ -282,7 +282,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         return point(table, values, body, &name);
     }
     let Some(axes) = viewed.axes() else {
-        let Viewed::Mass(mass) = viewed else { return Err(problem("of", format!("no point of `{of}` moves"))) };
+        let ViewedElement::Mass(mass) = viewed else { return Err(problem("of", format!("no point of `{of}` moves"))) };
         let message = format!(
             "a rotated face of `{}` needs directions among x, y, z, but the mass moves along {}",
             mass.name,
@@ -330,7 +330,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
 }
 
 /// Builds a point of a body, with all directions of its points or those that are named.
-fn point(table: &StatedTable, values: &Values, body: &Body, name: &str) -> Result<Place, Box<Problem>> {
+fn point(table: &CompiledTable, values: &Values, body: &Body, name: &str) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
         Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
     };
@@ -357,14 +357,14 @@ fn point(table: &StatedTable, values: &Values, body: &Body, name: &str) -> Resul
 }
 
 /// Returns a mass that stands in for a place if only names are known.
-pub(crate) fn stand_in(table: &StatedTable, values: &Values) -> Mass {
+pub(crate) fn stand_in(table: &CompiledTable, values: &Values) -> Mass {
     let (directions, _) = directions(table, values).unwrap_or_default();
     Mass { name: values.text("name").unwrap_or_default().to_owned(), mass: 1.0, directions }
 }
 
 /// Returns the names of a place's directions (none if it has one displacement) and the names of
 /// its nodes' rows.
-fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<String>), Box<Problem>> {
+fn directions(table: &CompiledTable, values: &Values) -> Result<(Vec<String>, Vec<String>), Box<Problem>> {
     let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let problem = |key: &str, message: String| Box::new(Problem::new(table.location_of(key, None), key, message));
     let stated = values.names("directions").map(<[String]>::to_vec);
@@ -406,18 +406,18 @@ fn directions(table: &StatedTable, values: &Values) -> Result<(Vec<String>, Vec<
     Ok((names, rows))
 }
 
-trait Helped {
+trait WithHelp {
     fn map_help(self, help: &str) -> Self;
 }
 
-impl Helped for Box<Problem> {
+impl WithHelp for Box<Problem> {
     fn map_help(mut self, help: &str) -> Self {
         self.help = Some(help.to_owned());
         self
     }
 }
 
-fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
+fn made(table: &CompiledTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| Box::new(Problem::new(table.location_of(key, None), key, message));
     let stated: Vec<&str> =
         ["dof", "dofs", "nodes", "sum"].into_iter().filter(|key| table.entry(key).is_some()).collect();
@@ -513,7 +513,7 @@ fn in_space(names: &[String]) -> Option<Vec<&String>> {
 }
 
 /// Returns the row of a node along a direction.
-fn find_of(component: &Component, table: &StatedTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
+fn find_of(component: &Component, table: &CompiledTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
     let name = format!("{node}.{along}");
     component.row(&name).ok_or_else(|| {
         let place = table.location_of("nodes", Some(node));

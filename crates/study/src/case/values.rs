@@ -231,7 +231,7 @@ const MOST_DECIMALS: usize = 300;
 
 /// One resolved value.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Given {
+pub(crate) enum ResolvedValue {
     Text(String),
     Names(Vec<String>),
     Quantity(f64, Dimension),
@@ -251,7 +251,7 @@ pub(crate) enum Given {
 /// Every accessor returns `None` if the key is absent or has a value of another type.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Values {
-    pub(crate) entries: Vec<(&'static str, Given)>,
+    pub(crate) entries: Vec<(&'static str, ResolvedValue)>,
 }
 
 macro_rules! accessors {
@@ -267,33 +267,33 @@ macro_rules! accessors {
 
 accessors! {
     /// A text, a name, or the word of a choice.
-    text -> &str { Given::Text(text) => text }
+    text -> &str { ResolvedValue::Text(text) => text }
     /// One or several names.
-    names -> &[String] { Given::Names(names) => names }
+    names -> &[String] { ResolvedValue::Names(names) => names }
     /// A quantity in SI (rad/s for frequencies).
-    quantity -> f64 { Given::Quantity(value, _) => *value }
+    quantity -> f64 { ResolvedValue::Quantity(value, _) => *value }
     /// A whole number.
-    count -> u64 { Given::Count(count) => *count }
+    count -> u64 { ResolvedValue::Count(count) => *count }
     /// True or false.
-    flag -> bool { Given::Flag(flag) => *flag }
+    flag -> bool { ResolvedValue::Flag(flag) => *flag }
     /// Frequencies, rad/s.
-    frequencies -> &Frequencies { Given::Frequencies(frequencies) => frequencies }
+    frequencies -> &Frequencies { ResolvedValue::Frequencies(frequencies) => frequencies }
     /// Quantities in SI by name.
-    by_name -> &BTreeMap<String, f64> { Given::ByName(table, _) => table }
+    by_name -> &BTreeMap<String, f64> { ResolvedValue::ByName(table, _) => table }
     /// Three numbers.
-    vector -> [f64; 3] { Given::Vector(vector) => *vector }
+    vector -> [f64; 3] { ResolvedValue::Vector(vector) => *vector }
     /// One or several quantities, in SI.
-    quantities -> &[f64] { Given::Quantities(list, _) => list }
+    quantities -> &[f64] { ResolvedValue::Quantities(list, _) => list }
     /// Weighted sums of rows.
-    sums -> &[Vec<(String, f64)>] { Given::Sums(sums) => sums }
+    sums -> &[Vec<(String, f64)>] { ResolvedValue::Sums(sums) => sums }
     /// A friction law.
-    law -> &SharedLaw { Given::Law(law) => law }
+    law -> &SharedLaw { ResolvedValue::Law(law) => law }
     /// A table inside the table.
-    table -> &Values { Given::Table(table) => table }
+    table -> &Values { ResolvedValue::Table(table) => table }
 }
 
 impl Values {
-    pub(crate) fn get(&self, key: &str) -> Option<&Given> {
+    pub(crate) fn get(&self, key: &str) -> Option<&ResolvedValue> {
         self.entries.iter().find(|(name, _)| *name == key).map(|(_, given)| given)
     }
 
@@ -304,32 +304,32 @@ impl Values {
     }
 }
 
-impl Given {
+impl ResolvedValue {
     fn to_json(&self) -> Json {
         match self {
-            Given::Text(text) => json!(text),
-            Given::Names(names) => json!(names),
-            Given::Quantity(value, dimension) => quantity_json(*value, Some(*dimension)),
-            Given::Count(count) => json!(count),
-            Given::Flag(flag) => json!(flag),
-            Given::Frequencies(Frequencies::List(list)) => json!({ "rad_per_s": list }),
-            Given::Frequencies(Frequencies::Range { from, to, points }) => {
+            ResolvedValue::Text(text) => json!(text),
+            ResolvedValue::Names(names) => json!(names),
+            ResolvedValue::Quantity(value, dimension) => quantity_json(*value, Some(*dimension)),
+            ResolvedValue::Count(count) => json!(count),
+            ResolvedValue::Flag(flag) => json!(flag),
+            ResolvedValue::Frequencies(Frequencies::List(list)) => json!({ "rad_per_s": list }),
+            ResolvedValue::Frequencies(Frequencies::Range { from, to, points }) => {
                 json!({ "from_rad_per_s": from, "to_rad_per_s": to, "points": points })
             }
-            Given::Frequencies(Frequencies::Adaptive { from, to, tolerance }) => {
+            ResolvedValue::Frequencies(Frequencies::Adaptive { from, to, tolerance }) => {
                 json!({ "from_rad_per_s": from, "to_rad_per_s": to, "tolerance": tolerance })
             }
-            Given::ByName(table, dimension) => {
+            ResolvedValue::ByName(table, dimension) => {
                 let entry = |(name, value): (&String, &f64)| (name.clone(), quantity_json(*value, Some(*dimension)));
                 Json::Object(table.iter().map(entry).collect())
             }
-            Given::Vector(vector) => json!(vector),
-            Given::Quantities(list, dimension) => {
+            ResolvedValue::Vector(vector) => json!(vector),
+            ResolvedValue::Quantities(list, dimension) => {
                 json!(list.iter().map(|value| quantity_json(*value, Some(*dimension))).collect::<Vec<_>>())
             }
-            Given::Sums(sums) => json!(sums),
-            Given::Law(law) => json!(law),
-            Given::Table(table) => table.to_json(),
+            ResolvedValue::Sums(sums) => json!(sums),
+            ResolvedValue::Law(law) => json!(law),
+            ResolvedValue::Table(table) => table.to_json(),
         }
     }
 }

@@ -4,7 +4,7 @@
 //! Each study kind supplies the counts.
 
 use crate::case::study::{Case, Study};
-use crate::check::survey::{Surveyed, range};
+use crate::check::survey::{SurveyedCase, range};
 use crate::results::decimation::MOST_ROWS;
 use crate::run::basis_check;
 use crate::run::output_columns;
@@ -20,7 +20,7 @@ use stickslip::model::System;
 
 /// The size of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Size {
+pub struct StudySize {
     /// Rows of its tables.
     pub rows: u64,
     /// Size of its tables as numbers of eight bytes, bytes.
@@ -81,7 +81,7 @@ const SWITCHES: f64 = 4.0;
 
 /// The shape of a planned table: rows and columns.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Shape {
+pub struct TableShape {
     /// Rows.
     pub rows: f64,
     /// Columns of numbers and flags.
@@ -94,7 +94,7 @@ pub struct Shape {
 #[derive(Debug, Default)]
 pub struct Cost {
     /// Shapes of its tables.
-    pub tables: Vec<Shape>,
+    pub tables: Vec<TableShape>,
     /// Number of points in figures.
     pub drawn: f64,
     /// Memory of one unit of work during its computation, without its tables, bytes.
@@ -112,7 +112,7 @@ pub struct Cost {
 /// Data for a cost estimate: counts, and the cost of one orbit. The first case represents all
 /// cases.
 #[derive(Debug, Clone)]
-pub struct Costing<'a> {
+pub struct CostInputs<'a> {
     /// The study.
     pub study: &'a Study,
     /// Its first case.
@@ -131,7 +131,7 @@ pub struct Costing<'a> {
     pub joints: f64,
     /// Number of sliders in all joints; a joint without sliders counts as one.
     sliders: f64,
-    surveyed: &'a Surveyed,
+    surveyed: &'a SurveyedCase,
     /// True if a law is smooth, or is made smooth by `width`.
     smooth: bool,
     has_states: bool,
@@ -146,23 +146,23 @@ pub struct Costing<'a> {
     /// Memory of one factor of the dynamic stiffness in all rows, bytes; zero if none is made.
     /// Stored here because computing it takes seconds for a large structure.
     factor_bytes: f64,
-    pace: Pace,
+    pace: Difficulty,
 }
 
 /// The assumed difficulty of finding orbits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Pace {
+enum Difficulty {
     /// The typical case.
     Usual,
     /// The hard case: many orbits are not found, or only after long searches.
     Slow,
 }
 
-impl Pace {
+impl Difficulty {
     fn of<T>(self, usual: T, slow: T) -> T {
         match self {
-            Pace::Usual => usual,
-            Pace::Slow => slow,
+            Difficulty::Usual => usual,
+            Difficulty::Slow => slow,
         }
     }
 }
@@ -176,9 +176,9 @@ fn finds_series(case: &Case, system: &System) -> bool {
     }
 }
 
-impl<'a> Costing<'a> {
+impl<'a> CostInputs<'a> {
     /// Returns the costing of a study whose orbits are hard to find.
-    pub(crate) fn new(study: &'a Study, surveyed: &'a Surveyed) -> Self {
+    pub(crate) fn new(study: &'a Study, surveyed: &'a SurveyedCase) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
         // the option `width` makes exact laws smooth
         let width = case.method.options.get("width");
@@ -187,7 +187,7 @@ impl<'a> Costing<'a> {
         let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
         let series = finds_series(case, system);
         let factor_bytes = if series { harmonic_balance::factor_bytes(system) } else { 0 };
-        Costing {
+        CostInputs {
             study,
             case,
             cases: study.cases() as f64,
@@ -205,13 +205,13 @@ impl<'a> Costing<'a> {
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
             series,
             factor_bytes: factor_bytes as f64,
-            pace: Pace::Slow,
+            pace: Difficulty::Slow,
         }
     }
 
     /// Returns the costing of the same study with typical orbits.
     pub(crate) fn usual(&self) -> Self {
-        Costing { pace: Pace::Usual, ..self.clone() }
+        CostInputs { pace: Difficulty::Usual, ..self.clone() }
     }
 
     /// Returns the system of the first case.
@@ -238,18 +238,18 @@ impl<'a> Costing<'a> {
     ///
     /// The columns are frequency; amplitude, mean and phase of each place; dissipation and slip
     /// of each joint; the columns of `output`; evidence; status.
-    pub fn orbits(&self, rows: f64) -> Shape {
+    pub fn orbits(&self, rows: f64) -> TableShape {
         let extra = output_columns::columns(self.case, self.system()).len() as f64;
         let numbers = self.varied + 3.0 * self.places + 2.0 * self.joints + extra + 6.0;
-        Shape { rows, numbers, words: 1.0 }
+        TableShape { rows, numbers, words: 1.0 }
     }
 
     /// Returns the shape of a table with one row for each of `rows` instants.
     ///
     /// The columns are time and frequency; displacement and velocity of each place; three
     /// numbers and the contact state of each joint.
-    pub fn motion(&self, rows: f64) -> Shape {
-        Shape { rows, numbers: self.varied + 2.0 + 2.0 * self.places + 3.0 * self.joints, words: self.joints }
+    pub fn motion(&self, rows: f64) -> TableShape {
+        TableShape { rows, numbers: self.varied + 2.0 + 2.0 * self.places + 3.0 * self.joints, words: self.joints }
     }
 
     /// Returns the instants of a period in a table: `samples` steps, both ends, and the
@@ -350,14 +350,14 @@ impl Cost {
 
     /// Returns the cells of at most as many rows as a figure shows.
     fn shown(&self, number: f64, word: f64) -> f64 {
-        let rows = |table: &Shape| table.rows.min(MOST_ROWS as f64);
+        let rows = |table: &TableShape| table.rows.min(MOST_ROWS as f64);
         self.tables.iter().map(|table| rows(table) * (number * table.numbers + word * table.words)).sum()
     }
 }
 
-impl Costing<'_> {
+impl CostInputs<'_> {
     /// Returns the size of a study of this cost, divided into `units` units of work.
-    pub(crate) fn size(&self, cost: &Cost, units: usize) -> Size {
+    pub(crate) fn size(&self, cost: &Cost, units: usize) -> StudySize {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let tables = cost.cells(NUMBER + WRITTEN, WORD + WRITTEN);
         // finished units wait until they are in order; a figure reads back at most
@@ -370,7 +370,7 @@ impl Costing<'_> {
         let working = units.min(threads) as f64 * (cost.unit + factors);
         // a float above the largest value of the type becomes that value
         let whole = |value: f64| value as u64;
-        Size {
+        StudySize {
             rows: whole(cost.rows()),
             results: whole(cost.cells(NUMBER, NUMBER)),
             memory: whole(tables.min(waiting + shown) + drawn + working),
@@ -414,7 +414,7 @@ impl Costing<'_> {
 // ------------------------------------------------------------------------------------------
 // memory limit
 
-impl Size {
+impl StudySize {
     /// Returns the error that refuses a study which needs more memory than the limit.
     pub(crate) fn refusal(&self, study: &Study, memory: u64) -> Option<StudyError> {
         let limit = study.memory_limit();
@@ -646,7 +646,7 @@ const ASSEMBLING: f64 = 5e-5;
 /// Time to evaluate the motion at one instant, per mass and joint, s.
 const INSTANT: f64 = 5e-7;
 
-impl Costing<'_> {
+impl CostInputs<'_> {
     /// Returns the time of one orbit by the method of the study, s.
     pub fn orbit(&self) -> f64 {
         let case = self.case;
@@ -867,7 +867,7 @@ impl Costing<'_> {
     fn least_damping(&self) -> f64 {
         let modes = &self.surveyed.survey.free().elastic;
         let highest = self.range().map_or(f64::INFINITY, |(_, highest)| DRIVEN * highest);
-        let driven = modes.iter().filter(|mode| self.pace == Pace::Slow || mode.omega <= highest);
+        let driven = modes.iter().filter(|mode| self.pace == Difficulty::Slow || mode.omega <= highest);
         driven.map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE)
     }
 

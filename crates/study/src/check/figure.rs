@@ -1,20 +1,20 @@
 //! Checks of `[figure]` that need the model and the kind.
 
-use crate::case::names::Names;
+use crate::case::names::ModelNames;
 use crate::case::values::Values;
-use crate::kinds::info::{Complaint, KindInfo};
+use crate::kinds::info::{KeyError, KindInfo};
 use crate::syntax::suggest;
 use crate::syntax::units;
 use stickslip::model::Model;
 
 /// Checks the values of `[figure]`.
-pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), Complaint> {
-    let known = Names::of_places(model).and_joints(model);
+pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), KeyError> {
+    let known = ModelNames::of_places(model).and_joints(model);
     for name in figure.names("only").unwrap_or_default() {
         if model.is_rotation(name) {
             let message = format!("`{name}` is a rotation; figures show displacements only");
             let help = "name a [[place]] of the body; the tables contain its rotations in rad";
-            return Err(Complaint { name: Some(name.clone()), ..Complaint::new("only", message, help) });
+            return Err(KeyError { name: Some(name.clone()), ..KeyError::new("only", message, help) });
         }
         known.all("only", "mass or joint", name)?;
     }
@@ -22,7 +22,7 @@ pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(
         let Some(text) = figure.text(key) else { continue };
         let Some(expected) = axis else {
             let message = format!("a figure of kind `{}` has no single unit on this axis", kind.name);
-            return Err(Complaint::new(key, message, "remove this key"));
+            return Err(KeyError::new(key, message, "remove this key"));
         };
         let example = expected.name_and_unit().map_or("", |(_, unit)| unit);
         match units::parse(text) {
@@ -30,7 +30,7 @@ pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(
             found => {
                 let what = if found.is_some() { "a unit of another quantity" } else { "not a known unit" };
                 let help = format!("write a unit such as {example}");
-                return Err(Complaint::new(key, format!("`{}` is {what}", suggest::shown(text)), help));
+                return Err(KeyError::new(key, format!("`{}` is {what}", suggest::shown(text)), help));
             }
         }
     }

@@ -7,7 +7,7 @@
 //! rounding of the inertia. A mode far below the excitation creates terms of `Ω/ω` times the
 //! motion; they cancel, and only rounding remains.
 
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::syntax::expression::displayed;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -16,13 +16,13 @@ use stickslip::law::{Law, Parameter};
 use stickslip::model::{Element, GROUND, Mass, Model, ModelError};
 
 /// A mass and the stiffest element attached to it.
-struct Held<'a> {
+struct AttachedMass<'a> {
     mass: &'a Mass,
     stiffness: f64,
     by: Element,
 }
 
-impl Held<'_> {
+impl AttachedMass<'_> {
     /// Returns the excitation frequency below which the inertia is lost, rad/s.
     fn slowest(&self) -> f64 {
         (f64::EPSILON * self.stiffness / self.mass.mass).sqrt()
@@ -32,7 +32,7 @@ impl Held<'_> {
 /// Iterates over the masses with an attached stiffness.
 ///
 /// Places without mass and places with an imposed motion are left out.
-fn held(model: &Model) -> impl Iterator<Item = Held<'_>> {
+fn held(model: &Model) -> impl Iterator<Item = AttachedMass<'_>> {
     let mut stiffest: HashMap<&str, (f64, Element)> = HashMap::new();
     let springs = model.springs.iter().enumerate().map(|(i, s)| (&s.between, s.stiffness, Element::Spring(i)));
     let joints = model.joints.iter().enumerate().map(|(i, j)| (&j.between, stiffness(&*j.law), Element::Joint(i)));
@@ -47,14 +47,14 @@ fn held(model: &Model) -> impl Iterator<Item = Held<'_>> {
     let free = |name: &str| model.motions.iter().all(|motion| motion.on != name);
     model.masses.iter().filter(move |mass| mass.mass > 0.0 && free(&mass.name)).filter_map(move |mass| {
         let &(stiffness, by) = stiffest.get(mass.name.as_str())?;
-        (stiffness > 0.0).then_some(Held { mass, stiffness, by })
+        (stiffness > 0.0).then_some(AttachedMass { mass, stiffness, by })
     })
 }
 
 /// Returns the error of an element so stiff that a mass does not move at `omega`, rad/s; `None`
 /// without one.
 pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
-    let Held { mass, stiffness, by } = held(model).find(|held| omega < held.slowest())?;
+    let AttachedMass { mass, stiffness, by } = held(model).find(|held| omega < held.slowest())?;
     let message = format!(
         "a stiffness of {} is too high for a mass of {}: `{}` cannot move at {}, because its inertia is lost in \
          rounding; replace this place by `ground`, merge the two masses, or use the law `coulomb` for rigid friction",
@@ -75,8 +75,8 @@ const LOST: f64 = 1e-6;
 /// The condition is `ε √(m Ω²/k) >` [`LOST`] for the stiffest element of a mass. Returns `None`
 /// without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
-    let lost = |held: &Held<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
-    let Held { mass, stiffness, by } = held(model).find(lost)?;
+    let lost = |held: &AttachedMass<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
+    let AttachedMass { mass, stiffness, by } = held(model).find(lost)?;
     let message = format!(
         "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
          rounding; remove it, or correct the mass",
@@ -100,7 +100,7 @@ const SEEN: f64 = 100.0;
 
 /// Returns the error of an excitation frequency `omega`, rad/s, that is too slow for every
 /// mass.
-pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
+pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
     let mut slowest = 0.0f64;
     let mut softest: Option<(f64, &str)> = None;
     for held in held(model) {
@@ -127,7 +127,7 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<Complaint> {
          represent rigid parts",
         shown(enough)
     );
-    Some(Complaint::new("frequency", message, help))
+    Some(KeyError::new("frequency", message, help))
 }
 
 /// Returns the stiffness of a law while it sticks, N/m; zero for a rigid law and for one

@@ -7,12 +7,12 @@ use stickslip::model::{Survey, System};
 
 /// A case with the survey of its model.
 #[derive(Debug)]
-pub struct Surveyed {
+pub struct SurveyedCase {
     pub(crate) case: Case,
     pub(crate) survey: Survey,
 }
 
-impl Surveyed {
+impl SurveyedCase {
     /// Surveys case `index` of a study.
     pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
         let case = study.case(index)?;
@@ -20,7 +20,7 @@ impl Surveyed {
         let forces = |system: &System| Some(StaticEquilibrium::under_load(system)?.forces());
         let survey = case.model.survey_under_load(&forces);
         let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-        Ok(Surveyed { case, survey })
+        Ok(SurveyedCase { case, survey })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Warnings about likely mistakes in a study. Each study kind selects those that concern it.
 
 use crate::case::values::{Frequencies, Values};
-use crate::check::survey::{Surveyed, range};
+use crate::check::survey::{SurveyedCase, range};
 use crate::syntax::format::{quantity, significant};
 use crate::syntax::key::MOST_POINTS;
 use std::f64::consts::TAU;
@@ -9,27 +9,27 @@ use stickslip::curve::modes::unit;
 use stickslip::model::{Cyclic, LinearMode, Modes};
 
 /// Warnings of a kind that needs an excitation.
-pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
+pub(crate) fn driven(cases: &[SurveyedCase]) -> Vec<String> {
     no_excitation(cases, false).into_iter().collect()
 }
 
 /// Warnings of a kind that needs an excitation or an initial state.
-pub(crate) fn moved(cases: &[Surveyed]) -> Vec<String> {
+pub(crate) fn moved(cases: &[SurveyedCase]) -> Vec<String> {
     no_excitation(cases, true).into_iter().collect()
 }
 
 /// Warnings of a kind that looks for resonances in a range of frequencies.
-pub(crate) fn resonant(cases: &[Surveyed]) -> Vec<String> {
+pub(crate) fn resonant(cases: &[SurveyedCase]) -> Vec<String> {
     no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
 }
 
 /// Warnings of a kind with given frequencies: those of `resonant`, and frequencies too far
 /// apart for a resonance.
-pub(crate) fn sampled(cases: &[Surveyed]) -> Vec<String> {
+pub(crate) fn sampled(cases: &[SurveyedCase]) -> Vec<String> {
     resonant(cases).into_iter().chain(coarse(cases)).collect()
 }
 
-fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
+fn no_excitation(cases: &[SurveyedCase], starts_count: bool) -> Option<String> {
     if cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
         return None;
     }
@@ -39,7 +39,7 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
             .filter_map(|key| values.by_name(key))
             .any(|table| table.values().any(|v| *v != 0.0))
     };
-    let constant = |one: &Surveyed| {
+    let constant = |one: &SurveyedCase| {
         let model = &one.case.model;
         model.forces.iter().any(|force| force.amplitude != 0.0) || model.motions.iter().any(|m| m.amplitude != 0.0)
     };
@@ -55,8 +55,8 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
 
 /// Warns of a resonance within the range that only the joints damp. Kinds that search for the
 /// best joint compare peaks; for them an undamped structure is a textbook case.
-pub(crate) fn undamped(cases: &[Surveyed]) -> Option<String> {
-    let found = |one: &Surveyed| {
+pub(crate) fn undamped(cases: &[SurveyedCase]) -> Option<String> {
+    let found = |one: &SurveyedCase| {
         let (from, to) = range(&one.case)?;
         one.survey.undamped(from, to).first().copied()
     };
@@ -73,7 +73,7 @@ pub(crate) fn undamped(cases: &[Surveyed]) -> Option<String> {
     })
 }
 
-fn no_resonance(cases: &[Surveyed]) -> Option<String> {
+fn no_resonance(cases: &[SurveyedCase]) -> Option<String> {
     let (from, to) = range(&cases[0].case).filter(|(from, to)| from < to)?;
     let mut nearest: Option<(f64, f64, &str)> = None;
     for one in cases {
@@ -120,7 +120,7 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
 
 /// A resonance of the linear structure that is narrower than the steps of a range of
 /// frequencies.
-struct Narrow {
+struct NarrowResonance {
     /// Excitation frequency and width of the resonance, rad/s.
     at: f64,
     width: f64,
@@ -132,17 +132,18 @@ struct Narrow {
 ///
 /// The width is that at half power, twice damping times frequency, with joints free or stuck,
 /// the larger one. Friction only adds to it.
-fn coarse(cases: &[Surveyed]) -> Option<String> {
+fn coarse(cases: &[SurveyedCase]) -> Option<String> {
     let Some(Frequencies::Range { points, .. }) = cases[0].case.frequencies else { return None };
     // the warning must be true for every case
-    let narrow = cases.iter().map(narrowest).collect::<Option<Vec<Narrow>>>()?;
+    let narrow = cases.iter().map(narrowest).collect::<Option<Vec<NarrowResonance>>>()?;
     // modes by nodal diameter take time, so they are only computed if there is a warning
     // without them
     let narrow = match cases.iter().any(|one| one.case.model.ring.is_some_and(|ring| ring.order.is_some())) {
-        true => cases.iter().map(narrowest_met).collect::<Option<Vec<Narrow>>>()?,
+        true => cases.iter().map(narrowest_met).collect::<Option<Vec<NarrowResonance>>>()?,
         false => narrow,
     };
-    let Narrow { at, width, points: enough } = narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
+    let NarrowResonance { at, width, points: enough } =
+        narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
     let (from, to) = range(&cases[0].case)?;
     let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
     let step = (to - from) / (points - 1) as f64;
@@ -162,7 +163,7 @@ fn coarse(cases: &[Surveyed]) -> Option<String> {
 
 /// Returns the narrowest resonance in the range of a case, if it is narrower than the step of
 /// the frequencies.
-fn narrowest(one: &Surveyed) -> Option<Narrow> {
+fn narrowest(one: &SurveyedCase) -> Option<NarrowResonance> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let (free, stuck) = (one.survey.free(), one.survey.stuck());
     if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
@@ -174,7 +175,7 @@ fn narrowest(one: &Surveyed) -> Option<Narrow> {
 
 /// Like [`narrowest`], for a tuned disk in a travelling wave. Each harmonic of the excitation
 /// meets the modes of one nodal diameter.
-fn narrowest_met(one: &Surveyed) -> Option<Narrow> {
+fn narrowest_met(one: &SurveyedCase) -> Option<NarrowResonance> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let ring = one.case.model.ring.filter(|ring| ring.equal);
     let Some((sectors, order)) = ring.and_then(|ring| Some((ring.sectors, ring.order?))) else {
@@ -208,12 +209,15 @@ fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)
 
 /// Returns the narrowest resonance within a range of frequencies, if it is narrower than their
 /// step.
-fn narrowest_of(all: impl Iterator<Item = (f64, f64, f64)>, (from, to, points): (f64, f64, usize)) -> Option<Narrow> {
+fn narrowest_of(
+    all: impl Iterator<Item = (f64, f64, f64)>,
+    (from, to, points): (f64, f64, usize),
+) -> Option<NarrowResonance> {
     // without damping there is no width; where friction bounds the motion, friction determines
     // it
     let inside = all.filter(|(low, high, width)| *low >= from && *high <= to && *width > 0.0);
     let (at, _, width) = inside.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    ((to - from) / (points - 1) as f64 > width).then(|| Narrow {
+    ((to - from) / (points - 1) as f64 > width).then(|| NarrowResonance {
         at,
         width,
         points: ((to - from) / width).ceil() + 1.0,
@@ -230,12 +234,12 @@ const UNLOADED: f64 = 1e6;
 
 /// Warnings of a nonlinear mode: its amplitudes end before any joint slips, or a constant force
 /// acts on the structure.
-pub(crate) fn of_mode(cases: &[Surveyed]) -> Vec<String> {
+pub(crate) fn of_mode(cases: &[SurveyedCase]) -> Vec<String> {
     sticks(cases).into_iter().chain(displaced(cases)).collect()
 }
 
 /// Warns of constant forces: a mode is a motion without any forces.
-fn displaced(cases: &[Surveyed]) -> Option<String> {
+fn displaced(cases: &[SurveyedCase]) -> Option<String> {
     let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
     let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
     Some(format!(
@@ -244,7 +248,7 @@ fn displaced(cases: &[Surveyed]) -> Option<String> {
     ))
 }
 
-fn sticks(cases: &[Surveyed]) -> Option<String> {
+fn sticks(cases: &[SurveyedCase]) -> Option<String> {
     let mut needed = f64::INFINITY;
     let mut asked = 0.0;
     for one in cases {

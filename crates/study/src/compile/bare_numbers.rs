@@ -1,7 +1,7 @@
 //! Refuses bare numbers next to quantities with a unit, such as `["1100 rpm", 1200]`. A bare
 //! number counts in SI, which is probably not the unit that the user means.
 
-use crate::compile::compiled::Quantity;
+use crate::compile::compiled::CompiledQuantity;
 use crate::syntax::error::Problem;
 use crate::syntax::expression::displayed;
 use crate::syntax::suggest::shown;
@@ -14,8 +14,8 @@ const ROUNDING: f64 = 1e-12;
 
 /// Returns a problem if one quantity is a bare number and another one has a unit with a
 /// different factor to SI.
-pub(crate) fn mixed<'a>(key: &str, all: impl IntoIterator<Item = &'a Quantity>) -> Option<Problem> {
-    let all: Vec<&Quantity> = all.into_iter().collect();
+pub(crate) fn mixed<'a>(key: &str, all: impl IntoIterator<Item = &'a CompiledQuantity>) -> Option<Problem> {
+    let all: Vec<&CompiledQuantity> = all.into_iter().collect();
     // a bare frequency is in Hz
     let bare = |dimension| if matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE) { TAU } else { 1.0 };
     let counts_so = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= ROUNDING;
@@ -33,7 +33,7 @@ pub(crate) fn mixed<'a>(key: &str, all: impl IntoIterator<Item = &'a Quantity>) 
 }
 
 /// Returns the unit of a literal, its factor to SI and its dimension.
-pub(crate) fn with_unit(quantity: &Quantity) -> Option<(&str, f64, Dimension)> {
+pub(crate) fn with_unit(quantity: &CompiledQuantity) -> Option<(&str, f64, Dimension)> {
     if !quantity.expression.is_literal() {
         return None;
     }
@@ -47,7 +47,7 @@ pub(crate) fn with_unit(quantity: &Quantity) -> Option<(&str, f64, Dimension)> {
 }
 
 /// Returns the value of a literal without a unit, unless it is zero.
-fn bare_number(quantity: &Quantity) -> Option<f64> {
+fn bare_number(quantity: &CompiledQuantity) -> Option<f64> {
     if !quantity.expression.is_literal() {
         return None;
     }

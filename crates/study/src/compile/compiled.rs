@@ -1,70 +1,70 @@
 //! Compiled statements of a study file: expressions are parsed and locations are known, but
 //! nothing is evaluated.
 
-use crate::case::values::{Frequencies, Given, Values};
+use crate::case::values::{Frequencies, ResolvedValue, Values};
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::expression::{Expression, Value, described, displayed};
-use crate::syntax::key::Within;
+use crate::syntax::expression::{Expression, ExpressionValue, described, displayed};
+use crate::syntax::key::Bounds;
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
 use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
 
 /// A quantity as it stands in a text.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Quantity {
+pub(crate) struct CompiledQuantity {
     pub location: Location,
-    /// Start of its text in the source, see [`crate::syntax::document::Content::Text`].
+    /// Start of its text in the source, see [`crate::syntax::document::TomlValue::Text`].
     pub inner: Option<usize>,
     pub text: String,
     pub expression: Expression,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct StatedTable {
+pub(crate) struct CompiledTable {
     pub location: Location,
     /// The indices of the repetition that states the table, in words; empty without a
     /// repetition.
     pub turn: String,
-    pub entries: Vec<StatedEntry>,
+    pub entries: Vec<CompiledEntry>,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct StatedEntry {
+pub(crate) struct CompiledEntry {
     pub key: &'static str,
     /// Location of the value; that of the table if the value is a default.
     pub location: Location,
-    pub value: Stated,
+    pub value: CompiledValue,
 }
 
 /// Names of rows with their locations and weights.
-pub(crate) type Weights = Vec<(String, Location, Quantity)>;
+pub(crate) type Weights = Vec<(String, Location, CompiledQuantity)>;
 
 /// Permitted order of the ends of a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
+pub(crate) enum RangeOrder {
     Rising,
     /// The second end may lie below the first, but must differ from it.
     Any,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) enum Stated {
-    Fixed(Given),
+pub(crate) enum CompiledValue {
+    Fixed(ResolvedValue),
     Names(Vec<(String, Location)>),
-    Quantity { quantity: Quantity, dimension: Dimension, within: Within, example: &'static str },
-    List(Vec<Quantity>, Within),
-    Range { from: Quantity, to: Quantity, points: usize, within: Within, order: Order },
-    Adaptive { from: Quantity, to: Quantity, tolerance: Quantity },
-    ByName(Vec<(String, Location, Quantity)>, Dimension),
-    Vector(Vec<Quantity>, Dimension, &'static str),
-    Quantities(Vec<Quantity>, Dimension, Within, &'static str),
+    Quantity { quantity: CompiledQuantity, dimension: Dimension, within: Bounds, example: &'static str },
+    List(Vec<CompiledQuantity>, Bounds),
+    Range { from: CompiledQuantity, to: CompiledQuantity, points: usize, within: Bounds, order: RangeOrder },
+    Adaptive { from: CompiledQuantity, to: CompiledQuantity, tolerance: CompiledQuantity },
+    ByName(Vec<(String, Location, CompiledQuantity)>, Dimension),
+    Vector(Vec<CompiledQuantity>, Dimension, &'static str),
+    Quantities(Vec<CompiledQuantity>, Dimension, Bounds, &'static str),
     Sums(Vec<Weights>),
-    Law(&'static LawInfo, StatedTable),
-    Table(StatedTable),
+    Law(&'static LawInfo, CompiledTable),
+    Table(CompiledTable),
 }
 
-impl StatedTable {
-    pub fn entry(&self, key: &str) -> Option<&StatedEntry> {
+impl CompiledTable {
+    pub fn entry(&self, key: &str) -> Option<&CompiledEntry> {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
@@ -75,31 +75,33 @@ impl StatedTable {
 
     /// Calls `each` with the key, the quantity and its dimension (if the schema defines it) for
     /// every quantity in the table.
-    pub fn each_quantity(&self, each: &mut dyn FnMut(&'static str, &Quantity, Option<Dimension>)) {
+    pub fn each_quantity(&self, each: &mut dyn FnMut(&'static str, &CompiledQuantity, Option<Dimension>)) {
         for entry in &self.entries {
             match &entry.value {
-                Stated::Fixed(_) | Stated::Names(_) => {}
-                Stated::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
-                Stated::Vector(parts, dimension, _) | Stated::Quantities(parts, dimension, ..) => {
+                CompiledValue::Fixed(_) | CompiledValue::Names(_) => {}
+                CompiledValue::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
+                CompiledValue::Vector(parts, dimension, _) | CompiledValue::Quantities(parts, dimension, ..) => {
                     parts.iter().for_each(|q| each(entry.key, q, Some(*dimension)));
                 }
-                Stated::Sums(sums) => {
+                CompiledValue::Sums(sums) => {
                     sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE)));
                 }
-                Stated::List(list, _) => list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY))),
-                Stated::Range { from, to, .. } => {
+                CompiledValue::List(list, _) => {
+                    list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY)))
+                }
+                CompiledValue::Range { from, to, .. } => {
                     each(entry.key, from, None);
                     each(entry.key, to, None);
                 }
-                Stated::Adaptive { from, to, tolerance } => {
+                CompiledValue::Adaptive { from, to, tolerance } => {
                     each(entry.key, from, None);
                     each(entry.key, to, None);
                     each(entry.key, tolerance, Some(Dimension::NONE));
                 }
-                Stated::ByName(list, dimension) => {
+                CompiledValue::ByName(list, dimension) => {
                     list.iter().for_each(|(_, _, q)| each(entry.key, q, Some(*dimension)));
                 }
-                Stated::Law(_, table) | Stated::Table(table) => table.each_quantity(each),
+                CompiledValue::Law(_, table) | CompiledValue::Table(table) => table.each_quantity(each),
             }
         }
     }
@@ -109,9 +111,13 @@ impl StatedTable {
     pub fn location_of(&self, key: &str, name: Option<&str>) -> &Location {
         let Some(entry) = self.entry(key) else { return &self.location };
         let inside = name.and_then(|name| match &entry.value {
-            Stated::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, location)| location),
-            Stated::ByName(names, _) => names.iter().find(|(n, _, _)| n == name).map(|(_, location, _)| location),
-            Stated::Sums(sums) => sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, location, _)| location),
+            CompiledValue::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, location)| location),
+            CompiledValue::ByName(names, _) => {
+                names.iter().find(|(n, _, _)| n == name).map(|(_, location, _)| location)
+            }
+            CompiledValue::Sums(sums) => {
+                sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, location, _)| location)
+            }
             _ => None,
         });
         inside.unwrap_or(&entry.location)
@@ -121,12 +127,12 @@ impl StatedTable {
 /// The values of the parameters of one case, by index.
 pub(crate) struct Environment<'a> {
     pub names: &'a [String],
-    pub values: Vec<Value>,
+    pub values: Vec<ExpressionValue>,
 }
 
-impl Quantity {
+impl CompiledQuantity {
     /// Returns the value, of any dimension.
-    pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<Value, Problem> {
+    pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
         self.expression
             .evaluate(&environment.values)
             .map_err(|fault| Problem::fault(&self.location, self.inner, key, fault))
@@ -136,7 +142,7 @@ impl Quantity {
     pub fn number(
         &self,
         key: &str,
-        (dimension, within): (Dimension, Within),
+        (dimension, within): (Dimension, Bounds),
         example: &str,
         environment: &Environment<'_>,
     ) -> Result<f64, Problem> {
@@ -152,7 +158,7 @@ impl Quantity {
     /// Converts `value`, the value of this quantity, to a number of this dimension.
     pub fn convert(
         &self,
-        value: Value,
+        value: ExpressionValue,
         dimension: Dimension,
         key: &str,
         example: &str,
@@ -184,7 +190,7 @@ impl Quantity {
         name: &str,
         dimension: Option<Dimension>,
         environment: &Environment<'_>,
-    ) -> Result<Value, Problem> {
+    ) -> Result<ExpressionValue, Problem> {
         let value = self.value(name, environment)?;
         self.in_dimension(value, name, dimension, environment)
     }
@@ -193,17 +199,17 @@ impl Quantity {
     /// must have.
     pub fn in_dimension(
         &self,
-        value: Value,
+        value: ExpressionValue,
         name: &str,
         dimension: Option<Dimension>,
         environment: &Environment<'_>,
-    ) -> Result<Value, Problem> {
+    ) -> Result<ExpressionValue, Problem> {
         let Some(dimension) = dimension else { return Ok(value) };
         let number = self.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
             None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
             Some(_) => problem,
         })?;
-        Ok(Value::of(number, dimension))
+        Ok(ExpressionValue::of(number, dimension))
     }
 
     pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
@@ -215,7 +221,7 @@ impl Quantity {
     }
 }
 
-impl StatedTable {
+impl CompiledTable {
     /// Returns the values of all keys. Errors go to `problems`; their keys are left out.
     pub fn values(&self, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Values {
         let before = problems.len();
@@ -235,77 +241,77 @@ impl StatedTable {
     }
 }
 
-impl Stated {
+impl CompiledValue {
     fn given(
         &self,
         key: &'static str,
         environment: &Environment<'_>,
         problems: &mut Vec<Problem>,
-    ) -> Result<Given, Problem> {
+    ) -> Result<ResolvedValue, Problem> {
         Ok(match self {
-            Stated::Fixed(given) => given.clone(),
-            Stated::Names(names) => Given::Names(names.iter().map(|(name, _)| name.clone()).collect()),
-            Stated::Quantity { quantity, dimension, within, example } => {
-                Given::Quantity(quantity.number(key, (*dimension, *within), example, environment)?, *dimension)
+            CompiledValue::Fixed(given) => given.clone(),
+            CompiledValue::Names(names) => ResolvedValue::Names(names.iter().map(|(name, _)| name.clone()).collect()),
+            CompiledValue::Quantity { quantity, dimension, within, example } => {
+                ResolvedValue::Quantity(quantity.number(key, (*dimension, *within), example, environment)?, *dimension)
             }
-            Stated::List(list, within) => {
+            CompiledValue::List(list, within) => {
                 let frequency = (Dimension::FREQUENCY, *within);
                 let numbers = list.iter().map(|q| q.number(key, frequency, "\"121 Hz\"", environment));
-                Given::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
+                ResolvedValue::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
             }
-            Stated::Range { from, to, points, within, order } => {
+            CompiledValue::Range { from, to, points, within, order } => {
                 let frequency = (Dimension::FREQUENCY, *within);
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
-                if *order == Order::Rising || start == end {
+                if *order == RangeOrder::Rising || start == end {
                     not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
                 }
-                Given::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
+                ResolvedValue::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
             }
-            Stated::Adaptive { from, to, tolerance } => {
-                let frequency = (Dimension::FREQUENCY, Within::Positive);
+            CompiledValue::Adaptive { from, to, tolerance } => {
+                let frequency = (Dimension::FREQUENCY, Bounds::Positive);
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
                 not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
                 let share =
-                    tolerance.number("tolerance", (Dimension::NONE, Within::Positive), "\"1 %\"", environment)?;
+                    tolerance.number("tolerance", (Dimension::NONE, Bounds::Positive), "\"1 %\"", environment)?;
                 if !(FINEST..=COARSEST).contains(&share) {
                     let message = format!("must lie between {FINEST} and {COARSEST}, found {share}");
                     return Err(tolerance.problem("tolerance", message).help("1 % makes a smooth figure"));
                 }
-                Given::Frequencies(Frequencies::Adaptive { from: start, to: end, tolerance: share })
+                ResolvedValue::Frequencies(Frequencies::Adaptive { from: start, to: end, tolerance: share })
             }
-            Stated::ByName(names, dimension) => {
+            CompiledValue::ByName(names, dimension) => {
                 let mut table = BTreeMap::new();
                 for (name, _, quantity) in names {
-                    let number = quantity.number(name, (*dimension, Within::Finite), "", environment)?;
+                    let number = quantity.number(name, (*dimension, Bounds::Finite), "", environment)?;
                     table.insert(name.clone(), number);
                 }
-                Given::ByName(table, *dimension)
+                ResolvedValue::ByName(table, *dimension)
             }
-            Stated::Vector(parts, dimension, example) => {
+            CompiledValue::Vector(parts, dimension, example) => {
                 let mut vector = [0.0; 3];
                 for (value, part) in vector.iter_mut().zip(parts) {
-                    *value = part.number(key, (*dimension, Within::Finite), example, environment)?;
+                    *value = part.number(key, (*dimension, Bounds::Finite), example, environment)?;
                 }
-                Given::Vector(vector)
+                ResolvedValue::Vector(vector)
             }
-            Stated::Quantities(parts, dimension, within, example) => {
-                let number = |part: &Quantity| part.number(key, (*dimension, *within), example, environment);
-                Given::Quantities(parts.iter().map(number).collect::<Result<_, _>>()?, *dimension)
+            CompiledValue::Quantities(parts, dimension, within, example) => {
+                let number = |part: &CompiledQuantity| part.number(key, (*dimension, *within), example, environment);
+                ResolvedValue::Quantities(parts.iter().map(number).collect::<Result<_, _>>()?, *dimension)
             }
-            Stated::Sums(sums) => {
+            CompiledValue::Sums(sums) => {
                 let one = |sum: &Weights| {
-                    let weight = |(name, _, quantity): &(String, Location, Quantity)| {
-                        let weight = quantity.number(name, (Dimension::NONE, Within::Finite), "", environment)?;
+                    let weight = |(name, _, quantity): &(String, Location, CompiledQuantity)| {
+                        let weight = quantity.number(name, (Dimension::NONE, Bounds::Finite), "", environment)?;
                         Ok((name.clone(), weight))
                     };
                     sum.iter().map(weight).collect::<Result<Vec<_>, Problem>>()
                 };
-                Given::Sums(sums.iter().map(one).collect::<Result<_, Problem>>()?)
+                ResolvedValue::Sums(sums.iter().map(one).collect::<Result<_, Problem>>()?)
             }
-            Stated::Law(row, table) => Given::Law(law(row, table, key, environment, problems)?),
-            Stated::Table(table) => Given::Table(table.values(environment, problems)),
+            CompiledValue::Law(row, table) => ResolvedValue::Law(law(row, table, key, environment, problems)?),
+            CompiledValue::Table(table) => ResolvedValue::Table(table.values(environment, problems)),
         })
     }
 }
@@ -314,7 +320,7 @@ impl Stated {
 /// parameter (as an exponent) is read after that one.
 fn law(
     row: &'static LawInfo,
-    table: &StatedTable,
+    table: &CompiledTable,
     key: &'static str,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
@@ -324,7 +330,7 @@ fn law(
     let (raised, plain): (Vec<&Parameter>, Vec<&Parameter>) = row.parameters.iter().partition(|p| p.power.is_some());
     for parameter in plain.into_iter().chain(raised) {
         let Some(entry) = table.entry(parameter.key) else { continue };
-        let Stated::Quantity { quantity, within, example, .. } = &entry.value else { continue };
+        let CompiledValue::Quantity { quantity, within, example, .. } = &entry.value else { continue };
         let value = |key: &str| {
             let default = || row.parameters.iter().find(|p| p.key == key)?.default;
             numbers.get(key).copied().or_else(default)
@@ -358,7 +364,12 @@ const FINEST: f64 = 1e-5;
 const COARSEST: f64 = 0.5;
 
 /// Refuses a range whose end is not above its start.
-pub(crate) fn not_empty(from: f64, to: f64, end: &Quantity, dimension: Option<Dimension>) -> Result<(), Problem> {
+pub(crate) fn not_empty(
+    from: f64,
+    to: f64,
+    end: &CompiledQuantity,
+    dimension: Option<Dimension>,
+) -> Result<(), Problem> {
     if from < to {
         return Ok(());
     }

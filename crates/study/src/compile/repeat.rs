@@ -5,7 +5,7 @@
 //! indices make a grid; the first one changes slowest.
 
 use crate::syntax::expression::Expression;
-use crate::syntax::units::Fault;
+use crate::syntax::units::TextError;
 
 /// The index of a repetition: its first and last value, and whether values beyond them wrap
 /// around in names.
@@ -31,7 +31,7 @@ impl Repetition {
     }
 
     /// Returns the element with this number, from 0.
-    pub fn turn(&self, number: usize) -> Turn<'_> {
+    pub fn turn(&self, number: usize) -> Iteration<'_> {
         let mut rest = number as i64;
         let mut values = vec![0; self.indices.len()];
         for (value, index) in values.iter_mut().zip(&self.indices).rev() {
@@ -39,18 +39,18 @@ impl Repetition {
             *value = index.from + rest % length;
             rest /= length;
         }
-        Turn { indices: &self.indices, values }
+        Iteration { indices: &self.indices, values }
     }
 }
 
 /// One element of a repetition: the values of its indices.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Turn<'a> {
+pub(crate) struct Iteration<'a> {
     indices: &'a [Index],
     values: Vec<i64>,
 }
 
-impl Turn<'_> {
+impl Iteration<'_> {
     /// Returns the value of an index.
     pub fn value(&self, name: &str) -> Option<f64> {
         let at = self.indices.iter().position(|index| index.name == name)?;
@@ -71,14 +71,14 @@ impl Turn<'_> {
     /// Replaces the braces in a name by their values.
     ///
     /// # Errors
-    /// [`Fault`] with the byte range of `text` that is wrong.
-    pub fn name(&self, text: &str) -> Result<String, Fault> {
+    /// [`TextError`] with the byte range of `text` that is wrong.
+    pub fn name(&self, text: &str) -> Result<String, TextError> {
         let mut name = String::new();
         let mut at = 0;
         while let Some(open) = text[at..].find('{').map(|i| at + i) {
             let Some(close) = text[open..].find('}').map(|i| open + i) else {
                 return Err(
-                    Fault::new(open..text.len(), "this brace is not closed").help("write it as in \"blade{i}\"")
+                    TextError::new(open..text.len(), "this brace is not closed").help("write it as in \"blade{i}\"")
                 );
             };
             name.push_str(&text[at..open]);
@@ -95,21 +95,21 @@ impl Turn<'_> {
     }
 
     /// Evaluates the whole number inside braces.
-    fn whole(&self, inner: &str) -> Result<i64, Fault> {
+    fn whole(&self, inner: &str) -> Result<i64, TextError> {
         let names: Vec<&str> = self.names().collect();
         let expression = Expression::compile_with(inner, &|_| None, &|name| self.value(name), &names)?;
         let value = expression.evaluate(&[])?;
         let whole = value.si as i64;
         if value.dimension.is_some() || whole as f64 != value.si {
             let message = format!("a name needs a whole number, found {}", value.si);
-            return Err(Fault::new(0..inner.len(), message));
+            return Err(TextError::new(0..inner.len(), message));
         }
         let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let used = |index: &&Index| inner.split(|c| !word(c)).any(|part| part == index.name);
         match self.indices.iter().filter(used).collect::<Vec<_>>()[..] {
             [index] if index.wraps => Ok(index.from + (whole - index.from).rem_euclid(index.to - index.from + 1)),
             [_, _, ..] if self.indices.iter().filter(used).any(|index| index.wraps) => {
-                Err(Fault::new(0..inner.len(), "with `wrap`, braces must contain exactly one index")
+                Err(TextError::new(0..inner.len(), "with `wrap`, braces must contain exactly one index")
                     .help("write \"m{i}_{j}\""))
             }
             _ => Ok(whole),

@@ -1,10 +1,10 @@
 //! The statement of a model: its lists, files and template, and the location of a model error
 //! in them.
 
-use crate::case::names::Names;
-use crate::case::stress_stiffening::Stiffened;
-use crate::case::values::Given;
-use crate::compile::compiled::{Stated, StatedTable};
+use crate::case::names::ModelNames;
+use crate::case::stress_stiffening::StressStiffening;
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::displayed;
 use crate::syntax::suggest::{nearest, one_of};
@@ -16,25 +16,25 @@ use stickslip_numerics::sparse::Matrix;
 
 /// The statement of a model: lists of the study file or of a template, and matrices.
 #[derive(Debug, Clone)]
-pub(crate) struct ModelStatement {
-    pub lists: Lists,
-    pub template: Option<NamedTemplate>,
-    pub matrices: Option<Matrices>,
+pub(crate) struct SourceModel {
+    pub lists: ModelLists,
+    pub template: Option<TemplateSource>,
+    pub matrices: Option<MatrixSource>,
 }
 
 /// `[structure]`, with the contents of its files.
 #[derive(Debug, Clone)]
-pub(crate) struct Matrices {
-    pub table: StatedTable,
+pub(crate) struct MatrixSource {
+    pub table: CompiledTable,
     /// The structure; `None` if the files were not read.
     pub component: Option<Component>,
     /// The stiffness that rotation adds.
-    pub stiffened: Option<Stiffened>,
+    pub stiffened: Option<StressStiffening>,
     /// Number of constrained rows in the files, which the component does not contain.
     pub left_out: usize,
 }
 
-impl Matrices {
+impl MatrixSource {
     /// Returns whether `model` rotates at a speed that changes its stiffness.
     fn spins(&self, model: &Model) -> bool {
         let (own, of_model) = (self.component.as_ref(), model.substructure.as_ref().map(|own| &own.component));
@@ -48,7 +48,7 @@ impl Matrices {
         let mut hasher = crc32fast::Hasher::new();
         component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
         let (mass, damping, stiffness) = component.matrices();
-        let more = self.stiffened.as_ref().map(Stiffened::more);
+        let more = self.stiffened.as_ref().map(StressStiffening::more);
         for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
             for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
                 let place = [number, row, column].map(|index| index as u64);
@@ -62,9 +62,9 @@ impl Matrices {
 
 /// The template that a study names.
 #[derive(Debug, Clone)]
-pub(crate) struct NamedTemplate {
+pub(crate) struct TemplateSource {
     /// The table `[model]`.
-    pub table: StatedTable,
+    pub table: CompiledTable,
     /// Index of the template's file in the sources.
     pub source: usize,
     /// For every parameter: the names of the parameters that the study sets and that it depends
@@ -72,10 +72,10 @@ pub(crate) struct NamedTemplate {
     pub given: Vec<Vec<String>>,
 }
 
-impl NamedTemplate {
+impl TemplateSource {
     /// Rewords a problem in the template's file for a user who has not written that file. The
     /// location becomes that of the template's name in the study.
-    pub fn reword(&self, element: Element, table: &StatedTable, problem: &mut Problem) {
+    pub fn reword(&self, element: Element, table: &CompiledTable, problem: &mut Problem) {
         if problem.location.source == self.source {
             problem.message = self.blame(element, Some(table), &problem.key, &problem.message);
             problem.location = self.table.location_of("template", None).clone();
@@ -83,7 +83,7 @@ impl NamedTemplate {
     }
 
     /// Describes an error of an element, with the parameters on which its key `key` depends.
-    fn blame(&self, element: Element, table: Option<&StatedTable>, key: &str, message: &str) -> String {
+    fn blame(&self, element: Element, table: Option<&CompiledTable>, key: &str, message: &str) -> String {
         let (mut own, mut all) = (BTreeSet::new(), BTreeSet::new());
         if let Some(table) = table {
             table.each_quantity(&mut |of, quantity, _| {
@@ -104,20 +104,20 @@ impl NamedTemplate {
 }
 
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Lists {
-    pub place: Vec<StatedTable>,
-    pub mass: Vec<StatedTable>,
-    pub body: Vec<StatedTable>,
-    pub spring: Vec<StatedTable>,
-    pub joint: Vec<StatedTable>,
-    pub force: Vec<StatedTable>,
-    pub motion: Vec<StatedTable>,
+pub(crate) struct ModelLists {
+    pub place: Vec<CompiledTable>,
+    pub mass: Vec<CompiledTable>,
+    pub body: Vec<CompiledTable>,
+    pub spring: Vec<CompiledTable>,
+    pub joint: Vec<CompiledTable>,
+    pub force: Vec<CompiledTable>,
+    pub motion: Vec<CompiledTable>,
     /// `[disk]`; then the lists state one sector.
-    pub disk: Option<StatedDisk>,
+    pub disk: Option<DiskSource>,
 }
 
-impl Lists {
-    pub fn get_mut(&mut self, name: &str) -> Option<&mut Vec<StatedTable>> {
+impl ModelLists {
+    pub fn get_mut(&mut self, name: &str) -> Option<&mut Vec<CompiledTable>> {
         match name {
             "place" => Some(&mut self.place),
             "mass" => Some(&mut self.mass),
@@ -131,14 +131,14 @@ impl Lists {
     }
 
     /// Returns all lists, in order.
-    pub fn all(&self) -> [&Vec<StatedTable>; 7] {
+    pub fn all(&self) -> [&Vec<CompiledTable>; 7] {
         [&self.place, &self.mass, &self.body, &self.spring, &self.joint, &self.force, &self.motion]
     }
 
     /// Gives quantities at rotations of bodies the dimensions of moments and angles.
     pub fn turn(&mut self) {
         let named = self.body.iter().filter_map(|table| match table.entry("name").map(|entry| &entry.value) {
-            Some(Stated::Fixed(Given::Text(name))) => Some(name.clone()),
+            Some(CompiledValue::Fixed(ResolvedValue::Text(name))) => Some(name.clone()),
             _ => None,
         });
         let bodies: BTreeSet<String> = named.collect();
@@ -148,12 +148,12 @@ impl Lists {
         };
         for table in self.spring.iter_mut().chain(&mut self.force).chain(&mut self.motion) {
             let turned = table.entries.iter().any(|entry| match &entry.value {
-                Stated::Fixed(Given::Text(name)) => entry.key == "on" && turns(name),
-                Stated::Names(names) => names.iter().any(|(name, _)| turns(name)),
+                CompiledValue::Fixed(ResolvedValue::Text(name)) => entry.key == "on" && turns(name),
+                CompiledValue::Names(names) => names.iter().any(|(name, _)| turns(name)),
                 _ => false,
             });
             for entry in table.entries.iter_mut().filter(|_| turned) {
-                if let Stated::Quantity { dimension, example, .. } = &mut entry.value
+                if let CompiledValue::Quantity { dimension, example, .. } = &mut entry.value
                     && let Some(of_rotation) = OF_ROTATIONS.iter().find(|row| row.displacement == *dimension)
                 {
                     (*dimension, *example) = (of_rotation.rotation, of_rotation.example);
@@ -162,7 +162,7 @@ impl Lists {
         }
     }
 
-    pub fn get(&self, name: &str) -> &[StatedTable] {
+    pub fn get(&self, name: &str) -> &[CompiledTable] {
         match name {
             "place" => &self.place,
             "mass" => &self.mass,
@@ -177,22 +177,22 @@ impl Lists {
 }
 
 /// Dimensions of one quantity for a displacement and for a rotation.
-struct OfRotation {
+struct RotationDimension {
     displacement: Dimension,
     rotation: Dimension,
     example: &'static str,
 }
 
 /// The pairs of dimensions.
-const OF_ROTATIONS: [OfRotation; 4] = [
-    OfRotation { displacement: Dimension::LENGTH, rotation: Dimension::ANGLE, example: "\"0.1 deg\"" },
-    OfRotation { displacement: Dimension::FORCE, rotation: Dimension::ENERGY, example: "\"2 N m\"" },
-    OfRotation {
+const OF_ROTATIONS: [RotationDimension; 4] = [
+    RotationDimension { displacement: Dimension::LENGTH, rotation: Dimension::ANGLE, example: "\"0.1 deg\"" },
+    RotationDimension { displacement: Dimension::FORCE, rotation: Dimension::ENERGY, example: "\"2 N m\"" },
+    RotationDimension {
         displacement: Dimension::STIFFNESS,
         rotation: Dimension::ANGULAR_STIFFNESS,
         example: "\"500 N m/rad\"",
     },
-    OfRotation {
+    RotationDimension {
         displacement: Dimension::DAMPING,
         rotation: Dimension::ANGULAR_DAMPING,
         example: "\"0.01 N m s/rad\"",
@@ -201,8 +201,8 @@ const OF_ROTATIONS: [OfRotation; 4] = [
 
 /// `[disk]` as it is stated.
 #[derive(Debug, Clone)]
-pub(crate) struct StatedDisk {
-    pub table: StatedTable,
+pub(crate) struct DiskSource {
+    pub table: CompiledTable,
     /// The deviations in the pattern file.
     pub pattern: Option<Vec<f64>>,
     /// Pairs of nodes on the low and the high side of a sector given by matrices.
@@ -213,12 +213,12 @@ pub(crate) struct StatedDisk {
     pub blade: Option<Vec<String>>,
 }
 
-impl StatedDisk {
+impl DiskSource {
     /// Returns the index of the parameter that differs from sector to sector, if there is one.
     pub fn mistuned(&self, names: &[String]) -> Option<usize> {
-        let Stated::Table(table) = &self.table.entry("mistuning")?.value else { return None };
+        let CompiledValue::Table(table) = &self.table.entry("mistuning")?.value else { return None };
         match &table.entry("of")?.value {
-            Stated::Names(of) if of.len() == 1 => names.iter().position(|name| *name == of[0].0),
+            CompiledValue::Names(of) if of.len() == 1 => names.iter().position(|name| *name == of[0].0),
             _ => None,
         }
     }
@@ -226,7 +226,7 @@ impl StatedDisk {
 
 /// Converts a model error to a problem at its location in the file. `model` provides the
 /// existing names.
-pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: &Model) -> Problem {
+pub(crate) fn problem_of(structure: &SourceModel, error: &ModelError, model: &Model) -> Problem {
     let (list, index) = error.element.entry();
     let whole = Location::default();
     // if the export at rest is valid, the error lies in its sum with the second export
@@ -250,7 +250,7 @@ pub(crate) fn problem_of(structure: &ModelStatement, error: &ModelError, model: 
         }
     };
     let places = model.place_names();
-    let nodes = Names::of_places(model);
+    let nodes = ModelNames::of_places(model);
     let help = match &error.wrong_name {
         Some(wrong) => Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
             (Some(directions), _) => format!("write {}", one_of(directions.iter().map(String::as_str))),

@@ -8,7 +8,7 @@ use crate::syntax::suggest::shown;
 use std::collections::BTreeSet;
 
 /// The value of a parameter in a case, as stated.
-pub(crate) struct Stated<'a> {
+pub(crate) struct StatedValue<'a> {
     pub text: &'a str,
     pub location: &'a Location,
     /// `None` for a value from a range.
@@ -17,7 +17,11 @@ pub(crate) struct Stated<'a> {
 
 /// Returns the parameters outside the template file on which the parameters `of` depend, `of`
 /// included, in index order.
-pub(crate) fn given(template: usize, stated: &[Stated<'_>], of: impl IntoIterator<Item = usize>) -> BTreeSet<usize> {
+pub(crate) fn given(
+    template: usize,
+    stated: &[StatedValue<'_>],
+    of: impl IntoIterator<Item = usize>,
+) -> BTreeSet<usize> {
     let (mut found, mut open) = (BTreeSet::new(), of.into_iter().collect::<Vec<_>>());
     while let Some(next) = open.pop() {
         if found.insert(next) {
@@ -30,7 +34,12 @@ pub(crate) fn given(template: usize, stated: &[Stated<'_>], of: impl IntoIterato
 
 /// Moves a problem of a template parameter to the first user value that causes it; returns
 /// other problems unchanged.
-pub(crate) fn blame(problem: Problem, template: Option<usize>, names: &[String], stated: &[Stated<'_>]) -> Problem {
+pub(crate) fn blame(
+    problem: Problem,
+    template: Option<usize>,
+    names: &[String],
+    stated: &[StatedValue<'_>],
+) -> Problem {
     let Some(template) = template.filter(|source| *source == problem.location.source) else { return problem };
     let Some(wrong) = names.iter().position(|name| *name == problem.key) else { return problem };
     let given = given(template, stated, [wrong]);

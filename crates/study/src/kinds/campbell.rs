@@ -8,18 +8,18 @@
 use super::nodal_diameter::{STATES, waves};
 use super::shared::keys::anything;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
-use crate::kinds::info::{Complaint, KindInfo};
+use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::Kind;
 use crate::results::columns::FREQUENCY;
 use crate::results::dataset::{Figure, Panel, Series, Style, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, Stretch, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, largest, numbers, words};
 use crate::results::notes::Note;
-use crate::results::table_builder::Rows;
-use crate::run::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::SPEEDS;
-use crate::syntax::key::{Takes, default, required};
+use crate::syntax::key::{ValueType, default, required};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, ReductionEvidence};
@@ -42,21 +42,21 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             required(
                 "speed",
-                Takes::Frequencies(SPEEDS),
+                ValueType::Frequencies(SPEEDS),
                 "speeds of rotation as frequencies; zero is allowed",
                 "{ from = \"10 Hz\", to = \"120 Hz\", points = 56 }",
             ),
             default(
                 "parameter",
-                Takes::Name,
+                ValueType::Name,
                 PARAMETER,
                 "the parameter that holds the speed, if stiffnesses depend on it; its stated value is then ignored",
                 "\"speed\"",
             ),
-            default("engine_orders", Takes::Count(1, 200), "6", "highest engine order", "6"),
+            default("engine_orders", ValueType::Count(1, 200), "6", "highest engine order", "6"),
             default(
                 "modes",
-                Takes::Count(1, 100),
+                ValueType::Count(1, 100),
                 "3",
                 "number of lowest modes; for a tuned disk, the number for every nodal diameter",
                 "3",
@@ -69,26 +69,26 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[TABLE, CROSSINGS],
     },
-    grain: |_| Grain::Case,
+    grain: |_| UnitSize::Case,
     cost,
     warnings: |_| Vec::new(),
     compute,
     draw,
 };
 
-fn check(values: &Values, _: &Model, _: usize) -> Result<(), Complaint> {
+fn check(values: &Values, _: &Model, _: usize) -> Result<(), KeyError> {
     let speeds = values.frequencies("speed").map_or(0, crate::case::values::Frequencies::len);
     if speeds >= 2 {
         return Ok(());
     }
     let message = "a Campbell diagram needs at least two speeds";
-    Err(Complaint::new("speed", message, "write { from = \"10 Hz\", to = \"120 Hz\", points = 56 }"))
+    Err(KeyError::new("speed", message, "write { from = \"10 Hz\", to = \"120 Hz\", points = 56 }"))
 }
 
 /// Time of an eigenvalue problem per cube of its size, s.
 const EIGEN: f64 = 1e-8;
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let values = &costing.case.values;
     let speeds = values.frequencies("speed").map_or(2, crate::case::values::Frequencies::len) as f64;
     let count = |key: &str, or: u64| values.count(key).unwrap_or(or) as f64;
@@ -103,8 +103,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let size = sectors.map_or(costing.masses, |sectors| 2.0 * costing.masses / sectors);
     Cost {
         tables: vec![
-            Shape { rows: costing.cases * speeds * lines, numbers: costing.varied + 4.0, words: 1.0 },
-            Shape { rows: costing.cases * crossings, numbers: costing.varied + 5.0, words: 1.0 },
+            TableShape { rows: costing.cases * speeds * lines, numbers: costing.varied + 4.0, words: 1.0 },
+            TableShape { rows: costing.cases * crossings, numbers: costing.varied + 5.0, words: 1.0 },
         ],
         drawn: costing.cases * (speeds * lines + crossings),
         unit: speeds * lines * 8.0,
@@ -116,7 +116,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 /// A natural frequency, rad/s, with state of the joints (index in [`STATES`]), nodal diameter
 /// of a tuned disk, and mode number from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Natural {
+struct NaturalFrequency {
     state: usize,
     diameter: Option<usize>,
     mode: usize,
@@ -125,18 +125,18 @@ struct Natural {
     reduction: Option<ReductionEvidence>,
 }
 
-impl Natural {
-    fn is_like(&self, other: &Natural) -> bool {
+impl NaturalFrequency {
+    fn is_like(&self, other: &NaturalFrequency) -> bool {
         (self.state, self.diameter, self.mode) == (other.state, other.diameter, other.mode)
     }
 }
 
 /// Returns the natural frequencies of a model.
-fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
+fn naturals(model: &Model, most: usize) -> Result<Vec<NaturalFrequency>, String> {
     let mut found = Vec::new();
     let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes, reduction| {
         let all = modes.elastic.iter().take(most).enumerate();
-        found.extend(all.map(|(mode, one)| Natural { state, diameter, mode, omega: one.omega, reduction }));
+        found.extend(all.map(|(mode, one)| NaturalFrequency { state, diameter, mode, omega: one.omega, reduction }));
     };
     if model.ring.is_some_and(|ring| ring.equal) {
         let reduction = model.assemble().map_err(|error| error.to_string())?.reduction_evidence();
@@ -164,8 +164,12 @@ fn excited(order: usize, sectors: usize) -> usize {
 
 /// Pairs every engine order with the modes that it can excite; on a tuned disk, those of its
 /// nodal diameter.
-fn met(found: &[Natural], orders: usize, sectors: Option<usize>) -> impl Iterator<Item = (f64, &Natural)> {
-    let meets = move |natural: &Natural, order: usize| match (natural.diameter, sectors) {
+fn met(
+    found: &[NaturalFrequency],
+    orders: usize,
+    sectors: Option<usize>,
+) -> impl Iterator<Item = (f64, &NaturalFrequency)> {
+    let meets = move |natural: &NaturalFrequency, order: usize| match (natural.diameter, sectors) {
         (Some(diameter), Some(sectors)) => diameter == excited(order, sectors),
         _ => true,
     };
@@ -183,17 +187,17 @@ const MOST_REFINED: usize = 60;
 const FOUND: f64 = 1e-11;
 
 /// The evaluation of one case over its speeds.
-struct Diagram<'a> {
-    work: &'a Work<'a>,
-    prepared: &'a Prepared,
+struct CampbellDiagram<'a> {
+    work: &'a UnitTask<'a>,
+    prepared: &'a PreparedCase,
     most: usize,
     /// The frequencies, if they do not depend on the speed.
-    same: Option<Result<Vec<Natural>, String>>,
+    same: Option<Result<Vec<NaturalFrequency>, String>>,
 }
 
-impl Diagram<'_> {
+impl CampbellDiagram<'_> {
     /// Returns the natural frequencies at a speed, rad/s.
-    fn at(&self, speed: f64) -> Result<Vec<Natural>, String> {
+    fn at(&self, speed: f64) -> Result<Vec<NaturalFrequency>, String> {
         if let Some(same) = &self.same {
             return same.clone();
         }
@@ -212,10 +216,10 @@ impl Diagram<'_> {
     fn crossing(
         &self,
         order: f64,
-        (mut a, one): (f64, &Natural),
-        (mut b, other): (f64, &Natural),
+        (mut a, one): (f64, &NaturalFrequency),
+        (mut b, other): (f64, &NaturalFrequency),
     ) -> Result<f64, String> {
-        let excess = |speed: f64, mode: &Natural| (mode.omega - order * speed) * (mode.omega + order * speed);
+        let excess = |speed: f64, mode: &NaturalFrequency| (mode.omega - order * speed) * (mode.omega + order * speed);
         let (mut at_a, mut at_b) = (excess(a, one), excess(b, other));
         let (mut last, mut slow) = (f64::NAN, 0);
         for _ in 0..MOST_REFINED {
@@ -246,23 +250,23 @@ impl Diagram<'_> {
     }
 }
 
-fn compute(work: &Work<'_>) -> Computed {
+fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let values = &prepared.case.values;
     let name = values.text("parameter").unwrap_or(PARAMETER);
     let most = values.count("modes").unwrap_or(3) as usize;
     let depends = prepared.case.parameters.contains_key(name);
     let same = (!depends).then(|| naturals(&prepared.case.model, most));
-    let diagram = Diagram { work, prepared, most, same };
-    let mut part = Part::default();
+    let diagram = CampbellDiagram { work, prepared, most, same };
+    let mut part = UnitResult::default();
     if !depends {
         let message = format!("The study has no parameter `{name}`, so the frequencies do not depend on the speed.");
         part.notes.push(Note::Said(message));
     }
-    let (mut rows, mut crossings) = (Rows::default(), Rows::default());
+    let (mut rows, mut crossings) = (TableBuilder::default(), TableBuilder::default());
     let orders = values.count("engine_orders").unwrap_or(6) as usize;
     let sectors = prepared.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors);
-    let mut before: Option<(f64, Vec<Natural>)> = None;
+    let mut before: Option<(f64, Vec<NaturalFrequency>)> = None;
     for speed in values.frequencies("speed").into_iter().flat_map(|speeds| speeds.iter()) {
         let place = || format!("{}speed = {} Hz", label(prepared), hertz(speed));
         if work.context.stopped() {
@@ -290,7 +294,7 @@ fn compute(work: &Work<'_>) -> Computed {
                 }
                 match diagram.crossing(order, (*last, was), (speed, natural)) {
                     Ok(at) => {
-                        write(prepared, at, &Natural { omega: order * at, ..*natural }, &mut crossings);
+                        write(prepared, at, &NaturalFrequency { omega: order * at, ..*natural }, &mut crossings);
                         crossings.integer(ORDER, order as u64);
                         crossings.end();
                     }
@@ -305,12 +309,12 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-fn label(prepared: &Prepared) -> String {
+fn label(prepared: &PreparedCase) -> String {
     let label = prepared.case.label();
     if label.is_empty() { label } else { format!("{label}, ") }
 }
 
-fn write(prepared: &Prepared, speed: f64, natural: &Natural, rows: &mut Rows) {
+fn write(prepared: &PreparedCase, speed: f64, natural: &NaturalFrequency, rows: &mut TableBuilder) {
     rows.varied(&prepared.case);
     rows.text(JOINTS, STATES[natural.state]);
     if let Some(diameter) = natural.diameter {
@@ -324,13 +328,13 @@ fn write(prepared: &Prepared, speed: f64, natural: &Natural, rows: &mut Rows) {
 
 /// Draws a panel per case: frequencies, engine order lines and crossings. For a tuned disk it
 /// shows the frequencies that an engine order excites.
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (x, x_factor) = drawing.axis(0, "speed of rotation", largest(table, [SPEED.to_owned()]), "Hz");
     let (y, y_factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
     let crossings = drawing.table(CROSSINGS);
     let marks = crossings.map(|table| drawing.stretches(table)).unwrap_or_default();
-    let panel = |stretch: &Stretch, title: String| {
+    let panel = |stretch: &CaseRows, title: String| {
         let case = drawing.study.case(stretch.case).ok();
         let orders = case.as_ref().and_then(|case| case.values.count("engine_orders")).unwrap_or(6) as usize;
         let ring = case.and_then(|case| case.model.ring).filter(|ring| ring.equal);
@@ -372,7 +376,7 @@ const ROOM: f64 = 1.1;
 
 fn frequencies(
     table: &Table,
-    stretch: &Stretch,
+    stretch: &CaseRows,
     (x_factor, y_factor): (f64, f64),
     shown: &dyn Fn(Option<u64>) -> bool,
 ) -> Vec<Series> {

@@ -21,7 +21,7 @@ pub struct KindInfo {
     ///
     /// The last argument is the number of values of the last parameter of `vary`, 1 without
     /// `vary`.
-    pub check: fn(&Values, &Model, usize) -> Result<(), Complaint>,
+    pub check: fn(&Values, &Model, usize) -> Result<(), KeyError>,
     /// Dimensions of the two axes of the figure, if they are the same in every panel.
     pub axes: [Option<Dimension>; 2],
     /// True if the kind finds its orbits with the method of `[method]`, which must then support
@@ -39,7 +39,7 @@ pub struct KindInfo {
 
 /// An error that a kind finds in the values of its keys.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Complaint {
+pub struct KeyError {
     /// The key; the error is reported at its value, or at `[study]` if the key is absent.
     pub key: &'static str,
     /// The wrong name inside the value of the key, if the error is about a name.
@@ -50,9 +50,9 @@ pub struct Complaint {
     pub help: Option<String>,
 }
 
-impl Complaint {
+impl KeyError {
     pub(crate) fn new(key: &'static str, message: impl Into<String>, help: impl Into<String>) -> Self {
-        Complaint { key, name: None, message: message.into(), help: Some(help.into()) }
+        KeyError { key, name: None, message: message.into(), help: Some(help.into()) }
     }
 
     /// Returns the complaint about a name in the value of `key` that is not one of
@@ -64,6 +64,6 @@ impl Complaint {
             None => format!("choose {}", suggest::one_of(candidates.iter().take(12).copied())),
         };
         let message = format!("there is no {what} `{}`", suggest::shown(name));
-        Complaint { key, name: Some(name.to_owned()), message, help: Some(help) }
+        KeyError { key, name: Some(name.to_owned()), message, help: Some(help) }
     }
 }

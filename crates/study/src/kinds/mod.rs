@@ -23,7 +23,7 @@ mod transient;
 use crate::case::study::Study;
 use crate::run::output_columns;
 
-pub use crate::kinds::info::{Complaint, KindInfo};
+pub use crate::kinds::info::{KeyError, KindInfo};
 pub use crate::kinds::kind::Kind;
 
 /// All study kinds, in the order in which lists show them.

@@ -1,28 +1,28 @@
 //! Nonlinear modes: frequency and equivalent damping over amplitude.
 
-use super::shared::disk_shape::{self, Around};
+use super::shared::disk_shape::{self, PlaceInSectors};
 use super::shared::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::warnings::of_mode;
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{amplitude_in, amplitude_of, first_harmonic_in, first_harmonic_of, phase_of};
-use crate::results::dataset::{Axis, Figure, Panel, Series, Table, Values as Cells};
+use crate::results::dataset::{Axis, CellValues, Figure, Panel, Series, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join, largest, numbers};
 use crate::results::notes::Note;
-use crate::results::table_builder::Rows;
-use crate::run::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::{display_unit, significant};
-use crate::syntax::key::{Key, Takes, Within, default, required};
+use crate::syntax::key::{Bounds, Key, ValueType, default, required};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode, unit};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
 
-const LENGTH: Takes = Takes::Quantity(Dimension::LENGTH, Within::Positive);
+const LENGTH: ValueType = ValueType::Quantity(Dimension::LENGTH, Bounds::Positive);
 
 /// Largest number of points of one mode.
 const MOST_POINTS: i64 = 10_000;
@@ -30,7 +30,7 @@ const MOST_POINTS: i64 = 10_000;
 const AMPLITUDE: &[Key] = &[
     required("from", LENGTH, "smallest amplitude", "\"1 um\""),
     required("to", LENGTH, "largest amplitude", "\"10 mm\""),
-    default("points", Takes::Count(2, MOST_POINTS), "61", "points, evenly spaced in the logarithm", "61"),
+    default("points", ValueType::Count(2, MOST_POINTS), "61", "points, evenly spaced in the logarithm", "61"),
 ];
 
 pub(super) const KIND: Kind = Kind {
@@ -40,13 +40,13 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             required(
                 "amplitude",
-                Takes::Table(AMPLITUDE),
+                ValueType::Table(AMPLITUDE),
                 "amplitude of the place that moves most in the mode of the structure without joints",
                 "{ from = \"1 um\", to = \"10 mm\" }",
             ),
-            default("mode", Takes::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),
-            default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
-            default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
+            default("mode", ValueType::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),
+            default("harmonics", ValueType::Count(1, 255), "15", "highest harmonic", "15"),
+            default("samples", ValueType::Count(8, 1 << 16), "1024", "samples per period", "1024"),
         ],
         check,
         axes: [Some(Dimension::LENGTH), None],
@@ -57,7 +57,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["modes", "modes_summary"],
     },
-    grain: |_| Grain::Case,
+    grain: |_| UnitSize::Case,
     cost,
     warnings: of_mode,
     compute,
@@ -71,7 +71,7 @@ const FOLLOWED: f64 = 8.0;
 /// modes.
 const STEPS: (f64, f64) = (100.0, 200.0);
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let values = &costing.case.values;
     let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
     let rows = costing.cases * points;
@@ -80,8 +80,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let elimination = costing.eliminated((harmonics + 1.0) * costing.masses);
     Cost {
         tables: vec![
-            Shape { rows, numbers: costing.varied + 4.0 + 3.0 * costing.places, words: 0.0 },
-            Shape { rows: costing.cases, numbers: costing.varied + 5.0, words: 0.0 },
+            TableShape { rows, numbers: costing.varied + 4.0 + 3.0 * costing.places, words: 0.0 },
+            TableShape { rows: costing.cases, numbers: costing.varied + 5.0, words: 0.0 },
         ],
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
@@ -91,12 +91,12 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let range = values.table("amplitude");
     if let Some((from, to)) = range.and_then(|t| t.quantity("from").zip(t.quantity("to")))
         && from >= to
     {
-        return Err(Complaint::new("amplitude", "the range is empty", "`from` must be below `to`"));
+        return Err(KeyError::new("amplitude", "the range is empty", "`from` must be below `to`"));
     }
     check_samples(values)?;
     let number = values.count("mode").unwrap_or(1);
@@ -104,19 +104,19 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let masses = of_masses.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
         let message = format!("there is no mode {number}: the structure has {masses} degrees of freedom");
-        return Err(Complaint::new("mode", message, "modes count from 1, by ascending frequency"));
+        return Err(KeyError::new("mode", message, "modes count from 1, by ascending frequency"));
     }
     Ok(())
 }
 
-fn compute(work: &Work<'_>) -> Computed {
+fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
-    let mut part = Part::default();
+    let mut part = UnitResult::default();
     let unit = unit(&prepared.system, number(prepared)).map_err(|error| (prepared.case.index, error))?;
     let Some(unit) = unit else {
         (work.context.finished)();
         part.count(|| location_of(prepared), "failed", Some(UNSEEN.to_owned()));
-        part.tables = vec![Rows::default(), Rows::default()];
+        part.tables = vec![TableBuilder::default(), TableBuilder::default()];
         return Ok(part);
     };
     let mode = follow(prepared, unit).map_err(|error| (prepared.case.index, error))?;
@@ -125,7 +125,7 @@ fn compute(work: &Work<'_>) -> Computed {
     part.count(|| location_of(prepared), status, reason);
     let place = location_of(prepared);
     part.notes.extend(remarks(unit, &mode).into_iter().map(|text| Note::of_case(&place, text)));
-    let (mut rows, mut summary) = (Rows::default(), Rows::default());
+    let (mut rows, mut summary) = (TableBuilder::default(), TableBuilder::default());
     let (mut stretch, mut before) = (1, f64::INFINITY);
     let reduction = prepared.system.reduction_evidence();
     for point in &mode.points {
@@ -162,7 +162,7 @@ fn compute(work: &Work<'_>) -> Computed {
 }
 
 /// Returns the index of the mode, from 0.
-fn number(prepared: &Prepared) -> usize {
+fn number(prepared: &PreparedCase) -> usize {
     prepared.case.values.count("mode").unwrap_or(1) as usize - 1
 }
 
@@ -174,7 +174,7 @@ const UNSEEN: &str = "the structure has no such mode, or no place moves in it; c
 ///
 /// `unit` is the modal amplitude per unit displacement of the place that moves most, m √kg per
 /// m.
-fn follow(prepared: &Prepared, unit: f64) -> Result<Mode, MethodError> {
+fn follow(prepared: &PreparedCase, unit: f64) -> Result<Mode, MethodError> {
     let values = &prepared.case.values;
     let range = values.table("amplitude");
     let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0) * unit;
@@ -191,7 +191,7 @@ fn follow(prepared: &Prepared, unit: f64) -> Result<Mode, MethodError> {
 }
 
 /// Returns the mode and its parameters in words.
-fn location_of(prepared: &Prepared) -> String {
+fn location_of(prepared: &PreparedCase) -> String {
     let (mode, label) = (format!("mode {}", number(prepared) + 1), prepared.case.label());
     if label.is_empty() { mode } else { format!("{label}, {mode}") }
 }
@@ -261,7 +261,7 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
 
 /// Draws the place that moves most at the largest amplitude of every case. For a disk it adds
 /// the shapes at the smallest and largest amplitude.
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(table), Some(system)) = (drawing.table("modes"), drawing.system()) else { return Figure::default() };
     // results of earlier versions have only the first harmonic in this column
     let column = |place: &String| amplitude_of(place);
@@ -275,48 +275,49 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, displacements.iter().map(column)), "m");
     let stretches = drawing.stretches(table);
     let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
-        Some(Cells::Integer(parts)) => parts.clone(),
+        Some(CellValues::Integer(parts)) => parts.clone(),
         _ => vec![1; table.rows()],
     };
-    let widest_of = |stretch: &Stretch| {
+    let widest_of = |stretch: &CaseRows| {
         let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
         let moves = |place: &&String| at_last(place).unwrap_or(0.0);
         displacements.iter().max_by(|a, b| moves(a).total_cmp(&moves(b)))
     };
     // draws in one band show one place: that of the first draw
     let common = stretches.first().filter(|_| drawing.study.draws().is_some()).and_then(widest_of);
-    let panel = |stretches: &[Stretch], title: &str, (quantity, unit_of): (&str, &str), read: &str, scale: f64| Panel {
-        title: title.to_owned(),
-        x: x_axis.clone().log(),
-        y: Axis::new(quantity, unit_of),
-        series: stretches
-            .iter()
-            .enumerate()
-            .flat_map(|(colour, stretch)| {
-                let Some(widest) = common.or_else(|| widest_of(stretch)) else { return Vec::new() };
-                // the curves of many draws form one band
-                let alone = stretch.varied.is_empty() || drawing.study.draws().is_some();
-                let label = if alone { widest.clone() } else { stretch.label() };
-                let mut from = stretch.rows.start;
-                // the line is interrupted at turning points of the curve
-                let lines = parts[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
-                    let rows = from..from + part.len();
-                    from = rows.end;
-                    let x = numbers(table, &column(widest), rows.clone()).iter().map(|x| x * factor).collect();
-                    let y = numbers(table, read, rows).iter().map(|y| y * scale).collect();
-                    Series::line(label.clone(), x, y, colour)
-                });
-                lines.collect()
-            })
-            .collect(),
-        ..Panel::default()
-    };
-    let both = |stretches: &[Stretch], title: &str| {
+    let panel =
+        |stretches: &[CaseRows], title: &str, (quantity, unit_of): (&str, &str), read: &str, scale: f64| Panel {
+            title: title.to_owned(),
+            x: x_axis.clone().log(),
+            y: Axis::new(quantity, unit_of),
+            series: stretches
+                .iter()
+                .enumerate()
+                .flat_map(|(colour, stretch)| {
+                    let Some(widest) = common.or_else(|| widest_of(stretch)) else { return Vec::new() };
+                    // the curves of many draws form one band
+                    let alone = stretch.varied.is_empty() || drawing.study.draws().is_some();
+                    let label = if alone { widest.clone() } else { stretch.label() };
+                    let mut from = stretch.rows.start;
+                    // the line is interrupted at turning points of the curve
+                    let lines = parts[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
+                        let rows = from..from + part.len();
+                        from = rows.end;
+                        let x = numbers(table, &column(widest), rows.clone()).iter().map(|x| x * factor).collect();
+                        let y = numbers(table, read, rows).iter().map(|y| y * scale).collect();
+                        Series::line(label.clone(), x, y, colour)
+                    });
+                    lines.collect()
+                })
+                .collect(),
+            ..Panel::default()
+        };
+    let both = |stretches: &[CaseRows], title: &str| {
         let frequency = panel(stretches, title, ("frequency", "Hz"), "frequency_Hz", 1.0);
         vec![frequency, panel(stretches, title, ("equivalent damping ratio", "%"), "damping_ratio", 100.0)]
     };
     if drawing.study.draws().is_some() {
-        let of_draw = |stretch: &Stretch, title: String| both(std::slice::from_ref(stretch), &title);
+        let of_draw = |stretch: &CaseRows, title: String| both(std::slice::from_ref(stretch), &title);
         return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
     }
     let mut panels = both(&stretches, "");
@@ -332,7 +333,12 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
 /// largest.
 ///
 /// The colours begin after those of the `cases` curves.
-fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cases): (&Stretch, usize)) -> Vec<Panel> {
+fn wheels(
+    drawing: &FigureInput<'_>,
+    table: &Table,
+    places: &[String],
+    (stretch, cases): (&CaseRows, usize),
+) -> Vec<Panel> {
     let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
     let Some(ring) = case.model.ring else { return Vec::new() };
     let shown: Vec<&String> = places.iter().filter(|name| drawing.shows(name)).collect();
@@ -350,7 +356,12 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, places: &[String], (stretch, cas
             None => at(&amplitude_of(name)),
         };
         let moves = shown.iter().map(|name| (name.as_str(), size(name), at(&phase_of(name))));
-        disk_shape::panel(&Around::of_ring(moves)?, ring.sectors, join([stretch.label(), words, frequency]), cases)
+        disk_shape::panel(
+            &PlaceInSectors::of_ring(moves)?,
+            ring.sectors,
+            join([stretch.label(), words, frequency]),
+            cases,
+        )
     };
     ends.into_iter().filter_map(wheel).collect()
 }

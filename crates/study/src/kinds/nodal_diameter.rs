@@ -1,20 +1,20 @@
 //! Frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck,
 //! and mode shapes.
 
-use super::shared::disk_shape::{self, Around, of_sector};
+use super::shared::disk_shape::{self, PlaceInSectors, of_sector};
 use super::shared::keys::anything;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
-use crate::kinds::info::{Complaint, KindInfo};
+use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::Kind;
 use crate::results::columns::{FREQUENCY, phase_of, shape_of};
 use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers, words};
-use crate::results::table_builder::Rows;
-use crate::run::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join, largest, numbers, words};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::significant;
-use crate::syntax::key::{Takes, default, optional};
+use crate::syntax::key::{ValueType, default, optional};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, WaveModes};
 
@@ -34,22 +34,28 @@ pub(super) const KIND: Kind = Kind {
         summary: "natural frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck, \
             and mode shapes",
         keys: &[
-            default("modes", Takes::Count(1, 100), "4", "lowest modes of every nodal diameter", "4"),
-            default(SHAPES, Takes::Flag, "true", "draws the mode shapes; the table always contains them", "false"),
+            default("modes", ValueType::Count(1, 100), "4", "lowest modes of every nodal diameter", "4"),
+            default(SHAPES, ValueType::Flag, "true", "draws the mode shapes; the table always contains them", "false"),
             optional(
                 DIAMETER,
-                Takes::Count(0, 100_000),
+                ValueType::Count(0, 100_000),
                 "the nodal diameter whose lowest modes are drawn; default: the first mode (or `mode`) of the lowest \
                  nodal diameters",
                 "3",
             ),
             optional(
                 MODE,
-                Takes::Count(1, 100),
+                ValueType::Count(1, 100),
                 "number of the drawn mode, by ascending frequency in its nodal diameter",
                 "1",
             ),
-            default(JOINTS, Takes::Choice(states), STATES[0], "state of the joints in the drawn shapes", "\"stuck\""),
+            default(
+                JOINTS,
+                ValueType::Choice(states),
+                STATES[0],
+                "state of the joints in the drawn shapes",
+                "\"stuck\"",
+            ),
         ],
         check,
         axes: [Some(Dimension::NONE), Some(Dimension::FREQUENCY)],
@@ -58,7 +64,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[TABLE],
     },
-    grain: |_| Grain::Case,
+    grain: |_| UnitSize::Case,
     cost,
     warnings: |_| Vec::new(),
     compute,
@@ -71,27 +77,27 @@ fn states() -> Vec<(&'static str, &'static str)> {
     vec![(STATES[0], "no joint carries a force"), (STATES[1], "no joint slips")]
 }
 
-fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     check_disk(model)?;
     let (most, sectors) = (values.count("modes").unwrap_or(4), model.ring.map_or(0, |ring| ring.sectors as u64));
     if let Some(diameter) = values.count(DIAMETER).filter(|diameter| 2 * diameter > sectors) {
         let message = format!("a disk of {sectors} sectors has no {diameter} nodal diameters");
-        return Err(Complaint::new(DIAMETER, message, format!("choose a nodal diameter from 0 to {}", sectors / 2)));
+        return Err(KeyError::new(DIAMETER, message, format!("choose a nodal diameter from 0 to {}", sectors / 2)));
     }
     if let Some(mode) = values.count(MODE).filter(|mode| *mode > most) {
         let message = format!("mode {mode} is not among the {most} lowest that are computed");
-        return Err(Complaint::new(MODE, message, format!("write modes = {mode}, or a mode from 1 to {most}")));
+        return Err(KeyError::new(MODE, message, format!("write modes = {mode}, or a mode from 1 to {most}")));
     }
     Ok(())
 }
 
 /// Checks that the model is a disk of equal sectors.
-fn check_disk(model: &Model) -> Result<(), Complaint> {
+fn check_disk(model: &Model) -> Result<(), KeyError> {
     match model.ring {
         Some(ring) if ring.equal => Ok(()),
         Some(_) => {
             let message = "the sectors differ, so the modes of this mistuned disk have no nodal diameter";
-            Err(Complaint::new(
+            Err(KeyError::new(
                 "kind",
                 message,
                 "remove `mistuning` from [disk], or use kind = \"modes\" for the modes of the whole ring",
@@ -99,19 +105,19 @@ fn check_disk(model: &Model) -> Result<(), Complaint> {
         }
         None => {
             let message = "the model is not a disk; only disks have nodal diameters";
-            Err(Complaint::new("kind", message, "state one sector, and add [disk] with `sectors`"))
+            Err(KeyError::new("kind", message, "state one sector, and add [disk] with `sectors`"))
         }
     }
 }
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let modes = costing.case.values.count("modes").unwrap_or(4) as f64;
     let sectors = costing.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
     let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * costing.masses / sectors);
     let rows = costing.cases * waves * 2.0 * modes;
     let shapes = 2.0 * costing.places / sectors;
     Cost {
-        tables: vec![Shape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
+        tables: vec![TableShape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
         unit: if each > SPARSE { FACTOR * each } else { 8.0 * each * each },
         spared: None,
@@ -145,10 +151,10 @@ pub(super) fn waves(model: &Model, most: usize) -> Result<Vec<WaveModes>, String
     }
 }
 
-fn compute(work: &Work<'_>) -> Computed {
+fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
-    let mut part = Part::default();
-    let mut rows = Rows::default();
+    let mut part = UnitResult::default();
+    let mut rows = TableBuilder::default();
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
     match waves(&prepared.case.model, most) {
         Ok(waves) => {
@@ -162,11 +168,11 @@ fn compute(work: &Work<'_>) -> Computed {
     Ok(part)
 }
 
-fn location_of(prepared: &Prepared) -> String {
+fn location_of(prepared: &PreparedCase) -> String {
     prepared.case.label()
 }
 
-fn write(prepared: &Prepared, waves: &[WaveModes], rows: &mut Rows) {
+fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) {
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
     let places = places(&prepared.case.model);
     for (state, name) in STATES.into_iter().enumerate() {
@@ -205,10 +211,10 @@ fn places(model: &Model) -> Vec<(String, String)> {
 /// Draws a panel per case: a line with marks for every mode, with joints free and joints stuck.
 ///
 /// Shapes follow if the figure has room.
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
-    let panel = |stretch: &Stretch, title: String| Panel {
+    let panel = |stretch: &CaseRows, title: String| Panel {
         title,
         x: Axis::new("nodal diameters", "").whole(),
         y: y.clone(),
@@ -217,7 +223,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     let stretches = drawing.stretches(table);
     let room = stretches.len() * (1 + WHEELS) <= MOST_PANELS;
-    let of_case = |stretch: &Stretch, title: String| {
+    let of_case = |stretch: &CaseRows, title: String| {
         let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
         std::iter::once(panel(stretch, title)).chain(shapes).collect::<Vec<_>>()
     };
@@ -228,7 +234,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
 ///
 /// These are the lowest modes of one nodal diameter, one mode of the lowest nodal diameters, or
 /// one mode of one nodal diameter.
-fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel> {
+fn wheels(drawing: &FigureInput<'_>, table: &Table, stretch: &CaseRows) -> Vec<Panel> {
     let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
     let (Some(ring), values) = (case.model.ring, &case.values) else { return Vec::new() };
     let (Some(diameters), Some(modes)) = (table.integers(DIAMETER), table.integers(MODE)) else { return Vec::new() };
@@ -255,7 +261,7 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel>
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
         let around = |(_, place): &(String, String)| {
             let moves = (at(&shape_of(place)), at(&phase_of(place)));
-            Around::of_wave(place.clone(), moves, diameter as usize, ring.sectors)
+            PlaceInSectors::of_wave(place.clone(), moves, diameter as usize, ring.sectors)
         };
         let many = if diameter == 1 { "" } else { "s" };
         let frequency = format!("{} Hz", significant(frequencies[row], 5));
@@ -267,7 +273,7 @@ fn wheels(drawing: &Drawing<'_>, table: &Table, stretch: &Stretch) -> Vec<Panel>
     stretch.rows.clone().filter(wanted).take(WHEELS).filter_map(wheel).collect()
 }
 
-fn lines(table: &Table, stretch: &Stretch, factor: f64) -> Vec<Series> {
+fn lines(table: &Table, stretch: &CaseRows, factor: f64) -> Vec<Series> {
     let (Some(diameters), Some(modes)) = (table.integers(DIAMETER), table.integers(MODE)) else { return Vec::new() };
     let states = words(table, JOINTS);
     let frequencies = numbers(table, FREQUENCY, 0..table.rows());

@@ -3,19 +3,19 @@
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
 use super::shared::orbit_sweep;
 use crate::case::values::hertz;
-use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::warnings::driven;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, MOST_PANELS, Stretch, join, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join, largest, numbers};
 use crate::results::notes::Note;
-use crate::results::table_builder::Rows;
-use crate::run::point_row::{Summary, location_of};
-use crate::run::work::{Computed, Part, Prepared, Work};
+use crate::results::table_builder::TableBuilder;
+use crate::run::point_row::{PointRow, location_of};
+use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
 use crate::syntax::format::{display_unit, shown_hertz};
-use crate::syntax::key::{Takes, default};
+use crate::syntax::key::{ValueType, default};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
@@ -35,7 +35,7 @@ pub(super) const KIND: Kind = Kind {
             OUTPUT,
             default(
                 "multipliers",
-                Takes::Flag,
+                ValueType::Flag,
                 "false",
                 "computes all Floquet multipliers into `multipliers.csv`; `stable` needs only the largest one",
                 "true",
@@ -55,7 +55,7 @@ pub(super) const KIND: Kind = Kind {
     draw,
 };
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let points = costing.points();
     let rows = points * costing.instants();
     let orbits = costing.orbits(points);
@@ -67,8 +67,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     Cost {
         tables: vec![
             costing.motion(rows),
-            Shape { numbers: orbits.numbers + 4.0, ..orbits },
-            Shape { rows: multipliers, numbers: costing.varied + 5.0, words: 0.0 },
+            TableShape { numbers: orbits.numbers + 4.0, ..orbits },
+            TableShape { rows: multipliers, numbers: costing.varied + 5.0, words: 0.0 },
         ],
         // the panels beyond the limit are also built
         drawn: rows * (costing.places + costing.joints),
@@ -78,16 +78,17 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn compute(work: &Work<'_>) -> Computed {
-    let mut part = Part::default();
-    let (mut motion, mut summary, mut multipliers) = (Rows::default(), Rows::default(), Rows::default());
+fn compute(work: &UnitTask<'_>) -> Computed {
+    let mut part = UnitResult::default();
+    let (mut motion, mut summary, mut multipliers) =
+        (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
     let prepared = work.case();
     for (orbit, stable) in orbit_sweep::found(work, &mut part)? {
         let omega = orbit.omega;
         one_of_many(prepared, &orbit).into_iter().for_each(|note| note.join(&mut part.notes));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
-        let mut row = Summary::of(prepared, &orbit, stable);
+        let mut row = PointRow::of(prepared, &orbit, stable);
         if orbit.start.len() <= FOLLOWED {
             row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
         }
@@ -129,7 +130,7 @@ fn compute(work: &Work<'_>) -> Computed {
 /// Returns the note that a permanently stuck joint makes the orbit one of a continuum.
 ///
 /// It covers orbits with half-period symmetry; [`Note::History`] covers the others.
-fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
+fn one_of_many(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");
         let text =
@@ -139,7 +140,7 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
 }
 
 /// Writes the cells of one instant.
-pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
+pub(super) fn write_sample(prepared: &PreparedCase, sample: &Sample, rows: &mut TableBuilder) {
     let system = &prepared.system;
     for (place, along) in system.places().iter().zip(system.seen()) {
         let (what, unit) = if along.is_rotation() { ("rotation", "rad") } else { ("displacement", "m") };
@@ -169,7 +170,7 @@ fn word(contact: Contact) -> &'static str {
 }
 
 /// Draws displacements of the places and forces of the joints over time: two panels per orbit.
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
     // a table from another source may lack columns
     let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
@@ -210,7 +211,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         panels.retain(|panel| !panel.series.is_empty());
         panels
     };
-    let of_case = |stretch: &Stretch, title: String| -> Vec<Panel> {
+    let of_case = |stretch: &CaseRows, title: String| -> Vec<Panel> {
         let mut from = stretch.rows.start;
         let runs = frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b).take(MOST_PANELS);
         let of_run = |run: &[f64]| {

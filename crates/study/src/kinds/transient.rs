@@ -4,24 +4,26 @@
 use super::orbit::write_sample;
 use super::shared::keys::MOST_SAMPLES;
 use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
-use crate::case::names::Names;
+use crate::case::names::ModelNames;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::warnings::moved;
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series, Table};
-use crate::results::decay::{Decay, Motion};
+use crate::results::decay::{Decay, PlaceMotionFn};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, largest, numbers, thinned, words};
+use crate::results::drawing::{
+    CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, join, largest, numbers, thinned, words,
+};
 use crate::results::notes::{Note, WARNING};
-use crate::results::table_builder::Rows;
+use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::location_of;
-use crate::run::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
+use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::{display_unit, shown_hertz};
 use crate::syntax::key::RANGE;
-use crate::syntax::key::{Key, Takes, Within, default, optional, required};
+use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
 use std::f64::consts::TAU;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
@@ -30,8 +32,8 @@ use stickslip::method::time_history::{Excitation, Instant, TimeHistory, TimeHist
 use stickslip::model::Model;
 use stickslip::orbit::Sample;
 
-const FREQUENCY: Takes = Takes::Quantity(Dimension::FREQUENCY, Within::Positive);
-const DURATION: Takes = Takes::Quantity(Dimension::TIME, Within::Positive);
+const FREQUENCY: ValueType = ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive);
+const DURATION: ValueType = ValueType::Quantity(Dimension::TIME, Bounds::Positive);
 
 /// Largest number of samples of one transient.
 const MOST_STEPS: f64 = 1e7;
@@ -49,41 +51,41 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             optional(
                 "frequency",
-                Takes::Frequencies(RANGE),
+                ValueType::Frequencies(RANGE),
                 "excitation frequency; without it and without `run_up` the motion is a free decay",
                 "\"121 Hz\"",
             ),
             optional(
                 "run_up",
-                Takes::Table(RUN_UP),
+                ValueType::Table(RUN_UP),
                 "excitation frequency that changes linearly in time, in steps of one cycle: each cycle has a \
                  constant frequency and ends when the cycle of the linear ramp ends",
                 "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
             ),
             optional("duration", DURATION, "computed time; default for a run-up: its duration", "\"2 s\""),
-            optional("cycles", Takes::Count(1, 1_000_000), "computed time in periods of `frequency`", "200"),
+            optional("cycles", ValueType::Count(1, 1_000_000), "computed time in periods of `frequency`", "200"),
             optional(
                 "start",
-                Takes::ByName(Dimension::LENGTH),
+                ValueType::ByName(Dimension::LENGTH),
                 "initial displacements of masses that are pulled and released, see `begin`; default: zero",
                 "{ blade1 = \"1 mm\" }",
             ),
             optional(
                 "begin",
-                Takes::Choice(beginnings),
+                ValueType::Choice(beginnings),
                 "initial state of the other masses and joints; default: `equilibrium` with `start`, otherwise \
                  `unloaded`",
                 "\"unloaded\"",
             ),
             optional(
                 "start_velocity",
-                Takes::ByName(Dimension::VELOCITY),
+                ValueType::ByName(Dimension::VELOCITY),
                 "initial velocities; default: zero",
                 "{ blade1 = \"0.1 m/s\" }",
             ),
             default(
                 "samples_per_cycle",
-                Takes::Count(8, MOST_SAMPLES),
+                ValueType::Count(8, MOST_SAMPLES),
                 "64",
                 "points of the table per excitation period (for a run-up: of its highest frequency)",
                 "64",
@@ -98,7 +100,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["motion", "motion_summary", "decay", "decay_summary"],
     },
-    grain: |_| Grain::Case,
+    grain: |_| UnitSize::Case,
     cost,
     warnings: moved,
     compute,
@@ -106,7 +108,7 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Returns the duration of one transient (s) and the number of its samples.
-fn lengths(costing: &Costing<'_>) -> (f64, f64) {
+fn lengths(costing: &CostInputs<'_>) -> (f64, f64) {
     let values = &costing.case.values;
     let (low, high) = costing.range().unzip();
     let period = |omega: f64| TAU / omega;
@@ -118,7 +120,7 @@ fn lengths(costing: &Costing<'_>) -> (f64, f64) {
     (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
 }
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let (duration, samples) = lengths(costing);
     let points = costing.points();
     let table = costing.motion(points * samples);
@@ -131,10 +133,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let summaries = if free { points } else { 0.0 };
     Cost {
         tables: vec![
-            Shape { numbers: table.numbers + costing.several(), ..table },
-            Shape { rows: points * costing.places, numbers: costing.varied + costing.several() + 2.0, words: 1.0 },
-            Shape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
-            Shape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
+            TableShape { numbers: table.numbers + costing.several(), ..table },
+            TableShape { rows: points * costing.places, numbers: costing.varied + costing.several() + 2.0, words: 1.0 },
+            TableShape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
+            TableShape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
         ],
         drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
         unit: 0.0,
@@ -143,8 +145,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
-    let free = Names::of_free_masses(model);
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
+    let free = ModelNames::of_free_masses(model);
     for key in ["start", "start_velocity"] {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
             free.one(key, "free mass", name)?;
@@ -153,20 +155,20 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
     let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
     let (duration, cycles) = (values.quantity("duration"), values.count("cycles"));
     if run_up.is_some() && drive.is_some() {
-        return Err(Complaint::new("run_up", "`frequency` and `run_up` exclude each other", "remove one of them"));
+        return Err(KeyError::new("run_up", "`frequency` and `run_up` exclude each other", "remove one of them"));
     }
     if duration.is_some() && cycles.is_some() {
-        return Err(Complaint::new("cycles", "`duration` and `cycles` exclude each other", "remove one of them"));
+        return Err(KeyError::new("cycles", "`duration` and `cycles` exclude each other", "remove one of them"));
     }
     if cycles.is_some() && drive.is_none() {
         let help = "write `duration` instead, or add `frequency`";
-        return Err(Complaint::new("cycles", "`cycles` counts periods of `frequency`, which is absent", help));
+        return Err(KeyError::new("cycles", "`cycles` counts periods of `frequency`, which is absent", help));
     }
     if let Some(run_up) = run_up
         && run_up.quantity("from") == run_up.quantity("to")
     {
         let help = "write `frequency` for a constant excitation frequency";
-        return Err(Complaint::new("run_up", "`from` and `to` are the same frequency", help));
+        return Err(KeyError::new("run_up", "`from` and `to` are the same frequency", help));
     }
     let lowest = drive.map(|f| f.iter().fold(f64::INFINITY, f64::min));
     let highest = match (drive, run_up) {
@@ -180,21 +182,21 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         .or_else(|| run_up.and_then(|run_up| run_up.quantity("duration")));
     let Some(time) = time else {
         let help = if drive.is_some() { "add `duration` or `cycles`" } else { "add `duration`" };
-        return Err(Complaint::new("duration", "the duration of the motion is missing", help));
+        return Err(KeyError::new("duration", "the duration of the motion is missing", help));
     };
     let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
     let Some(step) = values.quantity("time_step").or(highest.map(|omega| period(omega) / per_cycle)) else {
         let help = "add `time_step`, for example \"0.1 ms\"";
-        return Err(Complaint::new("time_step", "a free decay has no period to divide into samples", help));
+        return Err(KeyError::new("time_step", "a free decay has no period to divide into samples", help));
     };
     if time / step > MOST_STEPS {
         let message = format!("the study needs {:.3e} samples; the limit is {MOST_STEPS:e}", time / step);
-        return Err(Complaint::new("duration", message, "shorten `duration` or use fewer samples"));
+        return Err(KeyError::new("duration", message, "shorten `duration` or use fewer samples"));
     }
     Ok(())
 }
 
-fn compute(work: &Work<'_>) -> Computed {
+fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let case = &prepared.case;
     let values = &case.values;
@@ -207,7 +209,7 @@ fn compute(work: &Work<'_>) -> Computed {
         Some(frequencies) => frequencies.iter().map(Some).collect(),
         None => vec![None],
     };
-    let mut part = Part::default();
+    let mut part = UnitResult::default();
     let pull = values.by_name("start");
     let begin = values.text("begin").unwrap_or(if pull.is_some() { EQUILIBRIUM } else { UNLOADED });
     let pulled = if begin == EQUILIBRIUM { pulled(&case.model, &prepared.system, pull) } else { None };
@@ -217,8 +219,8 @@ fn compute(work: &Work<'_>) -> Computed {
         part.notes.push(Note::of_case(&case.label(), format!("{WARNING}{text}")));
     }
     let start = pulled.unwrap_or_else(|| Start { displacement: given(&prepared.system, pull), states: Vec::new() });
-    let (mut rows, mut extremes) = (Rows::default(), Rows::default());
-    let (mut decay, mut summary) = (Rows::default(), Rows::default());
+    let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
+    let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
     for drive in drives {
         let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
         let fastest = match excitation {
@@ -262,7 +264,7 @@ fn compute(work: &Work<'_>) -> Computed {
                 let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
                 let [x, v] = of_place(sample);
                 let motion = |time: f64| of_place(&since(time));
-                decay.add([time, x, v], (Some(i) == most).then_some(&motion as &Motion<'_>));
+                decay.add([time, x, v], (Some(i) == most).then_some(&motion as &PlaceMotionFn<'_>));
                 if x.abs() > largest[i].0 {
                     largest[i] = (x.abs(), time);
                 }
@@ -319,11 +321,11 @@ const PER_CYCLE: f64 = 20.0;
 ///
 /// Returns the warning for too few samples.
 fn read_off(
-    prepared: &Prepared,
+    prepared: &PreparedCase,
     decays: &[Decay],
     step: f64,
-    rows: &mut Rows,
-    summary: &mut Rows,
+    rows: &mut TableBuilder,
+    summary: &mut TableBuilder,
 ) -> Option<&'static str> {
     let displacements = (0..decays.len()).filter(|place| !prepared.system.seen()[*place].is_rotation());
     let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
@@ -363,10 +365,10 @@ const TIME: &str = "time_s";
 
 /// Draws damping over amplitude, cycle by cycle, of the place that moves most, with a curve for
 /// every case.
-fn damping(drawing: &Drawing<'_>, table: &Table, places: &[String]) -> Panel {
+fn damping(drawing: &FigureInput<'_>, table: &Table, places: &[String]) -> Panel {
     let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
     let stretches = drawing.stretches(table);
-    let line = |(colour, stretch): (usize, &&Stretch)| {
+    let line = |(colour, stretch): (usize, &&CaseRows)| {
         let x = numbers(table, "amplitude_m", stretch.rows.clone()).iter().map(|x| x * factor).collect();
         let y = numbers(table, "damping_ratio", stretch.rows.clone()).iter().map(|y| 100.0 * y).collect();
         let place = words(table, "mass").get(stretch.rows.start).cloned().unwrap_or_default();
@@ -387,7 +389,7 @@ fn damping(drawing: &Drawing<'_>, table: &Table, places: &[String]) -> Panel {
 }
 
 /// Draws a panel for every case and frequency, with a line for every place.
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("motion"), drawing.system()) else { return Figure::default() };
     let drives = motion.numbers("drive_frequency_Hz");
     let column = |place: &String| format!("{place}_displacement_m");
@@ -408,7 +410,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         };
         Panel { title, x, y, series: shown.iter().map(line).collect(), ..Panel::default() }
     };
-    let of_case = |stretch: &Stretch, title: String| -> Vec<Panel> {
+    let of_case = |stretch: &CaseRows, title: String| -> Vec<Panel> {
         let Some(drives) = drives else { return vec![panel(title, stretch.rows.clone())] };
         let mut from = stretch.rows.start;
         let of_drive = |run: &[f64]| {

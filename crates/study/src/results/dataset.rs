@@ -46,13 +46,13 @@ pub struct Column {
     /// Header, with the SI unit as its last part, for example `blade1_amplitude_m`.
     pub name: String,
     /// The values.
-    pub values: Values,
+    pub values: CellValues,
 }
 
 /// The values of a column. A missing number (of a failed point) is NaN and is written as an
 /// empty cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Values {
+pub enum CellValues {
     /// Real numbers, written with all their digits.
     Number(Vec<f64>),
     /// Counts.
@@ -64,14 +64,14 @@ pub enum Values {
     Flag(Vec<Option<bool>>),
 }
 
-impl Values {
+impl CellValues {
     /// Returns the number of rows.
     pub fn len(&self) -> usize {
         match self {
-            Values::Number(v) => v.len(),
-            Values::Integer(v) => v.len(),
-            Values::Text(v) => v.len(),
-            Values::Flag(v) => v.len(),
+            CellValues::Number(v) => v.len(),
+            CellValues::Integer(v) => v.len(),
+            CellValues::Text(v) => v.len(),
+            CellValues::Flag(v) => v.len(),
         }
     }
     /// Returns true if there is no row.
@@ -82,22 +82,22 @@ impl Values {
     /// Returns cells of the same type without a value, for columns that a case does not have.
     ///
     /// A missing count is zero.
-    pub(crate) fn blank(&self, rows: usize) -> Values {
+    pub(crate) fn blank(&self, rows: usize) -> CellValues {
         match self {
-            Values::Number(_) => Values::Number(vec![f64::NAN; rows]),
-            Values::Integer(_) => Values::Integer(vec![0; rows]),
-            Values::Text(_) => Values::Text(vec![String::new(); rows]),
-            Values::Flag(_) => Values::Flag(vec![None; rows]),
+            CellValues::Number(_) => CellValues::Number(vec![f64::NAN; rows]),
+            CellValues::Integer(_) => CellValues::Integer(vec![0; rows]),
+            CellValues::Text(_) => CellValues::Text(vec![String::new(); rows]),
+            CellValues::Flag(_) => CellValues::Flag(vec![None; rows]),
         }
     }
 
     /// Appends cells of the same type.
-    pub(crate) fn extend(&mut self, more: Values) {
+    pub(crate) fn extend(&mut self, more: CellValues) {
         match (self, more) {
-            (Values::Number(a), Values::Number(b)) => a.extend(b),
-            (Values::Integer(a), Values::Integer(b)) => a.extend(b),
-            (Values::Text(a), Values::Text(b)) => a.extend(b),
-            (Values::Flag(a), Values::Flag(b)) => a.extend(b),
+            (CellValues::Number(a), CellValues::Number(b)) => a.extend(b),
+            (CellValues::Integer(a), CellValues::Integer(b)) => a.extend(b),
+            (CellValues::Text(a), CellValues::Text(b)) => a.extend(b),
+            (CellValues::Flag(a), CellValues::Flag(b)) => a.extend(b),
             (a, b) => panic!("a column has two sorts of values: {a:?}, {b:?}"),
         }
     }
@@ -125,7 +125,7 @@ impl Column {
     /// assert_eq!(unit("blade_shape_per_sqrt_kg"), None); // study files have no root units
     /// ```
     pub fn unit(&self) -> Option<String> {
-        if !matches!(self.values, Values::Number(_)) || self.name.contains("_sqrt_") {
+        if !matches!(self.values, CellValues::Number(_)) || self.name.contains("_sqrt_") {
             return None;
         }
         let ends = self.name.match_indices('_').map(|(at, _)| &self.name[at + 1..]);
@@ -134,20 +134,20 @@ impl Column {
 
     /// Builds a column of numbers.
     pub fn numbers(name: &str, values: Vec<f64>) -> Column {
-        Column { name: name.to_owned(), values: Values::Number(values) }
+        Column { name: name.to_owned(), values: CellValues::Number(values) }
     }
 
     /// Returns the values if they are numbers.
     pub fn as_numbers(&self) -> Option<&[f64]> {
         match &self.values {
-            Values::Number(values) => Some(values),
+            CellValues::Number(values) => Some(values),
             _ => None,
         }
     }
 
     /// Builds a column of words.
     pub fn texts(name: &str, values: Vec<String>) -> Column {
-        Column { name: name.to_owned(), values: Values::Text(values) }
+        Column { name: name.to_owned(), values: CellValues::Text(values) }
     }
 }
 
@@ -184,21 +184,21 @@ impl Table {
     /// Returns the counts of a column.
     pub fn integers(&self, column: &str) -> Option<&[u64]> {
         match &self.column(column)?.values {
-            Values::Integer(values) => Some(values),
+            CellValues::Integer(values) => Some(values),
             _ => None,
         }
     }
     /// Returns the words of a column.
     pub fn texts(&self, column: &str) -> Option<&[String]> {
         self.column(column).and_then(|c| match &c.values {
-            Values::Text(v) => Some(v.as_slice()),
+            CellValues::Text(v) => Some(v.as_slice()),
             _ => None,
         })
     }
     /// Returns the flags of a column.
     pub fn flags(&self, column: &str) -> Option<&[Option<bool>]> {
         self.column(column).and_then(|c| match &c.values {
-            Values::Flag(v) => Some(v.as_slice()),
+            CellValues::Flag(v) => Some(v.as_slice()),
             _ => None,
         })
     }

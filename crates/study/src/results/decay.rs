@@ -30,7 +30,7 @@ pub struct Cycle {
 }
 
 /// Displacement (m) and velocity (m/s) of a place at a time (s) between two samples.
-pub type Motion<'a> = dyn Fn(f64) -> [f64; 2] + 'a;
+pub type PlaceMotionFn<'a> = dyn Fn(f64) -> [f64; 2] + 'a;
 
 /// The turning points of one place, detected as samples arrive.
 #[derive(Debug, Clone, Default)]
@@ -47,7 +47,7 @@ impl Decay {
     /// Locates a turning point since the last sample by `motion`, or by the cubic through both
     /// samples if `motion` is `None`. The cubic has an error where the acceleration jumps, as
     /// at the turning points of dry friction.
-    pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&Motion<'_>>) {
+    pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&PlaceMotionFn<'_>>) {
         match self.last {
             // a motion that begins at rest begins with a turning point
             None if velocity == 0.0 => self.turns.push((time, displacement)),
@@ -126,7 +126,7 @@ fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64
 ///
 /// The motion has velocity `v0` at the first time; the search ends where the velocity in the
 /// direction of `v0` vanishes.
-fn turning_point(motion: &Motion<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
+fn turning_point(motion: &PlaceMotionFn<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
         if motion(middle)[1] * v0 > 0.0 { low = middle } else { high = middle }

@@ -9,7 +9,7 @@
 //! as the full curve, and all its points were computed.
 
 use crate::case::study::Study;
-use crate::results::dataset::{Column, Table, Values};
+use crate::results::dataset::{CellValues, Column, Table};
 use crate::results::drawing::MOST_CURVES;
 
 /// Largest number of rows of a table that are held in memory for its figure.
@@ -19,30 +19,32 @@ pub const MOST_ROWS: usize = 500_000;
 ///
 /// # Example
 /// ```
-/// use stickslip_study::{read_study, run::{Context, check}, thinning::Thinning};
+/// use stickslip_study::{read_study, run::{Context, check}, decimation::Decimation};
 /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
 /// let block = check(&study).unwrap().block(0..4, &Context::unwatched(1)).unwrap();
 /// let rows: Vec<_> = block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
-/// let mut thinning = Thinning::new(&study, &rows);
-/// block.tables.iter().cloned().for_each(|table| thinning.add(table));
-/// assert!(thinning.keeps_all());
-/// assert_eq!(format!("{:?}", thinning.tables()), format!("{:?}", block.tables));
+/// let mut decimation = Decimation::new(&study, &rows);
+/// block.tables.iter().cloned().for_each(|table| decimation.add(table));
+/// assert!(decimation.keeps_all());
+/// assert_eq!(format!("{:?}", decimation.tables()), format!("{:?}", block.tables));
 /// ```
 #[derive(Debug)]
-pub struct Thinning {
-    tables: Vec<Kept>,
+pub struct Decimation {
+    tables: Vec<DecimatedTable>,
 }
 
-impl Thinning {
+impl Decimation {
     /// For tables of a study with these names and numbers of rows.
-    pub fn new(study: &Study, tables: &[(&str, usize)]) -> Thinning {
-        Thinning { tables: tables.iter().map(|(name, rows)| Kept::new(study, name, *rows, MOST_ROWS)).collect() }
+    pub fn new(study: &Study, tables: &[(&str, usize)]) -> Decimation {
+        Decimation {
+            tables: tables.iter().map(|(name, rows)| DecimatedTable::new(study, name, *rows, MOST_ROWS)).collect(),
+        }
     }
 
     /// Returns whether every row is kept.
     pub fn keeps_all(&self) -> bool {
-        self.tables.iter().all(|table| table.cases == Cases::All && table.bin.is_none())
+        self.tables.iter().all(|table| table.cases == CaseSelection::All && table.bin.is_none())
     }
 
     /// Adds the next rows of a table.
@@ -54,13 +56,13 @@ impl Thinning {
 
     /// Returns the kept rows.
     pub fn tables(self) -> Vec<Table> {
-        self.tables.into_iter().map(Kept::finished).collect()
+        self.tables.into_iter().map(DecimatedTable::finished).collect()
     }
 }
 
 /// The cases of a table that are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cases {
+enum CaseSelection {
     All,
     /// The first cases, up to this number.
     First(usize),
@@ -70,9 +72,9 @@ enum Cases {
 
 /// The kept rows of a table.
 #[derive(Debug)]
-struct Kept {
+struct DecimatedTable {
     rows: Table,
-    cases: Cases,
+    cases: CaseSelection,
     /// Number of neighbouring rows in a bin, of which only the extremes stay.
     bin: Option<usize>,
     /// Number of leading columns that identify a case.
@@ -82,30 +84,30 @@ struct Kept {
     open: Table,
 }
 
-impl Kept {
-    fn new(study: &Study, name: &str, rows: usize, most: usize) -> Kept {
+impl DecimatedTable {
+    fn new(study: &Study, name: &str, rows: usize, most: usize) -> DecimatedTable {
         let empty = Table { name: name.to_owned(), columns: Vec::new() };
         let keys = study.varied().len();
-        let (mut cases, mut bin) = (Cases::All, None);
+        let (mut cases, mut bin) = (CaseSelection::All, None);
         if rows > most {
             let of_case = rows.div_ceil(study.cases());
             let kept = if study.draws().is_some() {
                 let first = (most / of_case).clamp(1, study.cases());
-                cases = Cases::First(first);
+                cases = CaseSelection::First(first);
                 first
             } else {
                 let each = study.cases().div_ceil(MOST_CURVES);
-                cases = Cases::Each(each);
+                cases = CaseSelection::Each(each);
                 study.cases().div_ceil(each)
             };
             // a bin keeps at most two rows for every column: a few dozen
             bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * EXTREMES);
         }
-        Kept { rows: empty.clone(), cases, bin, keys, now: None, open: empty }
+        DecimatedTable { rows: empty.clone(), cases, bin, keys, now: None, open: empty }
     }
 
     fn add(&mut self, table: Table) {
-        if self.cases == Cases::All && self.bin.is_none() {
+        if self.cases == CaseSelection::All && self.bin.is_none() {
             return self.rows.append(table);
         }
         let mut from = 0;
@@ -124,9 +126,9 @@ impl Kept {
             let more = table.rows().min(from.saturating_add(room));
             let to = (from + 1..more).find(|row| key_differs(&table, *row, now)).unwrap_or(more);
             let keeps = match self.cases {
-                Cases::All => true,
-                Cases::First(first) => number < first,
-                Cases::Each(each) => number % each == 0,
+                CaseSelection::All => true,
+                CaseSelection::First(first) => number < first,
+                CaseSelection::Each(each) => number % each == 0,
             };
             if keeps {
                 self.open.append(rows(&table, &(from..to).collect::<Vec<_>>()));
@@ -149,7 +151,7 @@ impl Kept {
         }
         let mut kept = vec![0, open.rows() - 1];
         for column in &open.columns {
-            if let Values::Number(values) = &column.values {
+            if let CellValues::Number(values) = &column.values {
                 let by = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
                 // a gap in a curve stays a gap
                 let (there, gaps): (Vec<usize>, Vec<usize>) = (0..values.len()).partition(|row| !values[*row].is_nan());
@@ -173,12 +175,12 @@ const EXTREMES: usize = 24;
 
 fn key(table: &Table, row: usize, keys: usize) -> Vec<u64> {
     let columns = table.columns.iter().take(keys);
-    columns.map(|column| if let Values::Number(v) = &column.values { v[row].to_bits() } else { 0 }).collect()
+    columns.map(|column| if let CellValues::Number(v) = &column.values { v[row].to_bits() } else { 0 }).collect()
 }
 
 fn key_differs(table: &Table, row: usize, key: &[u64]) -> bool {
     table.columns.iter().zip(key).any(|(column, bits)| match &column.values {
-        Values::Number(values) => values[row].to_bits() != *bits,
+        CellValues::Number(values) => values[row].to_bits() != *bits,
         _ => false,
     })
 }
@@ -188,10 +190,10 @@ fn rows(table: &Table, which: &[usize]) -> Table {
     let column = |column: &Column| Column {
         name: column.name.clone(),
         values: match &column.values {
-            Values::Number(v) => Values::Number(which.iter().map(|row| v[*row]).collect()),
-            Values::Integer(v) => Values::Integer(which.iter().map(|row| v[*row]).collect()),
-            Values::Text(v) => Values::Text(which.iter().map(|row| v[*row].clone()).collect()),
-            Values::Flag(v) => Values::Flag(which.iter().map(|row| v[*row]).collect()),
+            CellValues::Number(v) => CellValues::Number(which.iter().map(|row| v[*row]).collect()),
+            CellValues::Integer(v) => CellValues::Integer(which.iter().map(|row| v[*row]).collect()),
+            CellValues::Text(v) => CellValues::Text(which.iter().map(|row| v[*row].clone()).collect()),
+            CellValues::Flag(v) => CellValues::Flag(which.iter().map(|row| v[*row]).collect()),
         },
     };
     Table { name: table.name.clone(), columns: table.columns.iter().map(column).collect() }
@@ -210,7 +212,7 @@ mod tests {
 
     fn table(cases: usize, rows: usize) -> Table {
         let all = 0..cases * rows;
-        let numbers = |value: &dyn Fn(usize) -> f64| Values::Number(all.clone().map(value).collect());
+        let numbers = |value: &dyn Fn(usize) -> f64| CellValues::Number(all.clone().map(value).collect());
         let column = |name: &str, values| Column { name: name.to_owned(), values };
         Table {
             name: "curve".to_owned(),
@@ -219,12 +221,12 @@ mod tests {
                 column("x", numbers(&|i| (i % rows) as f64)),
                 column("y", numbers(&|i| (i as f64 * 0.1).sin() + if i % rows == rows / 3 { 50.0 } else { 0.0 })),
                 column("z", numbers(&|i| if i % 100_000 == 777 { f64::NAN } else { -(i as f64 * 0.01).cos() })),
-                column("status", Values::Text(all.clone().map(|_| "converged".to_owned()).collect())),
+                column("status", CellValues::Text(all.clone().map(|_| "converged".to_owned()).collect())),
             ],
         }
     }
 
-    fn fed(mut kept: Kept, table: &Table, step: usize) -> Table {
+    fn fed(mut kept: DecimatedTable, table: &Table, step: usize) -> Table {
         let all: Vec<usize> = (0..table.rows()).collect();
         all.chunks(step).for_each(|chunk| kept.add(rows(table, chunk)));
         kept.finished()
@@ -236,7 +238,7 @@ mod tests {
     fn a_long_curve_keeps_its_envelope() {
         let (study, most) = (study("vary = { Ft = [\"2 N\"] }"), 5000);
         let table = table(1, 400_000);
-        let kept = fed(Kept::new(&study, "curve", table.rows(), most), &table, 1009);
+        let kept = fed(DecimatedTable::new(&study, "curve", table.rows(), most), &table, 1009);
         assert!(kept.rows() < most && kept.rows() > most / 10, "{}", kept.rows());
         let (x, y) = (kept.numbers("x").unwrap(), kept.numbers("y").unwrap());
         assert!(x.is_sorted_by(|a, b| a < b));
@@ -254,7 +256,7 @@ mod tests {
         let gaps = kept.numbers("z").unwrap().iter().filter(|value| value.is_nan()).count();
         assert_eq!(gaps, 4);
         // the result does not depend on the size of the blocks
-        let other = fed(Kept::new(&study, "curve", table.rows(), most), &table, 70_001);
+        let other = fed(DecimatedTable::new(&study, "curve", table.rows(), most), &table, 70_001);
         assert!(format!("{other:?}") == format!("{kept:?}"));
     }
 
@@ -262,13 +264,13 @@ mod tests {
     fn of_many_cases_some_are_kept_whole() {
         let listed = study("vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 1000 } }");
         let table = table(1000, 20);
-        let kept = fed(Kept::new(&listed, "curve", table.rows(), 10_000), &table, 33);
+        let kept = fed(DecimatedTable::new(&listed, "curve", table.rows(), 10_000), &table, 33);
         let cases = kept.numbers("Ft_N").unwrap();
         assert!(cases.iter().all(|case| (*case as usize).is_multiple_of(3)), "every third");
         assert_eq!(kept.rows(), 334 * 20);
         // of draws, the first ones
         let drawn = study("[sample]\ncount = 1000\nof = { Ft = { uniform = [\"1 N\", \"9 N\"] } }");
-        let kept = fed(Kept::new(&drawn, "curve", table.rows(), 10_000), &table, 33);
+        let kept = fed(DecimatedTable::new(&drawn, "curve", table.rows(), 10_000), &table, 33);
         // compared as text, because of the NaN values
         assert!(format!("{kept:?}") == format!("{:?}", rows(&table, &(0..10_000).collect::<Vec<_>>())));
     }

@@ -8,22 +8,22 @@
 //! have them.
 
 use crate::results::dataset::{Emphasis, Panel, Series, Style};
-use crate::results::drawing::{Drawing, MOST_CURVES, MOST_PANELS, Stretch, join, thinned};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, join, thinned};
 use crate::results::percentiles::percentiles;
 
 /// Returns the panels of all cases, as `of_case` draws them under a title.
 ///
 /// For draws, returns the combined panels of each combination of `vary`.
 pub(crate) fn panels(
-    drawing: &Drawing<'_>,
-    stretches: &[Stretch],
-    of_case: &dyn Fn(&Stretch, String) -> Vec<Panel>,
+    drawing: &FigureInput<'_>,
+    stretches: &[CaseRows],
+    of_case: &dyn Fn(&CaseRows, String) -> Vec<Panel>,
 ) -> Vec<Panel> {
     if drawing.study.draws().is_none() {
         let cases = stretches.iter().take(MOST_PANELS);
         return cases.flat_map(|stretch| of_case(stretch, stretch.label())).collect();
     }
-    let of_group = |(words, group): (String, Vec<&Stretch>)| -> Vec<Panel> {
+    let of_group = |(words, group): (String, Vec<&CaseRows>)| -> Vec<Panel> {
         let title = join([words, drawing.draws(group.len())]);
         let cases: Vec<Vec<Panel>> = group.iter().map(|stretch| of_case(stretch, title.clone())).collect();
         let most = cases.iter().map(Vec::len).max().unwrap_or(0);

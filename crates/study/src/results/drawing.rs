@@ -3,7 +3,7 @@
 
 use crate::case::study::{Study, VariedValue};
 use crate::case::values::Values;
-use crate::results::dataset::{Axis, Table, Values as Cells, column_name};
+use crate::results::dataset::{Axis, CellValues, Table, column_name};
 use crate::syntax::format::display_unit;
 use crate::syntax::units;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use stickslip::model::System;
 
 /// A study and its finished tables.
 #[derive(Debug, Clone, Copy)]
-pub struct Drawing<'a> {
+pub struct FigureInput<'a> {
     /// The study.
     pub study: &'a Study,
     /// Its tables.
@@ -21,7 +21,7 @@ pub struct Drawing<'a> {
 
 /// The rows of a table that belong to one case.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Stretch {
+pub(crate) struct CaseRows {
     /// Number of the case.
     pub case: usize,
     /// Values of the varied parameters.
@@ -30,7 +30,7 @@ pub(crate) struct Stretch {
     pub rows: Range<usize>,
 }
 
-impl Stretch {
+impl CaseRows {
     /// Returns the varied parameters in words.
     pub fn label(&self) -> String {
         crate::case::study::varied_text(&self.varied)
@@ -43,14 +43,14 @@ pub(crate) const MOST_CURVES: usize = 400;
 
 /// The assignment of curves to panels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Layout {
+pub(crate) enum PanelLayout {
     /// One panel per case, with a curve for every mass.
     Cases,
     /// One panel per mass, with a curve for every case.
     Masses,
 }
 
-impl<'a> Drawing<'a> {
+impl<'a> FigureInput<'a> {
     /// Returns the values of `[figure]`.
     pub(crate) fn options(&self) -> Values {
         self.study.figure_values()
@@ -75,21 +75,21 @@ impl<'a> Drawing<'a> {
     /// Chooses the layout for this number of masses and cases, with `panels` panels per case.
     ///
     /// Random draws are shown by percentiles for every mass.
-    pub(crate) fn layout(&self, masses: usize, cases: usize, panels: usize) -> Layout {
+    pub(crate) fn layout(&self, masses: usize, cases: usize, panels: usize) -> PanelLayout {
         if self.study.draws().is_some() {
-            return Layout::Masses;
+            return PanelLayout::Masses;
         }
         match self.options().text("panels") {
-            Some("cases") => return Layout::Cases,
-            Some("masses") => return Layout::Masses,
+            Some("cases") => return PanelLayout::Cases,
+            Some("masses") => return PanelLayout::Masses,
             _ => {}
         }
         match self.options().flag("overlay") {
-            Some(true) => Layout::Masses,
-            Some(false) => Layout::Cases,
-            None if cases > 1 && cases * panels > MOST_PANELS => Layout::Masses,
-            None if masses > 1 && cases <= MOST_CASES => Layout::Cases,
-            None => Layout::Masses,
+            Some(true) => PanelLayout::Masses,
+            Some(false) => PanelLayout::Cases,
+            None if cases > 1 && cases * panels > MOST_PANELS => PanelLayout::Masses,
+            None if masses > 1 && cases <= MOST_CASES => PanelLayout::Cases,
+            None => PanelLayout::Masses,
         }
     }
 
@@ -113,7 +113,7 @@ impl<'a> Drawing<'a> {
     /// Returns the colour axis of curves that differ in the varied parameter number `which`.
     ///
     /// Returns `None` without such a parameter.
-    pub(crate) fn varied_axis(&self, stretches: &[Stretch], which: usize) -> Option<Axis> {
+    pub(crate) fn varied_axis(&self, stretches: &[CaseRows], which: usize) -> Option<Axis> {
         let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
             stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.as_written().0)).collect();
@@ -132,12 +132,12 @@ impl<'a> Drawing<'a> {
 
     /// Groups the stretches by their parameters of `vary`, without drawn parameters: text and
     /// stretches.
-    pub(crate) fn by_listed<'s>(&self, stretches: &'s [Stretch]) -> Vec<(String, Vec<&'s Stretch>)> {
+    pub(crate) fn by_listed<'s>(&self, stretches: &'s [CaseRows]) -> Vec<(String, Vec<&'s CaseRows>)> {
         let (drawn, combinations) = (self.study.drawn(), self.study.cases_of_a_draw());
-        let mut groups: BTreeMap<usize, Vec<&Stretch>> = BTreeMap::new();
+        let mut groups: BTreeMap<usize, Vec<&CaseRows>> = BTreeMap::new();
         stretches.iter().for_each(|stretch| groups.entry(stretch.case % combinations).or_default().push(stretch));
         let words =
-            |stretch: &Stretch| crate::case::study::varied_text(stretch.varied.get(drawn..).unwrap_or_default());
+            |stretch: &CaseRows| crate::case::study::varied_text(stretch.varied.get(drawn..).unwrap_or_default());
         groups.into_values().map(|group| (group.first().map_or_else(String::new, |s| words(s)), group)).collect()
     }
 
@@ -169,24 +169,24 @@ impl<'a> Drawing<'a> {
     ///
     /// The first columns of the table are the varied parameters, all of them or all but the
     /// last.
-    pub(crate) fn stretches(&self, table: &Table) -> Vec<Stretch> {
+    pub(crate) fn stretches(&self, table: &Table) -> Vec<CaseRows> {
         self.stretches_of(table, self.study.varied().len())
     }
 
     /// Does the same by the first `keys` varied parameters; `case` is the first case of each
     /// stretch.
-    pub(crate) fn stretches_of(&self, table: &Table, keys: usize) -> Vec<Stretch> {
+    pub(crate) fn stretches_of(&self, table: &Table, keys: usize) -> Vec<CaseRows> {
         let columns: Vec<&[f64]> = table
             .columns
             .iter()
             .take(keys)
             .filter_map(|column| match &column.values {
-                Cells::Number(values) => Some(values.as_slice()),
+                CellValues::Number(values) => Some(values.as_slice()),
                 _ => None,
             })
             .collect();
         let same = |a: usize, b: usize| columns.iter().all(|column| column[a].to_bits() == column[b].to_bits());
-        let mut stretches: Vec<Stretch> = Vec::new();
+        let mut stretches: Vec<CaseRows> = Vec::new();
         let mut from = 0;
         let mut case = 0;
         while from < table.rows() {
@@ -202,7 +202,7 @@ impl<'a> Drawing<'a> {
                     .zip(&columns)
                     .all(|(value, column)| value.column().1.to_bits() == column[from].to_bits())
                 {
-                    stretches.push(Stretch { case, varied, rows: from..to });
+                    stretches.push(CaseRows { case, varied, rows: from..to });
                     break;
                 }
                 case += 1;

@@ -1,7 +1,7 @@
 //! Histograms, and for maxima the fitted Weibull distribution with its high percentiles.
 
 use crate::results::dataset::{Axis, Panel, Series, Style};
-use crate::results::weibull::Maxima;
+use crate::results::weibull::WeibullMaxima;
 
 /// Smallest number of values for a histogram.
 pub(crate) const LEAST: usize = 20;
@@ -58,7 +58,7 @@ fn width_of(sorted: &[f64]) -> f64 {
 pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
     let mut panel = panel(values, x, title, each)?;
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MOST_FITTED).collect();
-    let Some(fit) = Maxima::fit(&finite) else { return Some(panel) };
+    let Some(fit) = WeibullMaxima::fit(&finite) else { return Some(panel) };
     let bars = &panel.series[0];
     let top = bars.y.iter().copied().fold(0.0, f64::max);
     let width = bars.x.get(1).map_or(0.0, |second| second - bars.x[0]);

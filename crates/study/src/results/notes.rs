@@ -1,7 +1,7 @@
 //! Notes for the reader of the results, as sentences. Notes of one kind from several units
 //! become one sentence.
 
-use crate::run::basis_check::Slipping;
+use crate::run::basis_check::SlipReductionCheck;
 use crate::syntax::expression::displayed;
 use crate::syntax::format::significant;
 use serde::{Deserialize, Serialize};
@@ -99,7 +99,7 @@ pub enum Note {
     /// frequency, rad/s.
     InTime(f64),
     /// Points at which joints slip on a reduced model.
-    Slipping(Slipping),
+    Slipping(SlipReductionCheck),
     /// Points of one case at which a joint is permanently stuck.
     Stuck {
         /// The varied parameters of the case, in words.
@@ -151,7 +151,7 @@ impl Note {
             Reduction::UpTo { up_to, .. } | Reduction::Modes { up_to, .. } => up_to,
             Reduction::None { .. } => return None,
         };
-        Slipping::of(orbit, up_to).map(Note::Slipping)
+        SlipReductionCheck::of(orbit, up_to).map(Note::Slipping)
     }
 
     /// Returns a note if the orbit is one of several. Their amplitudes differ if the stiffness

@@ -3,12 +3,12 @@
 
 use crate::case::study::Case;
 use crate::results::columns::REDUCTION_ERROR;
-use crate::results::dataset::{Column, Table, Values as Cells, column_name};
+use crate::results::dataset::{CellValues, Column, Table, column_name};
 use stickslip::model::ReductionEvidence;
 
 /// Columns that grow row by row. All rows write their columns in the same order.
 #[derive(Debug, Default)]
-pub struct Rows {
+pub struct TableBuilder {
     columns: Vec<Column>,
     next: usize,
     /// Number of finished rows.
@@ -17,13 +17,13 @@ pub struct Rows {
     linear: bool,
 }
 
-impl Rows {
+impl TableBuilder {
     /// Rows of motions in which no joint slips.
     pub fn linear() -> Self {
-        Rows { linear: true, ..Rows::default() }
+        TableBuilder { linear: true, ..TableBuilder::default() }
     }
 
-    fn cells(&mut self, name: &str, empty: Cells) -> &mut Cells {
+    fn cells(&mut self, name: &str, empty: CellValues) -> &mut CellValues {
         let name = column_name(name);
         let at = self.columns[self.next..].iter().position(|column| column.name == name);
         self.next += at.unwrap_or(0);
@@ -36,28 +36,28 @@ impl Rows {
 
     /// Adds a real number.
     pub fn number(&mut self, name: &str, value: f64) {
-        if let Cells::Number(v) = self.cells(name, Cells::Number(Vec::new())) {
+        if let CellValues::Number(v) = self.cells(name, CellValues::Number(Vec::new())) {
             v.push(value);
         }
     }
 
     /// Adds a count.
     pub fn integer(&mut self, name: &str, value: u64) {
-        if let Cells::Integer(v) = self.cells(name, Cells::Integer(Vec::new())) {
+        if let CellValues::Integer(v) = self.cells(name, CellValues::Integer(Vec::new())) {
             v.push(value);
         }
     }
 
     /// Adds a word.
     pub fn text(&mut self, name: &str, value: &str) {
-        if let Cells::Text(v) = self.cells(name, Cells::Text(Vec::new())) {
+        if let CellValues::Text(v) = self.cells(name, CellValues::Text(Vec::new())) {
             v.push(value.to_owned());
         }
     }
 
     /// Adds true, false or unknown.
     pub fn flag(&mut self, name: &str, value: Option<bool>) {
-        if let Cells::Flag(v) = self.cells(name, Cells::Flag(Vec::new())) {
+        if let CellValues::Flag(v) = self.cells(name, CellValues::Flag(Vec::new())) {
             v.push(value);
         }
     }
@@ -83,7 +83,7 @@ impl Rows {
     pub fn err(&mut self, error: f64) {
         let known = self.columns.iter_mut().filter(|column| column.name == REDUCTION_ERROR && !self.linear);
         for column in known {
-            if let Cells::Number(errors) = &mut column.values {
+            if let CellValues::Number(errors) = &mut column.values {
                 errors.iter_mut().for_each(|known| *known = known.max(error));
             }
         }

@@ -6,8 +6,8 @@
 
 use crate::case::study::Study;
 use crate::results::columns::{ENERGY_GAP, RESIDUAL};
-use crate::results::dataset::{Dataset, Table, Values as Cells};
-use crate::results::drawing::{Drawing, Stretch};
+use crate::results::dataset::{CellValues, Dataset, Table};
+use crate::results::drawing::{CaseRows, FigureInput};
 
 /// Reason why a dataset cannot be read as the results of a study.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -114,11 +114,11 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// Its columns differ in length.
-    pub fn table(&self, name: &str) -> Result<Option<Written<'a>>, ResultsError> {
+    pub fn table(&self, name: &str) -> Result<Option<TypedTable<'a>>, ResultsError> {
         let Some(table) = self.dataset.tables.iter().find(|table| table.name == name && table.rows() > 0) else {
             return Ok(None);
         };
-        let written = Written { dataset: self.dataset, table };
+        let written = TypedTable { dataset: self.dataset, table };
         match table.columns.iter().find(|column| column.values.len() != table.rows()) {
             Some(column) => Err(written.no_column(&column.name)),
             None => Ok(Some(written)),
@@ -129,8 +129,8 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// Some rows belong to no case.
-    pub fn stretches(&self, written: &Written<'_>, keys: usize) -> Result<Vec<Stretch>, ResultsError> {
-        let drawing = Drawing { study: self.study, tables: &self.dataset.tables };
+    pub fn stretches(&self, written: &TypedTable<'_>, keys: usize) -> Result<Vec<CaseRows>, ResultsError> {
+        let drawing = FigureInput { study: self.study, tables: &self.dataset.tables };
         let stretches = drawing.stretches_of(written.table, keys);
         let all: usize = stretches.iter().map(|stretch| stretch.rows.len()).sum();
         if all == written.table.rows() { Ok(stretches) } else { Err(written.other_rows()) }
@@ -139,12 +139,12 @@ impl<'a> Results<'a> {
 
 /// A table that provides columns by name and type, or an error.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Written<'a> {
+pub(crate) struct TypedTable<'a> {
     dataset: &'a Dataset,
     pub table: &'a Table,
 }
 
-impl<'a> Written<'a> {
+impl<'a> TypedTable<'a> {
     pub fn numbers(&self, column: &str) -> Result<&'a [f64], ResultsError> {
         self.table.numbers(column).ok_or_else(|| self.no_column(column))
     }
@@ -152,7 +152,7 @@ impl<'a> Written<'a> {
     pub fn integers(&self, column: &str) -> Result<&'a [u64], ResultsError> {
         let found = self.table.columns.iter().find(|c| c.name == column);
         match found.map(|c| &c.values) {
-            Some(Cells::Integer(values)) => Ok(values),
+            Some(CellValues::Integer(values)) => Ok(values),
             _ => Err(self.no_column(column)),
         }
     }

@@ -18,7 +18,7 @@ use stickslip_numerics::maximum::maximum;
 
 /// The distribution of maxima with the largest likelihood for some values.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Maxima {
+pub(crate) struct WeibullMaxima {
     /// λ, the upper bound of all values.
     pub bound: f64,
     /// δ.
@@ -60,25 +60,25 @@ const STRANGE: f64 = 1.63;
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
 /// Scale, shape and log-likelihood of the best distribution with a given bound.
-struct Profile {
+struct ProfileLikelihood {
     scale: f64,
     shape: f64,
     likelihood: f64,
 }
 
-impl Maxima {
+impl WeibullMaxima {
     /// Fits the distribution by maximum likelihood.
     ///
     /// Returns `None` for fewer than 20 values, for equal values, and if the likelihood has no
     /// maximum because the values crowd at their upper end.
-    pub fn fit(values: &[f64]) -> Option<Maxima> {
+    pub fn fit(values: &[f64]) -> Option<WeibullMaxima> {
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let range = high - low;
         if values.len() < LEAST || !(range > 0.0 && range.is_finite()) {
             return None;
         }
         let bound = |s: f64| high + range * libm::exp(s);
-        let profile = |s: f64| Profile::of(values, bound(s)).filter(|profile| profile.shape > PEAKED);
+        let profile = |s: f64| ProfileLikelihood::of(values, bound(s)).filter(|profile| profile.shape > PEAKED);
         let height = |s: f64| profile(s).map_or(f64::NEG_INFINITY, |profile| profile.likelihood);
         let (from, to) = (libm::log(NEAR), libm::log(FAR));
         let step = (to - from) / STEPS as f64;
@@ -87,11 +87,11 @@ impl Maxima {
         let best = (0..=STEPS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let ends = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
         let Ok((s, _)) = maximum(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
-        let Profile { scale, shape, .. } = profile(s)?;
-        let found = Maxima { bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
+        let ProfileLikelihood { scale, shape, .. } = profile(s)?;
+        let found = WeibullMaxima { bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
         // the bound counts as known at the far end, and if the likelihood is not regular in it
         let known = best == STEPS || shape <= REGULAR;
-        Some(Maxima { covariance: found.covariance(values, known)?, ..found })
+        Some(WeibullMaxima { covariance: found.covariance(values, known)?, ..found })
     }
 
     /// Returns the probability that a value is not exceeded.
@@ -200,9 +200,9 @@ fn inverse(matrix: &[[f64; 3]; 3], size: usize) -> Option<[[f64; 3]; 3]> {
     Some(inverse)
 }
 
-impl Profile {
+impl ProfileLikelihood {
     /// Solves `1/β = Σ y^β ln y / Σ y^β - mean ln y` and `δ^β = mean y^β`, with `y = λ - x`.
-    fn of(values: &[f64], bound: f64) -> Option<Profile> {
+    fn of(values: &[f64], bound: f64) -> Option<ProfileLikelihood> {
         let count = values.len() as f64;
         let logs: Vec<f64> = values.iter().map(|value| libm::log(bound - value)).collect();
         let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -242,7 +242,7 @@ impl Profile {
         }
         let log_scale = highest + libm::log(sums(shape)[0] / count) / shape;
         let likelihood = count * (libm::log(shape) - shape * log_scale + (shape - 1.0) * (highest + mean) - 1.0);
-        let profile = Profile { scale: libm::exp(log_scale), shape, likelihood };
+        let profile = ProfileLikelihood { scale: libm::exp(log_scale), shape, likelihood };
         (shape.is_finite() && likelihood.is_finite()).then_some(profile)
     }
 }
@@ -268,7 +268,7 @@ mod tests {
     /// differences of that likelihood.
     #[test]
     fn the_fit_is_that_of_scipy() {
-        let fit = Maxima::fit(&values()).unwrap();
+        let fit = WeibullMaxima::fit(&values()).unwrap();
         let near = |what: &str, found: f64, expected: f64, within: f64| {
             assert!((found / expected - 1.0).abs() < within, "{what}: {found} {expected}");
         };
@@ -295,11 +295,11 @@ mod tests {
             |set: u64, i: u64| 1.5 - 0.4 * (-stickslip_numerics::random::Stream::new(set).uniform(i).ln()).powf(0.4);
         let of_one = (0..40).filter(|set| {
             let values: Vec<f64> = (0..200).map(|i| draw(*set, i)).collect();
-            Maxima::fit(&values).unwrap().is_of(&values)
+            WeibullMaxima::fit(&values).unwrap().is_of(&values)
         });
         assert!(of_one.count() >= 39);
         let two: Vec<f64> = (0..200).map(|i| if i % 3 == 0 { draw(1, i) } else { 1.03 + 1e-4 * i as f64 }).collect();
-        assert!(!Maxima::fit(&two).unwrap().is_of(&two));
+        assert!(!WeibullMaxima::fit(&two).unwrap().is_of(&two));
     }
 
     /// The 99th percentile lies in its interval about as often as stated, over many sets of 100
@@ -312,7 +312,7 @@ mod tests {
         let held = (0..sets).filter(|set| {
             let stream = stickslip_numerics::random::Stream::new(*set);
             let draw = |i: u64| bound - scale * (-stream.uniform(i).ln()).powf(1.0 / shape);
-            let (low, high) = Maxima::fit(&(0..100).map(draw).collect::<Vec<_>>()).unwrap().interval(0.99);
+            let (low, high) = WeibullMaxima::fit(&(0..100).map(draw).collect::<Vec<_>>()).unwrap().interval(0.99);
             (low..=high).contains(&truth)
         });
         // 95 % of a hundred sets, less the effect of chance and of the skewness of the bound
@@ -321,11 +321,11 @@ mod tests {
 
     #[test]
     fn what_has_no_such_distribution_has_no_fit() {
-        assert_eq!(Maxima::fit(&values()[..19]), None);
-        assert_eq!(Maxima::fit(&[1.5; 40]), None);
+        assert_eq!(WeibullMaxima::fit(&values()[..19]), None);
+        assert_eq!(WeibullMaxima::fit(&[1.5; 40]), None);
         // the values of a Gumbel distribution, for which the best bound is very large
         let rising: Vec<f64> = (1..100).map(|i| -(-(f64::from(i) / 100.0).ln()).ln()).collect();
-        let fit = Maxima::fit(&rising).unwrap();
+        let fit = WeibullMaxima::fit(&rising).unwrap();
         assert!((fit.quantile(0.99) - 4.6).abs() < 0.5 && fit.bound > 10.0, "{fit:?}");
     }
 }

@@ -44,20 +44,20 @@ const SHOWS: f64 = 0.01;
 
 /// Points with slip on a reduced structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Slipping {
+pub struct SlipReductionCheck {
     points: usize,
     /// The lowest frequency limit of the known reduction error, rad/s.
     up_to: f64,
     /// The points of a unit of work in order, until some were solved again.
     #[serde(skip)]
-    all: Vec<Point>,
+    all: Vec<CurvePoint>,
     /// The worst result of solving again.
-    again: Option<Again>,
+    again: Option<BasisDifference>,
 }
 
 /// A point of a curve.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Point {
+pub(crate) struct CurvePoint {
     omega: f64,
     /// Amplitudes of all places, m.
     amplitudes: Vec<f64>,
@@ -65,7 +65,7 @@ pub(crate) struct Point {
 
 /// A point that was solved again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Again {
+pub struct BasisDifference {
     /// Largest difference of an amplitude, relative to the largest amplitude.
     pub error: f64,
     place: String,
@@ -90,23 +90,23 @@ pub(crate) fn count(points: f64, cases: f64) -> f64 {
     (POINTS as f64 * (points / BLOCK as f64).ceil().max(cases.min(FIRST as f64))).min(points)
 }
 
-impl Slipping {
+impl SlipReductionCheck {
     /// Returns the record of one orbit; `up_to` is the frequency limit of the known reduction
     /// error, rad/s.
     ///
     /// Returns `None` if no joint slips, or if the series has no harmonic above the limit.
-    pub(crate) fn of(orbit: &Orbit, up_to: f64) -> Option<Slipping> {
+    pub(crate) fn of(orbit: &Orbit, up_to: f64) -> Option<SlipReductionCheck> {
         let highest = orbit.evidence.harmonics.map(|h| h as f64 * orbit.omega / orbit.periods as f64);
         let slips = orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0);
         let amplitudes = orbit.places.iter().map(|place| place.size()).collect();
-        let all = vec![Point { omega: orbit.omega, amplitudes }];
+        let all = vec![CurvePoint { omega: orbit.omega, amplitudes }];
         let counts = slips && highest.is_none_or(|highest| highest > up_to);
-        counts.then_some(Slipping { points: 1, up_to, all, again: None })
+        counts.then_some(SlipReductionCheck { points: 1, up_to, all, again: None })
     }
 
     /// Appends the record of the following points.
-    pub(crate) fn join(&mut self, more: &Slipping) {
-        let error = |again: &Option<Again>| again.as_ref().map_or(-1.0, |again| again.error);
+    pub(crate) fn join(&mut self, more: &SlipReductionCheck) {
+        let error = |again: &Option<BasisDifference>| again.as_ref().map_or(-1.0, |again| again.error);
         self.points += more.points;
         self.up_to = self.up_to.min(more.up_to);
         self.all.extend(more.all.iter().cloned());
@@ -132,7 +132,7 @@ impl Slipping {
             let Some(again) = again(&farther, method, &all[index]) else { continue };
             of += 1;
             if self.again.as_ref().is_none_or(|worst| again.error > worst.error) {
-                self.again = Some(Again { at: at(all[index].omega), ..again });
+                self.again = Some(BasisDifference { at: at(all[index].omega), ..again });
             }
         }
         self.again.iter_mut().for_each(|again| again.of = of);
@@ -142,7 +142,7 @@ impl Slipping {
     /// Returns the note for the reader.
     pub(crate) fn text(&self, warning: &str) -> String {
         let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
-        let Slipping { points, up_to, again, .. } = self;
+        let SlipReductionCheck { points, up_to, again, .. } = self;
         let slips = format!(
             "at {points} point{} joints slip: `reduction_error` holds for forces up to {}, not for the higher \
              harmonics of friction",
@@ -157,7 +157,7 @@ impl Slipping {
                  reduce = {{ up_to = \"{twice}\" }} or with reduce = false.",
                 &slips[1..]
             ),
-            Some(Again { error, place, at, of, coordinates, up_to }) => {
+            Some(BasisDifference { error, place, at, of, coordinates, up_to }) => {
                 let some = if *of == 1 {
                     "the largest was".to_owned()
                 } else {
@@ -181,15 +181,15 @@ impl Slipping {
     }
 }
 
-impl Point {
+impl CurvePoint {
     fn largest(&self) -> f64 {
         self.amplitudes.iter().copied().fold(0.0, f64::max)
     }
 }
 
 /// Returns the indices of the largest point and of others over the whole range, ascending.
-fn chosen(points: &[Point]) -> BTreeSet<usize> {
-    let heights: Vec<f64> = points.iter().map(Point::largest).collect();
+fn chosen(points: &[CurvePoint]) -> BTreeSet<usize> {
+    let heights: Vec<f64> = points.iter().map(CurvePoint::largest).collect();
     let others = (0..POINTS - 1).map(|k| k * points.len().saturating_sub(1) / (POINTS - 2));
     leading(heights.iter().copied()).into_iter().chain(others).filter(|index| *index < points.len()).collect()
 }
@@ -207,13 +207,13 @@ fn farther(model: &Model, system: &System) -> Option<System> {
 }
 
 /// Returns the difference of a point from the orbit in the larger basis, if that converges.
-fn again(farther: &System, method: &dyn Method, point: &Point) -> Option<Again> {
+fn again(farther: &System, method: &dyn Method, point: &CurvePoint) -> Option<BasisDifference> {
     let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
     let reduced = farther.reduced()?;
     let differences = orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.size() - here).abs());
     let (worst, difference) = differences.enumerate().fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
     let error = difference / orbit.places.iter().map(|place| place.size()).fold(0.0, f64::max);
-    error.is_finite().then(|| Again {
+    error.is_finite().then(|| BasisDifference {
         error,
         place: orbit.places[worst].name.clone(),
         at: String::new(),

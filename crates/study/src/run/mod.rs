@@ -14,4 +14,4 @@ pub mod result_block;
 mod runner;
 pub mod work;
 
-pub use runner::{CONVERGED, Checked, Context, NOT_REACHED, Prepared, check, drawn, redrawn, run, units};
+pub use runner::{CONVERGED, CheckedStudy, Context, NOT_REACHED, PreparedCase, check, drawn, redrawn, run, units};

@@ -2,14 +2,14 @@
 
 use crate::case::study::Case;
 use crate::results::columns;
-use crate::run::work::Prepared;
+use crate::run::work::PreparedCase;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::model::{Axis, System, SystemJoint};
 use stickslip::orbit::{JointMotion, Orbit, Sample};
 
 /// A group of columns that `output` can select.
-pub(crate) struct Extra {
+pub(crate) struct OutputColumns {
     /// Name in `output`.
     pub name: &'static str,
     /// One-line description.
@@ -17,12 +17,12 @@ pub(crate) struct Extra {
     /// Names of its columns.
     columns: fn(&System) -> Vec<String>,
     /// Its numbers, one for each column.
-    values: fn(&Prepared, &Orbit, &[Sample]) -> Vec<f64>,
+    values: fn(&PreparedCase, &Orbit, &[Sample]) -> Vec<f64>,
 }
 
 /// All choices of `output`.
-pub(crate) const TABLE: &[Extra] = &[
-    Extra {
+pub(crate) const TABLE: &[OutputColumns] = &[
+    OutputColumns {
         name: "joint_force",
         doc: "half the peak-to-peak value of the force of every joint",
         columns: |system| of_joints(system, "force_amplitude_N"),
@@ -32,7 +32,7 @@ pub(crate) const TABLE: &[Extra] = &[
             axes.map(|(j, a)| half_range(samples.iter().map(|sample| sample.joints[j].force[a]))).collect()
         },
     },
-    Extra {
+    OutputColumns {
         name: "joint_mean",
         doc: "mean force of every joint over the period; for a contact the mean normal load",
         columns: |system| of_joints(system, "force_mean_N"),
@@ -46,7 +46,7 @@ pub(crate) const TABLE: &[Extra] = &[
             axes.map(|(j, a)| sum(j, a) / INSTANTS as f64).collect()
         },
     },
-    Extra {
+    OutputColumns {
         name: "joint_motion",
         doc: "half the peak-to-peak value of the relative displacement of every joint",
         columns: |system| of_joints(system, "amplitude_m"),
@@ -55,7 +55,7 @@ pub(crate) const TABLE: &[Extra] = &[
             axes.map(|(low, high)| 0.5 * (high - low).abs()).collect()
         },
     },
-    Extra {
+    OutputColumns {
         name: "contact",
         doc: "shares of the period in which the faces of every joint stick and are apart, in addition to the slip \
             share",
@@ -73,7 +73,7 @@ pub(crate) const TABLE: &[Extra] = &[
             joints.flat_map(shares).collect()
         },
     },
-    Extra {
+    OutputColumns {
         name: "velocity",
         doc: "half the peak-to-peak value of the velocity of every place",
         columns: |system| of_places(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
@@ -82,7 +82,7 @@ pub(crate) const TABLE: &[Extra] = &[
             places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.velocity)))).collect()
         },
     },
-    Extra {
+    OutputColumns {
         name: "acceleration",
         doc: "half the peak-to-peak value of the acceleration of every place",
         columns: |system| of_places(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
@@ -91,7 +91,7 @@ pub(crate) const TABLE: &[Extra] = &[
             places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.acceleration)))).collect()
         },
     },
-    Extra {
+    OutputColumns {
         name: "harmonics",
         doc: "amplitudes of harmonics 1 to 5 of the displacement of every place",
         columns: |system| {
@@ -103,7 +103,7 @@ pub(crate) const TABLE: &[Extra] = &[
         },
         values: |prepared, orbit, _| harmonics(prepared, orbit),
     },
-    Extra {
+    OutputColumns {
         name: "receptance",
         doc: "amplitude of the first harmonic of every place per unit of the largest force",
         columns: |system| of_places(system, |unit| format!("receptance_{unit}_per_N")),
@@ -140,7 +140,7 @@ fn half_range(values: impl Iterator<Item = f64>) -> f64 {
 /// Returns the amplitudes of the harmonics by the rectangle rule.
 ///
 /// For a smooth periodic motion the error comes only from harmonics near [`INSTANTS`].
-fn harmonics(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
+fn harmonics(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
     let mut sums = vec![Complex64::new(0.0, 0.0); prepared.system.places().len() * HARMONICS];
     for instant in 0..INSTANTS {
         let turn = TAU * instant as f64 / INSTANTS as f64;
@@ -155,7 +155,7 @@ fn harmonics(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
 }
 
 /// Iterates over the choices in `output` of a case, in the order of [`TABLE`].
-fn wanted(case: &Case) -> impl Iterator<Item = &'static Extra> + '_ {
+fn wanted(case: &Case) -> impl Iterator<Item = &'static OutputColumns> + '_ {
     let names = case.values.names("output").unwrap_or_default();
     TABLE.iter().filter(move |extra| names.iter().any(|name| name == extra.name))
 }
@@ -166,7 +166,7 @@ pub(crate) fn columns(case: &Case, system: &System) -> Vec<String> {
 }
 
 /// Returns the values of these columns.
-pub(crate) fn values(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
+pub(crate) fn values(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
     if wanted(&prepared.case).next().is_none() {
         return Vec::new();
     }

@@ -2,9 +2,9 @@
 
 use crate::case::study::Case;
 use crate::results::columns;
-use crate::results::table_builder::Rows;
+use crate::results::table_builder::TableBuilder;
 use crate::run::output_columns;
-use crate::run::work::Prepared;
+use crate::run::work::PreparedCase;
 use stickslip::method::OrbitError;
 use stickslip::orbit::{Orbit, Symmetry};
 
@@ -16,7 +16,7 @@ pub(crate) fn location_of(case: &Case, omega: f64) -> String {
 
 /// Numbers that a table keeps of one orbit, with its evidence.
 #[derive(Debug, Clone)]
-pub(crate) struct Summary {
+pub(crate) struct PointRow {
     /// Amplitude, mean and phase (degrees) of every place.
     pub places: Vec<[f64; 3]>,
     /// Dissipation and slip fraction of every joint.
@@ -36,12 +36,12 @@ pub(crate) struct Summary {
     pub extra: Vec<f64>,
 }
 
-impl Summary {
-    pub fn new(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> Self {
+impl PointRow {
+    pub fn new(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitError>) -> Self {
         match outcome {
-            Ok(orbit) => Summary::of(prepared, orbit, orbit.is_stable()),
+            Ok(orbit) => PointRow::of(prepared, orbit, orbit.is_stable()),
             Err(error) => {
-                let mut row = Summary::missing(prepared, error.status());
+                let mut row = PointRow::missing(prepared, error.status());
                 row.failure = Some(error.to_string());
                 row
             }
@@ -49,8 +49,8 @@ impl Summary {
     }
 
     /// The row of an orbit whose stability is known already.
-    pub fn of(prepared: &Prepared, orbit: &Orbit, stable: Option<bool>) -> Self {
-        Summary {
+    pub fn of(prepared: &PreparedCase, orbit: &Orbit, stable: Option<bool>) -> Self {
+        PointRow {
             places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
             joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
             stable,
@@ -68,9 +68,9 @@ impl Summary {
     }
 
     /// The row of a point without a result.
-    pub fn missing(prepared: &Prepared, status: &str) -> Self {
+    pub fn missing(prepared: &PreparedCase, status: &str) -> Self {
         let system = &prepared.system;
-        Summary {
+        PointRow {
             places: vec![[f64::NAN; 3]; system.places().len()],
             joints: vec![[f64::NAN; 2]; system.joints().len()],
             stable: None,
@@ -88,7 +88,7 @@ impl Summary {
     }
 
     /// Writes the cells of the row that follow the varied parameters and the frequency.
-    pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
+    pub fn write(&self, prepared: &PreparedCase, rows: &mut TableBuilder) {
         let system = &prepared.system;
         for ((place, along), [amplitude, mean, phase]) in system.places().iter().zip(system.seen()).zip(&self.places) {
             rows.number(&columns::amplitude_in(place, along.unit()), *amplitude);

@@ -6,7 +6,7 @@
 use crate::kinds::info::KindInfo;
 use crate::results::dataset::{Failure, Table};
 use crate::results::notes::Note;
-use crate::run::work::{NOT_REACHED, Part};
+use crate::run::work::{NOT_REACHED, UnitResult};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -50,8 +50,8 @@ impl Block {
     }
 
     /// Builds the block of one unit.
-    pub(crate) fn of(kind: &KindInfo, unit: usize, part: Part) -> Block {
-        let Part { tables: rows, notes, failures, points, cut } = part;
+    pub(crate) fn of(kind: &KindInfo, unit: usize, part: UnitResult) -> Block {
+        let UnitResult { tables: rows, notes, failures, points, cut } = part;
         let mut block = Block { units: unit..unit + 1, ..Block::empty(kind, unit) };
         // the part of a unit that was not reached has no tables
         block.tables.iter_mut().zip(rows).for_each(|(table, rows)| table.columns = rows.table(&table.name).columns);

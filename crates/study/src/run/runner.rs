@@ -8,13 +8,13 @@ use crate::case::study::Study;
 use crate::check::summary::ModelSummary;
 use crate::kinds;
 use crate::results::dataset::{Dataset, Figure, Record, Table};
-use crate::results::decimation::Thinning;
-use crate::results::drawing::Drawing;
+use crate::results::decimation::Decimation;
+use crate::results::drawing::FigureInput;
 use crate::results::notes::Note;
 use crate::run::basis_check::has_turn;
 use crate::run::point_row::location_of;
 use crate::run::result_block::{Block, Tally};
-use crate::run::work::{AHEAD, Part, Units, Work, refused};
+use crate::run::work::{AHEAD, UnitResult, UnitTask, WorkUnits, refused};
 use crate::syntax::error::StudyError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -23,7 +23,7 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use stickslip::method::Choice;
 
-pub use crate::run::work::{CONVERGED, Context, NOT_REACHED, Prepared};
+pub use crate::run::work::{CONVERGED, Context, NOT_REACHED, PreparedCase};
 
 /// Runs a study.
 ///
@@ -48,14 +48,14 @@ pub fn run(study: &Study, context: &Context) -> Result<Dataset, StudyError> {
 /// A study that was checked: it was surveyed, every case was prepared once, and it fits into
 /// memory.
 #[derive(Debug)]
-pub struct Checked {
+pub struct CheckedStudy {
     study: Study,
     summary: ModelSummary,
     /// The methods that find the orbits of the cases, in words, each once.
     methods: Vec<String>,
     /// The first case, if it is kept. Many studies, in particular large ones, have only this
     /// case.
-    first: Option<Arc<Prepared>>,
+    first: Option<Arc<PreparedCase>>,
     /// Duration of the check.
     time: Duration,
 }
@@ -75,28 +75,28 @@ pub struct Checked {
 /// assert_eq!(checked.summary().joints.len(), 1);
 /// assert_eq!(checked.run(&Context::unwatched(1)).unwrap().tables.len(), 2);
 /// ```
-pub fn check(study: &Study) -> Result<Checked, StudyError> {
+pub fn check(study: &Study) -> Result<CheckedStudy, StudyError> {
     let start = Instant::now();
     let summary = ModelSummary::new(study)?;
     if let Some(error) = summary.size.refusal(study, summary.size.memory) {
         return Err(error);
     }
     let mut choices = BTreeSet::new();
-    let mut choose = |prepared: &Prepared| {
+    let mut choose = |prepared: &PreparedCase| {
         if study.kind().uses_method {
             choices.insert(prepared.method.choice(&prepared.system));
         }
     };
-    let first = Arc::new(Prepared::new(study, 0)?);
+    let first = Arc::new(PreparedCase::new(study, 0)?);
     choose(&first);
     for index in 1..study.cases() {
-        choose(&Prepared::new(study, index)?);
+        choose(&PreparedCase::new(study, index)?);
     }
     let methods = choices.iter().map(Choice::to_string).collect();
-    Ok(Checked { study: study.clone(), summary, methods, first: Some(first), time: start.elapsed() })
+    Ok(CheckedStudy { study: study.clone(), summary, methods, first: Some(first), time: start.elapsed() })
 }
 
-impl Checked {
+impl CheckedStudy {
     /// Returns the study.
     pub fn study(&self) -> &Study {
         &self.study
@@ -110,8 +110,8 @@ impl Checked {
     /// Returns the checked study without its prepared first case, for callers that hold many
     /// studies. A first case of 2000 masses takes 0.1 GB. A run prepares it again.
     #[must_use]
-    pub fn lean(self) -> Checked {
-        Checked { first: None, ..self }
+    pub fn lean(self) -> CheckedStudy {
+        CheckedStudy { first: None, ..self }
     }
 
     /// Returns the number of its units of work, which are independent of each other.
@@ -185,7 +185,7 @@ impl Checked {
         }
         let first = match &self.first {
             Some(first) => first.clone(),
-            None => Arc::new(Prepared::new(&self.study, 0)?),
+            None => Arc::new(PreparedCase::new(&self.study, 0)?),
         };
         let kind = self.study.kind();
         parts(&self.study, &first, range, context, &mut |unit, part| take(Block::of(kind, unit, part)))
@@ -194,7 +194,7 @@ impl Checked {
     /// Returns the dataset without its results, as known before the computation; see
     /// [`Dataset::completed`].
     pub fn outline(&self, threads: usize) -> Dataset {
-        let Checked { study, summary, methods, .. } = self;
+        let CheckedStudy { study, summary, methods, .. } = self;
         let mut notes = summary.warnings.clone();
         notes.extend(study.notes());
         Dataset {
@@ -240,7 +240,7 @@ impl Dataset {
 /// study give an empty figure.
 pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
     let rows: Vec<(&str, usize)> = tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
-    let mut thinning = Thinning::new(study, &rows);
+    let mut thinning = Decimation::new(study, &rows);
     if thinning.keeps_all() {
         return drawn(study, tables);
     }
@@ -248,9 +248,9 @@ pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
     drawn(study, &thinning.tables())
 }
 
-/// Draws the figure of the rows that a [`Thinning`] has kept.
+/// Draws the figure of the rows that a [`Decimation`] has kept.
 pub fn drawn(study: &Study, tables: &[Table]) -> Figure {
-    Figure { title: study.title().to_owned(), ..(kinds::of(study).draw)(&Drawing { study, tables }) }
+    Figure { title: study.title().to_owned(), ..(kinds::of(study).draw)(&FigureInput { study, tables }) }
 }
 
 /// Returns the study as it was understood, with its summary.
@@ -266,8 +266,8 @@ pub fn units(study: &Study) -> usize {
 }
 
 /// Divides a study into its units.
-fn cut(study: &Study) -> Units {
-    Units::of(study, (kinds::of(study).grain)(study))
+fn cut(study: &Study) -> WorkUnits {
+    WorkUnits::of(study, (kinds::of(study).grain)(study))
 }
 
 /// Interval at which a run checks for a stop request.
@@ -282,15 +282,15 @@ const GRACE: Duration = Duration::from_millis(500);
 /// before a slow unit ends.
 fn parts<E: From<StudyError>>(
     study: &Study,
-    first: &Arc<Prepared>,
+    first: &Arc<PreparedCase>,
     range: Range<usize>,
     context: &Context,
-    take: &mut dyn FnMut(usize, Part) -> Result<(), E>,
+    take: &mut dyn FnMut(usize, UnitResult) -> Result<(), E>,
 ) -> Result<(), E> {
     let units = cut(study);
     let shared = Arc::new(study.clone());
     let (send, receive) = mpsc::channel();
-    let mut waiting: BTreeMap<usize, Part> = BTreeMap::new();
+    let mut waiting: BTreeMap<usize, UnitResult> = BTreeMap::new();
     let (mut begun, mut joined) = (range.start, range.start);
     let mut deadline: Option<Instant> = None;
     while joined < range.end {
@@ -325,12 +325,12 @@ fn parts<E: From<StudyError>>(
         }
     }
     for index in joined..range.end {
-        take(index, waiting.remove(&index).unwrap_or_else(|| Part::not_reached(units.get(index).len())))?;
+        take(index, waiting.remove(&index).unwrap_or_else(|| UnitResult::not_reached(units.get(index).len())))?;
     }
     Ok(())
 }
 
-type Finished = (usize, std::thread::Result<Result<Part, StudyError>>);
+type Finished = (usize, std::thread::Result<Result<UnitResult, StudyError>>);
 
 /// Returns the next finished unit, or `None` after a while. A thread of the pool executes other
 /// tasks meanwhile, because it must not wait for itself.
@@ -347,17 +347,22 @@ fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     None
 }
 
-fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context) -> Result<Part, StudyError> {
+fn compute(
+    study: &Study,
+    first: &Arc<PreparedCase>,
+    index: usize,
+    context: &Context,
+) -> Result<UnitResult, StudyError> {
     let unit = cut(study).get(index);
     if context.stopped() {
-        return Ok(Part::not_reached(unit.len()));
+        return Ok(UnitResult::not_reached(unit.len()));
     }
     let prepared = |index: usize| match index {
         0 => Ok(first.clone()),
-        _ => Prepared::new(study, index).map(Arc::new),
+        _ => PreparedCase::new(study, index).map(Arc::new),
     };
     let cases = unit.cases.clone().map(prepared).collect::<Result<Vec<_>, _>>()?;
-    let work = Work { study, cases, points: unit.points, context };
+    let work = UnitTask { study, cases, points: unit.points, context };
     let mut part = (kinds::of(study).compute)(&work);
     if let Ok(part) = &mut part
         && !context.stopped()
@@ -365,7 +370,7 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
         solve_again(&work, index, part);
     }
     // kinds check for a stop in many places
-    part.map(|part| Part { cut: context.stopped(), ..part }).map_err(|(index, error)| {
+    part.map(|part| UnitResult { cut: context.stopped(), ..part }).map_err(|(index, error)| {
         match work.cases.iter().find(|prepared| prepared.case.index == index) {
             Some(prepared) => refused(study, &prepared.case, &error),
             None => study.error_at("study", 0, "kind", error.to_string(), None),
@@ -375,7 +380,7 @@ fn compute(study: &Study, first: &Arc<Prepared>, index: usize, context: &Context
 
 /// If joints slip on a reduced model, solves some points again with more modes and records the
 /// difference.
-fn solve_again(work: &Work<'_>, index: usize, part: &mut Part) {
+fn solve_again(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
     let (study, prepared) = (work.study, work.case());
     let points = part.points.values().sum::<u64>() as usize;
     let slipping = part.notes.iter_mut().find_map(|note| match note {
@@ -383,7 +388,7 @@ fn solve_again(work: &Work<'_>, index: usize, part: &mut Part) {
         _ => None,
     });
     let Some(slipping) = slipping else { return };
-    let Prepared { case, system, method } = prepared;
+    let PreparedCase { case, system, method } = prepared;
     let turn = study.kind().uses_method && has_turn(index, points);
     let at = |omega: f64| location_of(case, omega);
     if let Some(error) = slipping.solve_again(turn, (&case.model, system, &**method), &at) {

@@ -7,7 +7,7 @@
 
 use crate::case::study::{Case, Study};
 use crate::results::notes::Note;
-use crate::results::table_builder::Rows;
+use crate::results::table_builder::TableBuilder;
 use crate::syntax::error::StudyError;
 use crate::syntax::expression::displayed;
 use std::collections::BTreeMap;
@@ -55,7 +55,7 @@ impl fmt::Debug for Context {
 
 /// A case that is ready to be computed.
 #[derive(Debug)]
-pub struct Prepared {
+pub struct PreparedCase {
     /// The case of the study.
     pub case: Case,
     /// The assembled model.
@@ -64,7 +64,7 @@ pub struct Prepared {
     pub method: Box<dyn Method>,
 }
 
-impl Prepared {
+impl PreparedCase {
     /// Prepares case `index` of a study.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl Prepared {
             method.solver(&system).map_err(told)?;
         }
         (study.kind().needs)(&case.values, &case.method.options, &system).map_err(told)?;
-        Ok(Prepared { case, system, method })
+        Ok(PreparedCase { case, system, method })
     }
 }
 
@@ -146,7 +146,7 @@ fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
 
 /// Size of the units of a study kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Grain {
+pub enum UnitSize {
     /// Blocks of at most [`BLOCK`] frequencies of one case.
     Frequencies,
     /// One case with all its frequencies.
@@ -157,14 +157,14 @@ pub enum Grain {
 
 /// A unit of work: some cases, and some of their frequencies.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unit {
+pub struct WorkUnit {
     /// The cases.
     pub cases: Range<usize>,
     /// The frequencies by number; `0..1` in a study without frequencies.
     pub points: Range<usize>,
 }
 
-impl Unit {
+impl WorkUnit {
     /// Returns the number of points of the study in this unit.
     pub fn len(&self) -> usize {
         self.cases.len() * self.points.len()
@@ -178,8 +178,8 @@ impl Unit {
 
 /// The units of a study, in order. They are made on demand, so their number costs no memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Units {
-    grain: Grain,
+pub struct WorkUnits {
+    grain: UnitSize,
     cases: usize,
     /// Number of frequencies of every case.
     points: usize,
@@ -187,12 +187,12 @@ pub struct Units {
     curve: usize,
 }
 
-impl Units {
+impl WorkUnits {
     /// Divides `study` into units of this size.
-    pub fn of(study: &Study, grain: Grain) -> Self {
+    pub fn of(study: &Study, grain: UnitSize) -> Self {
         let cases = study.cases();
         let points = (study.points() / cases.max(1)).max(1);
-        Units { grain, cases, points, curve: study.last_varied().max(1) }
+        WorkUnits { grain, cases, points, curve: study.last_varied().max(1) }
     }
 
     /// Returns the number of blocks of frequencies of one case.
@@ -203,9 +203,9 @@ impl Units {
     /// Returns the number of units.
     pub fn len(&self) -> usize {
         match self.grain {
-            Grain::Frequencies => self.cases * self.stretches(),
-            Grain::Case => self.cases,
-            Grain::Curve => self.cases / self.curve,
+            UnitSize::Frequencies => self.cases * self.stretches(),
+            UnitSize::Case => self.cases,
+            UnitSize::Curve => self.cases / self.curve,
         }
     }
 
@@ -214,35 +214,35 @@ impl Units {
         self.len() == 0
     }
 
-    /// Returns the unit with this number, below [`Units::len`].
-    pub fn get(&self, index: usize) -> Unit {
+    /// Returns the unit with this number, below [`WorkUnits::len`].
+    pub fn get(&self, index: usize) -> WorkUnit {
         match self.grain {
-            Grain::Frequencies => {
+            UnitSize::Frequencies => {
                 let (case, stretch) = (index / self.stretches(), index % self.stretches());
-                Unit { cases: case..case + 1, points: stretch * BLOCK..((stretch + 1) * BLOCK).min(self.points) }
+                WorkUnit { cases: case..case + 1, points: stretch * BLOCK..((stretch + 1) * BLOCK).min(self.points) }
             }
-            Grain::Case => Unit { cases: index..index + 1, points: 0..self.points },
-            Grain::Curve => Unit { cases: index * self.curve..(index + 1) * self.curve, points: 0..self.points },
+            UnitSize::Case => WorkUnit { cases: index..index + 1, points: 0..self.points },
+            UnitSize::Curve => WorkUnit { cases: index * self.curve..(index + 1) * self.curve, points: 0..self.points },
         }
     }
 }
 
 /// A unit that is ready to be computed.
 #[derive(Debug)]
-pub struct Work<'a> {
+pub struct UnitTask<'a> {
     /// The study.
     pub study: &'a Study,
     /// Its cases.
-    pub cases: Vec<Arc<Prepared>>,
+    pub cases: Vec<Arc<PreparedCase>>,
     /// Its frequencies by number.
     pub points: Range<usize>,
     /// Settings of the run.
     pub context: &'a Context,
 }
 
-impl Work<'_> {
+impl UnitTask<'_> {
     /// Returns the first of the cases.
-    pub fn case(&self) -> &Prepared {
+    pub fn case(&self) -> &PreparedCase {
         &self.cases[0]
     }
 
@@ -259,13 +259,13 @@ impl Work<'_> {
 }
 
 /// Results of a unit, or the index of a case and the reason why its model is refused.
-pub type Computed = Result<Part, (usize, MethodError)>;
+pub type Computed = Result<UnitResult, (usize, MethodError)>;
 
 /// Results of a unit.
 #[derive(Debug, Default)]
-pub struct Part {
+pub struct UnitResult {
     /// Rows of the tables of the kind, in its order.
-    pub tables: Vec<Rows>,
+    pub tables: Vec<TableBuilder>,
     /// Notes for the reader of the results.
     pub notes: Vec<Note>,
     /// Points without a result: where, and why.
@@ -283,7 +283,7 @@ pub const CONVERGED: &str = "converged";
 /// Status of a point that an interrupted run did not reach.
 pub const NOT_REACHED: &str = "not-reached";
 
-impl Part {
+impl UnitResult {
     /// Counts a point, and records its failure if there is one.
     pub(crate) fn count(&mut self, at: impl FnOnce() -> String, status: &str, failure: Option<String>) {
         *self.points.entry(status.to_owned()).or_default() += 1;
@@ -294,7 +294,7 @@ impl Part {
 
     /// The part of a unit that an interrupted run did not reach.
     pub(crate) fn not_reached(points: usize) -> Self {
-        Part { points: BTreeMap::from([(NOT_REACHED.to_owned(), points as u64)]), ..Part::default() }
+        UnitResult { points: BTreeMap::from([(NOT_REACHED.to_owned(), points as u64)]), ..UnitResult::default() }
     }
 }
 
@@ -302,14 +302,14 @@ impl Part {
 mod tests {
     use super::*;
 
-    fn units(grain: Grain) -> Vec<Unit> {
-        let units = Units { grain, cases: 6, points: 150, curve: 3 };
+    fn units(grain: UnitSize) -> Vec<WorkUnit> {
+        let units = WorkUnits { grain, cases: 6, points: 150, curve: 3 };
         (0..units.len()).map(|index| units.get(index)).collect()
     }
 
     #[test]
     fn units_cover_every_point_once_and_in_order() {
-        for grain in [Grain::Frequencies, Grain::Case, Grain::Curve] {
+        for grain in [UnitSize::Frequencies, UnitSize::Case, UnitSize::Curve] {
             let all: Vec<(usize, usize)> = units(grain)
                 .into_iter()
                 .flat_map(|unit| unit.cases.flat_map(move |case| unit.points.clone().map(move |point| (case, point))))
@@ -318,7 +318,7 @@ mod tests {
                 (0..6).flat_map(|case| (0..150).map(move |point| (case, point))).collect();
             assert_eq!(all, expected, "{grain:?}");
         }
-        assert_eq!(units(Grain::Frequencies)[1], Unit { cases: 0..1, points: 61..122 });
-        assert_eq!(units(Grain::Curve).len(), 2);
+        assert_eq!(units(UnitSize::Frequencies)[1], WorkUnit { cases: 0..1, points: 61..122 });
+        assert_eq!(units(UnitSize::Curve).len(), 2);
     }
 }

@@ -4,7 +4,7 @@
 use crate::compile::templates;
 use crate::kinds;
 use crate::kinds::kind::Kind;
-use crate::syntax::schema::{FILE, Key, Presence, SAMPLE, STUDY, Takes, described};
+use crate::syntax::schema::{FILE, Key, Presence, SAMPLE, STUDY, ValueType, described};
 use stickslip::{law, method};
 
 /// Returns the reference of study files, key by key, as Markdown tables.
@@ -31,7 +31,7 @@ pub fn markdown() -> String {
     // nested tables follow the table that contains them
     let inner = |book: &mut String, of: &str, keys: &[Key]| {
         for key in keys.iter().filter(|key| key.is_taken()) {
-            if let Takes::Table(keys) | Takes::TableOrNone(keys) = key.takes {
+            if let ValueType::Table(keys) | ValueType::TableOrNone(keys) = key.takes {
                 rows(book, &format!("`{}` of {of}", key.name), key.doc, keys);
             }
         }
@@ -39,9 +39,9 @@ pub fn markdown() -> String {
     rows(&mut book, "Top of the file", "", FILE);
     for key in FILE {
         let (heading, keys) = match key.takes {
-            Takes::List(keys) => (format!("`[[{}]]`", key.name), keys),
-            Takes::Table(keys) => (format!("`[{}]`", key.name), keys),
-            Takes::Sample => (format!("`[{}]`", key.name), SAMPLE),
+            ValueType::List(keys) => (format!("`[[{}]]`", key.name), keys),
+            ValueType::Table(keys) => (format!("`[{}]`", key.name), keys),
+            ValueType::Sample => (format!("`[{}]`", key.name), SAMPLE),
             _ => continue,
         };
         rows(&mut book, &heading, key.doc, keys);

@@ -7,13 +7,13 @@ use toml::de::{DeTable, DeValue};
 
 /// A value of the file.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Node {
+pub(crate) struct TomlNode {
     pub location: Location,
-    pub value: Content,
+    pub value: TomlValue,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Content {
+pub(crate) enum TomlValue {
     /// A string; `inner` is the byte of the source at which its content begins, if the source
     /// contains the string without escapes.
     Text {
@@ -27,48 +27,48 @@ pub(crate) enum Content {
     },
     Flag(bool),
     Date,
-    List(Vec<Node>),
-    Table(Table),
+    List(Vec<TomlNode>),
+    Table(TomlTable),
 }
 
 /// A table, its entries in file order.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Table {
+pub(crate) struct TomlTable {
     /// Location of its header, or of the whole inline table.
     pub location: Location,
-    pub entries: Vec<Entry>,
+    pub entries: Vec<TomlEntry>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub(crate) struct TomlEntry {
     pub key: String,
     pub key_location: Location,
-    pub node: Node,
+    pub node: TomlNode,
 }
 
-impl Content {
+impl TomlValue {
     /// Describes the value for messages.
     pub fn described(&self) -> String {
         match self {
-            Content::Text { text, .. } => format!("the text \"{}\"", shown(text)),
-            Content::Number { value, whole: None } => format!("the number {value}"),
-            Content::Number { whole: Some(whole), .. } => format!("the number {whole}"),
-            Content::Flag(flag) => format!("`{flag}`"),
-            Content::Date => "a date".to_owned(),
-            Content::List(_) => "a list".to_owned(),
-            Content::Table(_) => "a table".to_owned(),
+            TomlValue::Text { text, .. } => format!("the text \"{}\"", shown(text)),
+            TomlValue::Number { value, whole: None } => format!("the number {value}"),
+            TomlValue::Number { whole: Some(whole), .. } => format!("the number {whole}"),
+            TomlValue::Flag(flag) => format!("`{flag}`"),
+            TomlValue::Date => "a date".to_owned(),
+            TomlValue::List(_) => "a list".to_owned(),
+            TomlValue::Table(_) => "a table".to_owned(),
         }
     }
 }
 
-impl Table {
-    pub fn get(&self, key: &str) -> Option<&Entry> {
+impl TomlTable {
+    pub fn get(&self, key: &str) -> Option<&TomlEntry> {
         self.entries.iter().find(|entry| entry.key == key)
     }
 }
 
 /// Parses a TOML text; `source` is its index among the sources.
-pub(crate) fn parse(text: &str, source: usize) -> Result<Table, Problem> {
+pub(crate) fn parse(text: &str, source: usize) -> Result<TomlTable, Problem> {
     let tree = DeTable::parse(text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
         let mut message = error.message().replace('\n', ", ");
@@ -86,35 +86,35 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<Table, Problem> {
         }
         Problem::new(&Location { source, span }, shown(key), message).maybe_help(help)
     })?;
-    let reader = Reader { text, source };
+    let reader = TreeBuilder { text, source };
     Ok(reader.table(tree.get_ref(), 0..0))
 }
 
-struct Reader<'a> {
+struct TreeBuilder<'a> {
     text: &'a str,
     source: usize,
 }
 
-impl Reader<'_> {
+impl TreeBuilder<'_> {
     fn location(&self, span: Range<usize>) -> Location {
         Location { source: self.source, span }
     }
 
     // the parser refuses more than 80 levels, so this recursion is shallow
-    fn table(&self, table: &DeTable<'_>, span: Range<usize>) -> Table {
-        let mut entries: Vec<Entry> = table
+    fn table(&self, table: &DeTable<'_>, span: Range<usize>) -> TomlTable {
+        let mut entries: Vec<TomlEntry> = table
             .iter()
-            .map(|(key, value)| Entry {
+            .map(|(key, value)| TomlEntry {
                 key: key.get_ref().to_string(),
                 key_location: self.location(key.span()),
                 node: self.node(value.get_ref(), value.span(), key.span()),
             })
             .collect();
         entries.sort_by_key(|entry| entry.key_location.span.start);
-        Table { location: self.location(span), entries }
+        TomlTable { location: self.location(span), entries }
     }
 
-    fn node(&self, value: &DeValue<'_>, span: Range<usize>, key: Range<usize>) -> Node {
+    fn node(&self, value: &DeValue<'_>, span: Range<usize>, key: Range<usize>) -> TomlNode {
         // tables made by dotted keys have no span
         let span = if span.is_empty() { key.clone() } else { span };
         let value = match value {
@@ -122,7 +122,7 @@ impl Reader<'_> {
                 let raw = self.text.get(span.clone()).unwrap_or("");
                 let quoted = |quote: char| raw.strip_prefix(quote).and_then(|r| r.strip_suffix(quote)) == Some(text);
                 let inner = (quoted('"') || quoted('\'')).then_some(span.start + 1);
-                Content::Text { text: text.to_string(), inner }
+                TomlValue::Text { text: text.to_string(), inner }
             }
             DeValue::Integer(integer) => {
                 let whole = i64::from_str_radix(integer.as_str(), integer.radix()).ok();
@@ -130,17 +130,19 @@ impl Reader<'_> {
                     Some(whole) => whole as f64,
                     None => integer.as_str().parse().unwrap_or(f64::INFINITY),
                 };
-                Content::Number { value, whole }
+                TomlValue::Number { value, whole }
             }
-            DeValue::Float(float) => Content::Number { value: float.as_str().parse().unwrap_or(f64::NAN), whole: None },
-            DeValue::Boolean(flag) => Content::Flag(*flag),
-            DeValue::Datetime(_) => Content::Date,
+            DeValue::Float(float) => {
+                TomlValue::Number { value: float.as_str().parse().unwrap_or(f64::NAN), whole: None }
+            }
+            DeValue::Boolean(flag) => TomlValue::Flag(*flag),
+            DeValue::Datetime(_) => TomlValue::Date,
             DeValue::Array(list) => {
-                Content::List(list.iter().map(|v| self.node(v.get_ref(), v.span(), key.clone())).collect())
+                TomlValue::List(list.iter().map(|v| self.node(v.get_ref(), v.span(), key.clone())).collect())
             }
-            DeValue::Table(table) => Content::Table(self.table(table, span.clone())),
+            DeValue::Table(table) => TomlValue::Table(self.table(table, span.clone())),
         };
-        Node { location: self.location(span), value }
+        TomlNode { location: self.location(span), value }
     }
 }
 
@@ -154,17 +156,17 @@ mod tests {
         let tree = parse(text, 0).unwrap();
         let a = tree.get("a").unwrap();
         assert_eq!(&text[a.node.location.span.clone()], "\"2 mm\"");
-        assert_eq!(a.node.value, Content::Text { text: "2 mm".into(), inner: Some(5) });
-        let Content::List(list) = &tree.get("mass").unwrap().node.value else { panic!() };
-        let Content::Table(mass) = &list[0].value else { panic!() };
+        assert_eq!(a.node.value, TomlValue::Text { text: "2 mm".into(), inner: Some(5) });
+        let TomlValue::List(list) = &tree.get("mass").unwrap().node.value else { panic!() };
+        let TomlValue::Table(mass) = &list[0].value else { panic!() };
         assert_eq!(&text[mass.location.span.clone()], "[[mass]]");
-        assert_eq!(mass.get("mass").unwrap().node.value, Content::Number { value: 16.0, whole: Some(16) });
+        assert_eq!(mass.get("mass").unwrap().node.value, TomlValue::Number { value: 16.0, whole: Some(16) });
     }
 
     #[test]
     fn an_escaped_text_is_underlined_as_a_whole() {
         let tree = parse("a = \"2\\u0020mm\"", 0).unwrap();
-        assert_eq!(tree.get("a").unwrap().node.value, Content::Text { text: "2 mm".into(), inner: None });
+        assert_eq!(tree.get("a").unwrap().node.value, TomlValue::Text { text: "2 mm".into(), inner: None });
     }
 
     #[test]

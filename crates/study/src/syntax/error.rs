@@ -1,6 +1,6 @@
 //! Errors in a study file: where, what was expected, what to do.
 
-use crate::syntax::units::Fault;
+use crate::syntax::units::TextError;
 use miette::{Diagnostic, LabeledSpan, MietteError, SourceCode, SourceSpan, SpanContents};
 use std::fmt;
 use std::ops::Range;
@@ -48,7 +48,7 @@ impl Problem {
     ///
     /// `inner` is the byte of the source at which the text begins. It is `None` if the source
     /// does not contain the text literally; then the whole location is wrong.
-    pub fn fault(location: &Location, inner: Option<usize>, key: &str, fault: Fault) -> Self {
+    pub fn fault(location: &Location, inner: Option<usize>, key: &str, fault: TextError) -> Self {
         let span = match inner {
             Some(start) => start + fault.span.start..start + fault.span.end,
             None => location.span.clone(),
@@ -63,10 +63,10 @@ impl Problem {
 /// [`Display`](fmt::Display) writes one line with file, line and column. As a [`Diagnostic`] it
 /// underlines the wrong value and carries the other errors of the same file as related errors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StudyError(Box<Inner>);
+pub struct StudyError(Box<ErrorDetails>);
 
 #[derive(Debug, Clone, PartialEq)]
-struct Inner {
+struct ErrorDetails {
     source: Arc<Source>,
     /// Byte range in the text, line and column; `None` for a file that could not be read.
     at: Option<(Range<usize>, usize, usize)>,
@@ -80,7 +80,14 @@ impl StudyError {
     /// Returns an error about a file as a whole.
     pub(crate) fn file(name: &str, message: impl Into<String>, help: Option<String>) -> Self {
         let source = Arc::new(Source { name: name.to_owned(), text: String::new() });
-        StudyError(Box::new(Inner { source, at: None, key: None, message: message.into(), help, others: Vec::new() }))
+        StudyError(Box::new(ErrorDetails {
+            source,
+            at: None,
+            key: None,
+            message: message.into(),
+            help,
+            others: Vec::new(),
+        }))
     }
 
     /// Returns an error at a location in one of the sources.
@@ -92,7 +99,7 @@ impl StudyError {
         let start = boundary(&source.text, problem.location.span.start);
         let end = boundary(&source.text, problem.location.span.end.max(start));
         let (line, column) = line_and_column(&source.text, start);
-        StudyError(Box::new(Inner {
+        StudyError(Box::new(ErrorDetails {
             source,
             at: Some((start..end, line, column)),
             key: (!problem.key.is_empty()).then_some(problem.key),

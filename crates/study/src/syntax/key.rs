@@ -24,7 +24,7 @@ pub struct Key {
     /// Name of the key.
     pub name: &'static str,
     /// The values that it takes.
-    pub takes: Takes,
+    pub takes: ValueType,
     /// Presence: required, optional, or optional with a default.
     pub presence: Presence,
     /// One line that describes it.
@@ -46,7 +46,7 @@ pub enum Presence {
 
 /// The values that a key takes.
 #[derive(Debug, Clone, Copy)]
-pub enum Takes {
+pub enum ValueType {
     /// Any text.
     Text,
     /// An identifier.
@@ -56,7 +56,7 @@ pub enum Takes {
     /// Two names of places.
     Pair,
     /// A quantity of a dimension within a range.
-    Quantity(Dimension, Within),
+    Quantity(Dimension, Bounds),
     /// A whole number within these bounds.
     Count(i64, i64),
     /// `true` or `false`.
@@ -100,7 +100,7 @@ pub enum Takes {
     /// Three numbers, or three quantities of a dimension.
     Vector(Dimension),
     /// A quantity, or a list of quantities.
-    Quantities(Dimension, Within),
+    Quantities(Dimension, Bounds),
     /// No value, with the reason: a user may look for this key, but the study file has no such
     /// key. The key's `doc` says what to do instead.
     Refused(&'static str),
@@ -108,7 +108,7 @@ pub enum Takes {
 
 /// The range of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Within {
+pub enum Bounds {
     /// Any finite number.
     Finite,
     /// Zero or more.
@@ -119,31 +119,31 @@ pub enum Within {
 
 /// Returns the range of a law's parameter for the reader. The law itself checks the exact
 /// bounds.
-pub(crate) fn within(range: law::Range) -> Within {
+pub(crate) fn within(range: law::Range) -> Bounds {
     match range {
-        law::Range::Positive | law::Range::Count(_) => Within::Positive,
-        law::Range::ZeroOrMore | law::Range::UpTo(_) => Within::AtLeastZero,
-        law::Range::Any | law::Range::Within(..) => Within::Finite,
+        law::Range::Positive | law::Range::Count(_) => Bounds::Positive,
+        law::Range::ZeroOrMore | law::Range::UpTo(_) => Bounds::AtLeastZero,
+        law::Range::Any | law::Range::Within(..) => Bounds::Finite,
     }
 }
 
-impl Within {
+impl Bounds {
     /// Returns whether the number is in the range.
     pub fn holds(self, value: f64) -> bool {
         value.is_finite()
             && match self {
-                Within::Finite => true,
-                Within::AtLeastZero => value >= 0.0,
-                Within::Positive => value > 0.0,
+                Bounds::Finite => true,
+                Bounds::AtLeastZero => value >= 0.0,
+                Bounds::Positive => value > 0.0,
             }
     }
 
     /// Describes the range in words.
     pub fn described(self) -> &'static str {
         match self {
-            Within::Finite => "a finite number",
-            Within::AtLeastZero => "zero or more",
-            Within::Positive => "more than zero",
+            Bounds::Finite => "a finite number",
+            Bounds::AtLeastZero => "zero or more",
+            Bounds::Positive => "more than zero",
         }
     }
 }
@@ -151,7 +151,7 @@ impl Within {
 impl Key {
     /// Returns whether the key takes a value.
     pub fn is_taken(&self) -> bool {
-        !matches!(self.takes, Takes::Refused(_))
+        !matches!(self.takes, ValueType::Refused(_))
     }
 }
 
@@ -160,23 +160,23 @@ pub(crate) const RATIO: &str = "damping_ratio";
 
 /// A key that users look for but that does not exist, with the reason and the alternative.
 pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {
-    Key { name, takes: Takes::Refused(why), presence: Presence::Optional, doc: instead, example: "" }
+    Key { name, takes: ValueType::Refused(why), presence: Presence::Optional, doc: instead, example: "" }
 }
 
 /// A required key.
-pub const fn required(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
+pub const fn required(name: &'static str, takes: ValueType, doc: &'static str, example: &'static str) -> Key {
     Key { name, takes, presence: Presence::Required, doc, example }
 }
 
 /// A key that may be absent.
-pub const fn optional(name: &'static str, takes: Takes, doc: &'static str, example: &'static str) -> Key {
+pub const fn optional(name: &'static str, takes: ValueType, doc: &'static str, example: &'static str) -> Key {
     Key { name, takes, presence: Presence::Optional, doc, example }
 }
 
 /// A key that may be absent, with its default.
 pub const fn default(
     name: &'static str,
-    takes: Takes,
+    takes: ValueType,
     value: &'static str,
     doc: &'static str,
     example: &'static str,
@@ -185,17 +185,17 @@ pub const fn default(
 }
 
 const FROM: Key =
-    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "first value", "\"119 Hz\"");
-const TO: Key = required("to", Takes::Quantity(Dimension::FREQUENCY, Within::Positive), "last value", "\"123 Hz\"");
+    required("from", ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive), "first value", "\"119 Hz\"");
+const TO: Key = required("to", ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive), "last value", "\"123 Hz\"");
 const POINTS: Key =
-    required("points", Takes::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241");
+    required("points", ValueType::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241");
 
 /// Keys of a range of frequencies.
 pub const RANGE: &[Key] = &[FROM, TO, POINTS];
 
 /// Keys of a range of speeds, which may begin at zero.
 pub const SPEEDS: &[Key] = &[
-    required("from", Takes::Quantity(Dimension::FREQUENCY, Within::AtLeastZero), "first value", "\"0 rpm\""),
+    required("from", ValueType::Quantity(Dimension::FREQUENCY, Bounds::AtLeastZero), "first value", "\"0 rpm\""),
     TO,
     POINTS,
 ];
@@ -206,7 +206,7 @@ pub const ENDS: &[Key] = &[
     TO,
     default(
         "points",
-        Takes::Count(2, MOST_POINTS as i64),
+        ValueType::Count(2, MOST_POINTS as i64),
         "2",
         "number of values of a range; only the two ends of the range matter",
         "2",
@@ -219,7 +219,7 @@ pub const ADAPTIVE: &[Key] = &[
     TO,
     required(
         "tolerance",
-        Takes::Quantity(Dimension::NONE, Within::Positive),
+        ValueType::Quantity(Dimension::NONE, Bounds::Positive),
         "distance of the curve from the straight lines between its points, relative to its largest amplitude",
         "\"1 %\"",
     ),

@@ -15,7 +15,7 @@ use stickslip::dimension::Dimension;
 /// An error in a quantity or an expression: its place in the text, what is wrong, and what to
 /// do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fault {
+pub struct TextError {
     /// Byte range of the text that is wrong; empty at a place where something is missing.
     pub span: Range<usize>,
     /// Description of the error, and the expected text.
@@ -24,9 +24,9 @@ pub struct Fault {
     pub help: Option<String>,
 }
 
-impl Fault {
+impl TextError {
     pub(crate) fn new(span: Range<usize>, message: impl Into<String>) -> Self {
-        Fault { span, message: message.into(), help: None }
+        TextError { span, message: message.into(), help: None }
     }
 
     pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
@@ -49,16 +49,16 @@ pub struct Unit {
 const ONE: Unit = Unit { numerator: 1, denominator: 1, exponent: 0, pi: 0, dimension: Dimension::NONE };
 
 /// A named unit, and whether it takes prefixes.
-struct Named {
+struct NamedUnit {
     name: &'static str,
     prefixes: bool,
     unit: Unit,
 }
 
-const fn named(name: &'static str, prefixes: bool, factor: (u64, u64, i32, i32), base: (i8, i8, i8, i8)) -> Named {
+const fn named(name: &'static str, prefixes: bool, factor: (u64, u64, i32, i32), base: (i8, i8, i8, i8)) -> NamedUnit {
     let (numerator, denominator, exponent, pi) = factor;
     let (kg, m, s, rad) = base;
-    Named {
+    NamedUnit {
         name,
         prefixes,
         unit: Unit { numerator, denominator, exponent, pi, dimension: Dimension { kg, m, s, rad } },
@@ -66,7 +66,7 @@ const fn named(name: &'static str, prefixes: bool, factor: (u64, u64, i32, i32),
 }
 
 // name, prefixes, (numerator, denominator, power of ten, power of π), (kg, m, s, rad)
-const UNITS: &[Named] = &[
+const UNITS: &[NamedUnit] = &[
     named("m", true, (1, 1, 0, 0), (0, 1, 0, 0)),
     named("g", true, (1, 1, -3, 0), (1, 0, 0, 0)),
     named("s", true, (1, 1, 0, 0), (0, 0, 1, 0)),
@@ -145,7 +145,7 @@ pub(crate) fn find(name: &str) -> Option<Unit> {
 
 /// Reads a text that is a unit as a whole: `mm`, `rad/s`, `kN/mm`.
 pub(crate) fn parse(text: &str) -> Option<Unit> {
-    let names = Names { parameter: &|_| false, function: &|_| false };
+    let names = ReservedNames { parameter: &|_| false, function: &|_| false };
     read(text, 0, &names).ok().filter(|(_, end)| *end == text.len()).map(|(unit, _)| unit)
 }
 
@@ -263,7 +263,7 @@ pub(crate) fn starts_unit(c: char) -> bool {
 }
 
 /// Names that the reader of units must distinguish from units.
-pub(crate) struct Names<'a> {
+pub(crate) struct ReservedNames<'a> {
     /// Returns whether this is the name of a parameter.
     pub parameter: &'a dyn Fn(&str) -> bool,
     /// Returns whether this is the name of a function.
@@ -272,9 +272,9 @@ pub(crate) struct Names<'a> {
 
 /// Returns whether a text that begins with `/` continues with a unit that cannot be a
 /// parameter: `/m`, `/s`.
-pub(crate) fn divides(text: &str, names: &Names<'_>) -> bool {
+pub(crate) fn divides(text: &str, names: &ReservedNames<'_>) -> bool {
     let Some(after) = text.strip_prefix('/') else { return false };
-    let reader = Reader { text: after.trim_start(), at: 0, names, depth: 0 };
+    let reader = UnitParser { text: after.trim_start(), at: 0, names, depth: 0 };
     reader.unit_here() && !(names.parameter)(reader.word())
 }
 
@@ -282,16 +282,16 @@ pub(crate) fn divides(text: &str, names: &Names<'_>) -> bool {
 /// after it.
 ///
 /// The text at `start` must satisfy [`starts_unit`] or [`divides`].
-pub(crate) fn read(text: &str, start: usize, names: &Names<'_>) -> Result<(Unit, usize), Fault> {
-    let mut reader = Reader { text, at: start, names, depth: 0 };
+pub(crate) fn read(text: &str, start: usize, names: &ReservedNames<'_>) -> Result<(Unit, usize), TextError> {
+    let mut reader = UnitParser { text, at: start, names, depth: 0 };
     let unit = reader.product(false)?;
     Ok((unit, reader.at))
 }
 
-struct Reader<'a> {
+struct UnitParser<'a> {
     text: &'a str,
     at: usize,
-    names: &'a Names<'a>,
+    names: &'a ReservedNames<'a>,
     depth: usize,
 }
 
@@ -300,7 +300,7 @@ const DEEPEST: usize = 8;
 /// Maximum power of a unit.
 const HIGHEST_POWER: i32 = 9;
 
-impl Reader<'_> {
+impl UnitParser<'_> {
     fn rest(&self) -> &str {
         &self.text[self.at..]
     }
@@ -328,7 +328,7 @@ impl Reader<'_> {
             && !((self.names.function)(word) && self.rest()[word.len()..].trim_start().starts_with('('))
     }
 
-    fn product(&mut self, group: bool) -> Result<Unit, Fault> {
+    fn product(&mut self, group: bool) -> Result<Unit, TextError> {
         let start = self.at;
         let mut unit = if self.peek() == Some('/') { ONE } else { self.factor()? };
         let mut divided = false;
@@ -352,7 +352,7 @@ impl Reader<'_> {
                 match self.peek() {
                     None => {
                         let message = format!("the unit is incomplete: after `{next}` a unit is missing");
-                        return Err(Fault::new(symbol..self.text.len(), message)
+                        return Err(TextError::new(symbol..self.text.len(), message)
                             .help("complete the unit, as in \"10 N/m\", or remove the sign"));
                     }
                     Some('(') if self.group_here() => {}
@@ -369,7 +369,7 @@ impl Reader<'_> {
                                 shown(before),
                                 shown(after)
                             );
-                            return Err(Fault::new(span, message).help(help));
+                            return Err(TextError::new(span, message).help(help));
                         }
                     }
                     Some(_) if group => return Err(self.unknown()),
@@ -387,7 +387,7 @@ impl Reader<'_> {
                     let word = self.word();
                     let message = format!("it is not clear whether `{word}` belongs to the denominator");
                     return Err(
-                        Fault::new(self.at..self.at + word.len(), message).help("write \"N s/m\" or \"N/(m s)\"")
+                        TextError::new(self.at..self.at + word.len(), message).help("write \"N s/m\" or \"N/(m s)\"")
                     );
                 }
             }
@@ -401,26 +401,26 @@ impl Reader<'_> {
 
     /// Returns whether the parenthesis at the current position contains only a unit.
     fn group_here(&self) -> bool {
-        let mut trial = Reader { text: self.text, at: self.at, names: self.names, depth: self.depth };
+        let mut trial = UnitParser { text: self.text, at: self.at, names: self.names, depth: self.depth };
         trial.factor().is_ok()
     }
 
-    fn factor(&mut self) -> Result<Unit, Fault> {
+    fn factor(&mut self) -> Result<Unit, TextError> {
         let start = self.at;
         let unit = if self.peek() == Some('(') {
             self.depth += 1;
             if self.depth > DEEPEST {
-                return Err(Fault::new(start..start + 1, "too many parentheses in a unit"));
+                return Err(TextError::new(start..start + 1, "too many parentheses in a unit"));
             }
             self.at += 1;
             self.skip_space();
             if !self.peek().is_some_and(|c| starts_unit(c) || c == '(') {
-                return Err(Fault::new(self.at..self.at, "a unit is missing here"));
+                return Err(TextError::new(self.at..self.at, "a unit is missing here"));
             }
             let inner = self.product(true)?;
             self.skip_space();
             if self.peek() != Some(')') {
-                return Err(Fault::new(start..start + 1, "this parenthesis is not closed"));
+                return Err(TextError::new(start..start + 1, "this parenthesis is not closed"));
             }
             self.at += 1;
             self.depth -= 1;
@@ -436,7 +436,7 @@ impl Reader<'_> {
         }
     }
 
-    fn exponent(&mut self) -> Result<Option<i32>, Fault> {
+    fn exponent(&mut self) -> Result<Option<i32>, TextError> {
         const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
         let start = self.at;
         let raised: String = self.rest().chars().take_while(|c| *c == '⁻' || RAISED.contains(c)).collect();
@@ -467,7 +467,7 @@ impl Reader<'_> {
         };
         match digits.parse::<i32>() {
             Ok(exponent) if exponent.abs() <= HIGHEST_POWER => Ok(Some(exponent)),
-            _ => Err(Fault::new(
+            _ => Err(TextError::new(
                 start..self.at,
                 format!("the power of a unit must be a whole number from -{HIGHEST_POWER} to {HIGHEST_POWER}"),
             )
@@ -475,17 +475,17 @@ impl Reader<'_> {
         }
     }
 
-    fn too_large(&self, start: usize) -> Fault {
-        Fault::new(start..self.at, "the powers in this unit are too large")
+    fn too_large(&self, start: usize) -> TextError {
+        TextError::new(start..self.at, "the powers in this unit are too large")
     }
 
-    fn unknown(&self) -> Fault {
+    fn unknown(&self) -> TextError {
         let word = self.word();
         if word.is_empty() {
-            return Fault::new(self.at..self.at, "a unit is missing here");
+            return TextError::new(self.at..self.at, "a unit is missing here");
         }
         let span = self.at..self.at + word.len();
-        let fault = Fault::new(span, format!("there is no unit `{}`", shown(word)));
+        let fault = TextError::new(span, format!("there is no unit `{}`", shown(word)));
         if (self.names.parameter)(word) {
             return fault.help(format!("a number is followed by its unit; for the parameter write \"* {word}\""));
         }
@@ -511,7 +511,7 @@ mod tests {
     use super::*;
 
     fn check(text: &str, expected: f64, dimension: Dimension) {
-        let names = Names { parameter: &|_| false, function: &|name| name == "min" };
+        let names = ReservedNames { parameter: &|_| false, function: &|name| name == "min" };
         let cut = text.find(' ').unwrap();
         let (unit, end) = read(text, cut + 1, &names).unwrap();
         assert_eq!((end, unit.dimension), (text.len(), dimension), "{text}");
@@ -559,7 +559,7 @@ mod tests {
     }
 
     fn refuse(text: &str, words: &str) {
-        let names = Names { parameter: &|name| name == "m", function: &|_| false };
+        let names = ReservedNames { parameter: &|name| name == "m", function: &|_| false };
         let fault = read(text, text.find(' ').unwrap() + 1, &names).unwrap_err();
         let all = format!("{} {}", fault.message, fault.help.unwrap_or_default());
         assert!(all.contains(words), "{text}: {all}");
@@ -578,7 +578,7 @@ mod tests {
     }
 
     fn read_unit(unit: &str) -> Unit {
-        let names = Names { parameter: &|_| false, function: &|_| false };
+        let names = ReservedNames { parameter: &|_| false, function: &|_| false };
         read(unit, 0, &names).unwrap().0
     }
 

@@ -6,14 +6,14 @@ mod distribution;
 pub(crate) use design::{DESIGNS, Design, MOST_SOBOL};
 pub(crate) use distribution::{DISTRIBUTIONS, Distribution, WITHIN};
 
-use crate::compile::compiled::{Environment, Quantity};
+use crate::compile::compiled::{CompiledQuantity, Environment};
 use crate::syntax::error::Problem;
-use crate::syntax::expression::Value;
+use crate::syntax::expression::ExpressionValue;
 use stickslip::dimension::Dimension;
 
 /// The sampling of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Sample {
+pub(crate) struct SampleSettings {
     pub count: usize,
     pub seed: u64,
     pub design: Design,
@@ -21,19 +21,19 @@ pub(crate) struct Sample {
 
 /// An uncertain parameter.
 #[derive(Debug, Clone)]
-pub(crate) struct Drawn {
-    pub sample: Sample,
+pub(crate) struct DrawnParameter {
+    pub sample: SampleSettings,
     /// Index of its coordinate in the draws.
     pub coordinate: usize,
     /// The distribution, a name of [`DISTRIBUTIONS`], and its numbers.
     pub distribution: &'static str,
-    pub numbers: Vec<Quantity>,
-    pub within: Option<[Quantity; 2]>,
+    pub numbers: Vec<CompiledQuantity>,
+    pub within: Option<[CompiledQuantity; 2]>,
 }
 
-impl Drawn {
+impl DrawnParameter {
     /// Iterates over its numbers and bounds.
-    pub fn quantities(&self) -> impl Iterator<Item = &Quantity> {
+    pub fn quantities(&self) -> impl Iterator<Item = &CompiledQuantity> {
         self.numbers.iter().chain(self.within.iter().flatten())
     }
 
@@ -44,9 +44,9 @@ impl Drawn {
         dimension: Option<Dimension>,
         index: usize,
         environment: &Environment<'_>,
-    ) -> Result<Value, Problem> {
+    ) -> Result<ExpressionValue, Problem> {
         let mut dimension = dimension;
-        let mut number = |quantity: &Quantity| {
+        let mut number = |quantity: &CompiledQuantity| {
             let value = quantity.settled(name, dimension, environment)?;
             dimension = dimension.or(value.dimension);
             if value.si.is_finite() { Ok(value.si) } else { Err(quantity.problem(name, "this is not a finite number")) }
@@ -72,6 +72,6 @@ impl Drawn {
                 })?
             }
         };
-        Ok(dimension.map_or_else(|| Value::bare(si), |dimension| Value::of(si, dimension)))
+        Ok(dimension.map_or_else(|| ExpressionValue::bare(si), |dimension| ExpressionValue::of(si, dimension)))
     }
 }

@@ -11,10 +11,10 @@ mod warnings;
 pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 
 use crate::case::study::Study;
-use crate::check::cost::{Cost, Costing, Size};
-use crate::check::survey::{Surveyed, range};
+use crate::check::cost::{Cost, CostInputs, StudySize};
+use crate::check::survey::{SurveyedCase, range};
 use crate::kinds;
-use crate::run::work::Units;
+use crate::run::work::WorkUnits;
 use crate::syntax::error::StudyError;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
@@ -45,13 +45,13 @@ pub struct ModelSummary {
     /// Number of orbits at one frequency, with the reason if there may be several. `None` if
     /// the study has no excitation or no joint, or if the structure is too large for a quick
     /// answer.
-    pub orbits: Option<Orbits>,
+    pub orbits: Option<OrbitCount>,
     /// Lowest and highest excitation frequency of the study, rad/s.
     pub range: Option<(f64, f64)>,
     /// Likely mistakes: sentences that begin with `warning: `.
     pub warnings: Vec<String>,
     /// Size of the results and the memory.
-    pub size: Size,
+    pub size: StudySize,
     /// Usual time on one thread, s; a rough estimate.
     pub usual_seconds: f64,
     /// Time without the work that only some results need, s, and the condition for it, in
@@ -63,7 +63,7 @@ pub struct ModelSummary {
 
 /// Number of orbits at one frequency.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Orbits {
+pub enum OrbitCount {
     /// One orbit, except for the offsets of stuck contacts: no two motions under the same
     /// excitation separate.
     One,
@@ -71,8 +71,8 @@ pub enum Orbits {
     Several(String),
 }
 
-impl Orbits {
-    fn new(system: &System) -> Option<Orbits> {
+impl OrbitCount {
+    fn new(system: &System) -> Option<OrbitCount> {
         let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
         let mut of: Vec<String> =
             separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
@@ -80,15 +80,15 @@ impl Orbits {
             // on a large structure the answer takes three factorizations
             return match system.structure().is_sparse() {
                 true => None,
-                false if system.contracts() => Some(Orbits::One),
-                false => Some(Orbits::Several("the structure feeds energy into some motion".to_owned())),
+                false if system.contracts() => Some(OrbitCount::One),
+                false => Some(OrbitCount::Several("the structure feeds energy into some motion".to_owned())),
             };
         }
         if let Some(more @ 1..) = of.len().checked_sub(NAMED) {
             of.truncate(NAMED);
             of.push(format!("{more} more"));
         }
-        Some(Orbits::Several(of.join(", ")))
+        Some(OrbitCount::Several(of.join(", ")))
     }
 }
 
@@ -156,15 +156,15 @@ impl ModelSummary {
     /// assert!(summary.to_string().contains("120.94"));   // a stuck mode, Hz
     /// ```
     pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
-        let mut cases = vec![Surveyed::new(study, 0)?];
+        let mut cases = vec![SurveyedCase::new(study, 0)?];
         let last = study.cases().saturating_sub(1);
         let others = if cases[0].survey.dofs() > LARGE { 0 } else { last.min(LOOKED_AT - 1) };
         for i in 1..=others {
-            cases.push(Surveyed::new(study, last * i / others)?);
+            cases.push(SurveyedCase::new(study, last * i / others)?);
         }
         // the first case in which the most joints have a positive limit: zero limits tell
         // nothing
-        let holds = |one: &Surveyed| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
+        let holds = |one: &SurveyedCase| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
         let most = cases.iter().map(holds).max().unwrap_or(0);
         let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
         let range = range(&shown.case);
@@ -181,11 +181,11 @@ impl ModelSummary {
         });
         let joints = joints.collect();
         let kind = kinds::of(study);
-        let costings: Vec<Costing<'_>> = cases.iter().map(|one| Costing::new(study, one)).collect();
+        let costings: Vec<CostInputs<'_>> = cases.iter().map(|one| CostInputs::new(study, one)).collect();
         // the time of all cases if they were like this one
-        let time = |costing: &Costing<'_>| costing.seconds(&(kind.cost)(costing));
+        let time = |costing: &CostInputs<'_>| costing.seconds(&(kind.cost)(costing));
         let mean =
-            |times: &dyn Fn(&Costing<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
+            |times: &dyn Fn(&CostInputs<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
         let (usual_seconds, seconds) = (mean(&|one| time(&one.usual())), mean(&time));
         let (slow, usual) = (&costings[0], costings[0].usual());
         let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
@@ -204,10 +204,10 @@ impl ModelSummary {
             free: first.free().clone(),
             stuck: first.stuck().clone(),
             joints,
-            orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| Orbits::new(first.system())),
+            orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| OrbitCount::new(first.system())),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
-            size: slow.size(&cost, Units::of(study, (kind.grain)(study)).len()),
+            size: slow.size(&cost, WorkUnits::of(study, (kind.grain)(study)).len()),
             usual_seconds,
             spared,
             seconds: seconds.max(usual_seconds),
@@ -272,7 +272,7 @@ impl ModelSummary {
             "joints_free": modes(&self.free),
             "joints_stuck": modes(&self.stuck),
             "joints": self.joints.iter().map(joint).collect::<Vec<_>>(),
-            "one_orbit_at_a_frequency": self.orbits.as_ref().map(|orbits| *orbits == Orbits::One),
+            "one_orbit_at_a_frequency": self.orbits.as_ref().map(|orbits| *orbits == OrbitCount::One),
             "rows": self.size.rows,
             "result_bytes": self.size.results,
             "memory_bytes": self.size.memory,

@@ -1,7 +1,7 @@
 //! Summary of a structure given by matrices: its size, its reduction, its lowest frequencies.
 
 use crate::case::study::Study;
-use crate::check::survey::Surveyed;
+use crate::check::survey::SurveyedCase;
 use crate::syntax::format::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
@@ -54,7 +54,7 @@ pub struct ReducedSummary {
 }
 
 impl StructureSummary {
-    pub(super) fn new(study: &Study, one: &Surveyed) -> Option<Self> {
+    pub(super) fn new(study: &Study, one: &SurveyedCase) -> Option<Self> {
         let Substructure { component, earlier, .. } = one.case.model.substructure.as_ref()?;
         let (mass, _, stiffness) = component.matrices();
         let reduced = one.survey.system().reduced().map(|reduced| ReducedSummary {

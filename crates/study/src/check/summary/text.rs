@@ -1,6 +1,6 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary, Orbits, UNLOADED, load};
+use super::{JointSummary, ModelSummary, OrbitCount, UNLOADED, load};
 use crate::syntax::format::{bytes_text, plural, quantity, significant};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -199,8 +199,10 @@ impl fmt::Display for ModelSummary {
             line("", &format!("and {more} more joint{}", plural(more)))?;
         }
         match &self.orbits {
-            Some(Orbits::One) => line("orbits", "one at each frequency, apart from offsets that stuck contacts keep")?,
-            Some(Orbits::Several(why)) => {
+            Some(OrbitCount::One) => {
+                line("orbits", "one at each frequency, apart from offsets that stuck contacts keep")?
+            }
+            Some(OrbitCount::Several(why)) => {
                 let what = "the table states the stability of each orbit if it is known; kind `branch` follows \
                     connected orbits if it supports the laws";
                 line("orbits", &format!("several may exist at one frequency ({why}): {what}"))?;

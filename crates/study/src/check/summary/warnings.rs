@@ -1,9 +1,9 @@
 //! Warnings about valid studies that look like mistakes: sentences that begin with `warning: `.
 
-use crate::case::linear_reference::Reference;
+use crate::case::linear_reference::LinearReference;
 use crate::case::study::{Study, evaluate};
-use crate::check::survey::Surveyed;
-use crate::compile::compiled::{Environment, StatedTable};
+use crate::check::survey::SurveyedCase;
+use crate::compile::compiled::{CompiledTable, Environment};
 use crate::results::notes::WARNING;
 use crate::syntax::expression::displayed;
 use crate::syntax::format::significant;
@@ -17,7 +17,7 @@ use stickslip::structure::ReducedComponent;
 const NAMED: usize = 6;
 
 /// Returns all warnings: those of the kind, and those of every study.
-pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[Surveyed]) -> Vec<String> {
+pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -> Vec<String> {
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
     warnings.extend(still(&cases[0]));
@@ -42,7 +42,7 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-fn loose(cases: &[Surveyed]) -> Vec<String> {
+fn loose(cases: &[SurveyedCase]) -> Vec<String> {
     let them = |count: usize| if count == 1 { "it" } else { "them" };
     let one = |one: &Loose| {
         let names = listed(&one.masses);
@@ -77,7 +77,7 @@ fn loose(cases: &[Surveyed]) -> Vec<String> {
 }
 
 /// Warns of a preload that no constant force balances, for the first such case.
-fn preloaded(cases: &[Surveyed]) -> Option<String> {
+fn preloaded(cases: &[SurveyedCase]) -> Option<String> {
     let (case, found) = cases.iter().find_map(|case| Some((case, case.survey.unpressed()?)))?;
     let pushed = case.survey.loose().iter().filter(|one| one.contacts.iter().any(|name| found.joints.contains(name)));
     let bodies: Vec<String> = pushed.flat_map(|one| one.masses.clone()).collect();
@@ -94,7 +94,7 @@ fn preloaded(cases: &[Surveyed]) -> Option<String> {
 }
 
 /// Warns of a model without mass.
-fn massless(one: &Surveyed) -> Option<String> {
+fn massless(one: &SurveyedCase) -> Option<String> {
     let (model, structure) = (&one.case.model, one.survey.system().structure());
     let none = model.substructure.is_none() && model.masses.iter().all(|mass| mass.mass == 0.0);
     (none && structure.dofs() > 0).then(|| {
@@ -109,7 +109,7 @@ fn massless(one: &Surveyed) -> Option<String> {
 }
 
 /// Warns of a stiffness that gives an implausible frequency.
-fn overstiff(one: &Surveyed) -> Option<String> {
+fn overstiff(one: &SurveyedCase) -> Option<String> {
     let (model, survey) = (&one.case.model, &one.survey);
     if model.substructure.is_some() || survey.is_too_large() {
         return None;
@@ -145,7 +145,7 @@ fn overstiff(one: &Surveyed) -> Option<String> {
 }
 
 /// Warns of joints between equal places: both use the same rows, or both are fixed.
-fn still(case: &Surveyed) -> Option<String> {
+fn still(case: &SurveyedCase) -> Option<String> {
     let moves = |axis: &Axis| {
         let mut weights: HashMap<usize, (f64, f64)> = HashMap::new();
         for (row, weight) in axis.rows() {
@@ -175,7 +175,7 @@ const USUAL: (f64, f64) = (0.1, 2e5);
 const REDUCTION_ERROR: f64 = 1e-3;
 
 /// Warns of probable mistakes in a structure given by matrices.
-fn structure(case: &Surveyed) -> Vec<String> {
+fn structure(case: &SurveyedCase) -> Vec<String> {
     let system = case.survey.system();
     let mut found = system.reduced().map_or_else(Vec::new, coordinates);
     let Some(reduction) = system.reduction_evidence() else { return found };
@@ -243,7 +243,7 @@ fn unused(study: &Study) -> Option<String> {
 /// Returns the parameters on which a value of the model, the study or the method depends.
 fn used_parameters(study: &Study) -> BTreeSet<usize> {
     let mut open: Vec<usize> = Vec::new();
-    let mut from = |table: &StatedTable| {
+    let mut from = |table: &CompiledTable| {
         table.each_quantity(&mut |_, quantity, _| open.extend(quantity.expression.parameters()));
     };
     from(&study.study);
@@ -270,7 +270,7 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
 
 /// Warns of a missing reference curve that the figure requests; the first case represents all
 /// cases.
-fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
+fn no_references(study: &Study, cases: &[SurveyedCase]) -> Vec<String> {
     if !study.asks_for_references() {
         return Vec::new();
     }
@@ -279,7 +279,7 @@ fn no_references(study: &Study, cases: &[Surveyed]) -> Vec<String> {
             remove it, or run the study without [sample]";
         return vec![why.to_owned()];
     }
-    Reference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
+    LinearReference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
 }
 
 /// A bare length from this value on, m, was probably meant in millimetres: gaps and imposed

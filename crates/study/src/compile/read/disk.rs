@@ -4,10 +4,10 @@
 //! coordinates, and the nodes of the blade.
 
 use super::reader::Reader;
-use crate::case::values::Given;
-use crate::compile::compiled::{Stated, StatedTable};
-use crate::compile::source_model::StatedDisk;
-use crate::syntax::document::Table;
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::source_model::DiskSource;
+use crate::syntax::document::TomlTable;
 use crate::syntax::error::Problem;
 use crate::syntax::key::Key;
 use crate::syntax::suggest::shown;
@@ -18,10 +18,10 @@ use stickslip::structure::Node;
 const MOST_BYTES: u64 = 1 << 26;
 
 impl Reader {
-    pub(super) fn disk(&mut self, table: &Table, keys: &[Key]) -> Option<StatedDisk> {
+    pub(super) fn disk(&mut self, table: &TomlTable, keys: &[Key]) -> Option<DiskSource> {
         let stated = self.table(table, keys, "[disk]");
         let pattern = match stated.entry("mistuning").map(|entry| &entry.value) {
-            Some(Stated::Table(mistuning)) => self.pattern(mistuning),
+            Some(CompiledValue::Table(mistuning)) => self.pattern(mistuning),
             _ => None,
         };
         let sides = self.csv(
@@ -39,13 +39,13 @@ impl Reader {
         let boundary = sides.map(|rows| rows.into_iter().map(|(_, [low, high])| (low, high)).collect());
         let blade = blade.map(|rows| rows.into_iter().map(|(_, [node])| node).collect());
         let nodes = self.nodes(&stated);
-        Some(StatedDisk { table: stated, pattern, boundary, nodes, blade })
+        Some(DiskSource { table: stated, pattern, boundary, nodes, blade })
     }
 
     /// Reads the node coordinates of a sector, if a file is named.
-    fn nodes(&mut self, stated: &StatedTable) -> Option<Vec<Node>> {
+    fn nodes(&mut self, stated: &CompiledTable) -> Option<Vec<Node>> {
         let entry = stated.entry("nodes").filter(|_| !self.without_files)?;
-        let Stated::Fixed(Given::Text(name)) = &entry.value else { return None };
+        let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let read = self.text_of(name).and_then(|text| {
             let deck = text.trim_start_matches('\u{feff}').trim_start().starts_with('*');
             let read = if deck { deck_nodes(&text) } else { csv_nodes(&text) };
@@ -55,20 +55,20 @@ impl Reader {
                 (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
             })
         });
-        let refuse = |(message, help): Refused| Problem::new(&entry.location, "nodes", message).maybe_help(help);
+        let refuse = |(message, help): MessageAndHelp| Problem::new(&entry.location, "nodes", message).maybe_help(help);
         read.map_err(|problem| self.problems.push(refuse(problem))).ok()
     }
 
     /// Reads the rows of the CSV file that a key names.
     fn csv<const N: usize>(
         &mut self,
-        stated: &StatedTable,
+        stated: &CompiledTable,
         key: &'static str,
         columns: [&str; N],
         help: &str,
     ) -> Option<Vec<CsvRow<N>>> {
         let entry = stated.entry(key).filter(|_| !self.without_files)?;
-        let Stated::Fixed(Given::Text(name)) = &entry.value else { return None };
+        let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let refuse =
             |(message, help): (String, Option<String>)| Problem::new(&entry.location, key, message).maybe_help(help);
         let rows = self.text_of(name).and_then(|text| {
@@ -80,12 +80,12 @@ impl Reader {
     }
 
     /// Reads the deviations of a file, if a file is named.
-    fn pattern(&mut self, mistuning: &StatedTable) -> Option<Vec<f64>> {
+    fn pattern(&mut self, mistuning: &CompiledTable) -> Option<Vec<f64>> {
         let file = mistuning.entry("file").map(|entry| (&entry.value, entry.location.clone()));
         if self.without_files && file.is_some() {
             return None;
         }
-        let Some((Stated::Fixed(Given::Text(name)), location)) = file else {
+        let Some((CompiledValue::Fixed(ResolvedValue::Text(name)), location)) = file else {
             if mistuning.entry("deviation").is_none() {
                 let message = "`deviation` or `file` is missing in the mistuning";
                 let problem = Problem::new(&mistuning.location, "mistuning", message);
@@ -108,7 +108,7 @@ impl Reader {
         }
     }
 
-    fn pattern_of(&self, name: &str) -> Result<Vec<f64>, Refused> {
+    fn pattern_of(&self, name: &str) -> Result<Vec<f64>, MessageAndHelp> {
         pattern(&self.text_of(name)?).map_err(|(line, message)| {
             let message = format!("`{}`, line {line}: {message}", shown(name));
             let help = "write a line `sector,deviation` and below it `0,0.012`, `1,-0.5 %` … for every sector";
@@ -117,7 +117,7 @@ impl Reader {
     }
 
     /// Reads a file whose path is relative to the folder of the study.
-    fn text_of(&self, name: &str) -> Result<String, Refused> {
+    fn text_of(&self, name: &str) -> Result<String, MessageAndHelp> {
         let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
         let failed = |error: std::io::Error| {
             let message = format!("`{}` cannot be read: {error}", shown(&path.display().to_string()));
@@ -134,7 +134,7 @@ impl Reader {
 }
 
 /// Message and help.
-type Refused = (String, Option<String>);
+type MessageAndHelp = (String, Option<String>);
 
 /// Number of the line, from 1, and its fields.
 type CsvRow<const N: usize> = (usize, [String; N]);

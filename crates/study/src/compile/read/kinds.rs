@@ -1,12 +1,12 @@
 //! Reads tables whose keys depend on `kind`: laws, `[method]`, `[study]`; and `[figure]`.
 
 use super::reader::Reader;
-use crate::compile::compiled::{Stated, StatedTable};
+use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::kinds;
 use crate::kinds::info::KindInfo;
-use crate::syntax::document::{Content, Entry, Node, Table};
+use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::schema::{self, FILE, Key, Presence, STUDY, Takes, Within};
+use crate::syntax::schema::{self, Bounds, FILE, Key, Presence, STUDY, ValueType};
 use crate::syntax::suggest::one_of;
 use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo};
@@ -20,13 +20,13 @@ pub(super) fn homes(name: &str, own: &[Key]) -> Vec<String> {
     let names = |keys: &[Key]| keys.iter().filter(|key| key.is_taken()).map(|key| key.name).collect::<Vec<_>>();
     let tables = FILE.iter().filter_map(|table| {
         let (keys, title) = match table.takes {
-            Takes::Table(keys) => (names(keys), format!("[{}]", table.name)),
-            Takes::List(keys) => (names(keys), format!("[[{}]]", table.name)),
-            Takes::Study => {
+            ValueType::Table(keys) => (names(keys), format!("[{}]", table.name)),
+            ValueType::List(keys) => (names(keys), format!("[[{}]]", table.name)),
+            ValueType::Study => {
                 let of_kinds = kinds::TABLE.iter().flat_map(|row| names(row.info.keys));
                 (names(STUDY).into_iter().chain(of_kinds).collect(), format!("[{}]", table.name))
             }
-            Takes::Method => {
+            ValueType::Method => {
                 let options = method::TABLE.iter().flat_map(|row| row.options).map(|option| option.key);
                 (names(schema::METHOD).into_iter().chain(options).collect(), format!("[{}]", table.name))
             }
@@ -42,7 +42,7 @@ impl Reader {
     /// Returns the row that `kind` names in a table of laws, methods or study kinds.
     fn kind<T: 'static>(
         &mut self,
-        table: &Table,
+        table: &TomlTable,
         (what, example): (&str, &str),
         rows: &'static [T],
         name: fn(&T) -> &'static str,
@@ -56,7 +56,7 @@ impl Reader {
         };
         let location = &entry.node.location;
         match &entry.node.value {
-            Content::Text { text, .. } => match rows.iter().find(|row| name(row) == text) {
+            TomlValue::Text { text, .. } => match rows.iter().find(|row| name(row) == text) {
                 Some(row) => Some(row),
                 None => {
                     self.unknown_word("kind", text, location, words);
@@ -71,12 +71,12 @@ impl Reader {
         }
     }
 
-    pub(super) fn law(&mut self, table: &Table) -> Option<Stated> {
+    pub(super) fn law(&mut self, table: &TomlTable) -> Option<CompiledValue> {
         let row: &'static LawInfo = *self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
-        let mut keys = vec![schema::required("kind", Takes::Text, "law", "\"coulomb\"")];
+        let mut keys = vec![schema::required("kind", ValueType::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
-            takes: Takes::Quantity(p.dimension, crate::syntax::key::within(p.range)),
+            takes: ValueType::Quantity(p.dimension, crate::syntax::key::within(p.range)),
             presence: if p.default.is_some() { Presence::Optional } else { Presence::Required },
             doc: p.doc,
             example: example_of(p.dimension),
@@ -88,14 +88,14 @@ impl Reader {
         {
             problem.help = of_another_law(row, &problem.key).or(problem.help.take());
         }
-        Some(Stated::Law(row, stated))
+        Some(CompiledValue::Law(row, stated))
     }
 
-    pub(super) fn method(&mut self, root: &Table) -> Option<StatedTable> {
-        let absent = Table::default();
+    pub(super) fn method(&mut self, root: &TomlTable) -> Option<CompiledTable> {
+        let absent = TomlTable::default();
         let table = match root.get("method").map(|entry| &entry.node) {
             None => &absent,
-            Some(Node { value: Content::Table(table), .. }) => table,
+            Some(TomlNode { value: TomlValue::Table(table), .. }) => table,
             Some(node) => {
                 let message = format!("expected a table, found {}", node.value.described());
                 self.problems
@@ -111,9 +111,9 @@ impl Reader {
         keys.extend(row.options.iter().map(|option| Key {
             name: option.key,
             takes: if option.count {
-                Takes::Count(1, 1_000_000)
+                ValueType::Count(1, 1_000_000)
             } else {
-                Takes::Quantity(option.dimension, Within::Positive)
+                ValueType::Quantity(option.dimension, Bounds::Positive)
             },
             presence: Presence::Optional,
             doc: option.doc,
@@ -134,10 +134,10 @@ impl Reader {
 
     pub(super) fn request<'a>(
         &mut self,
-        root: &'a Table,
-    ) -> Option<(&'static KindInfo, StatedTable, Option<&'a Entry>)> {
+        root: &'a TomlTable,
+    ) -> Option<(&'static KindInfo, CompiledTable, Option<&'a TomlEntry>)> {
         let node = &root.get("study")?.node;
-        let Content::Table(table) = &node.value else {
+        let TomlValue::Table(table) = &node.value else {
             let message = format!("expected a table, found {}", node.value.described());
             self.problems
                 .push(Problem::new(&node.location, "study", message).help("write [study] and below it its kind"));
@@ -149,18 +149,18 @@ impl Reader {
         // `vary` is not a value of the kind: it defines the cases
         let owner = format!("a study of kind `{}`", kind.name);
         self.check_keys(table, &keys, &owner);
-        let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, Takes::Vary)).collect();
+        let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, ValueType::Vary)).collect();
         let stated = self.stated(table, &rest);
         Some((kind, stated, table.get("vary")))
     }
 
     /// Reads `[figure]`; the result is empty if the table is absent.
-    pub(super) fn figure(&mut self, root: &Table) -> StatedTable {
+    pub(super) fn figure(&mut self, root: &TomlTable) -> CompiledTable {
         let key = FILE.iter().find(|key| key.name == "figure");
         let stated = root.get("figure").zip(key).and_then(|(entry, key)| self.value(key, &entry.node));
         match stated {
-            Some(Stated::Table(table)) => table,
-            _ => StatedTable { location: Location::default(), entries: Vec::new(), turn: Default::default() },
+            Some(CompiledValue::Table(table)) => table,
+            _ => CompiledTable { location: Location::default(), entries: Vec::new(), turn: Default::default() },
         }
     }
 }

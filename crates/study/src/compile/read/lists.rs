@@ -2,14 +2,14 @@
 //! several.
 
 use super::reader::Reader;
-use crate::compile::compiled::{Stated, StatedTable};
+use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::compile::repeat::{Index, Repetition};
-use crate::compile::source_model::Lists;
-use crate::syntax::document::{Content, Entry, Node, Table};
+use crate::compile::source_model::ModelLists;
+use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::is_reserved;
 use crate::syntax::key::RATIO;
-use crate::syntax::schema::{FILE, Key, MOST_ELEMENTS, MOST_MASSES, Takes, Within};
+use crate::syntax::schema::{Bounds, FILE, Key, MOST_ELEMENTS, MOST_MASSES, ValueType};
 use crate::syntax::suggest::shown;
 use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
@@ -18,42 +18,42 @@ use stickslip::model::is_identifier;
 const LARGEST_INDEX: u64 = 1_000_000;
 
 /// Converts a damping in percent to a damping ratio.
-fn percent(spring: &mut StatedTable) {
+fn percent(spring: &mut CompiledTable) {
     for entry in spring.entries.iter_mut().filter(|entry| entry.key == "damping") {
-        if let Stated::Quantity { quantity, dimension, within, example } = &mut entry.value
+        if let CompiledValue::Quantity { quantity, dimension, within, example } = &mut entry.value
             && quantity.text.trim_end().ends_with('%')
         {
-            (entry.key, *dimension, *within, *example) = (RATIO, Dimension::NONE, Within::AtLeastZero, "\"2 %\"");
+            (entry.key, *dimension, *within, *example) = (RATIO, Dimension::NONE, Bounds::AtLeastZero, "\"2 %\"");
         }
     }
 }
 
 impl Reader {
-    pub(super) fn lists(&mut self, root: &Table) -> Option<Lists> {
-        let mut lists = Lists::default();
+    pub(super) fn lists(&mut self, root: &TomlTable) -> Option<ModelLists> {
+        let mut lists = ModelLists::default();
         for key in FILE {
             let (node, name) = match root.get(key.name) {
                 Some(entry) => (&entry.node, key.name),
                 None => continue,
             };
             match (key.takes, &node.value) {
-                (Takes::Table(keys), Content::Table(table)) if name == "disk" => {
+                (ValueType::Table(keys), TomlValue::Table(table)) if name == "disk" => {
                     lists.disk = self.disk(table, keys);
                 }
                 // read elsewhere, together with its files
-                (Takes::Table(_), _) if name == "structure" => {}
-                (Takes::Table(keys), Content::Table(table)) => {
+                (ValueType::Table(_), _) if name == "structure" => {}
+                (ValueType::Table(keys), TomlValue::Table(table)) => {
                     self.table(table, keys, &format!("[{name}]"));
                 }
-                (Takes::Table(_), _) => {
+                (ValueType::Table(_), _) => {
                     self.wrong_type(key, node);
                 }
-                (Takes::List(keys), Content::List(list)) => {
+                (ValueType::List(keys), TomlValue::List(list)) => {
                     let most = if matches!(name, "mass" | "body") { MOST_MASSES } else { MOST_ELEMENTS };
                     let mut elements = 0;
                     for (i, node) in list.iter().enumerate() {
                         match &node.value {
-                            Content::Table(table) => {
+                            TomlValue::Table(table) => {
                                 let owner = format!("{name} {}", i + 1);
                                 let Some(repetition) = self.repetition(table, &owner) else { continue };
                                 elements = repetition.count().saturating_add(elements);
@@ -73,7 +73,7 @@ impl Reader {
                         }
                     }
                 }
-                (Takes::List(_), other) => {
+                (ValueType::List(_), other) => {
                     let message = format!("expected a list of tables, found {}", other.described());
                     let problem = Problem::new(&node.location, name, message);
                     self.problems.push(problem.help(format!("write [[{name}]] with two brackets")));
@@ -98,7 +98,7 @@ impl Reader {
     }
 
     /// Reads the entries that one repeated entry states, up to the first error.
-    fn repeated(&mut self, table: &Table, keys: &[Key], owner: &str, repetition: Repetition) -> Vec<StatedTable> {
+    fn repeated(&mut self, table: &TomlTable, keys: &[Key], owner: &str, repetition: Repetition) -> Vec<CompiledTable> {
         self.repetition = repetition;
         let mut all = Vec::with_capacity(self.repetition.count());
         for number in 0..self.repetition.count() {
@@ -122,7 +122,7 @@ impl Reader {
     }
 
     /// Reads the indices of `repeat`; empty if it is absent.
-    fn repetition(&mut self, table: &Table, owner: &str) -> Option<Repetition> {
+    fn repetition(&mut self, table: &TomlTable, owner: &str) -> Option<Repetition> {
         let Some(entry) = table.get("repeat") else { return Some(Repetition::default()) };
         let before = self.problems.len();
         let mut refuse = |location: &Location, message: String, help: Option<&str>| {
@@ -130,19 +130,19 @@ impl Reader {
             self.problems.push(problem.maybe_help(help.map(str::to_owned)));
         };
         let example = Some("write it as in repeat = { i = 12 } or repeat = { i = [2, 11] }");
-        let Content::Table(repeat) = &entry.node.value else {
+        let TomlValue::Table(repeat) = &entry.node.value else {
             let message = format!("expected a table of indices in {owner}, found {}", entry.node.value.described());
             refuse(&entry.node.location, message, example);
             return None;
         };
         let mut indices = Vec::new();
-        for Entry { key, key_location, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
-            let whole = |node: &Node| match node.value {
-                Content::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= LARGEST_INDEX),
+        for TomlEntry { key, key_location, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
+            let whole = |node: &TomlNode| match node.value {
+                TomlValue::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= LARGEST_INDEX),
                 _ => None,
             };
             let range = match &node.value {
-                Content::List(list) if list.len() == 2 => whole(&list[0]).zip(whole(&list[1])),
+                TomlValue::List(list) if list.len() == 2 => whole(&list[0]).zip(whole(&list[1])),
                 _ => whole(node).map(|times| (1, times)),
             };
             if !is_identifier(key) {
@@ -163,7 +163,7 @@ impl Reader {
                         let message = format!(
                             "expected a number of repetitions or [first, last], found {}",
                             match &node.value {
-                                Content::List(_) => "another list".to_owned(),
+                                TomlValue::List(_) => "another list".to_owned(),
                                 other => other.described(),
                             }
                         );
@@ -183,15 +183,15 @@ impl Reader {
     }
 
     /// Sets the indices that wrap around: all, none, or the named ones.
-    fn wrap(&mut self, entry: &Entry, indices: &mut [Index]) {
+    fn wrap(&mut self, entry: &TomlEntry, indices: &mut [Index]) {
         let node = &entry.node;
-        let named: Vec<&Node> = match &node.value {
-            Content::Flag(flag) => return indices.iter_mut().for_each(|index| index.wraps = *flag),
-            Content::List(list) => list.iter().collect(),
+        let named: Vec<&TomlNode> = match &node.value {
+            TomlValue::Flag(flag) => return indices.iter_mut().for_each(|index| index.wraps = *flag),
+            TomlValue::List(list) => list.iter().collect(),
             _ => vec![node],
         };
         for node in named {
-            let Content::Text { text, .. } = &node.value else {
+            let TomlValue::Text { text, .. } = &node.value else {
                 let message = format!("expected true, or the name of an index, found {}", node.value.described());
                 self.problems.push(Problem::new(&node.location, "wrap", message));
                 return;

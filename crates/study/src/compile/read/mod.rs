@@ -22,11 +22,11 @@ mod values;
 pub use template::TemplateParameter;
 
 use crate::case::study::{Study, stated};
-use crate::case::values::Given;
-use crate::compile::compiled::Stated;
-use crate::compile::source_model::ModelStatement;
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::CompiledValue;
+use crate::compile::source_model::SourceModel;
 use crate::compile::template_errors;
-use crate::syntax::document::{self, Content, Node, Table};
+use crate::syntax::document::{self, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::schema::{self, FILE, MOST_BYTES};
 use crate::syntax::suggest::nearest;
@@ -244,7 +244,7 @@ impl Reader {
         let words = |reader: &mut Reader, name: &str| -> Option<String> {
             let key = FILE.iter().find(|key| key.name == name)?;
             match reader.value(key, &root.get(name)?.node)? {
-                Stated::Fixed(Given::Text(text)) => Some(text),
+                CompiledValue::Fixed(ResolvedValue::Text(text)) => Some(text),
                 _ => None,
             }
         };
@@ -307,16 +307,16 @@ impl Reader {
     }
 
     /// Reads the model that the file states itself, without a template.
-    fn own_model(&mut self, root: &Table, file: &str) -> Option<ModelStatement> {
+    fn own_model(&mut self, root: &TomlTable, file: &str) -> Option<SourceModel> {
         let lists = self.lists(root)?;
         let matrices = match root.get("structure").map(|entry| &entry.node) {
-            Some(Node { value: Content::Table(table), .. }) => Some(self.matrices(table, file)?),
+            Some(TomlNode { value: TomlValue::Table(table), .. }) => Some(self.matrices(table, file)?),
             Some(other) => {
                 let key = FILE.iter().find(|key| key.name == "structure")?;
                 return self.wrong_type(key, other).and(None);
             }
             None => None,
         };
-        Some(ModelStatement { lists, template: None, matrices })
+        Some(SourceModel { lists, template: None, matrices })
     }
 }

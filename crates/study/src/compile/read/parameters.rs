@@ -3,35 +3,35 @@
 //! It determines the parameters, the order of their evaluation, and the number of cases.
 
 use super::reader::Reader;
-use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, Drawn, MOST_SOBOL, Sample, WITHIN};
-use crate::case::study::{Parameter, Replaced, Varied, VariedPoints, evaluate, stated};
-use crate::case::values::Given;
+use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, DrawnParameter, MOST_SOBOL, SampleSettings, WITHIN};
+use crate::case::study::{Parameter, ParameterValues, ReplacedParameter, VariedParameter, evaluate, stated};
+use crate::case::values::ResolvedValue;
 use crate::compile::bare_numbers::mixed;
-use crate::compile::compiled::{Quantity, Stated, StatedTable};
+use crate::compile::compiled::{CompiledQuantity, CompiledTable, CompiledValue};
 use crate::compile::template_errors;
-use crate::syntax::document::{Content, Entry, Node, Table};
+use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::is_reserved;
-use crate::syntax::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, Takes};
+use crate::syntax::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, ValueType};
 use crate::syntax::suggest::{nearest, one_of, shown};
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
 
 /// Name, numbers, and bounds.
-type StatedDistribution = (&'static str, Vec<Quantity>, Option<[Quantity; 2]>);
+type StatedDistribution = (&'static str, Vec<CompiledQuantity>, Option<[CompiledQuantity; 2]>);
 
 impl Reader {
     /// Reads the parameters: those `given` by a template, whose values the file may replace,
     /// and those that the file adds.
     pub(super) fn parameters(
         &mut self,
-        root: &Table,
+        root: &TomlTable,
         given: Vec<Parameter>,
         overrides: &[(String, String)],
     ) -> Option<Vec<Parameter>> {
-        let mut stated: Vec<(usize, &Node)> = Vec::new();
+        let mut stated: Vec<(usize, &TomlNode)> = Vec::new();
         if let Some(entry) = root.get("parameters") {
-            let Content::Table(table) = &entry.node.value else {
+            let TomlValue::Table(table) = &entry.node.value else {
                 let message = format!("expected a table of quantities, found {}", entry.node.value.described());
                 self.problems.push(Problem::new(&entry.node.location, "parameters", message));
                 return None;
@@ -89,7 +89,7 @@ impl Reader {
                 self.problems.push(Problem::new(&location, shown(name), message).help(help));
                 continue;
             };
-            let node = Node { location, value: Content::Text { text: text.clone(), inner: Some(0) } };
+            let node = TomlNode { location, value: TomlValue::Text { text: text.clone(), inner: Some(0) } };
             if let Some(quantity) = self.quantity(name, &node) {
                 let own = &parameters[index].quantity;
                 if self.template != Some(own.location.source) {
@@ -120,8 +120,8 @@ impl Reader {
         Some(())
     }
 
-    pub(super) fn vary(&mut self, entry: &Entry, parameters: &mut [Parameter]) -> Option<Vec<Varied>> {
-        let Content::Table(table) = &entry.node.value else {
+    pub(super) fn vary(&mut self, entry: &TomlEntry, parameters: &mut [Parameter]) -> Option<Vec<VariedParameter>> {
+        let TomlValue::Table(table) = &entry.node.value else {
             let message = format!("expected a table from parameters to values, found {}", entry.node.value.described());
             let problem = Problem::new(&entry.node.location, "vary", message);
             self.problems.push(problem.help("write it as in vary = { Ft = [\"2 N\", \"4 N\"] }"));
@@ -132,11 +132,13 @@ impl Reader {
             let Some(index) = self.parameter(entry, "vary") else { continue };
             let before = self.problems.len();
             let points = match &entry.node.value {
-                Content::List(list) => self.quantities(&entry.key, list, &entry.node.location).map(VariedPoints::List),
-                Content::Table(table) => self
+                TomlValue::List(list) => {
+                    self.quantities(&entry.key, list, &entry.node.location).map(ParameterValues::List)
+                }
+                TomlValue::Table(table) => self
                     .range(table, schema::RANGE, &entry.key)
-                    .map(|(from, to, points)| VariedPoints::Range { from, to, points }),
-                _ => self.quantity(&entry.key, &entry.node).map(|quantity| VariedPoints::List(vec![quantity])),
+                    .map(|(from, to, points)| ParameterValues::Range { from, to, points }),
+                _ => self.quantity(&entry.key, &entry.node).map(|quantity| ParameterValues::List(vec![quantity])),
             };
             // the unit in [parameters] counts too, but not that in a template, which the user
             // does not see
@@ -146,7 +148,11 @@ impl Reader {
                 let beside = mixed(&entry.key, std::iter::once(own).chain(points.quantities()));
                 self.problems.extend(beside.filter(|_| known == before));
             }
-            varied.extend(points.map(|points| Varied { index, location: entry.node.location.clone(), points }));
+            varied.extend(points.map(|points| VariedParameter {
+                index,
+                location: entry.node.location.clone(),
+                points,
+            }));
         }
         let which: Vec<usize> = varied.iter().map(|varied| varied.index).collect();
         if self.problems.is_empty() {
@@ -158,36 +164,40 @@ impl Reader {
     /// Reads `[sample]`: the design of the draws, and the drawn parameters.
     pub(super) fn sample(
         &mut self,
-        root: &Table,
+        root: &TomlTable,
         parameters: &mut [Parameter],
-        listed: &[Varied],
-    ) -> Option<(Option<Sample>, Vec<Varied>)> {
+        listed: &[VariedParameter],
+    ) -> Option<(Option<SampleSettings>, Vec<VariedParameter>)> {
         let Some(entry) = root.get("sample") else { return Some((None, Vec::new())) };
-        let Content::Table(table) = &entry.node.value else {
+        let TomlValue::Table(table) = &entry.node.value else {
             let message = format!("expected a table, found {}", entry.node.value.described());
             let help = "write [sample] and below it count = 1000 and of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
             self.problems.push(Problem::new(&entry.node.location, "sample", message).help(help));
             return None;
         };
         self.check_keys(table, SAMPLE, "`[sample]`");
-        let rest: Vec<Key> = SAMPLE.iter().copied().filter(|key| !matches!(key.takes, Takes::Distributions)).collect();
+        let rest: Vec<Key> =
+            SAMPLE.iter().copied().filter(|key| !matches!(key.takes, ValueType::Distributions)).collect();
         let stated = self.stated(table, &rest);
         let count = |key: &str| match stated.entry(key).map(|entry| &entry.value) {
-            Some(Stated::Fixed(Given::Count(count))) => Some(*count),
+            Some(CompiledValue::Fixed(ResolvedValue::Count(count))) => Some(*count),
             _ => None,
         };
         let design = match stated.entry("design").map(|entry| &entry.value) {
-            Some(Stated::Fixed(Given::Text(name))) => DESIGNS.iter().find(|(known, ..)| known == name).map(|row| row.2),
+            Some(CompiledValue::Fixed(ResolvedValue::Text(name))) => {
+                DESIGNS.iter().find(|(known, ..)| known == name).map(|row| row.2)
+            }
             _ => None,
         };
         let of = &table.get("of")?.node;
-        let Content::Table(of) = &of.value else {
+        let TomlValue::Table(of) = &of.value else {
             let message = format!("expected a table from parameters to distributions, found {}", of.value.described());
             let help = "write it as in of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message).help(help));
             return None;
         };
-        let sample = Sample { count: usize::try_from(count("count")?).ok()?, seed: count("seed")?, design: design? };
+        let sample =
+            SampleSettings { count: usize::try_from(count("count")?).ok()?, seed: count("seed")?, design: design? };
         if of.entries.is_empty() {
             let message = "no parameter is drawn: name at least one";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message));
@@ -208,8 +218,8 @@ impl Reader {
                 continue;
             }
             let Some((distribution, numbers, within)) = self.distribution(entry) else { continue };
-            let points = VariedPoints::Drawn(Drawn { sample, coordinate, distribution, numbers, within });
-            drawn.push(Varied { index, location: entry.node.location.clone(), points });
+            let points = ParameterValues::Drawn(DrawnParameter { sample, coordinate, distribution, numbers, within });
+            drawn.push(VariedParameter { index, location: entry.node.location.clone(), points });
         }
         let which: Vec<usize> = drawn.iter().map(|drawn| drawn.index).collect();
         if self.problems.is_empty() {
@@ -219,24 +229,24 @@ impl Reader {
     }
 
     /// Reads a distribution: `{ normal = [mean, deviation], within = [least, most] }`.
-    fn distribution(&mut self, entry: &Entry) -> Option<StatedDistribution> {
+    fn distribution(&mut self, entry: &TomlEntry) -> Option<StatedDistribution> {
         let names = || DISTRIBUTIONS.iter().map(|(name, ..)| *name);
         let example = "write it as in { normal = [\"2 N\", \"0.2 N\"] }";
-        let Content::Table(table) = &entry.node.value else {
+        let TomlValue::Table(table) = &entry.node.value else {
             let message = format!("expected a distribution, found {}", entry.node.value.described());
             self.problems.push(Problem::new(&entry.node.location, shown(&entry.key), message).help(example));
             return None;
         };
         let (mut found, mut within) = (None, None);
         for part in &table.entries {
-            let Content::List(list) = &part.node.value else {
+            let TomlValue::List(list) = &part.node.value else {
                 let message = format!("expected a list of quantities, found {}", part.node.value.described());
                 self.problems.push(Problem::new(&part.node.location, shown(&part.key), message).help(example));
                 return None;
             };
             let quantities = self.quantities(&entry.key, list, &part.node.location)?;
             let row = DISTRIBUTIONS.iter().find(|(name, ..)| *name == part.key);
-            match (row, <[Quantity; 2]>::try_from(quantities)) {
+            match (row, <[CompiledQuantity; 2]>::try_from(quantities)) {
                 (None, Ok(bounds)) if part.key == WITHIN => within = Some(bounds),
                 (None, Err(_)) if part.key == WITHIN => {
                     let message = "expected two bounds: the least and the largest value";
@@ -268,7 +278,7 @@ impl Reader {
     }
 
     /// Returns the parameter that an entry of `vary` or of a sample names.
-    fn parameter(&mut self, entry: &Entry, what: &str) -> Option<usize> {
+    fn parameter(&mut self, entry: &TomlEntry, what: &str) -> Option<usize> {
         if let Some(&index) = self.index.get(&entry.key) {
             return Some(index);
         }
@@ -285,24 +295,28 @@ impl Reader {
     /// leaves one value.
     pub(super) fn replace(
         &self,
-        varied: &mut [Varied],
+        varied: &mut [VariedParameter],
         parameters: &[Parameter],
         overrides: &[(String, String)],
-    ) -> Vec<Replaced> {
+    ) -> Vec<ReplacedParameter> {
         let mut replaced = Vec::new();
         for varied in varied {
             let name = &self.names[varied.index];
             let Some((_, text)) = overrides.iter().rfind(|(set, _)| set == name) else { continue };
-            replaced.push(Replaced { name: name.clone(), text: text.trim().to_owned(), values: varied.points.len() });
+            replaced.push(ReplacedParameter {
+                name: name.clone(),
+                text: text.trim().to_owned(),
+                values: varied.points.len(),
+            });
             let quantity = parameters[varied.index].quantity.clone();
             varied.location = quantity.location.clone();
-            varied.points = VariedPoints::List(vec![quantity]);
+            varied.points = ParameterValues::List(vec![quantity]);
         }
         replaced
     }
 
     /// Returns an order in which the parameters can be evaluated. A cycle is an error.
-    pub(super) fn order(&mut self, parameters: &[Parameter], varied: &[Varied]) -> Option<Vec<usize>> {
+    pub(super) fn order(&mut self, parameters: &[Parameter], varied: &[VariedParameter]) -> Option<Vec<usize>> {
         let mut needs: Vec<Vec<usize>> =
             parameters.iter().map(|p| p.quantity.expression.parameters().collect()).collect();
         // a cycle needs one value of each varied parameter, and the cases contain every
@@ -333,17 +347,17 @@ impl Reader {
 
     pub(super) fn limit_points(
         &mut self,
-        study: &StatedTable,
-        varied: &[Varied],
-        sample: Option<Sample>,
+        study: &CompiledTable,
+        varied: &[VariedParameter],
+        sample: Option<SampleSettings>,
     ) -> Option<()> {
-        let listed = varied.iter().filter(|varied| !matches!(varied.points, VariedPoints::Drawn(_)));
+        let listed = varied.iter().filter(|varied| !matches!(varied.points, ParameterValues::Drawn(_)));
         let draws = sample.map_or(1, |sample| sample.count);
         let cases = listed.fold(draws, |product, varied| product.saturating_mul(varied.points.len()));
         let frequency = study.entry("frequency");
         let frequencies = match frequency.map(|entry| &entry.value) {
-            Some(Stated::List(list, _)) => list.len(),
-            Some(Stated::Range { points, .. }) => *points,
+            Some(CompiledValue::List(list, _)) => list.len(),
+            Some(CompiledValue::Range { points, .. }) => *points,
             _ => 1,
         };
         if cases <= MOST_CASES && cases.saturating_mul(frequencies) <= MOST_POINTS {
@@ -368,42 +382,42 @@ impl Reader {
 /// The function is not recursive, because chains can be long.
 fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
     #[derive(Clone, Copy, PartialEq)]
-    enum State {
+    enum VisitState {
         New,
         Open,
         Done,
     }
-    let mut state = vec![State::New; needs.len()];
+    let mut state = vec![VisitState::New; needs.len()];
     let mut order = Vec::with_capacity(needs.len());
     for root in 0..needs.len() {
-        if state[root] != State::New {
+        if state[root] != VisitState::New {
             continue;
         }
         let mut path = vec![(root, 0)];
-        state[root] = State::Open;
+        state[root] = VisitState::Open;
         while let Some((node, next)) = path.last_mut() {
             let node = *node;
             match needs[node].get(*next) {
                 None => {
-                    state[node] = State::Done;
+                    state[node] = VisitState::Done;
                     order.push(node);
                     path.pop();
                 }
                 Some(&need) => {
                     *next += 1;
                     match state[need] {
-                        State::New => {
-                            state[need] = State::Open;
+                        VisitState::New => {
+                            state[need] = VisitState::Open;
                             path.push((need, 0));
                         }
-                        State::Open => {
+                        VisitState::Open => {
                             let start = path.iter().position(|(n, _)| *n == need).unwrap_or(0);
                             let mut circle: Vec<usize> = path[start..].iter().map(|(n, _)| *n).collect();
                             let lowest = (0..circle.len()).min_by_key(|i| circle[*i]).unwrap_or(0);
                             circle.rotate_left(lowest);
                             return Err(circle);
                         }
-                        State::Done => {}
+                        VisitState::Done => {}
                     }
                 }
             }

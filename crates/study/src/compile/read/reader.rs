@@ -1,7 +1,7 @@
 //! The state of a reader: its texts, the problems found, the parameters, and the current
 //! repetition.
 
-use crate::compile::repeat::{Repetition, Turn};
+use crate::compile::repeat::{Iteration, Repetition};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::expression::Expression;
 use std::collections::HashMap;
@@ -47,12 +47,12 @@ impl Reader {
     }
 
     /// Returns the current turn of the repetition.
-    pub(super) fn turn(&self) -> Turn<'_> {
+    pub(super) fn turn(&self) -> Iteration<'_> {
         self.repetition.turn(self.number)
     }
 
     /// Compiles an expression over the parameters and the indices of the turn.
-    pub(super) fn compile(&self, text: &str) -> Result<Expression, crate::syntax::units::Fault> {
+    pub(super) fn compile(&self, text: &str) -> Result<Expression, crate::syntax::units::TextError> {
         let turn = self.turn();
         let names: Vec<&str> = self.names.iter().map(String::as_str).chain(turn.names()).collect();
         Expression::compile_with(text, &|name| self.index.get(name).copied(), &|name| turn.value(name), &names)

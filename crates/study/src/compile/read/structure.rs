@@ -5,11 +5,11 @@
 //! left out.
 
 use super::reader::Reader;
-use crate::case::stress_stiffening::Stiffened;
-use crate::case::values::Given;
-use crate::compile::compiled::{Stated, StatedTable};
-use crate::compile::source_model::{Matrices, exchange, sensible};
-use crate::syntax::document::Table;
+use crate::case::stress_stiffening::StressStiffening;
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::source_model::{MatrixSource, exchange, sensible};
+use crate::syntax::document::TomlTable;
 use crate::syntax::error::Problem;
 use crate::syntax::schema::STRUCTURE;
 use crate::syntax::unit_sets;
@@ -20,7 +20,7 @@ use stickslip_numerics::sparse::Matrix;
 
 impl Reader {
     /// Reads the table and its matrices; `None` if a problem was found.
-    pub(super) fn matrices(&mut self, table: &Table, study_file: &str) -> Option<Matrices> {
+    pub(super) fn matrices(&mut self, table: &TomlTable, study_file: &str) -> Option<MatrixSource> {
         let before = self.problems.len();
         let stated = self.table(table, STRUCTURE, "[structure]");
         let several = ["damping", "modal_damping", "rayleigh"].into_iter().filter(|key| stated.entry(key).is_some());
@@ -34,12 +34,12 @@ impl Reader {
             return None;
         }
         if self.without_files {
-            return Some(Matrices { table: stated, component: None, stiffened: None, left_out: 0 });
+            return Some(MatrixSource { table: stated, component: None, stiffened: None, left_out: 0 });
         }
         let folder = Path::new(study_file).parent().unwrap_or(Path::new(""));
         match read(&stated, folder) {
             Ok((component, stiffened, left_out)) => {
-                Some(Matrices { table: stated, component: Some(component), stiffened, left_out })
+                Some(MatrixSource { table: stated, component: Some(component), stiffened, left_out })
             }
             Err(problem) => {
                 self.problems.push(problem);
@@ -50,11 +50,11 @@ impl Reader {
 }
 
 /// A matrix and its key in the table.
-type Read = (&'static str, formats::Matrix);
+type KeyedMatrix = (&'static str, formats::Matrix);
 
-fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffened>, usize), Problem> {
+fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<StressStiffening>, usize), Problem> {
     let problem = |key: &str, message: String| Problem::new(stated.location_of(key, None), key, message);
-    let one = |key: &'static str| -> Result<Option<Read>, Problem> {
+    let one = |key: &'static str| -> Result<Option<KeyedMatrix>, Problem> {
         let Some(file) = file(stated, key) else { return Ok(None) };
         let path = folder.join(&file.path);
         let matrix = formats::read(&path, file.format.as_deref(), file.name.as_deref());
@@ -65,7 +65,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let missing = |key| problem(key, "the file is missing".to_owned());
     let stiffness = one("stiffness")?.ok_or_else(|| missing("stiffness"))?;
     // some programs leave out empty rows; the rows of the stiffness matrix determine the order
-    let ordered = |(key, matrix): Read| {
+    let ordered = |(key, matrix): KeyedMatrix| {
         let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
         let ordered = formats::aligned(matrix, &stiffness.1).map_err(|error| said(error, &path));
         ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
@@ -96,16 +96,16 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     }
     let names = row_names(stated, folder, [&stiffness.1, &mass.1])?;
     let (damped, spins) = (damping.is_some(), stiffened.is_some());
-    let all: Vec<Read> = [Some(stiffness), Some(mass), damping, stiffened].into_iter().flatten().collect();
+    let all: Vec<KeyedMatrix> = [Some(stiffness), Some(mass), damping, stiffened].into_iter().flatten().collect();
     let left_out = formats::constrained(&all.iter().map(|(_, matrix)| matrix).collect::<Vec<_>>(), rows);
     let kept: Vec<usize> = (0..rows).filter(|row| left_out.binary_search(row).is_err()).collect();
-    let free = |(key, matrix): Read| {
+    let free = |(key, matrix): KeyedMatrix| {
         let free = matrix.without(&left_out).map_err(|error| said(error, Path::new("")));
         free.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
-    let all = all.into_iter().map(free).collect::<Result<Vec<Read>, Problem>>()?;
+    let all = all.into_iter().map(free).collect::<Result<Vec<KeyedMatrix>, Problem>>()?;
     let units = match stated.entry("units").map(|entry| &entry.value) {
-        Some(Stated::Fixed(Given::Text(text))) => unit_sets::find(text),
+        Some(CompiledValue::Fixed(ResolvedValue::Text(text))) => unit_sets::find(text),
         _ => None,
     };
     let units = units.ok_or_else(|| problem("units", "the units are missing".to_owned()))?;
@@ -125,7 +125,7 @@ fn read(stated: &StatedTable, folder: &Path) -> Result<(Component, Option<Stiffe
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else { return Err(missing("mass")) };
     let damping = if damped { next()? } else { None };
     let stiffened = if spins { next()? } else { None };
-    let stiffened = stiffened.map(|there| Stiffened::new(&stiffness, &there));
+    let stiffened = stiffened.map(|there| StressStiffening::new(&stiffness, &there));
     let stiffened = stiffened.transpose().map_err(|error| problem("stiffened", error.to_string()))?;
     let name = |row: &usize| Some(&names[*row]).filter(|name| !name.is_empty()).cloned();
     let names = kept.iter().map(|row| name(row).unwrap_or_else(|| (row + 1).to_string())).collect();
@@ -174,29 +174,29 @@ fn said(error: formats::Error, path: &Path) -> (String, String) {
 }
 
 /// A file as stated in the table.
-struct File {
+struct StatedFile {
     path: PathBuf,
     name: Option<String>,
     format: Option<String>,
 }
 
-fn file(stated: &StatedTable, key: &str) -> Option<File> {
-    let text = |stated: &Stated| match stated {
-        Stated::Fixed(Given::Text(text)) => Some(text.clone()),
+fn file(stated: &CompiledTable, key: &str) -> Option<StatedFile> {
+    let text = |stated: &CompiledValue| match stated {
+        CompiledValue::Fixed(ResolvedValue::Text(text)) => Some(text.clone()),
         _ => None,
     };
     match &stated.entry(key)?.value {
-        Stated::Table(table) => {
+        CompiledValue::Table(table) => {
             let of = |key: &str| text(&table.entry(key)?.value);
-            Some(File { path: of("file")?.into(), name: of("name"), format: of("format") })
+            Some(StatedFile { path: of("file")?.into(), name: of("name"), format: of("format") })
         }
-        other => Some(File { path: text(other)?.into(), name: None, format: None }),
+        other => Some(StatedFile { path: text(other)?.into(), name: None, format: None }),
     }
 }
 
 /// Returns the names of all rows, from a separate file or from a matrix file; unnamed rows are
 /// empty.
-fn row_names(stated: &StatedTable, folder: &Path, matrices: [&formats::Matrix; 2]) -> Result<Vec<String>, Problem> {
+fn row_names(stated: &CompiledTable, folder: &Path, matrices: [&formats::Matrix; 2]) -> Result<Vec<String>, Problem> {
     let rows = matrices[0].rows();
     let Some(file) = file(stated, "dofs") else {
         let named = matrices.iter().find_map(|matrix| matrix.names());

@@ -4,12 +4,12 @@
 use super::reader::Reader;
 use crate::case::study::{Parameter, evaluate, model_of};
 use crate::compile::compiled::Environment;
-use crate::compile::source_model::{Lists, ModelStatement, NamedTemplate};
+use crate::compile::source_model::{ModelLists, SourceModel, TemplateSource};
 use crate::compile::templates::{self, Template, comment_behind};
-use crate::syntax::document::{self, Content, Table};
+use crate::syntax::document::{self, TomlTable, TomlValue};
 use crate::syntax::error::{Problem, Source, StudyError};
-use crate::syntax::expression::Value;
-use crate::syntax::schema::{FILE, Takes};
+use crate::syntax::expression::ExpressionValue;
+use crate::syntax::schema::{FILE, ValueType};
 use crate::syntax::suggest::nearest;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,15 +19,15 @@ use stickslip::model::Model;
 /// The content of a template file without its study.
 pub(super) struct TemplateFile {
     pub parameters: Vec<Parameter>,
-    pub lists: Lists,
+    pub lists: ModelLists,
     /// Index of the file among the sources.
     pub source: usize,
 }
 
 /// Returns the template that `[model]` names, with its table.
-pub(super) fn named_template(root: &Table) -> Option<(&'static Template, &Table)> {
-    let Content::Table(table) = &root.get("model")?.node.value else { return None };
-    let Content::Text { text, .. } = &table.get("template")?.node.value else { return None };
+pub(super) fn named_template(root: &TomlTable) -> Option<(&'static Template, &TomlTable)> {
+    let TomlValue::Table(table) = &root.get("model")?.node.value else { return None };
+    let TomlValue::Text { text, .. } = &table.get("template")?.node.value else { return None };
     Some((templates::find(text)?, table))
 }
 
@@ -54,13 +54,13 @@ impl Reader {
     /// Returns the model of a template, with the law that the study sets for its joints.
     pub(super) fn with_template(
         &mut self,
-        root: &Table,
+        root: &TomlTable,
         row: &Template,
-        mut lists: Lists,
-        table: &Table,
+        mut lists: ModelLists,
+        table: &TomlTable,
         source: usize,
-    ) -> Option<ModelStatement> {
-        for key in FILE.iter().filter(|key| matches!(key.takes, Takes::List(_)) || key.name == "structure") {
+    ) -> Option<SourceModel> {
+        for key in FILE.iter().filter(|key| matches!(key.takes, ValueType::List(_)) || key.name == "structure") {
             if let Some(entry) = root.get(key.name) {
                 let message = format!(
                     "the template `{}` contains the whole model; `{}` cannot be added to it",
@@ -80,7 +80,7 @@ impl Reader {
                     let message = format!("the template `{}` is not a sector of a disk", row.name);
                     self.problems.push(Problem::new(&entry.node.location, "disk", message));
                 }
-                (Some(own), Some(Takes::Table(keys)), Content::Table(table)) => {
+                (Some(own), Some(ValueType::Table(keys)), TomlValue::Table(table)) => {
                     *own = self.disk(table, keys)?;
                 }
                 _ => {
@@ -89,7 +89,7 @@ impl Reader {
                 }
             }
         }
-        let Some(Takes::Table(keys)) = FILE.iter().find(|key| key.name == "model").map(|key| key.takes) else {
+        let Some(ValueType::Table(keys)) = FILE.iter().find(|key| key.name == "model").map(|key| key.takes) else {
             return None;
         };
         let table = self.table(table, keys, "[model]");
@@ -98,11 +98,7 @@ impl Reader {
                 entry.clone_from(law);
             }
         }
-        Some(ModelStatement {
-            lists,
-            template: Some(NamedTemplate { table, source, given: Vec::new() }),
-            matrices: None,
-        })
+        Some(SourceModel { lists, template: Some(TemplateSource { table, source, given: Vec::new() }), matrices: None })
     }
 }
 
@@ -112,13 +108,13 @@ struct CompiledTemplate {
     /// Each parameter has the dimension of its default, if the default has one.
     parameters: Vec<Parameter>,
     order: Vec<usize>,
-    structure: ModelStatement,
+    structure: SourceModel,
     sources: Vec<Arc<Source>>,
 }
 
 impl CompiledTemplate {
     /// Evaluates the parameters; `fixed` parameters have the given value, SI.
-    fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<Value>, StudyError> {
+    fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<ExpressionValue>, StudyError> {
         let values = evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed);
         values.map_err(|problem| StudyError::at(&self.sources, problem))
     }
@@ -146,7 +142,7 @@ fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
     let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
     match (stated, order) {
         (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
-            let structure = ModelStatement { lists, template: None, matrices: None };
+            let structure = SourceModel { lists, template: None, matrices: None };
             Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
         }
         _ => Err(reader.error(row.name)),

@@ -3,20 +3,20 @@
 
 use super::kinds::homes;
 use super::reader::Reader;
-use crate::case::values::Given;
+use crate::case::values::ResolvedValue;
 use crate::compile::bare_numbers::mixed;
-use crate::compile::compiled::{Order, Quantity, Stated, StatedEntry, StatedTable, Weights};
-use crate::syntax::document::{Content, Entry, Node, Table};
+use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, RangeOrder, Weights};
+use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
-use crate::syntax::schema::{self, Key, MOST_POINTS, Presence, Takes, Within};
+use crate::syntax::schema::{self, Bounds, Key, MOST_POINTS, Presence, ValueType};
 use crate::syntax::suggest::{nearest, one_of, shown};
 use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
 
 impl Reader {
     /// Reports unknown and missing keys.
-    pub(super) fn check_keys(&mut self, table: &Table, keys: &[Key], owner: &str) {
+    pub(super) fn check_keys(&mut self, table: &TomlTable, keys: &[Key], owner: &str) {
         for entry in &table.entries {
             if !keys.iter().any(|key| key.name == entry.key) {
                 let help = match nearest(&entry.key, keys.iter().map(|key| key.name)) {
@@ -39,7 +39,7 @@ impl Reader {
             if table.get(key.name).is_none() {
                 let message = format!("`{}` is missing in {owner}: {}", key.name, schema::described(&key.takes));
                 let help = match key.takes {
-                    Takes::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
+                    ValueType::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
                     _ => format!("add {} = {}", key.name, key.example),
                 };
                 self.problems.push(Problem::new(&table.location, key.name, message).help(help));
@@ -49,14 +49,14 @@ impl Reader {
 
     /// Returns the help for a `step` in a range, which has a number of points or a tolerance
     /// instead.
-    fn by_steps(&self, table: &Table, entry: &Entry, keys: &[Key]) -> Option<String> {
+    fn by_steps(&self, table: &TomlTable, entry: &TomlEntry, keys: &[Key]) -> Option<String> {
         let is_range = keys.iter().any(|key| key.name == "from") && keys.iter().any(|key| key.name == "to");
         if !is_range || nearest(&entry.key, ["step", "steps", "increment", "spacing"]).is_none() {
             return None;
         }
         let number = |key: &str| match &table.get(key)?.node.value {
-            Content::Text { text, .. } => self.compile(text).ok()?.evaluate(&[]).ok().map(|value| value.si),
-            Content::Number { value, .. } => Some(*value),
+            TomlValue::Text { text, .. } => self.compile(text).ok()?.evaluate(&[]).ok().map(|value| value.si),
+            TomlValue::Number { value, .. } => Some(*value),
             _ => None,
         };
         let steps = || Some((number("to")? - number("from")?) / number(&entry.key)?);
@@ -71,13 +71,13 @@ impl Reader {
         })
     }
 
-    pub(super) fn table(&mut self, table: &Table, keys: &[Key], owner: &str) -> StatedTable {
+    pub(super) fn table(&mut self, table: &TomlTable, keys: &[Key], owner: &str) -> CompiledTable {
         self.check_keys(table, keys, owner);
         self.stated(table, keys)
     }
 
     /// Reads the values of known keys. [`Reader::check_keys`] reports unknown and missing keys.
-    pub(super) fn stated(&mut self, table: &Table, keys: &[Key]) -> StatedTable {
+    pub(super) fn stated(&mut self, table: &TomlTable, keys: &[Key]) -> CompiledTable {
         let mut entries = Vec::with_capacity(keys.len());
         for key in keys {
             let (location, value) = match (table.get(key.name), key.presence) {
@@ -87,25 +87,25 @@ impl Reader {
                 }
                 (None, _) => continue,
             };
-            entries.extend(value.map(|value| StatedEntry { key: key.name, location, value }));
+            entries.extend(value.map(|value| CompiledEntry { key: key.name, location, value }));
         }
-        StatedTable { location: table.location.clone(), turn: String::new(), entries }
+        CompiledTable { location: table.location.clone(), turn: String::new(), entries }
     }
 
     /// Reads the default value of an absent key.
-    fn standing_for(&mut self, key: &Key, text: &str, location: &Location) -> Option<Stated> {
+    fn standing_for(&mut self, key: &Key, text: &str, location: &Location) -> Option<CompiledValue> {
         let value = match key.takes {
-            Takes::Count(..) => {
+            ValueType::Count(..) => {
                 let whole = text.parse::<i64>().ok();
-                Content::Number { value: whole.unwrap_or(0) as f64, whole }
+                TomlValue::Number { value: whole.unwrap_or(0) as f64, whole }
             }
-            Takes::Flag => Content::Flag(text == "true"),
-            _ => Content::Text { text: text.to_owned(), inner: None },
+            ValueType::Flag => TomlValue::Flag(text == "true"),
+            _ => TomlValue::Text { text: text.to_owned(), inner: None },
         };
-        self.value(key, &Node { location: location.clone(), value })
+        self.value(key, &TomlNode { location: location.clone(), value })
     }
 
-    pub(super) fn wrong_type(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+    pub(super) fn wrong_type(&mut self, key: &Key, node: &TomlNode) -> Option<CompiledValue> {
         let expected = schema::described(&key.takes);
         self.problems.push(
             Problem::new(&node.location, key.name, format!("expected {expected}, found {}", node.value.described()))
@@ -114,108 +114,115 @@ impl Reader {
         None
     }
 
-    pub(super) fn value(&mut self, key: &Key, node: &Node) -> Option<Stated> {
+    pub(super) fn value(&mut self, key: &Key, node: &TomlNode) -> Option<CompiledValue> {
         match (&key.takes, &node.value) {
-            (Takes::Text, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
-            (Takes::Name, Content::Text { text, inner }) => {
-                Some(Stated::Fixed(Given::Text(self.name(key.name, text, *inner, &node.location)?)))
+            (ValueType::Text, TomlValue::Text { text, .. }) => {
+                Some(CompiledValue::Fixed(ResolvedValue::Text(text.clone())))
             }
-            (Takes::Names, Content::Text { text, inner }) => {
-                Some(Stated::Names(vec![(self.name(key.name, text, *inner, &node.location)?, node.location.clone())]))
+            (ValueType::Name, TomlValue::Text { text, inner }) => {
+                Some(CompiledValue::Fixed(ResolvedValue::Text(self.name(key.name, text, *inner, &node.location)?)))
             }
-            (Takes::Refused(why), _) => {
+            (ValueType::Names, TomlValue::Text { text, inner }) => Some(CompiledValue::Names(vec![(
+                self.name(key.name, text, *inner, &node.location)?,
+                node.location.clone(),
+            )])),
+            (ValueType::Refused(why), _) => {
                 self.problems.push(Problem::new(&node.location, key.name, *why).help(key.doc));
                 None
             }
-            (Takes::Repeat, _) => None, // read before the other keys, whose values depend on it
-            (Takes::Names, Content::List(list)) if !list.is_empty() => self.names(key, list),
-            (Takes::Pair, Content::List(list)) if list.len() == 2 => self.names(key, list),
-            (Takes::Pair, Content::List(list)) => {
+            (ValueType::Repeat, _) => None, // read before the other keys, whose values depend on it
+            (ValueType::Names, TomlValue::List(list)) if !list.is_empty() => self.names(key, list),
+            (ValueType::Pair, TomlValue::List(list)) if list.len() == 2 => self.names(key, list),
+            (ValueType::Pair, TomlValue::List(list)) => {
                 let message = format!("expected two names of places, found {}", list.len());
                 let help = format!("write it as in {} = {}", key.name, key.example);
                 self.problems.push(Problem::new(&node.location, key.name, message).help(help));
                 None
             }
-            (Takes::Quantity(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+            (ValueType::Quantity(dimension, within), TomlValue::Text { .. } | TomlValue::Number { .. }) => {
                 let quantity = self.quantity(key.name, node)?;
                 let (dimension, within, example) = (*dimension, *within, key.example);
-                Some(Stated::Quantity { quantity, dimension, within, example })
+                Some(CompiledValue::Quantity { quantity, dimension, within, example })
             }
-            (Takes::Count(from, to), Content::Number { whole: Some(whole), .. }) => {
+            (ValueType::Count(from, to), TomlValue::Number { whole: Some(whole), .. }) => {
                 self.count(key, *whole, *from..=*to, &node.location)
             }
-            (Takes::Flag, Content::Flag(flag)) => Some(Stated::Fixed(Given::Flag(*flag))),
-            (Takes::Frequencies(keys), Content::Text { .. } | Content::Number { .. }) => {
-                Some(Stated::List(vec![self.quantity(key.name, node)?], within(keys)))
+            (ValueType::Flag, TomlValue::Flag(flag)) => Some(CompiledValue::Fixed(ResolvedValue::Flag(*flag))),
+            (ValueType::Frequencies(keys), TomlValue::Text { .. } | TomlValue::Number { .. }) => {
+                Some(CompiledValue::List(vec![self.quantity(key.name, node)?], within(keys)))
             }
-            (Takes::Frequencies(keys), Content::List(list)) => {
-                Some(Stated::List(self.quantities(key.name, list, &node.location)?, within(keys)))
+            (ValueType::Frequencies(keys), TomlValue::List(list)) => {
+                Some(CompiledValue::List(self.quantities(key.name, list, &node.location)?, within(keys)))
             }
-            (Takes::Frequencies(_), Content::Table(table)) if table.get("tolerance").is_some() => {
+            (ValueType::Frequencies(_), TomlValue::Table(table)) if table.get("tolerance").is_some() => {
                 self.adaptive(key, table)
             }
-            (Takes::Frequencies(keys), Content::Table(table)) => {
+            (ValueType::Frequencies(keys), TomlValue::Table(table)) => {
                 let (from, to, points) = self.range(table, keys, key.name)?;
                 // if only the ends matter, their order gives the direction
                 let ends = |key: &Key| key.name == "points" && matches!(key.presence, Presence::Default(_));
-                let order = if keys.iter().any(ends) { Order::Any } else { Order::Rising };
-                Some(Stated::Range { from, to, points, within: within(keys), order })
+                let order = if keys.iter().any(ends) { RangeOrder::Any } else { RangeOrder::Rising };
+                Some(CompiledValue::Range { from, to, points, within: within(keys), order })
             }
-            (Takes::ByName(dimension), Content::Table(table)) => {
+            (ValueType::ByName(dimension), TomlValue::Table(table)) => {
                 let mut names = Vec::new();
                 for entry in &table.entries {
                     let quantity = self.quantity(&entry.key, &entry.node)?;
                     names.push((entry.key.clone(), entry.key_location.clone(), quantity));
                 }
-                Some(Stated::ByName(names, *dimension))
+                Some(CompiledValue::ByName(names, *dimension))
             }
-            (Takes::File, Content::Text { text, .. }) => Some(Stated::Fixed(Given::Text(text.clone()))),
-            (Takes::File, Content::Table(table)) => {
-                Some(Stated::Table(self.table(table, schema::FILE_KEYS, &format!("`{}`", key.name))))
+            (ValueType::File, TomlValue::Text { text, .. }) => {
+                Some(CompiledValue::Fixed(ResolvedValue::Text(text.clone())))
             }
-            (Takes::TableOrNone(_), Content::Flag(false)) => Some(Stated::Fixed(Given::Flag(false))),
-            (Takes::TableOrNone(keys), Content::Table(table)) => {
-                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            (ValueType::File, TomlValue::Table(table)) => {
+                Some(CompiledValue::Table(self.table(table, schema::FILE_KEYS, &format!("`{}`", key.name))))
             }
-            (Takes::Row, Content::Text { .. } | Content::Number { whole: Some(_), .. }) => {
-                Some(Stated::Names(vec![(self.row(key, node)?, node.location.clone())]))
+            (ValueType::TableOrNone(_), TomlValue::Flag(false)) => {
+                Some(CompiledValue::Fixed(ResolvedValue::Flag(false)))
             }
-            (Takes::Rows, Content::List(list)) if !list.is_empty() => {
+            (ValueType::TableOrNone(keys), TomlValue::Table(table)) => {
+                Some(CompiledValue::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            }
+            (ValueType::Row, TomlValue::Text { .. } | TomlValue::Number { whole: Some(_), .. }) => {
+                Some(CompiledValue::Names(vec![(self.row(key, node)?, node.location.clone())]))
+            }
+            (ValueType::Rows, TomlValue::List(list)) if !list.is_empty() => {
                 let rows = list.iter().map(|node| Some((self.row(key, node)?, node.location.clone())));
-                Some(Stated::Names(rows.collect::<Option<_>>()?))
+                Some(CompiledValue::Names(rows.collect::<Option<_>>()?))
             }
-            (Takes::Weights, Content::Table(table)) if !table.entries.is_empty() => {
-                Some(Stated::Sums(vec![self.weights(key, table)?]))
+            (ValueType::Weights, TomlValue::Table(table)) if !table.entries.is_empty() => {
+                Some(CompiledValue::Sums(vec![self.weights(key, table)?]))
             }
-            (Takes::Weights, Content::List(list)) if !list.is_empty() => {
-                let sum = |node: &Node| match &node.value {
-                    Content::Table(table) if !table.entries.is_empty() => self.weights(key, table),
+            (ValueType::Weights, TomlValue::List(list)) if !list.is_empty() => {
+                let sum = |node: &TomlNode| match &node.value {
+                    TomlValue::Table(table) if !table.entries.is_empty() => self.weights(key, table),
                     _ => {
                         self.wrong_type(key, node);
                         None
                     }
                 };
-                Some(Stated::Sums(list.iter().map(sum).collect::<Option<_>>()?))
+                Some(CompiledValue::Sums(list.iter().map(sum).collect::<Option<_>>()?))
             }
-            (Takes::Vector(dimension), Content::List(list)) if list.len() == 3 => {
-                Some(Stated::Vector(self.quantities(key.name, list, &node.location)?, *dimension, key.example))
+            (ValueType::Vector(dimension), TomlValue::List(list)) if list.len() == 3 => {
+                Some(CompiledValue::Vector(self.quantities(key.name, list, &node.location)?, *dimension, key.example))
             }
-            (Takes::Quantities(dimension, within), Content::List(list)) => {
+            (ValueType::Quantities(dimension, within), TomlValue::List(list)) => {
                 let list = self.quantities(key.name, list, &node.location)?;
-                Some(Stated::Quantities(list, *dimension, *within, key.example))
+                Some(CompiledValue::Quantities(list, *dimension, *within, key.example))
             }
-            (Takes::Quantities(dimension, within), Content::Text { .. } | Content::Number { .. }) => {
+            (ValueType::Quantities(dimension, within), TomlValue::Text { .. } | TomlValue::Number { .. }) => {
                 let one = self.quantity(key.name, node)?;
-                Some(Stated::Quantities(vec![one], *dimension, *within, key.example))
+                Some(CompiledValue::Quantities(vec![one], *dimension, *within, key.example))
             }
-            (Takes::Table(keys), Content::Table(table)) => {
-                Some(Stated::Table(self.table(table, keys, &format!("`{}`", key.name))))
+            (ValueType::Table(keys), TomlValue::Table(table)) => {
+                Some(CompiledValue::Table(self.table(table, keys, &format!("`{}`", key.name))))
             }
-            (Takes::Law, Content::Table(table)) => self.law(table),
-            (Takes::Choice(words), Content::Text { text, .. }) => {
+            (ValueType::Law, TomlValue::Table(table)) => self.law(table),
+            (ValueType::Choice(words), TomlValue::Text { text, .. }) => {
                 let words = words();
                 if words.iter().any(|(word, _)| word == text) {
-                    return Some(Stated::Fixed(Given::Text(text.clone())));
+                    return Some(CompiledValue::Fixed(ResolvedValue::Text(text.clone())));
                 }
                 self.unknown_word(key.name, text, &node.location, words.iter().map(|(word, _)| *word).collect());
                 None
@@ -225,9 +232,15 @@ impl Reader {
     }
 
     /// Reads a whole number within limits.
-    fn count(&mut self, key: &Key, whole: i64, within: RangeInclusive<i64>, location: &Location) -> Option<Stated> {
+    fn count(
+        &mut self,
+        key: &Key,
+        whole: i64,
+        within: RangeInclusive<i64>,
+        location: &Location,
+    ) -> Option<CompiledValue> {
         if within.contains(&whole) {
-            return Some(Stated::Fixed(Given::Count(u64::try_from(whole).unwrap_or(0))));
+            return Some(CompiledValue::Fixed(ResolvedValue::Count(u64::try_from(whole).unwrap_or(0))));
         }
         let message = format!("expected {}, found {whole}", schema::described(&key.takes));
         let problem = Problem::new(location, key.name, message);
@@ -239,7 +252,7 @@ impl Reader {
     }
 
     /// Reads a range with adaptive points.
-    fn adaptive(&mut self, key: &Key, table: &Table) -> Option<Stated> {
+    fn adaptive(&mut self, key: &Key, table: &TomlTable) -> Option<CompiledValue> {
         let before = self.problems.len();
         if let Some(entry) = table.entries.iter().find(|entry| entry.key == "points") {
             let message = format!("`points` and `tolerance` in the range of `{}` exclude each other", shown(key.name));
@@ -251,7 +264,7 @@ impl Reader {
         let mut take = |key: &str| {
             let at = stated.entries.iter().position(|entry| entry.key == key)?;
             match stated.entries.swap_remove(at).value {
-                Stated::Quantity { quantity, .. } => Some(quantity),
+                CompiledValue::Quantity { quantity, .. } => Some(quantity),
                 _ => None,
             }
         };
@@ -259,7 +272,7 @@ impl Reader {
         if self.problems.len() > before {
             return None;
         }
-        Some(Stated::Adaptive { from: from?, to: to?, tolerance: tolerance? })
+        Some(CompiledValue::Adaptive { from: from?, to: to?, tolerance: tolerance? })
     }
 
     pub(super) fn unknown_word(&mut self, key: &str, word: &str, location: &Location, words: Vec<&str>) {
@@ -294,17 +307,17 @@ impl Reader {
     }
 
     /// Reads the name or number of a row, and fills in the indices of a repetition.
-    fn row(&mut self, key: &Key, node: &Node) -> Option<String> {
+    fn row(&mut self, key: &Key, node: &TomlNode) -> Option<String> {
         match &node.value {
-            Content::Text { text, inner } => self.filled(key, text, *inner, &node.location),
-            Content::Number { whole: Some(number), .. } => Some(number.to_string()),
+            TomlValue::Text { text, inner } => self.filled(key, text, *inner, &node.location),
+            TomlValue::Number { whole: Some(number), .. } => Some(number.to_string()),
             _ => self.wrong_type(key, node).and(None),
         }
     }
 
     /// Reads rows with their weights.
-    fn weights(&mut self, key: &Key, table: &Table) -> Option<Weights> {
-        let one = |entry: &Entry| {
+    fn weights(&mut self, key: &Key, table: &TomlTable) -> Option<Weights> {
+        let one = |entry: &TomlEntry| {
             let name = self.filled(key, &entry.key, None, &entry.key_location)?;
             Some((name, entry.key_location.clone(), self.quantity(&entry.key, &entry.node)?))
         };
@@ -321,19 +334,19 @@ impl Reader {
         }
     }
 
-    fn names(&mut self, key: &Key, list: &[Node]) -> Option<Stated> {
+    fn names(&mut self, key: &Key, list: &[TomlNode]) -> Option<CompiledValue> {
         let mut names = Vec::with_capacity(list.len());
         for node in list {
-            let Content::Text { text, inner } = &node.value else { return self.wrong_type(key, node) };
+            let TomlValue::Text { text, inner } = &node.value else { return self.wrong_type(key, node) };
             names.push((self.name(key.name, text, *inner, &node.location)?, node.location.clone()));
         }
-        Some(Stated::Names(names))
+        Some(CompiledValue::Names(names))
     }
 
-    pub(super) fn quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+    pub(super) fn quantity(&mut self, key: &str, node: &TomlNode) -> Option<CompiledQuantity> {
         let before = self.problems.len();
         let quantity = self.any_quantity(key, node);
-        if let (None, Content::Text { text, .. }) = (&quantity, &node.value)
+        if let (None, TomlValue::Text { text, .. }) = (&quantity, &node.value)
             && let Some((from, to)) = self.two_quantities(text)
         {
             self.problems.truncate(before);
@@ -357,12 +370,12 @@ impl Reader {
         })
     }
 
-    fn any_quantity(&mut self, key: &str, node: &Node) -> Option<Quantity> {
+    fn any_quantity(&mut self, key: &str, node: &TomlNode) -> Option<CompiledQuantity> {
         let location = &node.location;
         let problem = match &node.value {
-            Content::Text { text, inner } => match self.compile(text) {
+            TomlValue::Text { text, inner } => match self.compile(text) {
                 Ok(expression) => {
-                    return Some(Quantity {
+                    return Some(CompiledQuantity {
                         location: location.clone(),
                         inner: *inner,
                         text: text.clone(),
@@ -371,16 +384,16 @@ impl Reader {
                 }
                 Err(fault) => Problem::fault(location, *inner, key, fault),
             },
-            Content::Number { value, .. } if value.is_finite() => {
+            TomlValue::Number { value, .. } if value.is_finite() => {
                 let text = value.to_string();
-                return Some(Quantity {
+                return Some(CompiledQuantity {
                     location: location.clone(),
                     inner: None,
                     text,
                     expression: Expression::number(*value),
                 });
             }
-            Content::Number { value, .. } => {
+            TomlValue::Number { value, .. } => {
                 Problem::new(location, key, format!("expected a finite number, found {value}"))
             }
             other => Problem::new(location, key, format!("expected a quantity, found {}", other.described()))
@@ -390,18 +403,29 @@ impl Reader {
         None
     }
 
-    pub(super) fn quantities(&mut self, key: &str, list: &[Node], location: &Location) -> Option<Vec<Quantity>> {
+    pub(super) fn quantities(
+        &mut self,
+        key: &str,
+        list: &[TomlNode],
+        location: &Location,
+    ) -> Option<Vec<CompiledQuantity>> {
         if list.is_empty() {
             let problem = Problem::new(location, key, "the list is empty: write at least one value");
             self.problems.push(problem);
             return None;
         }
-        let quantities: Vec<Quantity> = list.iter().map(|node| self.quantity(key, node)).collect::<Option<_>>()?;
+        let quantities: Vec<CompiledQuantity> =
+            list.iter().map(|node| self.quantity(key, node)).collect::<Option<_>>()?;
         self.problems.extend(mixed(key, &quantities));
         Some(quantities)
     }
 
-    pub(super) fn range(&mut self, table: &Table, keys: &[Key], owner: &str) -> Option<(Quantity, Quantity, usize)> {
+    pub(super) fn range(
+        &mut self,
+        table: &TomlTable,
+        keys: &[Key],
+        owner: &str,
+    ) -> Option<(CompiledQuantity, CompiledQuantity, usize)> {
         let before = self.problems.len();
         let mut stated = self.table(table, keys, &format!("the range of `{}`", shown(owner)));
         if self.problems.len() > before {
@@ -413,9 +437,9 @@ impl Reader {
         };
         match (take("from")?, take("to")?, take("points")?) {
             (
-                Stated::Quantity { quantity: from, .. },
-                Stated::Quantity { quantity: to, .. },
-                Stated::Fixed(Given::Count(points)),
+                CompiledValue::Quantity { quantity: from, .. },
+                CompiledValue::Quantity { quantity: to, .. },
+                CompiledValue::Fixed(ResolvedValue::Count(points)),
             ) => {
                 self.problems.extend(mixed(owner, [&from, &to]));
                 Some((from, to, usize::try_from(points).ok()?))
@@ -426,7 +450,7 @@ impl Reader {
 }
 
 /// Returns the limits of the frequencies in a range with these keys.
-fn within(keys: &[Key]) -> Within {
+fn within(keys: &[Key]) -> Bounds {
     let first = keys.iter().find(|key| key.name == "from").map(|key| key.takes);
-    if let Some(Takes::Quantity(_, within)) = first { within } else { Within::Positive }
+    if let Some(ValueType::Quantity(_, within)) = first { within } else { Bounds::Positive }
 }

@@ -3,26 +3,26 @@
 
 mod prominence;
 
-use self::prominence::Top;
+use self::prominence::LocalMaximum;
 use super::shared::keys::{HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
 use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of, displacements, peak_places, worst};
 use crate::case::study::{Study, VariedValue, varied_text};
 use crate::case::values::{Frequencies, Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::warnings::{resonant, undamped};
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, Stretch, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
 use crate::results::notes::Note;
-use crate::results::table_builder::Rows;
-use crate::run::point_row::Summary;
-use crate::run::work::{Computed, Grain, Part, Prepared, Work};
+use crate::results::table_builder::TableBuilder;
+use crate::run::point_row::PointRow;
+use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::ENDS;
-use crate::syntax::key::{Takes, Within, default, required};
+use crate::syntax::key::{Bounds, ValueType, default, required};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
 use stickslip::dimension::Dimension;
@@ -38,25 +38,25 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             required(
                 "frequency",
-                Takes::Frequencies(ENDS),
+                ValueType::Frequencies(ENDS),
                 "excitation frequency: a range with its ends in either order (`steps` sets the spacing), or one \
                  value for a branch along a parameter",
                 "{ from = \"119 Hz\", to = \"123 Hz\" }",
             ),
             default(
                 "steps",
-                Takes::Count(2, 100_000),
+                ValueType::Count(2, 100_000),
                 "100",
                 "minimum number of steps over the range; steps shorten where the branch bends",
                 "100",
             ),
             PEAK_OF,
             OUTPUT,
-            default("harmonics", Takes::Count(1, 255), "15", "highest harmonic", "15"),
-            default("samples", Takes::Count(8, 1 << 16), "1024", "samples per period", "1024"),
+            default("harmonics", ValueType::Count(1, 255), "15", "highest harmonic", "15"),
+            default("samples", ValueType::Count(8, 1 << 16), "1024", "samples per period", "1024"),
             default(
                 "tolerance",
-                Takes::Quantity(Dimension::NONE, Within::Positive),
+                ValueType::Quantity(Dimension::NONE, Bounds::Positive),
                 // the truncation error of 15 harmonics with rigid friction, whose force decays
                 // as 1/h, was measured as 5e-3 to 1e-2. The default is not higher, because a
                 // branch turns at every border of stick, and 127 harmonics take forty times as
@@ -75,7 +75,7 @@ pub(super) const KIND: Kind = Kind {
         tables: &["branch", "peaks", "turns"],
     },
     // the cases of one branch along a parameter differ in the last parameter only
-    grain: |study| if along_parameter(study) { Grain::Curve } else { Grain::Case },
+    grain: |study| if along_parameter(study) { UnitSize::Curve } else { UnitSize::Case },
     cost,
     warnings: |cases| resonant(cases).into_iter().chain(undamped(cases)).collect(),
     compute,
@@ -92,7 +92,7 @@ const FOLLOWED: f64 = 15.0;
 /// Peaks and turning points per branch.
 const MARKS: f64 = 2.0;
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let values = &costing.case.values;
     let branches = if along_parameter(costing.study) { costing.curves() } else { costing.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
@@ -101,7 +101,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let samples = values.count("samples").unwrap_or(SERIES_SAMPLES) as f64;
     let rows = steps * POINTS;
     Cost {
-        tables: vec![costing.orbits(rows), Shape { rows: branches * MARKS, numbers: costing.varied + 2.0, words: 0.0 }],
+        tables: vec![
+            costing.orbits(rows),
+            TableShape { rows: branches * MARKS, numbers: costing.varied + 2.0, words: 0.0 },
+        ],
         drawn: rows * costing.places,
         unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
         spared: None,
@@ -109,16 +112,16 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), KeyError> {
     check_masses(model)?;
     let none = |f: &Frequencies| f.get(0) == f.get(f.len() - 1) && (f.len() > 1 || values_of_last < 2);
     if values.frequencies("frequency").is_some_and(none) {
-        return Err(Complaint::new("frequency", "a branch needs a range", RANGE));
+        return Err(KeyError::new("frequency", "a branch needs a range", RANGE));
     }
     check_peak_of(values, model)?;
     check_output(values)?;
     if values.quantity("tolerance").is_some_and(|tolerance| tolerance >= 1.0) {
-        return Err(Complaint::new(
+        return Err(KeyError::new(
             "tolerance",
             "the tolerance must be below 1",
             "0.001 is a thousandth of the amplitude",
@@ -131,7 +134,7 @@ fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Co
 const RANGE: &str = "write frequency = { from = …, to = … }, or vary = { Ft = [ … ] } with two different values";
 
 /// The reason why a branch is missing.
-enum Missing {
+enum BranchFailure {
     NoRange,
     Trace(TraceError),
 }
@@ -154,29 +157,29 @@ fn axis(along: Option<&VariedValue>) -> (String, f64) {
     along.map_or_else(|| ("frequency_Hz".to_owned(), 1.0 / TAU), |parameter| (parameter.name.clone(), 1.0))
 }
 
-fn compute(work: &Work<'_>) -> Computed {
+fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let (outer, along) = split(work.study, &prepared.case.varied);
     let label = || varied_text(outer);
-    let mut part = Part::default();
+    let mut part = UnitResult::default();
     let range = range(work, along);
     let found = follow(work, along, range);
     (0..work.cases.len() * work.points.len()).for_each(|_| (work.context.finished)());
     let branch = match found {
         Ok(branch) => branch,
-        Err(Missing::Trace(TraceError::Method(error))) => return Err((prepared.case.index, error)),
-        Err(Missing::Trace(TraceError::Start(error))) => {
+        Err(BranchFailure::Trace(TraceError::Method(error))) => return Err((prepared.case.index, error)),
+        Err(BranchFailure::Trace(TraceError::Start(error))) => {
             part.count(label, error.status(), Some(error.to_string()));
             return Ok(part);
         }
-        Err(Missing::NoRange) => {
+        Err(BranchFailure::NoRange) => {
             part.count(label, "no-range", Some(format!("a branch needs a range: {RANGE}")));
             return Ok(part);
         }
     };
     let places = peak_places(prepared);
     let (name, factor) = axis(along);
-    let begin = |rows: &mut Rows, value: f64| {
+    let begin = |rows: &mut TableBuilder, value: f64| {
         outer.iter().map(VariedValue::column).for_each(|(name, value)| rows.number(&name, value));
         let (column, value) = match along {
             None => ("frequency_Hz".to_owned(), hertz(value)),
@@ -184,12 +187,12 @@ fn compute(work: &Work<'_>) -> Computed {
         };
         rows.number(&column, value);
     };
-    let (mut rows, mut peaks, mut turns) = (Rows::default(), Rows::default(), Rows::default());
+    let (mut rows, mut peaks, mut turns) = (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
     for point in &branch.points {
         let stable = point.orbit.is_stable();
         orbit_sweep::count(&mut part, &prepared.case, &point.orbit, (stable, Note::on_branch));
         begin(&mut rows, point.value);
-        Summary::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
+        PointRow::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end();
     }
     for (value, height) in peaks_of(&branch, &places) {
@@ -240,8 +243,10 @@ fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
             && height >= heights[row]
     };
     let mut rows = 1..heights.len().saturating_sub(1);
-    let place = |peak: &(f64, f64)| rows.find(|row| near(*row, *peak)).map(|row| Top { row, height: peak.1 });
-    let Some(tops) = branch.peaks.iter().map(place).collect::<Option<Vec<Top>>>() else { return branch.peaks.clone() };
+    let place = |peak: &(f64, f64)| rows.find(|row| near(*row, *peak)).map(|row| LocalMaximum { row, height: peak.1 });
+    let Some(tops) = branch.peaks.iter().map(place).collect::<Option<Vec<LocalMaximum>>>() else {
+        return branch.peaks.clone();
+    };
     let kept = prominence::out(&tops, &heights, &errors);
     branch.peaks.iter().zip(kept).filter(|(_, kept)| *kept).map(|(peak, _)| *peak).collect()
 }
@@ -274,7 +279,7 @@ fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64))
 }
 
 /// Returns the first and last value along a branch.
-fn range(work: &Work<'_>, along: Option<&VariedValue>) -> (f64, f64) {
+fn range(work: &UnitTask<'_>, along: Option<&VariedValue>) -> (f64, f64) {
     let last = &work.cases[work.cases.len() - 1];
     match (along, split(work.study, &last.case.varied).1) {
         (Some(first), Some(last)) => (first.si, last.si),
@@ -282,10 +287,10 @@ fn range(work: &Work<'_>, along: Option<&VariedValue>) -> (f64, f64) {
     }
 }
 
-fn follow(work: &Work<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Result<Branch, Missing> {
+fn follow(work: &UnitTask<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Result<Branch, BranchFailure> {
     let prepared = work.case();
     if range.0 == range.1 {
-        return Err(Missing::NoRange);
+        return Err(BranchFailure::NoRange);
     }
     let values = &prepared.case.values;
     let system = |value: f64| -> Option<System> {
@@ -305,12 +310,12 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Re
         step: (range.1 - range.0).abs() / values.count("steps").unwrap_or(100) as f64,
         quantity: &|orbit| worst(orbit, &places),
     };
-    trace.branch().map_err(Missing::Trace)
+    trace.branch().map_err(BranchFailure::Trace)
 }
 
 /// Draws the branches; with several branches, only the place whose peak counts.
-fn draw(drawing: &Drawing<'_>) -> Figure {
-    let (Some(table), Ok(prepared)) = (drawing.table("branch"), Prepared::new(drawing.study, 0)) else {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
+    let (Some(table), Ok(prepared)) = (drawing.table("branch"), PreparedCase::new(drawing.study, 0)) else {
         return Figure::default();
     };
     let (system, places) = (&prepared.system, peak_places(&prepared));
@@ -330,7 +335,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         false => vec![places],
     };
     let unstable = unstable(table);
-    let line_of = |stretch: &Stretch, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
+    let line_of = |stretch: &CaseRows, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
         let mut from = stretch.rows.start;
         // between two equal values at an end of the range, the branch runs outside the range
         let at = numbers(table, &name_of_axis(table, outer.len()), stretch.rows.clone());
@@ -360,20 +365,20 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let name = |places: &[usize]| {
             places.iter().map(|place| system.places()[*place].as_str()).collect::<Vec<_>>().join(", ")
         };
-        let of_draw = |stretch: &Stretch, title: String| {
+        let of_draw = |stretch: &CaseRows, title: String| {
             let lines =
                 shown.iter().enumerate().flat_map(|(colour, places)| line_of(stretch, places, &name(places), colour));
             vec![panel(title, lines.collect())]
         };
         // the parameter along the branch does not distinguish draws
-        let apart: Vec<Stretch> = stretches
+        let apart: Vec<CaseRows> = stretches
             .iter()
-            .map(|stretch| Stretch { varied: stretch.varied[..outer.len()].to_vec(), ..stretch.clone() })
+            .map(|stretch| CaseRows { varied: stretch.varied[..outer.len()].to_vec(), ..stretch.clone() })
             .collect();
         return Figure { panels: draw_panels::panels(drawing, &apart, &of_draw), ..Figure::default() };
     }
     let several = stretches.iter().flat_map(|stretch| shown.iter().map(move |places| (stretch, places)));
-    let line = |(colour, (stretch, places)): (usize, (&Stretch, &Vec<usize>))| {
+    let line = |(colour, (stretch, places)): (usize, (&CaseRows, &Vec<usize>))| {
         let varied = || varied_text(&stretch.varied[..outer.len()]);
         let label = if one { system.places()[places[0]].clone() } else { varied() };
         line_of(stretch, places, &label, colour)

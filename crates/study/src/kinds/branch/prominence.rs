@@ -6,7 +6,7 @@
 
 /// A top of the branch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Top {
+pub(super) struct LocalMaximum {
     /// The nearest row.
     pub row: usize,
     /// Its height, at least that of its row.
@@ -16,10 +16,10 @@ pub(super) struct Top {
 /// Returns for each top, in row order, whether it is a peak.
 ///
 /// `heights` and relative `errors` belong to the rows; an unknown error is NaN.
-pub(super) fn out(tops: &[Top], heights: &[f64], errors: &[f64]) -> Vec<bool> {
+pub(super) fn out(tops: &[LocalMaximum], heights: &[f64], errors: &[f64]) -> Vec<bool> {
     let mut ground = heights.to_vec();
     tops.iter().for_each(|top| ground[top.row] = ground[top.row].max(top.height));
-    let stands = |top: &Top| {
+    let stands = |top: &LocalMaximum| {
         // the first of two equal tops counts as the higher point
         let before = valley((0..top.row).rev(), &ground, errors, &|height| height >= top.height);
         let behind = valley(top.row + 1..ground.len(), &ground, errors, &|height| height > top.height);
@@ -60,8 +60,8 @@ mod tests {
 
     fn standing(heights: &[f64], error: f64) -> Vec<usize> {
         let is_top = |row: &usize| heights[*row] >= heights[row - 1] && heights[*row] > heights[row + 1];
-        let tops: Vec<Top> =
-            (1..heights.len() - 1).filter(is_top).map(|row| Top { row, height: heights[row] }).collect();
+        let tops: Vec<LocalMaximum> =
+            (1..heights.len() - 1).filter(is_top).map(|row| LocalMaximum { row, height: heights[row] }).collect();
         let kept = out(&tops, heights, &vec![error; heights.len()]);
         tops.iter().zip(kept).filter(|(_, kept)| *kept).map(|(top, _)| top.row).collect()
     }
@@ -86,7 +86,7 @@ mod tests {
     /// A refined top between two rows counts with its refined height.
     #[test]
     fn a_refined_top_is_ground_for_others() {
-        let tops = [Top { row: 1, height: 1.1 }, Top { row: 3, height: 1.05 }];
+        let tops = [LocalMaximum { row: 1, height: 1.1 }, LocalMaximum { row: 3, height: 1.05 }];
         assert_eq!(out(&tops, &[0.0, 1.0, 0.99, 1.02, 0.0], &[0.1; 5]), [true, false]);
     }
 }

@@ -8,22 +8,22 @@ pub use tables::{Loop, loops};
 use self::tables::{DAMPING, DISPLACEMENT, DISSIPATION, FORCE, JOINT, LOOPS, STIFFNESS, SUMMARY, TIME};
 use super::shared::keys::{FREQUENCY, SAMPLES, anything};
 use super::shared::orbit_sweep;
-use crate::case::names::Names;
+use crate::case::names::ModelNames;
 use crate::case::study::varied_text;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::warnings::driven;
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
 use crate::results::dataset::{Figure, Panel, Series};
 use crate::results::draw_panels;
-use crate::results::drawing::{Drawing, Stretch, join, largest, numbers, words};
-use crate::results::table_builder::Rows;
-use crate::run::work::{Computed, Grain, Part, Prepared, Work};
+use crate::results::drawing::{CaseRows, FigureInput, join, largest, numbers, words};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::shown_hertz;
-use crate::syntax::key::{Takes, default, optional};
+use crate::syntax::key::{ValueType, default, optional};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::law::MOST_DIRECTIONS;
@@ -39,19 +39,19 @@ pub(super) const KIND: Kind = Kind {
             FREQUENCY,
             optional(
                 "loop",
-                Takes::Names,
+                ValueType::Names,
                 "joints or moved places (with the force that moves them) whose loops are computed; default: every \
                  joint",
                 "\"shroud\"",
             ),
             optional(
                 "against",
-                Takes::Name,
+                ValueType::Name,
                 "the mass whose displacement is the abscissa of the loops; default: the relative displacement of the \
                  joint",
                 "\"blade1\"",
             ),
-            default("sum", Takes::Flag, "false", "adds the forces of the joints to one loop per direction", "true"),
+            default("sum", ValueType::Flag, "false", "adds the forces of the joints to one loop per direction", "true"),
             SAMPLES,
         ],
         check,
@@ -61,14 +61,14 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[LOOPS, SUMMARY],
     },
-    grain: |_| Grain::Frequencies,
+    grain: |_| UnitSize::Frequencies,
     cost,
     warnings: driven,
     compute,
     draw,
 };
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let (values, points) = (&costing.case.values, costing.points());
     let loops = match values.names("loop") {
         _ if values.flag("sum") == Some(true) => MOST_DIRECTIONS as f64,
@@ -80,8 +80,8 @@ fn cost(costing: &Costing<'_>) -> Cost {
     let read = costing.instants() + loops * (QUADRATURE * FIVE.len()) as f64;
     Cost {
         tables: vec![
-            Shape { rows, numbers: keys + 3.0, words: 1.0 },
-            Shape { rows: points * loops, numbers: keys + 5.0, words: 2.0 },
+            TableShape { rows, numbers: keys + 3.0, words: 1.0 },
+            TableShape { rows: points * loops, numbers: keys + 5.0, words: 2.0 },
         ],
         drawn: rows,
         unit: costing.kept_orbits() + costing.samples_bytes(),
@@ -90,13 +90,13 @@ fn cost(costing: &Costing<'_>) -> Cost {
     }
 }
 
-fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let known = known(model);
     for name in values.names("loop").unwrap_or_default() {
         known.all("loop", "joint or moved place", name)?;
     }
     if let Some(name) = values.text("against") {
-        Names::of_displacements(model).one("against", "mass", name)?;
+        ModelNames::of_displacements(model).one("against", "mass", name)?;
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let wanted = wanted(values, model);
@@ -106,23 +106,19 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
         let first = ends.next();
         if ends.any(|between| Some(between) != first) {
             let message = "the summed joints connect different places, so they have no common relative displacement";
-            return Err(Complaint::new(
-                "sum",
-                message,
-                "name the place whose displacement is used: against = \"NAME\"",
-            ));
+            return Err(KeyError::new("sum", message, "name the place whose displacement is used: against = \"NAME\""));
         }
     }
     if known.is_empty() {
         let help = "add a [[joint]] or a [[motion]], or use kind = \"orbit\"";
-        return Err(Complaint::new("kind", "the model has no joint and no [[motion]], so it has no loop", help));
+        return Err(KeyError::new("kind", "the model has no joint and no [[motion]], so it has no loop", help));
     }
     Ok(())
 }
 
 /// Returns the names that can have a loop.
-fn known(model: &Model) -> Names {
-    Names::default().and_joints(model).and_moved(model)
+fn known(model: &Model) -> ModelNames {
+    ModelNames::default().and_joints(model).and_moved(model)
 }
 
 /// Returns the names of the requested loops: joints by direction, and moved places; by default
@@ -142,37 +138,37 @@ fn wanted(values: &Values, model: &Model) -> Vec<String> {
 
 /// The origin of force and displacement of a loop in a sample.
 #[derive(Debug, Clone, PartialEq)]
-struct Source {
-    force: Of,
+struct LoopSource {
+    force: ForceSource,
     /// The place whose displacement replaces that of the joint or moved place.
     against: Option<Along>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Of {
+enum ForceSource {
     /// The sum over these joints, each with the index of an axis.
     Joints(Vec<(usize, usize)>),
     Moved(usize),
 }
 
-impl Source {
+impl LoopSource {
     /// Returns displacement (m) and force (N).
     fn read(&self, sample: &Sample) -> (f64, f64) {
         let (displacement, force) = match &self.force {
-            Of::Joints(joints) => {
+            ForceSource::Joints(joints) => {
                 let force = joints.iter().map(|(j, axis)| sample.joints[*j].force[*axis]).sum();
                 let (first, axis) = joints[0];
                 (sample.joints[first].displacement[axis], force)
             }
-            Of::Moved(m) => sample.moved[*m],
+            ForceSource::Moved(m) => sample.moved[*m],
         };
         (self.against.as_ref().map_or(displacement, |place| place.along(&sample.displacement)), force)
     }
 }
 
-fn compute(work: &Work<'_>) -> Computed {
-    let mut part = Part::default();
-    let (mut table, mut summary) = (Rows::default(), Rows::default());
+fn compute(work: &UnitTask<'_>) -> Computed {
+    let mut part = UnitResult::default();
+    let (mut table, mut summary) = (TableBuilder::default(), TableBuilder::default());
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
@@ -193,7 +189,7 @@ fn compute(work: &Work<'_>) -> Computed {
                 table.number(FORCE, force);
                 table.end();
             }
-            let first = First::new(&orbit, source);
+            let first = FirstHarmonic::new(&orbit, source);
             summary.varied(&prepared.case);
             if several {
                 summary.number(DRIVE, hertz(omega));
@@ -214,7 +210,7 @@ fn compute(work: &Work<'_>) -> Computed {
 }
 
 /// Returns the loops that the study requests.
-fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
+fn sources(prepared: &PreparedCase) -> Vec<(String, LoopSource)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
     let against = against.map(|place| system.seen()[place].clone());
@@ -232,32 +228,33 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
     if values.flag("sum") == Some(true) {
         // forces along different directions are not added: each direction has its sum
-        let mut sums: Vec<Sum> = Vec::new();
+        let mut sums: Vec<JointSum> = Vec::new();
         for (name, (j, axis)) in names.into_iter().filter_map(|name| Some((name.clone(), joint(&name)?))) {
             let direction = system.joints()[j].axes()[axis].name();
             let at = sums.iter().position(|sum| sum.direction == direction).unwrap_or_else(|| {
-                sums.push(Sum { direction, names: Vec::new(), joints: Vec::new() });
+                sums.push(JointSum { direction, names: Vec::new(), joints: Vec::new() });
                 sums.len() - 1
             });
             sums[at].names.push(name);
             sums[at].joints.push((j, axis));
         }
-        let one =
-            |sum: Sum| (sum.names.join(" + "), Source { force: Of::Joints(sum.joints), against: against.clone() });
+        let one = |sum: JointSum| {
+            (sum.names.join(" + "), LoopSource { force: ForceSource::Joints(sum.joints), against: against.clone() })
+        };
         return sums.into_iter().map(one).collect();
     }
     let find = |name: &String| {
-        let joint = joint(name).map(|joint| Of::Joints(vec![joint]));
-        joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(Of::Moved))
+        let joint = joint(name).map(|joint| ForceSource::Joints(vec![joint]));
+        joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(ForceSource::Moved))
     };
     names
         .iter()
-        .filter_map(|name| Some((name.clone(), Source { force: find(name)?, against: against.clone() })))
+        .filter_map(|name| Some((name.clone(), LoopSource { force: find(name)?, against: against.clone() })))
         .collect()
 }
 
 /// The joints whose forces along one direction are added.
-struct Sum<'a> {
+struct JointSum<'a> {
     /// Name of the direction; `None` for joints with one direction.
     direction: Option<&'a str>,
     names: Vec<String>,
@@ -268,21 +265,23 @@ struct Sum<'a> {
 ///
 /// This holds for joints over their relative displacement, and for a moved place that is the
 /// only source of work.
-fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64> {
+fn exact_loss(prepared: &PreparedCase, orbit: &Orbit, source: &LoopSource) -> Option<f64> {
     match &source.force {
         _ if source.against.is_some() => None,
         // the dissipation of a joint is not known per direction
-        Of::Joints(joints) if joints.iter().any(|(j, _)| prepared.system.joints()[*j].axes().len() > 1) => None,
-        Of::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
-        Of::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
+        ForceSource::Joints(joints) if joints.iter().any(|(j, _)| prepared.system.joints()[*j].axes().len() > 1) => {
+            None
+        }
+        ForceSource::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
+        ForceSource::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }
-        Of::Moved(_) => None,
+        ForceSource::Moved(_) => None,
     }
 }
 
 /// First harmonic of a loop.
-struct First {
+struct FirstHarmonic {
     loss: f64,
     stiffness: f64,
     damping: f64,
@@ -291,10 +290,10 @@ struct First {
 /// Intervals of the quadrature per period. They end at the switches, so exact laws are smooth
 /// within each interval.
 const QUADRATURE: usize = 256;
-impl First {
+impl FirstHarmonic {
     /// Integrates `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement,
     /// and the loss `∮ F du`.
-    fn new(orbit: &Orbit, source: &Source) -> Self {
+    fn new(orbit: &Orbit, source: &LoopSource) -> Self {
         let (omega, times) = (orbit.omega, orbit_sweep::times(orbit, QUADRATURE));
         // u cos, u sin, F cos, F sin
         let mut sums = [0.0; 4];
@@ -321,13 +320,13 @@ impl First {
                 0.5 * (a.1 + b.1) * (b.0 - a.0)
             })
             .sum();
-        First { loss: area, stiffness, damping: reactive / omega }
+        FirstHarmonic { loss: area, stiffness, damping: reactive / omega }
     }
 }
 
 /// Draws the loops. The last varied parameter and the frequency distinguish loops in a panel;
 /// the others distinguish panels.
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(table) = drawing.table(LOOPS) else { return Figure::default() };
     let (x_axis, x_factor) = drawing.axis(0, "displacement", largest(table, [DISPLACEMENT.to_owned()]), "m");
     let (y_axis, y_factor) = drawing.axis(1, "force", largest(table, [FORCE.to_owned()]), "N");
@@ -338,7 +337,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     }
     let frequencies = table.numbers(DRIVE);
     let several = joints.iter().any(|joint| *joint != joints[0]);
-    let panels_of = |stretches: &[Stretch], words: &dyn Fn(&Stretch) -> (String, String)| {
+    let panels_of = |stretches: &[CaseRows], words: &dyn Fn(&CaseRows) -> (String, String)| {
         let mut panels: Vec<Panel> = Vec::new();
         for stretch in stretches {
             let (outer, inner) = words(stretch);
@@ -364,12 +363,12 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     let stretches = drawing.stretches(table);
     if drawing.study.draws().is_some() {
-        let of_draw = |stretch: &Stretch, title: String| {
+        let of_draw = |stretch: &CaseRows, title: String| {
             panels_of(std::slice::from_ref(stretch), &|_| (title.clone(), String::new()))
         };
         return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
     }
-    let split = |stretch: &Stretch| {
+    let split = |stretch: &CaseRows| {
         let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
         (varied_text(outer), varied_text(inner))
     };

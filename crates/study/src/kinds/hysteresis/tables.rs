@@ -126,7 +126,7 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::dataset::{Column, Values};
+    use crate::results::dataset::{CellValues, Column};
 
     /// A loop ends where joint, frequency or period end, even if the next loop has equal
     /// values.
@@ -136,9 +136,9 @@ mod tests {
         let mut table = Table {
             name: LOOPS.to_owned(),
             columns: vec![
-                column(FREQUENCY, Values::Number(vec![1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0])),
-                column(JOINT, Values::Text(["a", "a", "b", "b", "b", "b", "b"].map(str::to_owned).to_vec())),
-                column(TIME, Values::Number(vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 0.0])),
+                column(FREQUENCY, CellValues::Number(vec![1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0])),
+                column(JOINT, CellValues::Text(["a", "a", "b", "b", "b", "b", "b"].map(str::to_owned).to_vec())),
+                column(TIME, CellValues::Number(vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 0.0])),
             ],
         };
         assert_eq!(single(&table, 0..7), [0..2, 2..4, 4..6, 6..7]);

@@ -2,25 +2,25 @@
 
 mod tables;
 
-pub use tables::{Curve, Optimum, Point, curves};
+pub use tables::{Optimum, PeakCurve, PerformancePoint, curves};
 
 use super::shared::keys::{FREQUENCY, anything, check_masses};
 use super::shared::peak_of::{PEAK_OF, check_peak_of, peak_places};
 use crate::case::study::{VariedValue, varied_text};
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
+use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::warnings::sampled;
-use crate::kinds::info::Complaint;
+use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK};
 use crate::results::dataset::{Axis, Figure, Panel, Series};
-use crate::results::drawing::{Drawing, Stretch, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
 use crate::results::notes::Note;
 use crate::results::notes::WARNING;
 use crate::results::percentiles::percentiles;
-use crate::results::table_builder::Rows;
-use crate::run::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use stickslip::curve::both_ways;
 use stickslip::curve::peak::held;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
@@ -41,7 +41,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[tables::PERFORMANCE, tables::OPTIMUM],
     },
-    grain: |_| Grain::Curve,
+    grain: |_| UnitSize::Curve,
     cost,
     warnings: sampled,
     compute,
@@ -52,15 +52,15 @@ pub(super) const KIND: Kind = Kind {
 const REFINING: f64 = 12.0;
 const OPTIMUM: f64 = 35.0;
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
     let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
     let peak = costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.between();
     let tried = if costing.study.last_varied() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
         tables: vec![
-            Shape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
-            Shape { rows: curves, numbers: costing.varied + 2.0, words: 1.0 },
+            TableShape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
+            TableShape { rows: curves, numbers: costing.varied + 2.0, words: 1.0 },
         ],
         drawn: cases,
         unit: costing.orbit_bytes(),
@@ -72,18 +72,18 @@ fn cost(costing: &Costing<'_>) -> Cost {
 /// Smallest number of parameter values, and of frequencies, that form a curve.
 const FEWEST_VALUES: usize = 3;
 
-fn check(values: &Values, model: &Model, _: usize) -> Result<(), Complaint> {
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     check_masses(model)?;
     check_peak_of(values, model)?;
     if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
         let help = "write frequency = { from = …, to = …, points = … } around the resonance";
-        return Err(Complaint::new("frequency", "a peak needs a range of frequencies", help));
+        return Err(KeyError::new("frequency", "a peak needs a range of frequencies", help));
     }
     Ok(())
 }
 
-fn compute(work: &Work<'_>) -> Computed {
-    let mut part = Part::default();
+fn compute(work: &UnitTask<'_>) -> Computed {
+    let mut part = UnitResult::default();
     if work.case().case.varied.is_empty() || work.cases.len() < FEWEST_VALUES {
         part.notes.push(Note::Said(format!(
             "A performance curve needs at least {FEWEST_VALUES} values of one parameter: add vary = {{ Ft = [ … ] }} to [study]."
@@ -97,7 +97,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let curve = curve(work, &values).map_err(|error| (work.case().case.index, error))?;
     let mut listed: Vec<_> = order.iter().zip(&curve.rows).collect();
     listed.sort_by_key(|(case, _)| **case);
-    let (mut rows, mut optima) = (Rows::default(), Rows::default());
+    let (mut rows, mut optima) = (TableBuilder::default(), TableBuilder::default());
     for (&case, row) in listed {
         let prepared = &work.cases[case];
         let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
@@ -147,7 +147,7 @@ fn compute(work: &Work<'_>) -> Computed {
 }
 
 /// States why there is no optimum; `order` has the case of every row of the curve.
-fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, (parameter, order): (&str, &[usize])) -> String {
+fn no_optimum(work: &UnitTask<'_>, curve: &PerformanceCurve, (parameter, order): (&str, &[usize])) -> String {
     let level = curve.lowest();
     let height = |row: &usize| curve.rows[*row].peak.map_or(f64::NAN, |peak| peak.value);
     let text = |row: Option<&usize>| {
@@ -180,11 +180,11 @@ fn status(row: &Row) -> &'static str {
 }
 
 /// Returns the outer varied parameters of a case, and the last one.
-fn split(prepared: &Prepared) -> Option<(&[VariedValue], &VariedValue)> {
+fn split(prepared: &PreparedCase) -> Option<(&[VariedValue], &VariedValue)> {
     prepared.case.varied.split_last().map(|(last, outer)| (outer, last))
 }
 
-fn curve(work: &Work<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodError> {
+fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodError> {
     let first = work.case();
     let places = peak_places(first);
     let frequencies: Vec<f64> = work.points.clone().map(|index| work.omega(index)).collect();
@@ -219,7 +219,7 @@ fn curve(work: &Work<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodErro
 /// Largest number of bands in the panel; more bands hide each other.
 const MOST_BANDS: usize = 7;
 
-fn draw(drawing: &Drawing<'_>) -> Figure {
+fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(table), outer) = (drawing.table(tables::PERFORMANCE), drawing.study.varied().len().saturating_sub(1))
     else {
         return Figure::default();
@@ -249,7 +249,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let bands = groups.iter().take(MOST_BANDS).enumerate().flat_map(|(colour, (_, group))| {
             let curve =
-                |stretch: &&Stretch| (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
+                |stretch: &&CaseRows| (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
             let outer =
                 group.first().map_or(&[][..], |stretch| &stretch.varied[drawing.study.drawn().min(outer)..outer]);
             percentiles(&group.iter().map(curve).collect::<Vec<_>>(), &varied_text(outer), colour)

@@ -16,16 +16,16 @@ pub(super) const FAILED: &str = "failed_orbits";
 
 /// The resonance peak over a parameter, the last one of `vary`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct PeakCurve {
     /// The peak at each value of the parameter.
-    pub points: Vec<Point>,
+    pub points: Vec<PerformancePoint>,
     /// Its lowest point, refined between the values; `None` without an optimum between them.
     pub optimum: Option<Optimum>,
 }
 
 /// The resonance peak at one value of the parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct PerformancePoint {
     /// The varied parameters of the case; the last one is the parameter of the curve.
     pub varied: Vec<VariedValue>,
     /// The peak; `None` if no orbit was found.
@@ -71,7 +71,7 @@ pub struct Optimum {
 /// let curves = performance::curves(&study, &run(&study, &Context::unwatched(1)).unwrap()).unwrap();
 /// assert!((curves[0].optimum.unwrap().value - 6.684).abs() < 0.01);
 /// ```
-pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsError> {
+pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<PeakCurve>, ResultsError> {
     let results = Results::of(NAME, study, dataset)?;
     let Some(table) = results.table(PERFORMANCE)? else { return Ok(Vec::new()) };
     let (frequency, amplitude) = (table.numbers(FREQUENCY)?, table.numbers(AMPLITUDE)?);
@@ -82,10 +82,10 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsErr
         let point = |row: usize| {
             let of_case = study.varied_values(stretch.case + row - stretch.rows.start);
             let peak = |at_range_end| Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
-            Some(Point { varied: of_case?, peak: at_range_end[row].map(peak), failed_orbits: failed[row] })
+            Some(PerformancePoint { varied: of_case?, peak: at_range_end[row].map(peak), failed_orbits: failed[row] })
         };
-        let points: Option<Vec<Point>> = stretch.rows.clone().map(point).collect();
-        curves.push(Curve { points: points.ok_or_else(|| table.other_rows())?, optimum: None });
+        let points: Option<Vec<PerformancePoint>> = stretch.rows.clone().map(point).collect();
+        curves.push(PeakCurve { points: points.ok_or_else(|| table.other_rows())?, optimum: None });
     }
     let (Some(optima), true) = (results.table(OPTIMUM)?, !varied.is_empty()) else { return Ok(curves) };
     if optima.table.rows() != curves.len() {

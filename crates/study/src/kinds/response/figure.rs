@@ -1,15 +1,15 @@
 //! The figure of a response.
 
-use super::figure_data::{Drawn, PeakOf, force};
+use super::figure_data::{CasePeak, FigureData, force};
 use super::{amplification, tables};
 use crate::kinds::shared::contact_states;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
 use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
-use crate::results::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, PanelLayout, join, largest, numbers, words};
 use crate::results::histogram;
 use crate::syntax::format::display_unit;
 
-pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
+pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
         return Figure::default();
     };
@@ -31,7 +31,7 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
     let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
     let stretches = drawing.stretches(curve);
-    let mut drawn = Drawn {
+    let mut drawn = FigureData {
         drawing,
         curve,
         index: curve.index(),
@@ -53,12 +53,12 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
     };
     drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
     let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
-        Layout::Cases => {
+        PanelLayout::Cases => {
             // the colour scale belongs to maps; the curves of one panel have names
             let varied = (!drawn.faces.is_empty()).then(|| contact_states::axis("share of the period"));
             Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
         }
-        Layout::Masses => Figure {
+        PanelLayout::Masses => Figure {
             panels: drawn.by_mass(&stretches),
             sharing: Sharing::Always,
             varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
@@ -72,14 +72,14 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
 }
 
 /// Draws histograms of the largest peak of many draws.
-fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
+fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
     let (Some(table), Some(_)) = (drawn.drawing.table(tables::PEAKS), drawn.drawing.study.draws()) else {
         return Vec::new();
     };
     let stretches = drawn.drawing.stretches(table);
     let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &drawn.axes.1.unit) };
-    let of_group = |(words, group): (String, Vec<&Stretch>)| {
-        let highest = |stretch: &&Stretch| {
+    let of_group = |(words, group): (String, Vec<&CaseRows>)| {
+        let highest = |stretch: &&CaseRows| {
             let heights = numbers(table, AMPLITUDE, stretch.rows.clone());
             heights.into_iter().fold(f64::NAN, f64::max) * drawn.factor.1
         };
@@ -92,16 +92,16 @@ fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
 /// Returns the rows of the linear references case by case.
 ///
 /// Results of earlier versions have only those of the first case, without varied parameters.
-fn references_by_case(drawing: &Drawing<'_>, table: &Table) -> Vec<Stretch> {
+fn references_by_case(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows> {
     let varied = drawing.study.varied_values(0).unwrap_or_default();
     if table.columns.first().is_some_and(|column| column.name == DRIVE) {
-        return vec![Stretch { case: 0, varied, rows: 0..table.rows() }];
+        return vec![CaseRows { case: 0, varied, rows: 0..table.rows() }];
     }
     drawing.stretches(table)
 }
 
 /// Returns the peaks inside the frequency range.
-fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<PeakOf> {
+fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
     let way_back = table.flags(WAY_BACK).unwrap_or_default();
@@ -116,7 +116,7 @@ fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<PeakOf> {
         for (i, row) in stretch.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
                 let way_back = way_back.get(row).copied().flatten() == Some(true);
-                peaks.push(PeakOf { case: stretch.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
+                peaks.push(CasePeak { case: stretch.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
             }
         }
     }

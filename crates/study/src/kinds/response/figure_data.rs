@@ -1,10 +1,10 @@
 //! Data of a response figure: curves of places and joints, read from the tables.
 
-use crate::kinds::shared::contact_states::{self, State};
+use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::kinds::shared::disk_shape::{self, of_sector};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
-use crate::results::drawing::{Drawing, Stretch, join, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, join, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
@@ -19,11 +19,11 @@ pub(super) const SINGLE: usize = 7;
 const MANY: usize = 2;
 
 /// Names of places with amplitude (m) and phase (degrees).
-pub(super) type Shape<'a> = Vec<(&'a str, f64, f64)>;
+pub(super) type DeflectionShape<'a> = Vec<(&'a str, f64, f64)>;
 
 /// A peak of a place in a case.
 #[derive(Debug, Clone)]
-pub(super) struct PeakOf {
+pub(super) struct CasePeak {
     pub(super) case: usize,
     pub(super) mass: String,
     /// Frequency (Hz) and amplitude (m).
@@ -33,21 +33,21 @@ pub(super) struct PeakOf {
 }
 
 /// The data of the figure.
-pub(super) struct Drawn<'a> {
-    pub(super) drawing: &'a Drawing<'a>,
+pub(super) struct FigureData<'a> {
+    pub(super) drawing: &'a FigureInput<'a>,
     pub(super) curve: &'a Table,
     /// Columns of the curve table by name.
     pub(super) index: HashMap<&'a str, &'a Column>,
     /// Names and indices of the shown places.
     pub(super) shown: Vec<(String, usize)>,
     /// Other orbits of the reverse sweep, and the rows of each case.
-    pub(super) way_back: Option<(&'a Table, Vec<Stretch>)>,
+    pub(super) way_back: Option<(&'a Table, Vec<CaseRows>)>,
     /// The linear references, and the rows of each case that has different ones.
-    pub(super) references: Option<(&'a Table, Vec<Stretch>)>,
+    pub(super) references: Option<(&'a Table, Vec<CaseRows>)>,
     /// The peaks inside the frequency range.
-    pub(super) peaks: Vec<PeakOf>,
+    pub(super) peaks: Vec<CasePeak>,
     /// Shapes of a disk at its peaks, and the rows of each case.
-    pub(super) shapes: Option<(&'a Table, Vec<Stretch>)>,
+    pub(super) shapes: Option<(&'a Table, Vec<CaseRows>)>,
     /// Names of the joints whose forces are shown.
     pub(super) joints: Vec<String>,
     /// Names of the joints whose contact states are shown.
@@ -65,7 +65,7 @@ pub(super) struct Drawn<'a> {
     pub(super) left_out: Option<String>,
 }
 
-impl Drawn<'_> {
+impl FigureData<'_> {
     /// Returns the amplitudes of one place in some rows; NaN without such a column.
     pub(super) fn amplitudes(&self, name: &str, rows: Range<usize>) -> Vec<f64> {
         let column = self.index.get(&*column_name(&amplitude_of(name))).and_then(|column| column.as_numbers());
@@ -73,7 +73,7 @@ impl Drawn<'_> {
     }
 
     /// Returns the curve of one place in one case, with its peaks inserted.
-    pub(super) fn line(&self, stretch: &Stretch, name: &str) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn line(&self, stretch: &CaseRows, name: &str) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let y = self.amplitudes(name, stretch.rows.clone());
         self.scaled(
@@ -85,7 +85,7 @@ impl Drawn<'_> {
     ///
     /// The curve belongs to one place with its peaks, or to the largest of several, in the same
     /// colour. Most figures have no such curve.
-    pub(super) fn way_back(&self, stretch: &Stretch, names: &[&str], colour: usize) -> Option<Series> {
+    pub(super) fn way_back(&self, stretch: &CaseRows, names: &[&str], colour: usize) -> Option<Series> {
         let (table, stretches) = self.way_back.as_ref()?;
         let rows = stretches.iter().find(|of| of.case == stretch.case)?.rows.clone();
         let x = numbers(table, DRIVE, rows.clone());
@@ -104,13 +104,13 @@ impl Drawn<'_> {
     }
 
     /// Returns the largest amplitude of the shown places at the frequencies of the curve.
-    pub(super) fn largest(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn largest(&self, stretch: &CaseRows) -> (Vec<f64>, Vec<f64>) {
         self.scaled(self.largest_at(stretch, &self.all(stretch)))
     }
 
     /// Returns the largest amplitude with the peaks inserted, and states which place has the
     /// maximum.
-    pub(super) fn envelope(&self, stretch: &Stretch) -> (Vec<f64>, Vec<f64>, String) {
+    pub(super) fn envelope(&self, stretch: &CaseRows) -> (Vec<f64>, Vec<f64>, String) {
         let all = self.all(stretch);
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut heights: Vec<f64> = all.iter().map(|values| highest(values)).collect();
@@ -130,7 +130,7 @@ impl Drawn<'_> {
             y0 + (omega - x0) / (x1 - x0) * (y1 - y0)
         };
         // a peak of one place below the curve of another place is not on the envelope
-        let counts = |peak: &PeakOf| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
+        let counts = |peak: &CasePeak| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
         let (x, y) = self.scaled(self.with_peaks(stretch, points.clone(), &counts));
         (
             x,
@@ -143,12 +143,12 @@ impl Drawn<'_> {
     }
 
     /// Returns the amplitudes of every shown place.
-    fn all(&self, stretch: &Stretch) -> Vec<Vec<f64>> {
+    fn all(&self, stretch: &CaseRows) -> Vec<Vec<f64>> {
         self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect()
     }
 
     /// Returns the largest of several amplitudes over the frequency.
-    fn largest_at(&self, stretch: &Stretch, all: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    fn largest_at(&self, stretch: &CaseRows, all: &[Vec<f64>]) -> Vec<(f64, f64)> {
         let largest = |i: usize| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max);
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         x.into_iter().enumerate().map(|(i, x)| (x, largest(i))).collect()
@@ -163,7 +163,7 @@ impl Drawn<'_> {
     /// (degrees) of every shown place there.
     ///
     /// The maximum is a refined peak, or a point of the curve without a higher peak.
-    pub(super) fn at_the_highest(&self, stretch: &Stretch) -> Option<(f64, Shape<'_>)> {
+    pub(super) fn at_the_highest(&self, stretch: &CaseRows) -> Option<(f64, DeflectionShape<'_>)> {
         let peaks = self.shapes.as_ref().and_then(|(table, stretches)| {
             Some((*table, stretches.iter().find(|of| of.case == stretch.case)?.rows.clone()))
         });
@@ -173,7 +173,7 @@ impl Drawn<'_> {
                 let column = index.get(&*column_name(&column)).and_then(|column| column.as_numbers());
                 column.map_or(f64::NAN, |values| values[row])
             };
-            let shape = |row: usize| -> Shape<'_> {
+            let shape = |row: usize| -> DeflectionShape<'_> {
                 let names = self.shown.iter().map(|(name, _)| name.as_str());
                 names.map(|name| (name, number(amplitude_of(name), row), number(phase_of(name), row))).collect()
             };
@@ -188,15 +188,15 @@ impl Drawn<'_> {
         both.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, frequency, shape)| (frequency, shape))
     }
 
-    fn peaks_of(&self, stretch: &Stretch) -> impl Iterator<Item = &PeakOf> {
+    fn peaks_of(&self, stretch: &CaseRows) -> impl Iterator<Item = &CasePeak> {
         self.peaks.iter().filter(|peak| peak.case == stretch.case)
     }
 
     fn with_peaks(
         &self,
-        stretch: &Stretch,
+        stretch: &CaseRows,
         mut points: Vec<(f64, f64)>,
-        counts: &dyn Fn(&PeakOf) -> bool,
+        counts: &dyn Fn(&CasePeak) -> bool,
     ) -> Vec<(f64, f64)> {
         points.extend(self.peaks_of(stretch).filter(|peak| counts(peak)).map(|peak| peak.at));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -204,8 +204,8 @@ impl Drawn<'_> {
     }
 
     /// Returns marks at the peaks of one place.
-    pub(super) fn marks(&self, stretch: &Stretch, name: &str, colour: usize) -> impl Iterator<Item = Series> {
-        self.peaks_of(stretch).filter(move |peak| peak.mass == name).map(move |PeakOf { at: (x, y), .. }| {
+    pub(super) fn marks(&self, stretch: &CaseRows, name: &str, colour: usize) -> impl Iterator<Item = Series> {
+        self.peaks_of(stretch).filter(move |peak| peak.mass == name).map(move |CasePeak { at: (x, y), .. }| {
             Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour)
         })
     }
@@ -214,11 +214,11 @@ impl Drawn<'_> {
     ///
     /// Curves that all cases share are grey. Otherwise each curve has the colour of its case;
     /// of many cases only the first and the last are drawn.
-    pub(super) fn references(&self, names: &[&str], cases: &[(usize, &Stretch)]) -> Vec<Series> {
+    pub(super) fn references(&self, names: &[&str], cases: &[(usize, &CaseRows)]) -> Vec<Series> {
         let Some((table, known)) = &self.references else { return Vec::new() };
         // a case without rows has the references of the previous case
         let of = |case: usize| known.iter().rev().find(|own| own.case <= case);
-        let mut own: Vec<(usize, &Stretch, &Stretch)> = Vec::new();
+        let mut own: Vec<(usize, &CaseRows, &CaseRows)> = Vec::new();
         for (colour, stretch) in cases {
             let Some(reference) = of(stretch.case) else { continue };
             if own.iter().all(|(_, _, found)| found.rows != reference.rows) {
@@ -251,7 +251,7 @@ impl Drawn<'_> {
     }
 
     /// Returns crosses at the points of a case without an orbit, in this row from below.
-    pub(super) fn missing(&self, stretch: &Stretch, row: usize, colour: usize) -> Option<Series> {
+    pub(super) fn missing(&self, stretch: &CaseRows, row: usize, colour: usize) -> Option<Series> {
         let x = self.without_orbit(stretch);
         let count = self.failed;
         let label = format!("{count} point{} without an orbit", crate::syntax::format::plural(count));
@@ -259,7 +259,7 @@ impl Drawn<'_> {
     }
 
     /// Returns the frequencies, on the axis, at which a case has no orbit.
-    pub(super) fn without_orbit(&self, stretch: &Stretch) -> Vec<f64> {
+    pub(super) fn without_orbit(&self, stretch: &CaseRows) -> Vec<f64> {
         let all = self.all(stretch);
         let x = numbers(self.curve, DRIVE, stretch.rows.clone());
         let failed = |i: &usize| !all.is_empty() && all.iter().all(|values| values[*i].is_nan());
@@ -267,7 +267,7 @@ impl Drawn<'_> {
     }
 
     /// Returns the two reference curves of one case.
-    fn reference(&self, table: &Table, stretch: &Stretch, names: &[&str]) -> Vec<Series> {
+    fn reference(&self, table: &Table, stretch: &CaseRows, names: &[&str]) -> Vec<Series> {
         let rows = stretch.rows.clone();
         let x: Vec<f64> = numbers(table, DRIVE, rows.clone()).iter().map(|x| x * self.factor.0).collect();
         let line = |(what, style): (&str, Style)| {
@@ -291,7 +291,12 @@ impl Drawn<'_> {
     }
 
     /// Returns a panel of the share of one state, for one joint or the mean of several.
-    pub(super) fn share_panel(&self, (name, joints): &(String, Vec<String>), state: State, more: String) -> Panel {
+    pub(super) fn share_panel(
+        &self,
+        (name, joints): &(String, Vec<String>),
+        state: ContactState,
+        more: String,
+    ) -> Panel {
         let words = state.words();
         let title = if joints.len() == 1 { format!("{name} {words}") } else { format!("{name}, {words}") };
         Panel { y: contact_states::axis("share of the period"), ..self.panel(join([title, more])) }
@@ -299,13 +304,18 @@ impl Drawn<'_> {
 
     /// Returns the share of the period of one state, for example slip, as the mean of the
     /// joints.
-    pub(super) fn share_line(&self, stretch: &Stretch, joints: &[String], state: State) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn share_line(
+        &self,
+        stretch: &CaseRows,
+        joints: &[String],
+        state: ContactState,
+    ) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
         (x, contact_states::mean(self.curve, joints, &stretch.rows, state))
     }
 
     /// Returns the force of a joint, or the largest of several.
-    pub(super) fn force_line(&self, stretch: &Stretch, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn force_line(&self, stretch: &CaseRows, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
         let of = |column: &str, factor: f64| -> Vec<f64> {
             numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
         };

@@ -9,26 +9,26 @@ mod peaks;
 mod references;
 mod tables;
 
-pub use tables::{Curve, MassCurve, curves};
+pub use tables::{MassCurve, ResponseCurve, curves};
 
 use super::shared::keys::{FREQUENCY, OUTPUT, anything, check_output};
 use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of};
 use crate::case::values::{Frequencies, hertz};
-use crate::check::cost::{Cost, Costing, Shape};
-use crate::check::survey::Surveyed;
+use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::survey::SurveyedCase;
 use crate::check::warnings::{sampled, undamped};
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_in, phase_of};
 use crate::results::drawing::{MOST_CURVES, MOST_PANELS};
 use crate::results::notes::{Note, WARNING};
-use crate::results::table_builder::Rows;
-use crate::run::point_row::{Summary, location_of};
-use crate::run::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
-use crate::syntax::key::{Key, Takes, default};
+use crate::results::table_builder::TableBuilder;
+use crate::run::point_row::{PointRow, location_of};
+use crate::run::work::{Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
+use crate::syntax::key::{Key, ValueType, default};
 use figure_data::SINGLE;
-use peaks::{Found, Sought};
+use peaks::{FoundPeak, PeakQuantities};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::both_ways::{self, BothWays, Other};
@@ -45,7 +45,7 @@ pub(super) const KIND: Kind = Kind {
             FREQUENCY,
             default(
                 "peaks",
-                Takes::Flag,
+                ValueType::Flag,
                 "true",
                 "refines every peak of every mass between the points of the curve; with `peak_of`, the peaks of the \
                  largest amplitude",
@@ -79,7 +79,7 @@ pub(super) const KIND: Kind = Kind {
     },
     // an amplification needs the whole curve
     grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
-        true => Grain::Case,
+        true => UnitSize::Case,
         false => orbit_sweep::grain(study),
     },
     cost,
@@ -104,7 +104,7 @@ const LEADING: f64 = 3.0;
 /// Share of the points of a curve at which the reverse sweep has another orbit.
 const OTHERS: f64 = 0.2;
 
-fn cost(costing: &Costing<'_>) -> Cost {
+fn cost(costing: &CostInputs<'_>) -> Cost {
     let (points, values) = (costing.points(), &costing.case.values);
     let sought = values.flag("peaks") != Some(false) && costing.frequencies > 2.0;
     let peaks = match values.names("peak_of") {
@@ -134,10 +134,10 @@ fn cost(costing: &Costing<'_>) -> Cost {
     Cost {
         tables: vec![
             costing.orbits(points),
-            Shape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
-            Shape { rows: linear, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
-            Shape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
-            Shape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
+            TableShape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
+            TableShape { rows: linear, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
+            TableShape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
+            TableShape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
             costing.orbits((OTHERS * back).floor()),
         ],
         drawn: curves * costing.frequencies,
@@ -151,7 +151,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
 }
 
 /// Warns of the cost of refining the peaks of thousands of places, and states the alternatives.
-fn many_peaks(cases: &[Surveyed]) -> Option<String> {
+fn many_peaks(cases: &[SurveyedCase]) -> Option<String> {
     let one = cases.first()?;
     let (values, places) = (&one.case.values, one.survey.system().places().len());
     let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
@@ -167,10 +167,10 @@ fn many_peaks(cases: &[Surveyed]) -> Option<String> {
 /// nodes of a contact rarely do.
 const MANY_PEAKS: usize = 1000;
 
-fn compute(work: &Work<'_>) -> Computed {
+fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let case = &prepared.case;
-    let mut stretch = Computing::new(prepared);
+    let mut stretch = ResponseBuilder::new(prepared);
     let found = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
             let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
@@ -183,9 +183,9 @@ fn compute(work: &Work<'_>) -> Computed {
     let of = part.points.values().sum::<u64>() as usize;
     part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, of });
     part.tables = vec![stretch.rows];
-    let (mut amplified, mut shapes) = (Rows::default(), Rows::default());
+    let (mut amplified, mut shapes) = (TableBuilder::default(), TableBuilder::default());
     if !points.is_empty() && !work.context.stopped() {
-        let mut peaks = Rows::default();
+        let mut peaks = TableBuilder::default();
         let all = peaks::all(work, points, &others).map_err(|error| (case.index, error))?;
         for found in &all {
             if let Some(why) = found.peak.unsettled {
@@ -213,21 +213,21 @@ fn compute(work: &Work<'_>) -> Computed {
             part.notes.push(Note::of_case(&case.label(), format!("{WARNING}no amplification: {why}.")));
         }
     } else {
-        part.tables.push(Rows::default());
+        part.tables.push(TableBuilder::default());
     }
     if work.study.wants_references() && !references::are_known(work.study, case) {
         let (rows, absent) = references(work, &stretch.omegas);
         part.tables.push(rows);
         part.notes.extend(absent.into_iter().map(Note::Said));
     } else {
-        part.tables.push(Rows::default());
+        part.tables.push(TableBuilder::default());
     }
     part.tables.extend([amplified, shapes, stretch.way_back]);
     Ok(part)
 }
 
 /// Writes the row of an orbit.
-fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows) {
+fn orbit_row(prepared: &PreparedCase, omega: f64, summary: &PointRow, rows: &mut TableBuilder) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(omega));
     summary.write(prepared, rows);
@@ -235,7 +235,7 @@ fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows
 }
 
 /// Writes the row of a peak of a disk, with every place.
-fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
+fn shape(prepared: &PreparedCase, found: &FoundPeak, rows: &mut TableBuilder) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(found.peak.omega));
     let places = prepared.system.places().iter().zip(prepared.system.seen());
@@ -248,30 +248,30 @@ fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
 }
 
 /// The state of a range of points during its computation.
-struct Computing<'a> {
-    prepared: &'a Prepared,
-    part: Part,
-    rows: Rows,
+struct ResponseBuilder<'a> {
+    prepared: &'a PreparedCase,
+    part: UnitResult,
+    rows: TableBuilder,
     /// Rows of the reverse sweep.
-    way_back: Rows,
+    way_back: TableBuilder,
     omegas: Vec<f64>,
     stuck: usize,
 }
 
-impl<'a> Computing<'a> {
-    fn new(prepared: &'a Prepared) -> Self {
-        Computing {
+impl<'a> ResponseBuilder<'a> {
+    fn new(prepared: &'a PreparedCase) -> Self {
+        ResponseBuilder {
             prepared,
-            part: Part::default(),
-            rows: Rows::default(),
-            way_back: Rows::default(),
+            part: UnitResult::default(),
+            rows: TableBuilder::default(),
+            way_back: TableBuilder::default(),
             omegas: Vec::new(),
             stuck: 0,
         }
     }
 
     /// Adds a point; `None` if the run was stopped before.
-    fn add(&mut self, omega: f64, point: Option<(Summary, Vec<Note>)>) {
+    fn add(&mut self, omega: f64, point: Option<(PointRow, Vec<Note>)>) {
         let case = &self.prepared.case;
         let Some((summary, notes)) = point else {
             return self.part.count(|| location_of(case, omega), NOT_REACHED, None);
@@ -285,14 +285,14 @@ impl<'a> Computing<'a> {
 
     /// Adds the other orbits that the reverse sweep finds, and returns them as points for the
     /// peak search.
-    fn compare(&mut self, work: &Work<'_>, ways: Option<BothWays>) -> Result<Vec<Point>, MethodError> {
+    fn compare(&mut self, work: &UnitTask<'_>, ways: Option<BothWays>) -> Result<Vec<Point>, MethodError> {
         let Some(ways) = ways else { return Ok(Vec::new()) };
-        let (prepared, sought) = (self.prepared, Sought::new(self.prepared));
+        let (prepared, sought) = (self.prepared, PeakQuantities::new(self.prepared));
         let others = ways.others(&*prepared.method, &prepared.system, &work.context.stop)?;
         let points = others.iter().map(|Other { orbit, ratio }| {
             let note = Note::OtherOrbit { points: 1, from: orbit.omega, to: orbit.omega, ratios: [*ratio; 2] };
             note.join(&mut self.part.notes);
-            orbit_row(prepared, orbit.omega, &Summary::new(prepared, Ok(orbit)), &mut self.way_back);
+            orbit_row(prepared, orbit.omega, &PointRow::new(prepared, Ok(orbit)), &mut self.way_back);
             Point::new(orbit, &|orbit| sought.quantities(orbit))
         });
         Ok(points.collect())
@@ -300,21 +300,21 @@ impl<'a> Computing<'a> {
 }
 
 /// Returns the row and the notes of a point.
-fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, Vec<Note>) {
-    let summary = Summary::new(prepared, outcome);
+fn kept(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitError>) -> (PointRow, Vec<Note>) {
+    let summary = PointRow::new(prepared, outcome);
     let notes =
         outcome.map_or_else(|_| Vec::new(), |orbit| Note::of_orbit(&prepared.case.model, orbit, summary.stable));
     (summary, notes)
 }
 
 /// The points for the peak search, if requested, and the other points of the reverse sweep.
-type Followed = (Vec<Point>, Vec<Point>);
+type SweepPoints = (Vec<Point>, Vec<Point>);
 
 /// Computes the points at the frequencies of the unit.
-fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
+fn evenly(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
-    let sought = Sought::new(prepared);
+    let sought = PeakQuantities::new(prepared);
     let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
     let mut ways = BothWays::of(&prepared.system);
@@ -349,9 +349,13 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
 }
 
 /// Computes the points of a curve with adaptive frequencies.
-fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
+fn adaptively(
+    work: &UnitTask<'_>,
+    adaptive: Adaptive,
+    stretch: &mut ResponseBuilder<'_>,
+) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
-    let sought = Sought::new(prepared);
+    let sought = PeakQuantities::new(prepared);
     // the shape does not influence the frequencies
     let quantities = |orbit: &Orbit| sought.amplitudes(orbit);
     let keep = |outcome: Result<&Orbit, &OrbitError>| {
@@ -380,7 +384,7 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
 }
 
 /// Returns true if peaks are requested and the frequencies can have an inner peak.
-fn wants_peaks(work: &Work<'_>) -> bool {
+fn wants_peaks(work: &UnitTask<'_>) -> bool {
     let case = &work.case().case;
     let rising = |f: &Frequencies| f.len() > 2 && f.is_rising();
     case.values.flag("peaks").unwrap_or(true) && case.frequencies.as_ref().is_some_and(rising)

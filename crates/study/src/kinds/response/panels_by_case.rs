@@ -1,12 +1,12 @@
 //! Panels of a response case by case: curves of places, sectors of a disk, forces and contact
 //! states of joints.
 
-use super::figure_data::Drawn;
+use super::figure_data::FigureData;
 use crate::kinds::shared::contact_states;
-use crate::kinds::shared::disk_shape::{self, Around};
+use crate::kinds::shared::disk_shape::{self, PlaceInSectors};
 use crate::results::columns::FREQUENCY as DRIVE;
 use crate::results::dataset::{Axis, Panel, Series, Style};
-use crate::results::drawing::{MOST_PANELS, Stretch, join, numbers};
+use crate::results::drawing::{CaseRows, MOST_PANELS, join, numbers};
 use crate::syntax::format::significant;
 
 /// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
@@ -22,13 +22,13 @@ const ALIKE: f64 = 1e-5;
 /// curves would form one grey area of several megabytes.
 const BEHIND: usize = 100;
 
-impl Drawn<'_> {
+impl FigureData<'_> {
     /// Returns the panels of each case.
     ///
     /// A case has the curves of every place, the sectors of a disk, and the forces and contact
     /// states of joints. If the figure is full, the first cases are drawn, and the title states
     /// this.
-    pub(super) fn by_case(&self, stretches: &[Stretch]) -> Vec<Panel> {
+    pub(super) fn by_case(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         let each = self.panels_of_a_case().max(1);
         let room = (MOST_PANELS / each).clamp(1, stretches.len().max(1));
         let wheels = room * (each + 1) <= MOST_PANELS;
@@ -72,7 +72,7 @@ impl Drawn<'_> {
 
     /// Draws the places of one case: each of them, or the largest amplitude in front of all
     /// others.
-    fn masses_of(&self, stretch: &Stretch) -> Panel {
+    fn masses_of(&self, stretch: &CaseRows) -> Panel {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names, &[(0, stretch)]));
         panel.series.extend(self.missing(stretch, 1, MISSING));
@@ -116,7 +116,7 @@ impl Drawn<'_> {
 
     /// Returns at most `most` of the shown places, those with the largest amplitudes, in model
     /// order.
-    fn highest(&self, stretch: &Stretch, most: usize) -> Vec<&str> {
+    fn highest(&self, stretch: &CaseRows, most: usize) -> Vec<&str> {
         let names = self.names();
         let height = |name: &str| self.amplitudes(name, stretch.rows.clone()).into_iter().fold(0.0, f64::max);
         let mut by_height: Vec<(usize, f64)> = names.iter().map(|name| height(name)).enumerate().collect();
@@ -131,12 +131,12 @@ impl Drawn<'_> {
     ///
     /// Both panels show the places that move most, each in one colour, beginning with colour
     /// `first`.
-    fn sectors_of(&self, stretch: &Stretch, first: usize) -> Option<[Option<Panel>; 2]> {
+    fn sectors_of(&self, stretch: &CaseRows, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
         let (frequency, shape) = self.at_the_highest(stretch)?;
-        let all = Around::of_ring(shape)?;
+        let all = PlaceInSectors::of_ring(shape)?;
         let places = all.len();
-        let shape: Vec<Around> =
+        let shape: Vec<PlaceInSectors> =
             disk_shape::leaders(&all, disk_shape::MOST).into_iter().map(|place| all[place].clone()).collect();
         let bars = |colour: usize| {
             let around = &shape[colour];

@@ -1,29 +1,29 @@
 //! Panels of a response place by place and joint by joint: a curve for every case, or
 //! percentiles of draws.
 
-use super::figure_data::{Drawn, SINGLE};
+use super::figure_data::{FigureData, SINGLE};
 use crate::case::study::varied_text;
-use crate::kinds::shared::contact_states::{self, State};
+use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of};
 use crate::results::dataset::{Panel, Series};
-use crate::results::drawing::{MOST_CURVES, MOST_PANELS, Stretch, join, numbers, thinned};
+use crate::results::drawing::{CaseRows, MOST_CURVES, MOST_PANELS, join, numbers, thinned};
 use crate::results::percentiles::percentiles;
 
 /// Returns x and y of one draw.
-type CurveOf<'a> = &'a dyn Fn(&Stretch) -> (Vec<f64>, Vec<f64>);
+type CurveFn<'a> = &'a dyn Fn(&CaseRows) -> (Vec<f64>, Vec<f64>);
 
-impl Drawn<'_> {
+impl FigureData<'_> {
     /// Returns a panel for every place, or for the largest amplitude, and a panel for every
     /// joint.
     ///
     /// Each panel has a curve for every case. The last varied parameter distinguishes the
     /// curves of a panel, the other parameters the panels.
-    pub(super) fn by_mass(&self, stretches: &[Stretch]) -> Vec<Panel> {
+    pub(super) fn by_mass(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         if self.drawing.study.draws().is_some() {
             return self.by_percentiles(stretches);
         }
-        let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
-        let groups: Vec<(&[Stretch], String)> =
+        let outer = |stretch: &CaseRows| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+        let groups: Vec<(&[CaseRows], String)> =
             stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
         let masses: Vec<Option<&str>> =
             if self.single() { self.names().into_iter().map(Some).collect() } else { vec![None] };
@@ -43,11 +43,11 @@ impl Drawn<'_> {
     }
 
     /// Returns the same panels with percentiles of the draws for each combination of `vary`.
-    fn by_percentiles(&self, stretches: &[Stretch]) -> Vec<Panel> {
+    fn by_percentiles(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         let groups = self.drawing.by_listed(stretches);
         let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let some = (groups.len() > SINGLE).then(|| format!("the first {SINGLE} of {} cases", groups.len()));
-        let panel = |mut panel: Panel, name: &str, curve: CurveOf<'_>| {
+        let panel = |mut panel: Panel, name: &str, curve: CurveFn<'_>| {
             panel.title = join([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
             for (colour, (words, group)) in groups.iter().take(SINGLE).enumerate() {
                 let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();
@@ -55,7 +55,7 @@ impl Drawn<'_> {
             }
             panel
         };
-        let of = |stretch: &Stretch, column: &str| {
+        let of = |stretch: &CaseRows, column: &str| {
             let of = |column: &str, factor: f64| -> Vec<f64> {
                 numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
             };
@@ -75,8 +75,8 @@ impl Drawn<'_> {
             panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
         }
         for named in contact_states::groups(&self.faces) {
-            let of_case = |stretch: &Stretch| self.share_line(stretch, &named.1, State::Slip);
-            let shares = self.share_panel(&named, State::Slip, String::new());
+            let of_case = |stretch: &CaseRows| self.share_line(stretch, &named.1, ContactState::Slip);
+            let shares = self.share_panel(&named, ContactState::Slip, String::new());
             let title = shares.title.clone();
             panels.push(panel(shares, &title, &of_case));
         }
@@ -86,7 +86,7 @@ impl Drawn<'_> {
 
     /// Draws the cases of a group for one place, or for the largest amplitude of all; the
     /// figure has `panels` such panels.
-    fn cases_of_mass(&self, mass: Option<&str>, group: &[Stretch], outer: &str, panels: usize) -> Panel {
+    fn cases_of_mass(&self, mass: Option<&str>, group: &[CaseRows], outer: &str, panels: usize) -> Panel {
         let named = mass.filter(|_| panels > 1).map(str::to_owned);
         let thinned_out = match group.len() > MOST_CURVES {
             true => Some(format!("{MOST_CURVES} of {} cases", group.len())),
@@ -98,7 +98,7 @@ impl Drawn<'_> {
         } else if panels == 1 && self.system.places().len() > 1 {
             panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
         }
-        let cases: Vec<(usize, &Stretch)> = thinned(group, MOST_CURVES).into_iter().enumerate().collect();
+        let cases: Vec<(usize, &CaseRows)> = thinned(group, MOST_CURVES).into_iter().enumerate().collect();
         panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass]), &cases));
         // each case has its row of crosses if few cases have failures
         let failing = cases.iter().filter(|(_, stretch)| !self.without_orbit(stretch).is_empty()).count();
@@ -133,7 +133,7 @@ impl Drawn<'_> {
     fn cases_of_joint(
         &self,
         (joint, all): &(String, Vec<String>),
-        group: &[Stretch],
+        group: &[CaseRows],
         outer: &str,
         alone: usize,
     ) -> Panel {
@@ -154,12 +154,12 @@ impl Drawn<'_> {
     fn shares_in_cases(
         &self,
         named: &(String, Vec<String>),
-        group: &[Stretch],
+        group: &[CaseRows],
         outer: &str,
         alone: usize,
     ) -> Vec<Panel> {
         let (name, joints) = named;
-        let panel = |state: State| {
+        let panel = |state: ContactState| {
             let mut panel = self.share_panel(named, state, outer.to_owned());
             for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
                 let (x, y) = self.share_line(stretch, joints, state);
@@ -168,12 +168,12 @@ impl Drawn<'_> {
             }
             panel
         };
-        let occurs = |state: State| contact_states::occurs_in(self.curve, joints, state);
+        let occurs = |state: ContactState| contact_states::occurs_in(self.curve, joints, state);
         // the slip of a stop is unknown
-        let states: &[State] = match (occurs(State::Slip), occurs(State::Open)) {
-            (_, false) => &[State::Slip],
-            (true, true) => &[State::Slip, State::Open],
-            (false, true) => &[State::Open],
+        let states: &[ContactState] = match (occurs(ContactState::Slip), occurs(ContactState::Open)) {
+            (_, false) => &[ContactState::Slip],
+            (true, true) => &[ContactState::Slip, ContactState::Open],
+            (false, true) => &[ContactState::Open],
         };
         states.iter().map(|state| panel(*state)).collect()
     }
@@ -181,7 +181,7 @@ impl Drawn<'_> {
 
 /// Returns the curve of a case with the label of its last varied parameter, or `alone` without
 /// one.
-fn of_case(stretch: &Stretch, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+fn of_case(stretch: &CaseRows, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
     let last = stretch.varied.last();
     let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
     Series { value: last.map(|varied| varied.as_written().0), ..Series::line(label, x, y, colour) }

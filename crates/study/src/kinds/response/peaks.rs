@@ -1,7 +1,7 @@
 //! The peaks of a range of a response curve.
 
 use crate::kinds::shared::peak_of::{named_places, worst};
-use crate::run::work::{Prepared, Work};
+use crate::run::work::{PreparedCase, UnitTask};
 use stickslip::curve::both_ways::stretches;
 use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
@@ -24,7 +24,7 @@ const LEVEL: f64 = 1e-8;
 const SAME: f64 = 1e-2;
 
 /// The quantities of an orbit for the peak search.
-pub(super) struct Sought {
+pub(super) struct PeakQuantities {
     /// The places whose largest amplitude counts; empty if each place has separate peaks.
     named: Vec<usize>,
     places: usize,
@@ -32,10 +32,10 @@ pub(super) struct Sought {
     shapes: bool,
 }
 
-impl Sought {
-    pub(super) fn new(prepared: &Prepared) -> Self {
+impl PeakQuantities {
+    pub(super) fn new(prepared: &PreparedCase) -> Self {
         let shapes = prepared.case.model.ring.is_some();
-        Sought { named: named_places(prepared), places: prepared.system.places().len(), shapes }
+        PeakQuantities { named: named_places(prepared), places: prepared.system.places().len(), shapes }
     }
 
     /// Returns the amplitudes for the peak search.
@@ -71,7 +71,7 @@ impl Sought {
     }
 
     /// Returns the index of the quantity of a peak.
-    fn quantity(&self, found: &Found) -> usize {
+    fn quantity(&self, found: &FoundPeak) -> usize {
         if self.named.is_empty() { found.mass } else { 0 }
     }
 
@@ -84,7 +84,7 @@ impl Sought {
 }
 
 /// A peak and its place.
-pub(super) struct Found {
+pub(super) struct FoundPeak {
     pub(super) mass: usize,
     pub(super) peak: Peak,
     /// Amplitude (m) and phase (degrees) of every place, for a refined peak of a disk.
@@ -93,7 +93,7 @@ pub(super) struct Found {
     pub(super) way_back: bool,
 }
 
-impl Found {
+impl FoundPeak {
     /// Returns true if no place moves more at the peak; the first of equal places counts.
     pub(super) fn leads(&self, system: &System) -> bool {
         let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
@@ -104,22 +104,22 @@ impl Found {
 
 /// Returns the peaks of both sweeps by frequency; `others` are the other orbits of the reverse
 /// sweep.
-pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<Found>, MethodError> {
+pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<FoundPeak>, MethodError> {
     let mut of_others = Vec::new();
     for stretch in stretches(&points, others) {
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
         let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
         let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
-        of_others.extend(found.map(|found| Found { way_back: true, ..found }));
+        of_others.extend(found.map(|found| FoundPeak { way_back: true, ..found }));
     }
-    let sought = Sought::new(work.case());
+    let sought = PeakQuantities::new(work.case());
     of_others.retain(|found| !is_of_the_way_there(found, &points, others, &sought));
     let omegas: Vec<f64> = points.iter().map(|point| point.omega).collect();
     let mut all = peaks_of(work, points)?;
     all.retain(|found| !is_edge(found, &omegas, others, &sought));
     for found in of_others {
         match all.iter_mut().find(|other| is_same(other, &found, &omegas)) {
-            Some(same) if found.peak.value > same.peak.value => *same = Found { way_back: false, ..found },
+            Some(same) if found.peak.value > same.peak.value => *same = FoundPeak { way_back: false, ..found },
             Some(_) => {}
             None => all.push(found),
         }
@@ -129,7 +129,7 @@ pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Resu
 }
 
 /// Returns true if a peak of the forward sweep and a peak of the reverse sweep are the same.
-fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
+fn is_same(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
     let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
     let (a, b) = (&there.peak, &back.peak);
     !there.way_back && there.mass == back.mass && below(a) == below(b) && (a.value - b.value).abs() <= SAME * a.value
@@ -140,7 +140,7 @@ fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
 ///
 /// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
 /// than to that of the reverse sweep, and not higher.
-fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought: &Sought) -> bool {
+fn is_of_the_way_there(found: &FoundPeak, points: &[Point], others: &[Point], sought: &PeakQuantities) -> bool {
     let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
     let there = points.iter().find(|point| point.omega == own.omega);
@@ -151,7 +151,7 @@ fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought
 
 /// Returns true if a peak is only the jump of the forward sweep to a branch on which the
 /// reverse sweep reaches a higher amplitude.
-fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> bool {
+fn is_edge(found: &FoundPeak, omegas: &[f64], others: &[Point], sought: &PeakQuantities) -> bool {
     let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
     let next = omegas.iter().find(|omega| **omega > other.omega);
@@ -162,9 +162,9 @@ fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> 
 /// Returns the peaks of a range of a curve by frequency.
 ///
 /// An end of the whole curve is a peak at the range end if the curve falls from it.
-fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
+fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, MethodError> {
     let prepared = work.case();
-    let sought = Sought::new(prepared);
+    let sought = PeakQuantities::new(prepared);
     let count = sought.amplitudes_count();
     let omegas = prepared
         .case
@@ -172,13 +172,13 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         .as_ref()
         .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
     let wanted = if sought.named.is_empty() { count } else { 1 };
-    let at_end = |end: &Point, neighbour: &Point| -> Vec<Found> {
+    let at_end = |end: &Point, neighbour: &Point| -> Vec<FoundPeak> {
         let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
         (0..wanted.min(end.values.len()))
             .filter(falls)
             .map(|q| {
                 let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
-                Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), way_back: false }
+                FoundPeak { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), way_back: false }
             })
             .collect()
     };
@@ -201,7 +201,7 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
     inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
-        Found { mass, peak: found.peak, shape: found.values[count..].to_vec(), way_back: false }
+        FoundPeak { mass, peak: found.peak, shape: found.values[count..].to_vec(), way_back: false }
     });
     Ok(first.into_iter().chain(inner).chain(last).filter(|found| moves(&found.peak)).collect())
 }

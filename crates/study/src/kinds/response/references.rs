@@ -1,13 +1,13 @@
 //! The linear references of a response: the same structure with all joints free, and with all
 //! joints stuck.
 
-use crate::case::linear_reference::Reference;
+use crate::case::linear_reference::LinearReference;
 use crate::case::study::{Case, Study};
 use crate::case::values::hertz;
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_in};
 use crate::results::notes::WARNING;
-use crate::results::table_builder::Rows;
-use crate::run::work::{Prepared, Work};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{PreparedCase, UnitTask};
 use stickslip::method::{self, MethodError, Options, Solver};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -21,11 +21,11 @@ pub(super) const REFERENCE_POINTS: usize = 4;
 pub(super) fn are_known(study: &Study, case: &Case) -> bool {
     let before = case.index.checked_sub(1).and_then(|index| study.case(index).ok());
     before.is_some_and(|before| {
-        let alike = |reference: Reference| match (reference.model(&before.model), reference.model(&case.model)) {
+        let alike = |reference: LinearReference| match (reference.model(&before.model), reference.model(&case.model)) {
             (Ok(before), Ok(case)) => before == case,
             (before, case) => before.is_err() && case.is_err(),
         };
-        before.frequencies == case.frequencies && Reference::ALL.into_iter().all(alike)
+        before.frequencies == case.frequencies && LinearReference::ALL.into_iter().all(alike)
     })
 }
 
@@ -48,7 +48,7 @@ pub(super) fn others(study: &Study) -> f64 {
 ///
 /// Its joints have other laws than those for which the method was chosen. If that method does
 /// not support them, the first method that does is used.
-fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+fn solver<'a>(prepared: &PreparedCase, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
         let others = method::ways(system).methods.into_iter().filter_map(method::find);
         let mut takes = others.filter_map(|row| (row.build)(&Options::new()).ok()?.solver(system).ok());
@@ -58,7 +58,7 @@ fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver 
 
 /// Returns the responses with all joints free and with all joints stuck, and the reasons for
 /// missing ones.
-pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
+pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, Vec<String>) {
     let prepared = work.case();
     let between = omegas.windows(2).flat_map(|pair| {
         (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
@@ -67,7 +67,7 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
     let mut absent = Vec::new();
     // only the amplitudes are kept: an orbit with many places takes megabytes
     let amplitudes = |orbit: Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
-    let mut follow = |reference: Reference| -> Option<Vec<Option<Vec<f64>>>> {
+    let mut follow = |reference: LinearReference| -> Option<Vec<Option<Vec<f64>>>> {
         // the check of the study reports laws without a reference
         let model = reference.model(&prepared.case.model).ok()?;
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
@@ -76,8 +76,8 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
         });
         found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
     };
-    let curves = Reference::ALL.map(|reference| (reference.name(), follow(reference)));
-    let mut rows = Rows::linear();
+    let curves = LinearReference::ALL.map(|reference| (reference.name(), follow(reference)));
+    let mut rows = TableBuilder::linear();
     for (i, omega) in omegas.iter().enumerate() {
         rows.varied(&prepared.case);
         rows.number(DRIVE, hertz(*omega));

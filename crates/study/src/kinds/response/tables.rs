@@ -30,7 +30,7 @@ pub(super) const MASS: &str = "mass";
 
 /// The response of one case.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct ResponseCurve {
     /// The varied parameters of the case.
     pub varied: Vec<VariedValue>,
     /// Excitation frequencies, Hz, in table order.
@@ -92,7 +92,7 @@ impl MassCurve {
 /// let curves = response::curves(&study, &dataset).unwrap();
 /// assert!((curves[0].masses[0].amplitude[1] - 1.0).abs() < 1e-12);   // F/(c ω) at ω = √(k/m)
 /// ```
-pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsError> {
+pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, ResultsError> {
     let results = Results::of(NAME, study, dataset)?;
     let Some(curve) = results.table(CURVE)? else { return Ok(Vec::new()) };
     let keys = study.varied().len();
@@ -104,9 +104,9 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsErr
     let amplitudes =
         places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;
     let stretches = results.stretches(&curve, keys)?;
-    let mut curves: Vec<Curve> = stretches
+    let mut curves: Vec<ResponseCurve> = stretches
         .iter()
-        .map(|stretch| Curve {
+        .map(|stretch| ResponseCurve {
             varied: stretch.varied.clone(),
             frequency: frequency[stretch.rows.clone()].to_vec(),
             masses: places

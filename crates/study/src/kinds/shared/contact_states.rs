@@ -17,7 +17,7 @@ const PERCENT: f64 = 100.0;
 
 /// The contact state of faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::kinds) enum State {
+pub(in crate::kinds) enum ContactState {
     Stick,
     Slip,
     /// A stop in contact, whose sliding is unknown.
@@ -25,16 +25,16 @@ pub(in crate::kinds) enum State {
     Open,
 }
 
-impl State {
-    const ALL: [State; 4] = [State::Stick, State::Slip, State::Touch, State::Open];
+impl ContactState {
+    const ALL: [ContactState; 4] = [ContactState::Stick, ContactState::Slip, ContactState::Touch, ContactState::Open];
 
     /// Returns the state as a panel names it.
     pub(in crate::kinds) fn words(self) -> &'static str {
         match self {
-            State::Stick => "sticks",
-            State::Slip => "slips",
-            State::Touch => "touches",
-            State::Open => "is apart",
+            ContactState::Stick => "sticks",
+            ContactState::Slip => "slips",
+            ContactState::Touch => "touches",
+            ContactState::Open => "is apart",
         }
     }
 }
@@ -44,7 +44,7 @@ pub(in crate::kinds) fn has(table: &Table, joint: &str) -> bool {
     table.numbers(&columns::sticks(joint)).is_some_and(|shares| shares.iter().any(|share| share.is_finite()))
 }
 
-/// Returns the shares in percent of the period, in the order of [`State::ALL`], row by row.
+/// Returns the shares in percent of the period, in the order of [`ContactState::ALL`], row by row.
 fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
     let [stick, slip, open] = [columns::sticks(joint), columns::slips(joint), columns::open(joint)]
         .map(|column| numbers(table, &column, rows.clone()));
@@ -60,24 +60,24 @@ pub(in crate::kinds) fn axis(quantity: &str) -> Axis {
 }
 
 /// Returns the share of the period of one state, in percent; the mean of several joints.
-pub(in crate::kinds) fn mean(table: &Table, joints: &[String], rows: &Range<usize>, state: State) -> Vec<f64> {
+pub(in crate::kinds) fn mean(table: &Table, joints: &[String], rows: &Range<usize>, state: ContactState) -> Vec<f64> {
     let all: Vec<Vec<f64>> = joints.iter().map(|joint| of_joint(table, joint, rows)[state as usize].clone()).collect();
     (0..rows.len()).map(|i| all.iter().map(|shares| shares[i]).sum::<f64>() / all.len() as f64).collect()
 }
 
 /// Returns true if one of the joints is ever in a state.
-pub(in crate::kinds) fn occurs_in(table: &Table, joints: &[String], state: State) -> bool {
+pub(in crate::kinds) fn occurs_in(table: &Table, joints: &[String], state: ContactState) -> bool {
     joints.iter().any(|joint| occurs(&of_joint(table, joint, &(0..table.rows()))[state as usize]))
 }
 
 /// Returns the states with a map. Stick has no map, because it is the remainder.
-fn mapped(table: &Table, joints: &[String]) -> Vec<State> {
-    let drawn = |state: &State| match state {
-        State::Stick => false,
-        State::Slip => true,
-        State::Touch | State::Open => occurs_in(table, joints, *state),
+fn mapped(table: &Table, joints: &[String]) -> Vec<ContactState> {
+    let drawn = |state: &ContactState| match state {
+        ContactState::Stick => false,
+        ContactState::Slip => true,
+        ContactState::Touch | ContactState::Open => occurs_in(table, joints, *state),
     };
-    State::ALL.into_iter().filter(drawn).collect()
+    ContactState::ALL.into_iter().filter(drawn).collect()
 }
 
 /// Returns the number of panels that [`panels`] returns.
@@ -107,7 +107,8 @@ pub(in crate::kinds) fn panels(
     let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| of_joint(table, joint, rows)).collect();
     let titled = |words: &str| if title.is_empty() { words.to_owned() } else { format!("{words}, {title}") };
     if joints.len() <= FEW {
-        let occurring: Vec<State> = State::ALL.into_iter().filter(|state| occurs_in(table, joints, *state)).collect();
+        let occurring: Vec<ContactState> =
+            ContactState::ALL.into_iter().filter(|state| occurs_in(table, joints, *state)).collect();
         let of_joint = |(joint, shares): (&String, &[Vec<f64>; 4])| Panel {
             title: titled(joint),
             x: over.clone(),
@@ -118,7 +119,7 @@ pub(in crate::kinds) fn panels(
         return joints.iter().zip(&all).map(of_joint).collect();
     }
     let names = Axis { names: joints.to_vec(), ..Axis::new("joint", "").between(-0.5, joints.len() as f64 - 0.5) };
-    let map = |state: State| Panel {
+    let map = |state: ContactState| Panel {
         title: titled(&format!("share of the period in which a joint {}", state.words())),
         x: over.clone(),
         y: names.clone(),
@@ -137,7 +138,7 @@ fn occurs(shares: &[f64]) -> bool {
 }
 
 /// Returns the stacked shares of one joint, coloured by the states that occur in any joint.
-fn areas(shares: &[Vec<f64>; 4], x: &[f64], occurring: &[State], first: usize) -> Vec<Series> {
+fn areas(shares: &[Vec<f64>; 4], x: &[f64], occurring: &[ContactState], first: usize) -> Vec<Series> {
     let mut below = vec![0.0; x.len()];
     let mut areas = Vec::new();
     for (colour, state) in (first..).zip(occurring) {

@@ -10,12 +10,12 @@ use stickslip_numerics::leading::leading;
 
 /// A place of every sector: its name, and sector, amplitude and phase (degrees) of each.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::kinds) struct Around {
+pub(in crate::kinds) struct PlaceInSectors {
     pub(in crate::kinds) place: String,
     pub(in crate::kinds) of: Vec<(usize, f64, f64)>,
 }
 
-impl Around {
+impl PlaceInSectors {
     /// Returns a place of every sector in a travelling wave; each sector leads the previous one
     /// by `diameter / sectors` of a turn.
     pub(in crate::kinds) fn of_wave(
@@ -23,21 +23,23 @@ impl Around {
         (size, phase): (f64, f64),
         diameter: usize,
         sectors: usize,
-    ) -> Around {
+    ) -> PlaceInSectors {
         let lead = |sector: usize| 360.0 * (diameter * sector % sectors) as f64 / sectors as f64;
-        Around { place, of: (0..sectors).map(|sector| (sector, size, phase + lead(sector))).collect() }
+        PlaceInSectors { place, of: (0..sectors).map(|sector| (sector, size, phase + lead(sector))).collect() }
     }
 
     /// Groups places of a ring, with amplitude and phase, by their name in the sector.
     ///
     /// Returns `None` if a place belongs to no sector.
-    pub(in crate::kinds) fn of_ring<'a>(places: impl IntoIterator<Item = (&'a str, f64, f64)>) -> Option<Vec<Around>> {
-        let mut all: Vec<Around> = Vec::new();
+    pub(in crate::kinds) fn of_ring<'a>(
+        places: impl IntoIterator<Item = (&'a str, f64, f64)>,
+    ) -> Option<Vec<PlaceInSectors>> {
+        let mut all: Vec<PlaceInSectors> = Vec::new();
         for (name, size, phase) in places {
             let (place, sector) = of_sector(name)?;
             match all.iter_mut().find(|around| around.place == place) {
                 Some(around) => around.of.push((sector, size, phase)),
-                None => all.push(Around { place, of: vec![(sector, size, phase)] }),
+                None => all.push(PlaceInSectors { place, of: vec![(sector, size, phase)] }),
             }
         }
         Some(all)
@@ -69,7 +71,7 @@ const CIRCLE: usize = 180;
 pub(in crate::kinds) const MOST: usize = 4;
 
 /// Returns the indices of at most `most` places that move most, in ascending order.
-pub(in crate::kinds) fn leaders(places: &[Around], most: usize) -> Vec<usize> {
+pub(in crate::kinds) fn leaders(places: &[PlaceInSectors], most: usize) -> Vec<usize> {
     let mut leaders: Vec<usize> = (0..places.len()).collect();
     leaders.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
     leaders.truncate(most);
@@ -84,8 +86,13 @@ pub(in crate::kinds) fn left_out(shown: usize, places: usize) -> String {
 
 /// Draws some places of a ring in colours from `colour`. Sector 0 is at the top, and sector 1
 /// follows clockwise.
-pub(in crate::kinds) fn panel(places: &[Around], sectors: usize, title: String, colour: usize) -> Option<Panel> {
-    let largest = places.iter().map(Around::largest).fold(0.0, f64::max);
+pub(in crate::kinds) fn panel(
+    places: &[PlaceInSectors],
+    sectors: usize,
+    title: String,
+    colour: usize,
+) -> Option<Panel> {
+    let largest = places.iter().map(PlaceInSectors::largest).fold(0.0, f64::max);
     let all = places.iter().flat_map(|around| &around.of);
     // the first of equal displacements determines the instant
     let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
@@ -104,7 +111,7 @@ pub(in crate::kinds) fn panel(places: &[Around], sectors: usize, title: String, 
             let turn = *sector as f64 / sectors as f64;
             (at(turn, 1.0), at(turn, 1.0 + LARGEST * out))
         };
-        let Around { place: name, of } = &places[place];
+        let PlaceInSectors { place: name, of } = &places[place];
         let mut tips: Vec<_> = of.iter().map(tip).collect();
         // spokes from the circle at rest
         let nothing = (f64::NAN, f64::NAN);
@@ -132,7 +139,7 @@ mod tests {
     /// The first of equal displacements determines the instant.
     #[test]
     fn a_wave_has_its_nodal_diameters() {
-        let wave = Around::of_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
+        let wave = PlaceInSectors::of_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
         let found = panel(&[wave], 8, String::new(), 0).unwrap();
         let line = found.series.iter().find(|line| line.label == "blade").unwrap();
         let radii: Vec<f64> = line.x.iter().zip(&line.y).map(|(x, y)| x.hypot(*y)).collect();
@@ -149,8 +156,8 @@ mod tests {
     #[test]
     fn a_wheel_is_not_crowded() {
         let size = [1.0, 5.0, 2.0, 0.5, 3.0, 4.0];
-        let all: Vec<Around> =
-            size.iter().map(|size| Around::of_wave(format!("p{size}"), (*size, 0.0), 1, 6)).collect();
+        let all: Vec<PlaceInSectors> =
+            size.iter().map(|size| PlaceInSectors::of_wave(format!("p{size}"), (*size, 0.0), 1, 6)).collect();
         let found = panel(&all, 6, "mode 1".to_owned(), 2).unwrap();
         let drawn: Vec<(&str, usize)> =
             found.series.iter().filter(|s| s.label.starts_with('p')).map(|s| (s.label.as_str(), s.colour)).collect();
@@ -162,11 +169,11 @@ mod tests {
     fn places_of_a_ring_by_their_sector() {
         assert_eq!(of_sector("tip_12.x"), Some(("tip.x".to_owned(), 12)));
         assert_eq!(of_sector("blade"), None);
-        let all = Around::of_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
+        let all = PlaceInSectors::of_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
         assert_eq!(
             all.iter().map(|around| (around.place.as_str(), around.of.len())).collect::<Vec<_>>(),
             [("a", 2), ("b", 1)]
         );
-        assert!(Around::of_ring([("rotor", 1.0, 0.0)]).is_none());
+        assert!(PlaceInSectors::of_ring([("rotor", 1.0, 0.0)]).is_none());
     }
 }

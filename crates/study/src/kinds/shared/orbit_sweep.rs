@@ -3,28 +3,28 @@
 use crate::case::study::{Case, Study};
 use crate::results::notes::Note;
 use crate::run::point_row::location_of;
-use crate::run::work::{Grain, NOT_REACHED, Part, Work};
+use crate::run::work::{NOT_REACHED, UnitResult, UnitSize, UnitTask};
 use stickslip::curve::sweep::{See, Watch, solver, stretch};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
 /// A frequency (rad/s) and its outcome; `None` if the run was stopped before.
-type Point = (f64, Option<Result<Orbit, OrbitError>>);
+type SweepOutcome = (f64, Option<Result<Orbit, OrbitError>>);
 
 /// Returns the unit of work of a study.
 ///
 /// A unit is a range of frequencies with a cold start. If a law allows several orbits at a
 /// frequency, the unit is the whole curve. A cold start could then lead to another orbit than a
 /// warm start. The laws of the first case represent all cases.
-pub(in crate::kinds) fn grain(study: &Study) -> Grain {
+pub(in crate::kinds) fn grain(study: &Study) -> UnitSize {
     let unique = |case: Case| case.model.joints.iter().all(|joint| joint.law.is_incrementally_passive());
-    if study.case(0).is_ok_and(unique) { Grain::Frequencies } else { Grain::Case }
+    if study.case(0).is_ok_and(unique) { UnitSize::Frequencies } else { UnitSize::Case }
 }
 
 /// Solves the frequencies of a unit of one case, each with a warm start from the previous one.
 ///
 /// `see` receives each outcome immediately.
-pub(in crate::kinds) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), MethodError> {
+pub(in crate::kinds) fn sweep(work: &UnitTask<'_>, see: &mut See<'_>) -> Result<(), MethodError> {
     let prepared = work.case();
     let watch = Watch { finished: &*work.context.finished, stop: &work.context.stop };
     let mut omegas = work.points.clone().map(|index| work.omega(index));
@@ -33,7 +33,7 @@ pub(in crate::kinds) fn sweep(work: &Work<'_>, see: &mut See<'_>) -> Result<(), 
 }
 
 /// Returns the outcomes of a unit of one case.
-fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
+fn all(work: &UnitTask<'_>) -> Result<Vec<SweepOutcome>, (usize, MethodError)> {
     let mut points = Vec::with_capacity(work.points.len());
     sweep(work, &mut |omega, outcome| {
         points.push((omega, outcome.map(|outcome| outcome.cloned().map_err(Clone::clone))));
@@ -43,10 +43,13 @@ fn all(work: &Work<'_>) -> Result<Vec<Point>, (usize, MethodError)> {
 }
 
 /// An orbit, and its stability if known.
-type Judged = (Orbit, Option<bool>);
+type OrbitAndStability = (Orbit, Option<bool>);
 
 /// Returns the orbits of a unit of one case. Counts all its points and records the failures.
-pub(in crate::kinds) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Judged>, (usize, MethodError)> {
+pub(in crate::kinds) fn found(
+    work: &UnitTask<'_>,
+    part: &mut UnitResult,
+) -> Result<Vec<OrbitAndStability>, (usize, MethodError)> {
     let case = &work.case().case;
     let mut orbits = Vec::with_capacity(work.points.len());
     for (omega, point) in all(work)? {
@@ -64,7 +67,7 @@ pub(in crate::kinds) fn found(work: &Work<'_>, part: &mut Part) -> Result<Vec<Ju
 
 /// Counts an orbit and adds the notes on its stability and accuracy, worded by the kind.
 pub(in crate::kinds) fn count(
-    part: &mut Part,
+    part: &mut UnitResult,
     case: &Case,
     orbit: &Orbit,
     (stable, words): (Option<bool>, fn(Note) -> Note),
@@ -74,7 +77,7 @@ pub(in crate::kinds) fn count(
 }
 
 /// Counts a point without an orbit.
-fn count_missing(part: &mut Part, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
+fn count_missing(part: &mut UnitResult, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
     match point {
         Some(Err(error)) => part.count(|| location_of(case, omega), error.status(), Some(error.to_string())),
         _ => part.count(|| location_of(case, omega), NOT_REACHED, None),

@@ -2,11 +2,11 @@
 //!
 //! With several masses, the largest amplitude counts, at each frequency separately.
 
-use crate::case::names::Names;
+use crate::case::names::ModelNames;
 use crate::case::values::Values;
-use crate::kinds::info::Complaint;
-use crate::run::work::Prepared;
-use crate::syntax::key::{Key, Takes, optional};
+use crate::kinds::info::KeyError;
+use crate::run::work::PreparedCase;
+use crate::syntax::key::{Key, ValueType, optional};
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
 
@@ -16,27 +16,27 @@ const ALL: &str = "all";
 /// The key `peak_of`.
 pub(in crate::kinds) const PEAK_OF: Key = optional(
     "peak_of",
-    Takes::Names,
+    ValueType::Names,
     "the masses whose peak is used, or \"all\"; of several masses the largest amplitude; default: the first mass \
      with a force",
     "[\"blade1\", \"blade3\"]",
 );
 
 /// Checks that the key names masses of the model.
-pub(in crate::kinds) fn check_peak_of(values: &Values, model: &Model) -> Result<(), Complaint> {
-    let masses = Names::of_displacements(model);
+pub(in crate::kinds) fn check_peak_of(values: &Values, model: &Model) -> Result<(), KeyError> {
+    let masses = ModelNames::of_displacements(model);
     let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
     named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
 }
 
 /// Returns the places that the key names; empty if the key is absent.
-pub(in crate::kinds) fn named_places(prepared: &Prepared) -> Vec<usize> {
+pub(in crate::kinds) fn named_places(prepared: &PreparedCase) -> Vec<usize> {
     let names = prepared.case.values.names("peak_of").unwrap_or_default();
     let places = &prepared.system.places();
     if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
         return displacements(&prepared.system);
     }
-    let masses = Names::of_displacements(&prepared.case.model);
+    let masses = ModelNames::of_displacements(&prepared.case.model);
     let meant = names.iter().filter_map(|name| masses.all(PEAK_OF.name, "mass", name).ok()).flatten();
     let mut found: Vec<usize> = Vec::new();
     for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {
@@ -49,7 +49,7 @@ pub(in crate::kinds) fn named_places(prepared: &Prepared) -> Vec<usize> {
 }
 
 /// Returns the places whose peak counts: the named places, or the first place with a force.
-pub(in crate::kinds) fn peak_places(prepared: &Prepared) -> Vec<usize> {
+pub(in crate::kinds) fn peak_places(prepared: &PreparedCase) -> Vec<usize> {
     let named = named_places(prepared);
     if !named.is_empty() {
         return named;

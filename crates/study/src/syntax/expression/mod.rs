@@ -25,14 +25,14 @@ mod operation;
 mod parser;
 mod value;
 
-use crate::syntax::units::{Fault, power, times};
+use crate::syntax::units::{TextError, power, times};
 pub use operation::FUNCTIONS;
 use operation::Operation;
 pub(crate) use operation::is_reserved;
 use parser::Parser;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
-pub use value::Value;
+pub use value::ExpressionValue;
 pub(crate) use value::{described, displayed};
 
 /// A compiled expression: steps of a stack machine.
@@ -46,23 +46,23 @@ pub struct Expression {
 impl Expression {
     /// Returns the expression of one bare number.
     pub fn number(value: f64) -> Self {
-        Expression { steps: vec![(Operation::Push(Value::bare(value)), 0..0)] }
+        Expression { steps: vec![(Operation::Push(ExpressionValue::bare(value)), 0..0)] }
     }
 
     /// Compiles `text`. A name means the parameter at its index in `parameters`.
     ///
     /// # Errors
-    /// Returns a [`Fault`] with the byte range of `text` that is wrong.
+    /// Returns a [`TextError`] with the byte range of `text` that is wrong.
     ///
     /// # Example
     /// ```
     /// use stickslip::dimension::Dimension;
-    /// use stickslip_study::expression::{Expression, Value};
+    /// use stickslip_study::expression::{Expression, ExpressionValue};
     /// let e = Expression::compile("m - m1/2", &["m", "m1"]).unwrap();
-    /// let value = e.evaluate(&[Value::of(0.182, Dimension::MASS), Value::bare(0.002)]).unwrap();
+    /// let value = e.evaluate(&[ExpressionValue::of(0.182, Dimension::MASS), ExpressionValue::bare(0.002)]).unwrap();
     /// assert_eq!(value.to(Dimension::MASS), Ok(0.181));
     /// ```
-    pub fn compile<S: AsRef<str>>(text: &str, parameters: &[S]) -> Result<Self, Fault> {
+    pub fn compile<S: AsRef<str>>(text: &str, parameters: &[S]) -> Result<Self, TextError> {
         let index = |name: &str| parameters.iter().position(|p| p.as_ref() == name);
         let names: Vec<&str> = parameters.iter().map(AsRef::as_ref).collect();
         Expression::compile_with(text, &index, &|_| None, &names)
@@ -76,11 +76,11 @@ impl Expression {
         index: &dyn Fn(&str) -> Option<usize>,
         constant: &dyn Fn(&str) -> Option<f64>,
         names: &[&str],
-    ) -> Result<Self, Fault> {
+    ) -> Result<Self, TextError> {
         let mut parser = Parser { text, at: 0, index, constant, names, depth: 0, steps: Vec::new() };
         parser.space();
         if parser.peek().is_none() {
-            return Err(Fault::new(0..text.len(), "the text is empty: write a number or an expression"));
+            return Err(TextError::new(0..text.len(), "the text is empty: write a number or an expression"));
         }
         parser.sum()?;
         if let Some(c) = parser.peek() {
@@ -124,26 +124,28 @@ impl Expression {
     /// Evaluates the expression with `parameters` by index.
     ///
     /// # Errors
-    /// Returns a [`Fault`] with the byte range of the sub-expression whose dimensions do not
+    /// Returns a [`TextError`] with the byte range of the sub-expression whose dimensions do not
     /// fit or whose value is not finite.
-    pub fn evaluate(&self, parameters: &[Value]) -> Result<Value, Fault> {
-        let mut stack: Vec<Value> = Vec::with_capacity(8);
+    pub fn evaluate(&self, parameters: &[ExpressionValue]) -> Result<ExpressionValue, TextError> {
+        let mut stack: Vec<ExpressionValue> = Vec::with_capacity(8);
         for (operation, span) in &self.steps {
-            let fault = |message: String| Fault::new(span.clone(), message);
+            let fault = |message: String| TextError::new(span.clone(), message);
             // the parser balances the stack
-            let mut pop = || stack.pop().unwrap_or(Value::bare(f64::NAN));
+            let mut pop = || stack.pop().unwrap_or(ExpressionValue::bare(f64::NAN));
             let value = match *operation {
                 Operation::Push(value) => value,
-                Operation::Parameter(index) => parameters.get(index).copied().unwrap_or(Value::bare(f64::NAN)),
+                Operation::Parameter(index) => {
+                    parameters.get(index).copied().unwrap_or(ExpressionValue::bare(f64::NAN))
+                }
                 Operation::Negate => {
                     let a = pop();
-                    Value { si: -a.si, ..a }
+                    ExpressionValue { si: -a.si, ..a }
                 }
                 Operation::Add | Operation::Subtract => {
                     let (b, a) = (pop(), pop());
                     let (verb, sign) = if *operation == Operation::Add { ("add", 1.0) } else { ("subtract", -1.0) };
                     let (x, y, value) = unify(a, b).map_err(|e| e.into_fault(span, verb))?;
-                    Value { si: x + sign * y, ..value }
+                    ExpressionValue { si: x + sign * y, ..value }
                 }
                 Operation::Multiply | Operation::Divide => {
                     let (b, a) = (pop(), pop());
@@ -161,7 +163,7 @@ impl Expression {
                     if divide && b.si == 0.0 {
                         return Err(fault("this divides by zero".to_owned()));
                     }
-                    Value { si, dimension, with_pi: a.with_pi || b.with_pi }
+                    ExpressionValue { si, dimension, with_pi: a.with_pi || b.with_pi }
                 }
                 Operation::Power => {
                     let (b, a) = (pop(), pop());
@@ -175,13 +177,13 @@ impl Expression {
                             fault(format!("{} cannot be raised to the power {}", described(d), b.si))
                         })?),
                     };
-                    Value { si: a.si.powf(b.si), dimension, with_pi: a.with_pi || b.with_pi }
+                    ExpressionValue { si: a.si.powf(b.si), dimension, with_pi: a.with_pi || b.with_pi }
                 }
                 Operation::Call { function: function @ ("min" | "max"), arguments } => {
                     let mut best = pop();
                     for _ in 1..arguments {
                         let (x, y, value) = unify(best, pop()).map_err(|e| e.into_fault(span, "compare"))?;
-                        best = Value { si: if function == "min" { x.min(y) } else { x.max(y) }, ..value };
+                        best = ExpressionValue { si: if function == "min" { x.min(y) } else { x.max(y) }, ..value };
                     }
                     best
                 }
@@ -192,43 +194,47 @@ impl Expression {
             }
             stack.push(value);
         }
-        Ok(stack.pop().unwrap_or(Value::bare(f64::NAN)))
+        Ok(stack.pop().unwrap_or(ExpressionValue::bare(f64::NAN)))
     }
 }
 
-struct Clash {
+struct DimensionMismatch {
     a: Dimension,
     b: Dimension,
     other: Option<(String, Option<String>)>,
 }
 
-impl Clash {
-    fn into_fault(self, span: &Range<usize>, verb: &str) -> Fault {
+impl DimensionMismatch {
+    fn into_fault(self, span: &Range<usize>, verb: &str) -> TextError {
         match self.other {
-            Some((message, help)) => Fault { span: span.clone(), message, help },
-            None => Fault::new(span.clone(), format!("cannot {verb} {} and {}", described(self.a), described(self.b))),
+            Some((message, help)) => TextError { span: span.clone(), message, help },
+            None => {
+                TextError::new(span.clone(), format!("cannot {verb} {} and {}", described(self.a), described(self.b)))
+            }
         }
     }
 }
 
 /// Brings two values to one dimension: both numbers, and a value with the dimension of the
 /// result.
-fn unify(a: Value, b: Value) -> Result<(f64, f64, Value), Clash> {
+fn unify(a: ExpressionValue, b: ExpressionValue) -> Result<(f64, f64, ExpressionValue), DimensionMismatch> {
     let none = Dimension::NONE;
-    let unit = |value: Value, d| value.in_si_unit_of(d).map_err(|e| Clash { a: none, b: none, other: Some(e) });
+    let unit = |value: ExpressionValue, d| {
+        value.in_si_unit_of(d).map_err(|e| DimensionMismatch { a: none, b: none, other: Some(e) })
+    };
     match (a.dimension, b.dimension) {
-        (None, None) => Ok((a.si, b.si, Value { with_pi: a.with_pi || b.with_pi, ..a })),
+        (None, None) => Ok((a.si, b.si, ExpressionValue { with_pi: a.with_pi || b.with_pi, ..a })),
         (Some(d), None) => Ok((a.si, unit(b, d)?, a)),
         (None, Some(d)) => Ok((unit(a, d)?, b.si, b)),
         (Some(d), Some(e)) if d == e => Ok((a.si, b.si, a)),
-        (Some(a), Some(b)) => Err(Clash { a, b, other: None }),
+        (Some(a), Some(b)) => Err(DimensionMismatch { a, b, other: None }),
     }
 }
 
-fn call(function: &str, a: Value) -> Result<Value, String> {
+fn call(function: &str, a: ExpressionValue) -> Result<ExpressionValue, String> {
     let pure = |allowed: &[Dimension], value: f64| match a.dimension {
-        None => Ok(Value { si: value, ..a }),
-        Some(d) if allowed.contains(&d) => Ok(Value::of(value, Dimension::NONE)),
+        None => Ok(ExpressionValue { si: value, ..a }),
+        Some(d) if allowed.contains(&d) => Ok(ExpressionValue::of(value, Dimension::NONE)),
         Some(d) => Err(format!("`{function}` takes {}, found {}", described(allowed[0]), described(d))),
     };
     let angle = &[Dimension::ANGLE, Dimension::NONE];
@@ -238,7 +244,7 @@ fn call(function: &str, a: Value) -> Result<Value, String> {
         "tan" => pure(angle, a.si.tan()),
         "exp" => pure(&[Dimension::NONE], a.si.exp()),
         "ln" => pure(&[Dimension::NONE], a.si.ln()),
-        "abs" => Ok(Value { si: a.si.abs(), ..a }),
+        "abs" => Ok(ExpressionValue { si: a.si.abs(), ..a }),
         _ => {
             let dimension = match a.dimension {
                 None => None,
@@ -247,7 +253,7 @@ fn call(function: &str, a: Value) -> Result<Value, String> {
             if a.si < 0.0 {
                 return Err(format!("the square root of a negative number ({})", a.si));
             }
-            Ok(Value { si: a.si.sqrt(), dimension, ..a })
+            Ok(ExpressionValue { si: a.si.sqrt(), dimension, ..a })
         }
     }
 }
@@ -255,7 +261,7 @@ fn call(function: &str, a: Value) -> Result<Value, String> {
 /// Evaluates a quantity without parameters, in SI, for a key that expects `dimension`.
 ///
 /// # Errors
-/// Returns a [`Fault`] if the text is not an expression or has another dimension.
+/// Returns a [`TextError`] if the text is not an expression or has another dimension.
 ///
 /// # Example
 /// ```
@@ -264,9 +270,9 @@ fn call(function: &str, a: Value) -> Result<Value, String> {
 /// assert_eq!(quantity("25 s/mm", Dimension::INVERSE_VELOCITY), Ok(25_000.0));
 /// assert!(quantity("10 kg", Dimension::STIFFNESS).is_err());
 /// ```
-pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, Fault> {
+pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, TextError> {
     let value = Expression::compile::<&str>(text, &[])?.evaluate(&[])?;
-    value.written_as(text, dimension).map_err(|(message, help)| Fault { span: 0..text.len(), message, help })
+    value.written_as(text, dimension).map_err(|(message, help)| TextError { span: 0..text.len(), message, help })
 }
 
 #[cfg(test)]
@@ -276,20 +282,20 @@ mod tests {
 
     const PARAMETERS: [&str; 6] = ["m", "m1", "k", "f", "Ft", "omega"];
 
-    fn values() -> [Value; 6] {
+    fn values() -> [ExpressionValue; 6] {
         [
-            Value::of(0.182, Dimension::MASS),
-            Value::bare(0.002),
-            Value::of(105_103.0, Dimension::STIFFNESS),
-            Value::bare(121.0),
-            Value::of(2.0, Dimension::FORCE),
-            Value::of(760.0, Dimension::FREQUENCY),
+            ExpressionValue::of(0.182, Dimension::MASS),
+            ExpressionValue::bare(0.002),
+            ExpressionValue::of(105_103.0, Dimension::STIFFNESS),
+            ExpressionValue::bare(121.0),
+            ExpressionValue::of(2.0, Dimension::FORCE),
+            ExpressionValue::of(760.0, Dimension::FREQUENCY),
         ]
     }
 
-    fn evaluate(text: &str, dimension: Dimension) -> Result<f64, Fault> {
+    fn evaluate(text: &str, dimension: Dimension) -> Result<f64, TextError> {
         let value = Expression::compile(text, &PARAMETERS)?.evaluate(&values())?;
-        value.to(dimension).map_err(|(message, help)| Fault { span: 0..text.len(), message, help })
+        value.to(dimension).map_err(|(message, help)| TextError { span: 0..text.len(), message, help })
     }
 
     fn check(text: &str, dimension: Dimension, expected: f64) {

@@ -1,6 +1,6 @@
 //! The steps of an expression, and the reserved words.
 
-use super::Value;
+use super::ExpressionValue;
 
 /// The functions of expressions.
 pub const FUNCTIONS: &[&str] = &["sqrt", "sin", "cos", "tan", "exp", "ln", "abs", "min", "max"];
@@ -17,7 +17,7 @@ pub(super) fn is_not_finite(name: &str) -> bool {
 /// A step of the stack machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Operation {
-    Push(Value),
+    Push(ExpressionValue),
     Parameter(usize),
     Negate,
     Add,

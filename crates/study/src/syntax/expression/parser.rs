@@ -1,9 +1,9 @@
 //! Parses the text of an expression into steps by recursive descent.
 
-use super::Value;
+use super::ExpressionValue;
 use super::operation::{FUNCTIONS, Operation, is_not_finite};
 use crate::syntax::suggest::{nearest, shown};
-use crate::syntax::units::{self, Fault, Names};
+use crate::syntax::units::{self, ReservedNames, TextError};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 
@@ -50,16 +50,16 @@ impl Parser<'_> {
         self.steps.push((operation, start..end));
     }
 
-    fn deeper(&mut self) -> Result<(), Fault> {
+    fn deeper(&mut self) -> Result<(), TextError> {
         self.depth += 1;
         if self.depth > DEEPEST {
             let message = format!("more than {DEEPEST} nested parentheses or powers");
-            return Err(Fault::new(self.at..self.at, message).help("define parts of the expression as parameters"));
+            return Err(TextError::new(self.at..self.at, message).help("define parts of the expression as parameters"));
         }
         Ok(())
     }
 
-    pub(super) fn sum(&mut self) -> Result<(), Fault> {
+    pub(super) fn sum(&mut self) -> Result<(), TextError> {
         let start = self.at;
         self.product()?;
         while let Some(c @ ('+' | '-' | '−')) = self.peek() {
@@ -70,12 +70,14 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn product(&mut self) -> Result<(), Fault> {
+    fn product(&mut self) -> Result<(), TextError> {
         let start = self.at;
         self.signed()?;
         while let Some(c @ ('*' | '/' | '·' | '⋅' | '×')) = self.peek() {
             if self.rest().starts_with("**") {
-                return Err(Fault::new(self.at..self.at + 2, "`**` is not an operator").help("write a power with `^`"));
+                return Err(
+                    TextError::new(self.at..self.at + 2, "`**` is not an operator").help("write a power with `^`")
+                );
             }
             self.next(c);
             self.signed()?;
@@ -84,7 +86,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn signed(&mut self) -> Result<(), Fault> {
+    fn signed(&mut self) -> Result<(), TextError> {
         let start = self.at;
         let mut negative = false;
         while let Some(c @ ('+' | '-' | '−')) = self.peek() {
@@ -98,7 +100,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn power(&mut self) -> Result<(), Fault> {
+    fn power(&mut self) -> Result<(), TextError> {
         let start = self.at;
         self.atom()?;
         if self.peek() == Some('^') {
@@ -111,10 +113,10 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn atom(&mut self) -> Result<(), Fault> {
+    fn atom(&mut self) -> Result<(), TextError> {
         let start = self.at;
         match self.peek() {
-            None => Err(Fault::new(start..start, "the expression ends too early: a value is missing here")),
+            None => Err(TextError::new(start..start, "the expression ends too early: a value is missing here")),
             Some('(') => {
                 self.next('(');
                 self.deeper()?;
@@ -129,20 +131,21 @@ impl Parser<'_> {
         }
     }
 
-    fn close(&mut self, open: usize) -> Result<(), Fault> {
+    fn close(&mut self, open: usize) -> Result<(), TextError> {
         match self.peek() {
             Some(')') => {
                 self.next(')');
                 Ok(())
             }
             None => {
-                Err(Fault::new(open..open + 1, "this parenthesis is not closed").help("add `)` where it should close"))
+                Err(TextError::new(open..open + 1, "this parenthesis is not closed")
+                    .help("add `)` where it should close"))
             }
             Some(c) => Err(self.unexpected(c)),
         }
     }
 
-    fn number(&mut self) -> Result<(), Fault> {
+    fn number(&mut self) -> Result<(), TextError> {
         let start = self.at;
         let bytes = self.text.as_bytes();
         let digits = |mut at: usize| {
@@ -156,7 +159,7 @@ impl Parser<'_> {
             end = digits(end + 1);
         }
         if end == start + 1 && bytes[start] == b'.' {
-            return Err(Fault::new(start..end, "a number needs digits"));
+            return Err(TextError::new(start..end, "a number needs digits"));
         }
         if matches!(bytes.get(end), Some(b'e' | b'E')) {
             let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
@@ -167,14 +170,14 @@ impl Parser<'_> {
         }
         let literal = &self.text[start..end];
         if matches!(bytes.get(end), Some(b'.' | b',')) && bytes.get(end + 1).is_some_and(u8::is_ascii_digit) {
-            return Err(Fault::new(start..digits(end + 1), "this is not one number")
+            return Err(TextError::new(start..digits(end + 1), "this is not one number")
                 .help("use a decimal point and no digit grouping: \"10000.5 N/m\""));
         }
         self.at = end;
         self.space();
         let parameter = |name: &str| (self.index)(name).is_some() || (self.constant)(name).is_some();
         let function = |name: &str| FUNCTIONS.contains(&name);
-        let names = Names { parameter: &parameter, function: &function };
+        let names = ReservedNames { parameter: &parameter, function: &function };
         // `5000 1/m` means `5000 /m`; two numbers in a row have no other meaning
         if self.rest().strip_prefix('1').is_some_and(|rest| units::divides(rest, &names)) {
             self.at += 1;
@@ -183,23 +186,25 @@ impl Parser<'_> {
             Some(c) if units::starts_unit(c) || units::divides(self.rest(), &names) => {
                 let (unit, end) = units::read(self.text, self.at, &names)?;
                 self.at = end;
-                Value::of(unit.scale(literal), unit.dimension)
+                ExpressionValue::of(unit.scale(literal), unit.dimension)
             }
             Some('/') => match self.inverse_unit() {
                 Some((unit, inverse, end)) => {
                     self.at = end;
-                    Value::of(literal.parse().unwrap_or(f64::NAN) / unit.scale("1"), inverse)
+                    ExpressionValue::of(literal.parse().unwrap_or(f64::NAN) / unit.scale("1"), inverse)
                 }
-                None => Value::bare(literal.parse().unwrap_or(f64::NAN)),
+                None => ExpressionValue::bare(literal.parse().unwrap_or(f64::NAN)),
             },
-            _ => Value::bare(literal.parse().unwrap_or(f64::NAN)),
+            _ => ExpressionValue::bare(literal.parse().unwrap_or(f64::NAN)),
         };
         if !value.si.is_finite() {
-            return Err(Fault::new(start..end, "this number is too large"));
+            return Err(TextError::new(start..end, "this number is too large"));
         }
         let mantissa = literal.split(['e', 'E']).next().unwrap_or(literal);
         if value.si == 0.0 && mantissa.bytes().any(|b| (b'1'..=b'9').contains(&b)) {
-            return Err(Fault::new(start..end, "this number is too small").help("write 0 if it is meant to be zero"));
+            return Err(
+                TextError::new(start..end, "this number is too small").help("write 0 if it is meant to be zero")
+            );
         }
         self.push(Operation::Push(value), start);
         self.space();
@@ -222,7 +227,7 @@ impl Parser<'_> {
         Some((unit, unit.dimension.to_the(-1.0)?, end))
     }
 
-    fn name(&mut self) -> Result<(), Fault> {
+    fn name(&mut self) -> Result<(), TextError> {
         let start = self.at;
         let rest = self.rest();
         let end = start + rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
@@ -233,7 +238,7 @@ impl Parser<'_> {
             return self.call(name, start..end);
         }
         if let Some(value) = (self.constant)(name) {
-            self.push(Operation::Push(Value::bare(value)), start);
+            self.push(Operation::Push(ExpressionValue::bare(value)), start);
             return Ok(());
         }
         if let Some(index) = (self.index)(name) {
@@ -241,17 +246,17 @@ impl Parser<'_> {
             return Ok(());
         }
         if name == "pi" {
-            let value = Value { si: std::f64::consts::PI, dimension: None, with_pi: true };
+            let value = ExpressionValue { si: std::f64::consts::PI, dimension: None, with_pi: true };
             self.push(Operation::Push(value), start);
             return Ok(());
         }
         if is_not_finite(name) {
-            return Err(Fault::new(start..end, format!("expected a finite number, found `{name}`")));
+            return Err(TextError::new(start..end, format!("expected a finite number, found `{name}`")));
         }
         if FUNCTIONS.contains(&name) {
-            return Err(Fault::new(start..end, format!("the function `{name}` needs its argument in parentheses")));
+            return Err(TextError::new(start..end, format!("the function `{name}` needs its argument in parentheses")));
         }
-        let fault = Fault::new(start..end, format!("there is no parameter `{}`", shown(name)));
+        let fault = TextError::new(start..end, format!("there is no parameter `{}`", shown(name)));
         Err(if units::find(name).is_some() {
             let help = if self.steps.is_empty() {
                 format!("a unit needs a number before it, as in \"1 {name}\"")
@@ -270,9 +275,9 @@ impl Parser<'_> {
         })
     }
 
-    fn call(&mut self, name: &str, span: Range<usize>) -> Result<(), Fault> {
+    fn call(&mut self, name: &str, span: Range<usize>) -> Result<(), TextError> {
         let Some(&function) = FUNCTIONS.iter().find(|f| **f == name) else {
-            let fault = Fault::new(span, format!("there is no function `{}`", shown(name)));
+            let fault = TextError::new(span, format!("there is no function `{}`", shown(name)));
             return Err(match nearest(name, FUNCTIONS.iter().copied()) {
                 Some(near) => fault.help(format!("did you mean `{near}`?")),
                 None => fault.help(format!("the functions are {}; write a product with `*`", FUNCTIONS.join(", "))),
@@ -293,21 +298,23 @@ impl Parser<'_> {
         let several = matches!(function, "min" | "max");
         if several != (arguments > 1) {
             let needed = if several { "two or more arguments" } else { "one argument" };
-            return Err(Fault::new(span.start..self.at, format!("`{function}` takes {needed}, found {arguments}")));
+            return Err(TextError::new(span.start..self.at, format!("`{function}` takes {needed}, found {arguments}")));
         }
         self.push(Operation::Call { function, arguments }, span.start);
         Ok(())
     }
 
-    pub(super) fn unexpected(&self, c: char) -> Fault {
+    pub(super) fn unexpected(&self, c: char) -> TextError {
         let span = self.at..self.at + c.len_utf8();
         match c {
-            ')' => Fault::new(span, "this closing parenthesis has no opening parenthesis"),
-            ',' => Fault::new(span, "`,` separates the arguments of `min` and `max` only").help("use a decimal point"),
-            c if c.is_alphanumeric() => {
-                Fault::new(span, "an operator is missing here").help("write a product with `*`")
+            ')' => TextError::new(span, "this closing parenthesis has no opening parenthesis"),
+            ',' => {
+                TextError::new(span, "`,` separates the arguments of `min` and `max` only").help("use a decimal point")
             }
-            c => Fault::new(span, format!("unexpected `{}`", shown(&c.to_string()))),
+            c if c.is_alphanumeric() => {
+                TextError::new(span, "an operator is missing here").help("write a product with `*`")
+            }
+            c => TextError::new(span, format!("unexpected `{}`", shown(&c.to_string()))),
         }
     }
 }

@@ -6,7 +6,7 @@ use stickslip::dimension::Dimension;
 
 /// A number with or without a dimension.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Value {
+pub struct ExpressionValue {
     /// The number in SI (rad/s for frequencies), or as written for a bare number.
     pub si: f64,
     /// The dimension; `None` for a bare number.
@@ -15,15 +15,15 @@ pub struct Value {
     pub(crate) with_pi: bool,
 }
 
-impl Value {
+impl ExpressionValue {
     /// Returns a bare number.
     pub fn bare(si: f64) -> Self {
-        Value { si, dimension: None, with_pi: false }
+        ExpressionValue { si, dimension: None, with_pi: false }
     }
 
     /// Returns a number in SI with a dimension.
     pub fn of(si: f64, dimension: Dimension) -> Self {
-        Value { si, dimension: Some(dimension), with_pi: false }
+        ExpressionValue { si, dimension: Some(dimension), with_pi: false }
     }
 
     /// Returns the number in SI as a quantity of dimension `expected`.
@@ -34,7 +34,7 @@ impl Value {
         self.written_as("", expected)
     }
 
-    /// Does the same as [`Value::to`]; errors quote `text`, which the user wrote.
+    /// Does the same as [`ExpressionValue::to`]; errors quote `text`, which the user wrote.
     pub(crate) fn written_as(self, text: &str, expected: Dimension) -> Result<f64, (String, Option<String>)> {
         let Some(found) = self.dimension else {
             return self.in_si_unit_of(expected);
