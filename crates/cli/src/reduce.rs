@@ -109,7 +109,7 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
 fn over_speeds(substructure: &Substructure, places: &[Place], exports: &StiffnessExports) -> Result<Few, String> {
     let seen: Vec<Row> =
         places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
-    let few = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);
+    let few = exports.at_rest.reduced_between(&exports.at_speed, &seen, &substructure.reduction);
     let few = few.map_err(|error| error.to_string())?;
     let mut seen = few.seen.into_iter();
     let mut places: Vec<Place> = places.to_vec();
@@ -124,11 +124,11 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Stiffnes
         few.kind,
         few.error,
         few.up_to / TAU,
-        60.0 * exports.at / TAU
+        60.0 * exports.export_speed / TAU
     );
     let speed = format!(
         "stiffened = {{ file = \"stiffened.mtx\", at = \"{:e} rad/s\", speed = {:?} }}   # an expression over the parameters of the study",
-        exports.at, exports.speed
+        exports.export_speed, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
     Ok(Few { system, what, keys, there: Some(few.there), sector: None })

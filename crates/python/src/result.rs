@@ -71,7 +71,7 @@ impl PyResultSet {
     /// Points without a result: pairs of the point and the reason.
     #[getter]
     fn failures(&self) -> Vec<(&str, &str)> {
-        self.dataset.failures.iter().map(|failure| (failure.at.as_str(), failure.reason.as_str())).collect()
+        self.dataset.failures.iter().map(|failure| (failure.location.as_str(), failure.reason.as_str())).collect()
     }
 
     /// Number of points by status, for example ``{"converged": 244}``.

@@ -76,7 +76,7 @@ pub(crate) fn ring() -> Dataset {
     let wheel = Panel {
         title: "three nodal diameters".into(),
         series: vec![circle("at rest", 0.0).reference(), circle("blade", 0.3)],
-        picture: true,
+        equal_axes: true,
         ..Panel::default()
     };
     let mut dataset = bare("ring", "A ring of twelve", vec![map, wheel]);
@@ -274,7 +274,7 @@ pub(crate) fn hostile() -> Dataset {
         ],
         figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels, ..Figure::default() },
         notes: vec!["A <note> & more.".into()],
-        failures: (0..9).map(|i| Failure { at: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
+        failures: (0..9).map(|i| Failure { location: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
             reason: "shooting stopped after 50 iterations, residual 3.1e-4; try more harmonics <or> start from a neighbour".into() }).collect(),
         record: record(&[("converged", 240), ("not converged", 9)]),
     }

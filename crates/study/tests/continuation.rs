@@ -157,7 +157,7 @@ amplitude = {{ from = "0.01 mm", to = "100 mm", points = {points} }}
     let (coarse, fine) = (study(3), study(50));
     assert_eq!(fine.record.points.get("merging"), Some(&1), "{:?}", fine.record.points);
     let reason = &fine.failures[0].reason;
-    assert!(fine.failures[0].at == "mode 2" && reason.contains("nearly merges with another mode"), "{reason}");
+    assert!(fine.failures[0].location == "mode 2" && reason.contains("nearly merges with another mode"), "{reason}");
     assert_eq!(coarse.failures, fine.failures);
     let largest = |found: &Dataset| table(found, "modes_summary").numbers("largest_damping_ratio").unwrap()[0];
     assert!((largest(&coarse) / largest(&fine) - 1.0).abs() < 1e-6 && largest(&fine) > 0.05);

@@ -630,7 +630,7 @@ fn shapes_of_a_sector_are_those_of_the_ring() {
     }
     // the first mode of the nodal diameters 0 to 3
     let titles: Vec<&str> =
-        data.figure.panels.iter().filter(|panel| panel.picture).map(|panel| panel.title.as_str()).collect();
+        data.figure.panels.iter().filter(|panel| panel.equal_axes).map(|panel| panel.title.as_str()).collect();
     assert_eq!(titles.len(), 4);
     assert!(titles[1].starts_with("mode 1, 1 nodal diameter, "), "{titles:?}");
 }
@@ -641,7 +641,7 @@ fn the_shapes_that_are_drawn() {
     let titles = |keys: &str| -> Vec<String> {
         let study = read("", "", &format!("[study]\nkind = \"nodal-diameter\"\nmodes = 2\n{keys}\n")).unwrap();
         let panels = run(&study, &Context::unwatched(1)).unwrap().figure.panels;
-        panels.into_iter().filter(|panel| panel.picture).map(|panel| panel.title).collect()
+        panels.into_iter().filter(|panel| panel.equal_axes).map(|panel| panel.title).collect()
     };
     assert_eq!(titles("shapes = false").len(), 0);
     // ω² = (k + 2 kc (1 - cos θ))/m, θ = 120 degrees, with the joints' springs
@@ -674,7 +674,7 @@ fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
         assert!((found - 10.0 * x / largest).abs() < 1e-2, "{name}: {found} {}", 10.0 * x / largest);
     }
     let titles: Vec<&str> =
-        data.figure.panels.iter().filter(|panel| panel.picture).map(|panel| panel.title.as_str()).collect();
+        data.figure.panels.iter().filter(|panel| panel.equal_axes).map(|panel| panel.title.as_str()).collect();
     assert!(titles.len() == 2 && titles[1].starts_with("mode 3 at 10 m, "), "{titles:?}");
 }
 
@@ -743,7 +743,7 @@ fn amplification_is_the_ratio_of_two_studies() {
     assert!(panel.title.contains("99.9 % below"), "{}", panel.title);
     // the figure of one case shows the disk's shape
     let one = result(&text("3 %", ""));
-    assert!(one.figure.panels.iter().any(|panel| panel.picture), "{:?}", one.figure.panels.len());
+    assert!(one.figure.panels.iter().any(|panel| panel.equal_axes), "{:?}", one.figure.panels.len());
 }
 
 #[test]

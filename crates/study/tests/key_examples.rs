@@ -276,7 +276,7 @@ fn walk(
             tried(table, key, study_with(table, key, outer, kind));
         }
         let inner = match key.takes {
-            ValueType::Table(keys) | ValueType::TableOrNone(keys) | ValueType::List(keys) => keys,
+            ValueType::Table(keys) | ValueType::TableOrFalse(keys) | ValueType::List(keys) => keys,
             ValueType::Sample => SAMPLE,
             ValueType::Method => METHOD,
             _ => continue,

@@ -172,7 +172,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>, slowness: f64) -> R
         return Ok(None);
     }
     let summary = ModelSummary::new(&study).map_err(|error| error.to_string())?;
-    let (estimate, usual) = (summary.seconds, summary.usual_seconds);
+    let (estimate, usual) = (summary.longest_time_s, summary.usual_time_s);
     if estimate > number("STICKSLIP_RANDOM_LONG").map_or(LONG, |long| long as f64) {
         let kind = study.kind().name;
         return Ok(Some(Done { seed, kind, seconds: 0.0, estimate: 0.0, usual: 0.0, points: BTreeMap::new() }));

@@ -110,8 +110,10 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
         let top = (1.0 - row * (plot_height + row_gap) / inside).clamp(0.0, 1.0);
         let bottom = (top - plot_height / inside).max(0.0);
         let panels = &figure.panels;
-        let x_partner = (0..i).find(|&j| !panel.picture && frame::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
-        let y_partner = (0..i).find(|&j| !panel.picture && frame::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
+        let x_partner =
+            (0..i).find(|&j| !panel.equal_axes && frame::alike(&panels[j].x, &panel.x) && axes[j].x == own.x);
+        let y_partner =
+            (0..i).find(|&j| !panel.equal_axes && frame::alike(&panels[j].y, &panel.y) && axes[j].y == own.y);
         let mut x =
             axis(own.x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)), [limit, ROOM[0]]);
         x["title"]["text"] = json!(broken(&x_titles[i]));
@@ -132,7 +134,7 @@ pub(super) fn layout(figure: &Figure, page: Page, ink: &mut Ink) -> Value {
                 made["ticktext"] = json!(ticks.labels.iter().map(|name| plain(name)).collect::<Vec<_>>());
             }
         }
-        if panel.picture {
+        if panel.equal_axes {
             (x["visible"], y["visible"]) = (json!(false), json!(false));
             y["scaleanchor"] = json!(axis_name("x", i));
         }

@@ -17,11 +17,11 @@ const KEPT: usize = 16;
 #[derive(Debug, Clone)]
 pub struct StiffnessExports {
     /// The structure at rest.
-    pub rest: Component,
-    /// The stiffness at the speed `at`, N/m.
-    pub there: Matrix,
+    pub at_rest: Component,
+    /// The stiffness at the speed `export_speed`, N/m.
+    pub at_speed: Matrix,
     /// The speed of the second export, rad/s.
-    pub at: f64,
+    pub export_speed: f64,
     /// The speed of the study, as its file states it.
     pub speed: String,
 }
@@ -29,9 +29,9 @@ pub struct StiffnessExports {
 /// Difference between the stiffness of the second export and that at rest.
 #[derive(Debug, Clone)]
 pub(crate) struct StressStiffening {
-    more: Matrix,
+    difference: Matrix,
     /// Components by the bits of their factor `(Ω/Ω₁)²`.
-    kept: Arc<Mutex<Vec<(u64, Component)>>>,
+    cache: Arc<Mutex<Vec<(u64, Component)>>>,
 }
 
 impl StressStiffening {
@@ -40,7 +40,7 @@ impl StressStiffening {
     pub fn new(rest: &Matrix, there: &Matrix) -> Result<Self, MatrixError> {
         let less = rest.entries().map(|(row, column, value)| (row, column, -value));
         let more = Matrix::from_triplets(rest.n(), there.entries().chain(less))?;
-        Ok(StressStiffening { more, kept: Arc::default() })
+        Ok(StressStiffening { difference: more, cache: Arc::default() })
     }
 
     /// Returns the component with `share` times the difference added, where `share` is
@@ -50,12 +50,12 @@ impl StressStiffening {
             return Ok(component.clone());
         }
         let bits = share.to_bits();
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, found)) = kept.iter().find(|(of, _)| *of == bits) {
             return Ok(found.clone());
         }
         let (mass, damping, rest) = component.matrices();
-        let more = self.more.entries().map(|(row, column, value)| (row, column, share * value));
+        let more = self.difference.entries().map(|(row, column, value)| (row, column, share * value));
         // both matrices have the same size, so only a factor that is not finite can fail here
         let stiffness = Matrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
         let found = Component::new(component.rows().to_vec(), mass.clone(), damping.cloned(), stiffness)?;
@@ -68,7 +68,7 @@ impl StressStiffening {
 
     /// Returns the difference of the two stiffness matrices.
     pub fn more(&self) -> &Matrix {
-        &self.more
+        &self.difference
     }
 }
 

@@ -342,7 +342,7 @@ impl Study {
     /// Returns both exports of a structure that rotation stiffens (`stiffened`), at the values
     /// of the first case.
     pub fn stiffened(&self) -> Option<StiffnessExports> {
-        let MatrixSource { table, component, stiffened, .. } = self.structure.matrices.as_ref()?;
+        let MatrixSource { table, component, stress_stiffening: stiffened, .. } = self.structure.matrices.as_ref()?;
         let CompiledValue::Table(spin) = &table.entry("stiffened")?.value else { return None };
         let CompiledValue::Quantity { quantity: speed, .. } = &spin.entry("speed")?.value else { return None };
         let values = evaluate(&self.names, &self.parameters, &self.order, &self.choice(0), &[]).ok()?;
@@ -350,7 +350,7 @@ impl Study {
         let at = spin.values(&environment, &mut Vec::new()).quantity("at")?;
         let rest = component.clone()?;
         let there = stiffened.as_ref()?.at(&rest, 1.0).ok()?.matrices().2.clone();
-        Some(StiffnessExports { rest, there, at, speed: speed.text.clone() })
+        Some(StiffnessExports { at_rest: rest, at_speed: there, export_speed: at, speed: speed.text.clone() })
     }
 
     /// Returns the values of `[figure]`.
@@ -390,7 +390,7 @@ impl Study {
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
-        let parts = self.parts(index, CheckScope::Again(fixed), &mut problems);
+        let parts = self.parts(index, CheckScope::NumbersOnly(fixed), &mut problems);
         let error = StudyError::all(&self.sources, problems);
         match (parts, error) {
             (Some(parts), None) => Ok(self.finished(index, parts)),
@@ -633,7 +633,7 @@ impl Study {
             let unit = self.written_unit(varied).filter(|(_, dimension)| value.dimension == Some(*dimension));
             let unit = unit.map(|(unit, _)| unit);
             // the user's text, if it is a number with a unit
-            let text = match literal.filter(|q| q.inner.is_some() && q.expression.is_literal()) {
+            let text = match literal.filter(|q| q.text_start.is_some() && q.expression.is_literal()) {
                 Some(quantity)
                     if quantity.text.contains(|c: char| c == '%' || (c.is_alphabetic() && c != 'e' && c != 'E')) =>
                 {
@@ -673,7 +673,7 @@ impl Study {
     fn resolve(&self, index: usize, look: CheckScope, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
         let (first_look, fixed) = match look {
             CheckScope::First => (index == 0, None),
-            CheckScope::Again(fixed) => (false, fixed),
+            CheckScope::NumbersOnly(fixed) => (false, fixed),
         };
         let choice = self.choice(index);
         let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
@@ -774,7 +774,7 @@ enum CheckScope {
     /// differ only in numbers.
     First,
     /// Later: only the numbers are checked. A parameter may have another value.
-    Again(Option<(usize, f64)>),
+    NumbersOnly(Option<(usize, f64)>),
 }
 
 struct ResolvedCase {

@@ -64,7 +64,7 @@ const WHOLE: Reduction = Reduction::None { up_to: 0.0 };
 /// Builds the structure of `[structure]`. If the file does not state a reduction, [`settle`]
 /// decides later.
 pub(crate) fn of(
-    MatrixSource { table, stiffened, .. }: &MatrixSource,
+    MatrixSource { table, stress_stiffening: stiffened, .. }: &MatrixSource,
     component: &Component,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,

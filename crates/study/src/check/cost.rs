@@ -28,7 +28,7 @@ pub struct StudySize {
     /// Peak memory of a run that writes its tables as it proceeds, bytes; a rough estimate.
     pub memory: u64,
     /// Peak memory of a run that holds all tables, bytes.
-    pub whole: u64,
+    pub memory_all_tables: u64,
 }
 
 /// Bytes of a number in a table.
@@ -106,7 +106,7 @@ pub struct Cost {
     pub work: f64,
     /// Part of the work that is needed only for some results, s, and a text that says when it
     /// is skipped.
-    pub spared: Option<(f64, &'static str)>,
+    pub conditional_work: Option<(f64, &'static str)>,
 }
 
 /// Data for a cost estimate: counts, and the cost of one orbit. The first case represents all
@@ -124,7 +124,7 @@ pub struct CostInputs<'a> {
     /// Number of varied parameters, one column each.
     pub varied: f64,
     /// Number of degrees of freedom.
-    pub masses: f64,
+    pub dofs: f64,
     /// Number of places with results; every degree of freedom of a mass is one.
     pub places: f64,
     /// Number of joints.
@@ -136,13 +136,13 @@ pub struct CostInputs<'a> {
     smooth: bool,
     has_states: bool,
     /// True if a law has no rate form; integration then uses equal time steps.
-    stepped: bool,
+    equal_steps: bool,
     /// True if the friction of a law falls with velocity.
-    falls: bool,
+    falling_friction: bool,
     /// True if the force of a law is unbounded.
-    unbounded: bool,
+    unbounded_force: bool,
     /// True if the method of the study is harmonic balance.
-    series: bool,
+    harmonic_balance: bool,
     /// Memory of one factor of the dynamic stiffness in all rows, bytes; zero if none is made.
     /// Stored here because computing it takes seconds for a large structure.
     factor_bytes: f64,
@@ -153,16 +153,16 @@ pub struct CostInputs<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Difficulty {
     /// The typical case.
-    Usual,
+    Typical,
     /// The hard case: many orbits are not found, or only after long searches.
-    Slow,
+    Hard,
 }
 
 impl Difficulty {
     fn of<T>(self, usual: T, slow: T) -> T {
         match self {
-            Difficulty::Usual => usual,
-            Difficulty::Slow => slow,
+            Difficulty::Typical => usual,
+            Difficulty::Hard => slow,
         }
     }
 }
@@ -193,25 +193,25 @@ impl<'a> CostInputs<'a> {
             cases: study.cases() as f64,
             frequencies: if study.is_adaptive() { ADAPTIVE } else { given },
             varied: case.varied.len() as f64,
-            masses: system.dofs() as f64,
+            dofs: system.dofs() as f64,
             places: system.places().len() as f64,
             joints: system.joints().len() as f64,
             sliders: laws.iter().map(|law| law.sliders().map_or(1, |all| all.len().max(1)) as f64).sum(),
             surveyed,
             smooth: laws.iter().any(|law| law.pieces().is_none()),
-            stepped: laws.iter().any(|law| law.rate().is_none() && !law.is_free()),
-            falls: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
-            unbounded: laws.iter().any(|law| law.scale().is_infinite()),
+            equal_steps: laws.iter().any(|law| law.rate().is_none() && !law.is_free()),
+            falling_friction: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
+            unbounded_force: laws.iter().any(|law| law.scale().is_infinite()),
             has_states: laws.iter().any(|law| law.rate().is_some_and(|rate| rate.states() > 0)),
-            series,
+            harmonic_balance: series,
             factor_bytes: factor_bytes as f64,
-            pace: Difficulty::Slow,
+            pace: Difficulty::Hard,
         }
     }
 
     /// Returns the costing of the same study with typical orbits.
     pub(crate) fn usual(&self) -> Self {
-        CostInputs { pace: Difficulty::Usual, ..self.clone() }
+        CostInputs { pace: Difficulty::Typical, ..self.clone() }
     }
 
     /// Returns the system of the first case.
@@ -307,35 +307,35 @@ impl<'a> CostInputs<'a> {
     /// Measured: 1.0 MB for a ring of 12 sectors with 1188 coordinates and 12 joints of three
     /// directions, at 15 harmonics.
     pub fn kept_series_bytes(&self, harmonics: f64, samples: f64) -> f64 {
-        let coefficients = (harmonics + 2.0) * (self.masses + DIRECTIONS * self.joints);
+        let coefficients = (harmonics + 2.0) * (self.dofs + DIRECTIONS * self.joints);
         COEFFICIENT * coefficients + MEASURED * self.places + SERIES_SAMPLES * samples / SAMPLED * self.joints
     }
 
     /// Returns the bytes of an orbit in memory while it is computed.
     pub fn orbit_bytes(&self) -> f64 {
-        let state = 2.0 * self.masses + self.joints + 1.0;
+        let state = 2.0 * self.dofs + self.joints + 1.0;
         if self.is_series() {
             let harmonics = self.case.method.options.get("harmonics").copied().unwrap_or(SERIES_HARMONICS);
             return self.series_bytes(harmonics) + SERIES_SAMPLES * self.joints;
         }
-        let matrices = IN_TIME * NUMBER * self.masses * self.masses;
+        let matrices = IN_TIME * NUMBER * self.dofs * self.dofs;
         matrices + if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + SWITCHES * self.joints) }
     }
 
     /// Returns true if the method of the study is harmonic balance.
     pub fn is_series(&self) -> bool {
-        self.series
+        self.harmonic_balance
     }
 
     /// Returns the bytes of the motion at the instants of one period.
     pub fn samples_bytes(&self) -> f64 {
-        self.instants() * SAMPLE * (2.0 + self.masses + self.joints)
+        self.instants() * SAMPLE * (2.0 + self.dofs + self.joints)
     }
 
     /// Returns the bytes that harmonic balance needs to solve an orbit of this number of
     /// harmonics.
     pub fn series_bytes(&self, harmonics: f64) -> f64 {
-        SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.masses + 4.0 * self.joints)
+        SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.dofs + 4.0 * self.joints)
     }
 }
 
@@ -374,15 +374,15 @@ impl CostInputs<'_> {
             rows: whole(cost.rows()),
             results: whole(cost.cells(NUMBER, NUMBER)),
             memory: whole(tables.min(waiting + shown) + drawn + working),
-            whole: whole(tables + drawn + working),
+            memory_all_tables: whole(tables + drawn + working),
         }
     }
 
     /// Estimates the time of a study of this cost on one thread, s.
     pub(crate) fn seconds(&self, cost: &Cost) -> f64 {
-        let elements = self.masses + self.joints;
+        let elements = self.dofs + self.joints;
         // the modes of large models are not computed
-        let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { MODES * self.masses.powi(3) };
+        let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { MODES * self.dofs.powi(3) };
         let preparing = self.cases * (PREPARING + modes + ASSEMBLING * elements);
         let writing = CELL * cost.cells(1.0, 1.0);
         OVERHEAD + GENEROUS * (cost.work + self.matrices() + self.again() + preparing + writing + POINT * cost.drawn)
@@ -650,7 +650,7 @@ impl CostInputs<'_> {
     /// Returns the time of one orbit by the method of the study, s.
     pub fn orbit(&self) -> f64 {
         let case = self.case;
-        let size = self.masses + self.joints;
+        let size = self.dofs + self.joints;
         let shooting = self.pace.of(SHOOTING_USUAL, SHOOTING);
         let shooting = size * size * self.ringing() * if self.has_states { shooting.1 } else { shooting.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
@@ -664,10 +664,10 @@ impl CostInputs<'_> {
                 let digit = LN_10 / (TAU * self.least_damping());
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
                 let share = self.pace.of(0.0, UNSETTLED);
-                let restless = if self.unbounded { share * UNSETTLED_PERIODS } else { 0.0 };
+                let restless = if self.unbounded_force { share * UNSETTLED_PERIODS } else { 0.0 };
                 (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
             }
-            "shooting" if self.stepped => STEPPED * self.period(),
+            "shooting" if self.equal_steps => STEPPED * self.period(),
             _ if self.smooth => shooting,
             _ => self.events(),
         }
@@ -700,7 +700,7 @@ impl CostInputs<'_> {
     /// Returns the factor on the time of orbits if only contacts hold some bodies.
     fn unheld(&self) -> f64 {
         let survey = &self.surveyed.survey;
-        let contacts = self.smooth && self.stepped;
+        let contacts = self.smooth && self.equal_steps;
         if !contacts || survey.free().rigid == 0 || survey.system().cyclic().is_some() {
             return 1.0;
         }
@@ -725,7 +725,7 @@ impl CostInputs<'_> {
     /// With `harmonics = None` the method chooses the number of harmonics.
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let factor = match (self.smooth, self.is_rigid(), harmonics) {
-            (_, _, None) if self.falls => self.pace.of(HARD_FALLING.0, HARD_FALLING.1),
+            (_, _, None) if self.falling_friction => self.pace.of(HARD_FALLING.0, HARD_FALLING.1),
             (false, false, _) => 1.0,
             (_, _, None) => HARD,
             (true, _, Some(_)) => HARD_SMOOTH,
@@ -738,8 +738,8 @@ impl CostInputs<'_> {
             None => (SERIES_TOLERANCE / asked).powf(SERIES_ORDER.recip()).min(MOST_HARMONICS / SERIES_HARMONICS),
         };
         // friction that falls with velocity is hard to solve in the typical case too
-        let usual = if self.falls { SERIES } else { SERIES_USUAL };
-        let each = self.pace.of(usual, SERIES) * (self.masses + self.joints).max(1.0);
+        let usual = if self.falling_friction { SERIES } else { SERIES_USUAL };
+        let each = self.pace.of(usual, SERIES) * (self.dofs + self.joints).max(1.0);
         (each + self.coupled()) * factor * length.max(1.0).powf(SERIES_LENGTH)
     }
 
@@ -808,10 +808,10 @@ impl CostInputs<'_> {
 
     /// Returns the time of one period of a transient, s.
     pub fn period(&self) -> f64 {
-        let size = self.masses + self.joints;
-        let exact = self.masses + self.sliders;
+        let size = self.dofs + self.joints;
+        let exact = self.dofs + self.sliders;
         // `width` makes methods integrate sliders that have no smooth replacement
-        if self.stepped && (self.smooth || self.case.method.options.contains_key("width")) {
+        if self.equal_steps && (self.smooth || self.case.method.options.contains_key("width")) {
             return self.pace.of(STEPS.0, STEPS.1) * self.step();
         }
         match (self.smooth, self.has_states) {
@@ -826,7 +826,7 @@ impl CostInputs<'_> {
     /// Returns zero if the check takes no time compared with the orbit.
     fn judged(&self) -> f64 {
         let Some((steps, with_derivatives)) = evidence_steps(self.system()) else { return 0.0 };
-        let derivatives = if with_derivatives { JUDGED * self.masses.powi(2) } else { 0.0 };
+        let derivatives = if with_derivatives { JUDGED * self.dofs.powi(2) } else { 0.0 };
         steps as f64 * (self.step() + derivatives)
     }
 
@@ -839,16 +839,16 @@ impl CostInputs<'_> {
     fn step(&self) -> f64 {
         let joints = self.system().joints();
         let directions = joints.iter().map(|joint| joint.law().directions()).sum::<usize>() as f64;
-        STEP.0 * directions + STEP.1 * directions.powi(2) + STEP.2 * self.masses.powi(2)
+        STEP.0 * directions + STEP.1 * directions.powi(2) + STEP.2 * self.dofs.powi(2)
     }
 
     /// Returns the time to decompose the patterns of stick and slip in `periods` periods of a
     /// motion that does not repeat, s.
     pub fn patterns(&self, periods: f64) -> f64 {
-        if self.smooth || self.stepped {
+        if self.smooth || self.equal_steps {
             return 0.0;
         }
-        (periods * PATTERNS * self.sliders).max(1.0) * PATTERN * self.masses.powi(3)
+        (periods * PATTERNS * self.sliders).max(1.0) * PATTERN * self.dofs.powi(3)
     }
 
     /// Returns the factor on the integration time of a period due to the fastest mode that does
@@ -867,13 +867,13 @@ impl CostInputs<'_> {
     fn least_damping(&self) -> f64 {
         let modes = &self.surveyed.survey.free().elastic;
         let highest = self.range().map_or(f64::INFINITY, |(_, highest)| DRIVEN * highest);
-        let driven = modes.iter().filter(|mode| self.pace == Difficulty::Slow || mode.omega <= highest);
+        let driven = modes.iter().filter(|mode| self.pace == Difficulty::Hard || mode.omega <= highest);
         driven.map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE)
     }
 
     /// Returns the time to evaluate the motion at `instants` instants, s.
     pub fn reading(&self, instants: f64) -> f64 {
-        INSTANT * instants * (self.masses + self.joints)
+        INSTANT * instants * (self.dofs + self.joints)
     }
 
     /// Returns the time to evaluate the columns of `output` for one orbit, s.

@@ -19,7 +19,7 @@ use stickslip::model::{Element, GROUND, Mass, Model, ModelError};
 struct AttachedMass<'a> {
     mass: &'a Mass,
     stiffness: f64,
-    by: Element,
+    element: Element,
 }
 
 impl AttachedMass<'_> {
@@ -47,14 +47,14 @@ fn held(model: &Model) -> impl Iterator<Item = AttachedMass<'_>> {
     let free = |name: &str| model.motions.iter().all(|motion| motion.on != name);
     model.masses.iter().filter(move |mass| mass.mass > 0.0 && free(&mass.name)).filter_map(move |mass| {
         let &(stiffness, by) = stiffest.get(mass.name.as_str())?;
-        (stiffness > 0.0).then_some(AttachedMass { mass, stiffness, by })
+        (stiffness > 0.0).then_some(AttachedMass { mass, stiffness, element: by })
     })
 }
 
 /// Returns the error of an element so stiff that a mass does not move at `omega`, rad/s; `None`
 /// without one.
 pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
-    let AttachedMass { mass, stiffness, by } = held(model).find(|held| omega < held.slowest())?;
+    let AttachedMass { mass, stiffness, element: by } = held(model).find(|held| omega < held.slowest())?;
     let message = format!(
         "a stiffness of {} is too high for a mass of {}: `{}` cannot move at {}, because its inertia is lost in \
          rounding; replace this place by `ground`, merge the two masses, or use the law `coulomb` for rigid friction",
@@ -76,7 +76,7 @@ const LOST: f64 = 1e-6;
 /// without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     let lost = |held: &AttachedMass<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
-    let AttachedMass { mass, stiffness, by } = held(model).find(lost)?;
+    let AttachedMass { mass, stiffness, element: by } = held(model).find(lost)?;
     let message = format!(
         "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
          rounding; remove it, or correct the mass",

@@ -122,7 +122,7 @@ fn no_resonance(cases: &[SurveyedCase]) -> Option<String> {
 /// frequencies.
 struct NarrowResonance {
     /// Excitation frequency and width of the resonance, rad/s.
-    at: f64,
+    frequency: f64,
     width: f64,
     /// Number of points of the range whose steps are no wider.
     points: f64,
@@ -142,7 +142,7 @@ fn coarse(cases: &[SurveyedCase]) -> Option<String> {
         true => cases.iter().map(narrowest_met).collect::<Option<Vec<NarrowResonance>>>()?,
         false => narrow,
     };
-    let NarrowResonance { at, width, points: enough } =
+    let NarrowResonance { frequency: at, width, points: enough } =
         narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
     let (from, to) = range(&cases[0].case)?;
     let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
@@ -218,7 +218,7 @@ fn narrowest_of(
     let inside = all.filter(|(low, high, width)| *low >= from && *high <= to && *width > 0.0);
     let (at, _, width) = inside.min_by(|a, b| a.2.total_cmp(&b.2))?;
     ((to - from) / (points - 1) as f64 > width).then(|| NarrowResonance {
-        at,
+        frequency: at,
         width,
         points: ((to - from) / width).ceil() + 1.0,
     })

@@ -14,7 +14,7 @@ use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
 pub(crate) struct CompiledQuantity {
     pub location: Location,
     /// Start of its text in the source, see [`crate::syntax::document::TomlValue::Text`].
-    pub inner: Option<usize>,
+    pub text_start: Option<usize>,
     pub text: String,
     pub expression: Expression,
 }
@@ -24,7 +24,7 @@ pub(crate) struct CompiledTable {
     pub location: Location,
     /// The indices of the repetition that states the table, in words; empty without a
     /// repetition.
-    pub turn: String,
+    pub repetition: String,
     pub entries: Vec<CompiledEntry>,
 }
 
@@ -70,7 +70,7 @@ impl CompiledTable {
 
     /// Appends the indices of the repetition to a message.
     pub fn with_turn(&self, message: &str) -> String {
-        if self.turn.is_empty() { message.to_owned() } else { format!("{message} ({})", self.turn) }
+        if self.repetition.is_empty() { message.to_owned() } else { format!("{message} ({})", self.repetition) }
     }
 
     /// Calls `each` with the key, the quantity and its dimension (if the schema defines it) for
@@ -135,7 +135,7 @@ impl CompiledQuantity {
     pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
         self.expression
             .evaluate(&environment.values)
-            .map_err(|fault| Problem::fault(&self.location, self.inner, key, fault))
+            .map_err(|fault| Problem::fault(&self.location, self.text_start, key, fault))
     }
 
     /// Returns the value in SI. It must have this dimension and lie in this range.
@@ -213,7 +213,7 @@ impl CompiledQuantity {
     }
 
     pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
-        let span = match self.inner {
+        let span = match self.text_start {
             Some(start) => start..start + self.text.len(),
             None => self.location.span.clone(),
         };
@@ -232,7 +232,7 @@ impl CompiledTable {
                 Err(problem) => problems.push(problem),
             }
         }
-        if !self.turn.is_empty() {
+        if !self.repetition.is_empty() {
             for problem in &mut problems[before..] {
                 problem.message = self.with_turn(&problem.message);
             }

@@ -14,7 +14,7 @@ pub(crate) struct Index {
     pub name: String,
     pub from: i64,
     pub to: i64,
-    pub wraps: bool,
+    pub wrap: bool,
 }
 
 /// The indices of an entry.
@@ -107,8 +107,8 @@ impl Iteration<'_> {
         let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let used = |index: &&Index| inner.split(|c| !word(c)).any(|part| part == index.name);
         match self.indices.iter().filter(used).collect::<Vec<_>>()[..] {
-            [index] if index.wraps => Ok(index.from + (whole - index.from).rem_euclid(index.to - index.from + 1)),
-            [_, _, ..] if self.indices.iter().filter(used).any(|index| index.wraps) => {
+            [index] if index.wrap => Ok(index.from + (whole - index.from).rem_euclid(index.to - index.from + 1)),
+            [_, _, ..] if self.indices.iter().filter(used).any(|index| index.wrap) => {
                 Err(TextError::new(0..inner.len(), "with `wrap`, braces must contain exactly one index")
                     .help("write \"m{i}_{j}\""))
             }
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     fn index(name: &str, from: i64, to: i64, wraps: bool) -> Index {
-        Index { name: name.to_owned(), from, to, wraps }
+        Index { name: name.to_owned(), from, to, wrap: wraps }
     }
 
     #[test]

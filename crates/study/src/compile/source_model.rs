@@ -29,9 +29,9 @@ pub(crate) struct MatrixSource {
     /// The structure; `None` if the files were not read.
     pub component: Option<Component>,
     /// The stiffness that rotation adds.
-    pub stiffened: Option<StressStiffening>,
+    pub stress_stiffening: Option<StressStiffening>,
     /// Number of constrained rows in the files, which the component does not contain.
-    pub left_out: usize,
+    pub constrained_rows: usize,
 }
 
 impl MatrixSource {
@@ -48,7 +48,7 @@ impl MatrixSource {
         let mut hasher = crc32fast::Hasher::new();
         component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
         let (mass, damping, stiffness) = component.matrices();
-        let more = self.stiffened.as_ref().map(StressStiffening::more);
+        let more = self.stress_stiffening.as_ref().map(StressStiffening::more);
         for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
             for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
                 let place = [number, row, column].map(|index| index as u64);

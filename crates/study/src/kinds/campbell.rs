@@ -69,7 +69,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[TABLE, CROSSINGS],
     },
-    grain: |_| UnitSize::Case,
+    unit_size: |_| UnitSize::Case,
     cost,
     warnings: |_| Vec::new(),
     compute,
@@ -100,7 +100,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let depends = costing.case.parameters.contains_key(costing.case.values.text("parameter").unwrap_or(PARAMETER));
     let found = if depends { speeds + REFINED * crossings } else { 1.0 };
     // free and stuck joints for every wave; the complex problem of a wave has twice the size
-    let size = sectors.map_or(costing.masses, |sectors| 2.0 * costing.masses / sectors);
+    let size = sectors.map_or(costing.dofs, |sectors| 2.0 * costing.dofs / sectors);
     Cost {
         tables: vec![
             TableShape { rows: costing.cases * speeds * lines, numbers: costing.varied + 4.0, words: 1.0 },
@@ -108,7 +108,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         ],
         drawn: costing.cases * (speeds * lines + crossings),
         unit: speeds * lines * 8.0,
-        spared: None,
+        conditional_work: None,
         work: costing.cases * found * 2.0 * waves * size.powi(3) * EIGEN,
     }
 }
@@ -190,21 +190,21 @@ const FOUND: f64 = 1e-11;
 struct CampbellDiagram<'a> {
     work: &'a UnitTask<'a>,
     prepared: &'a PreparedCase,
-    most: usize,
+    mode_count: usize,
     /// The frequencies, if they do not depend on the speed.
-    same: Option<Result<Vec<NaturalFrequency>, String>>,
+    constant_frequencies: Option<Result<Vec<NaturalFrequency>, String>>,
 }
 
 impl CampbellDiagram<'_> {
     /// Returns the natural frequencies at a speed, rad/s.
     fn at(&self, speed: f64) -> Result<Vec<NaturalFrequency>, String> {
-        if let Some(same) = &self.same {
+        if let Some(same) = &self.constant_frequencies {
             return same.clone();
         }
         let name = self.prepared.case.values.text("parameter").unwrap_or(PARAMETER);
         let case =
             self.work.study.case_with(self.prepared.case.index, name, speed).map_err(|error| error.to_string())?;
-        naturals(&case.model, self.most)
+        naturals(&case.model, self.mode_count)
     }
 
     /// Returns the speed at which `order` times the speed equals the frequency of a mode.
@@ -257,11 +257,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let most = values.count("modes").unwrap_or(3) as usize;
     let depends = prepared.case.parameters.contains_key(name);
     let same = (!depends).then(|| naturals(&prepared.case.model, most));
-    let diagram = CampbellDiagram { work, prepared, most, same };
+    let diagram = CampbellDiagram { work, prepared, mode_count: most, constant_frequencies: same };
     let mut part = UnitResult::default();
     if !depends {
         let message = format!("The study has no parameter `{name}`, so the frequencies do not depend on the speed.");
-        part.notes.push(Note::Said(message));
+        part.notes.push(Note::Sentence(message));
     }
     let (mut rows, mut crossings) = (TableBuilder::default(), TableBuilder::default());
     let orders = values.count("engine_orders").unwrap_or(6) as usize;

@@ -14,7 +14,7 @@ pub struct Kind {
     /// Description of the kind.
     pub info: KindInfo,
     /// Divides its studies into units of work.
-    pub grain: fn(&Study) -> UnitSize,
+    pub unit_size: fn(&Study) -> UnitSize,
     /// Estimate of the size and the time of its studies; errs on the high side.
     pub cost: fn(&CostInputs<'_>) -> Cost,
     /// Likely mistakes in a study of this kind, as sentences. The argument is a sample of

@@ -57,7 +57,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["modes", "modes_summary"],
     },
-    grain: |_| UnitSize::Case,
+    unit_size: |_| UnitSize::Case,
     cost,
     warnings: of_mode,
     compute,
@@ -77,7 +77,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let rows = costing.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
     // odd harmonics, two parts each, of every degree of freedom
-    let elimination = costing.eliminated((harmonics + 1.0) * costing.masses);
+    let elimination = costing.eliminated((harmonics + 1.0) * costing.dofs);
     Cost {
         tables: vec![
             TableShape { rows, numbers: costing.varied + 4.0 + 3.0 * costing.places, words: 0.0 },
@@ -85,7 +85,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         ],
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
-        spared: None,
+        conditional_work: None,
         work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS))
             * (costing.series(Some(harmonics)) + elimination),
     }

@@ -64,7 +64,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[TABLE],
     },
-    grain: |_| UnitSize::Case,
+    unit_size: |_| UnitSize::Case,
     cost,
     warnings: |_| Vec::new(),
     compute,
@@ -113,14 +113,14 @@ fn check_disk(model: &Model) -> Result<(), KeyError> {
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let modes = costing.case.values.count("modes").unwrap_or(4) as f64;
     let sectors = costing.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
-    let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * costing.masses / sectors);
+    let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * costing.dofs / sectors);
     let rows = costing.cases * waves * 2.0 * modes;
     let shapes = 2.0 * costing.places / sectors;
     Cost {
         tables: vec![TableShape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
         unit: if each > SPARSE { FACTOR * each } else { 8.0 * each * each },
-        spared: None,
+        conditional_work: None,
         work: costing.cases * waves * if each > SPARSE { LOWEST * each.powf(1.5) } else { EIGEN * each.powi(3) },
     }
 }

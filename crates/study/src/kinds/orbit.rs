@@ -48,7 +48,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["orbit", "orbits", "multipliers"],
     },
-    grain: orbit_sweep::grain,
+    unit_size: orbit_sweep::grain,
     cost,
     warnings: driven,
     compute,
@@ -63,7 +63,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     // the return check of a harmonic balance orbit takes one period; multipliers take one more,
     // with the derivative
     let followed = if costing.is_series() { costing.period() } else { 0.0 };
-    let (multipliers, map) = if wanted { (points * 2.0 * costing.masses, costing.period()) } else { (0.0, 0.0) };
+    let (multipliers, map) = if wanted { (points * 2.0 * costing.dofs, costing.period()) } else { (0.0, 0.0) };
     Cost {
         tables: vec![
             costing.motion(rows),
@@ -73,7 +73,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         // the panels beyond the limit are also built
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
-        spared: None,
+        conditional_work: None,
         work: points * (costing.orbit() + followed + map + costing.extra() + costing.reading(costing.instants())),
     }
 }
@@ -129,7 +129,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 
 /// Returns the note that a permanently stuck joint makes the orbit one of a continuum.
 ///
-/// It covers orbits with half-period symmetry; [`Note::History`] covers the others.
+/// It covers orbits with half-period symmetry; [`Note::StuckOffset`] covers the others.
 fn one_of_many(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");

@@ -100,7 +100,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &["motion", "motion_summary", "decay", "decay_summary"],
     },
-    grain: |_| UnitSize::Case,
+    unit_size: |_| UnitSize::Case,
     cost,
     warnings: moved,
     compute,
@@ -140,7 +140,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         ],
         drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
         unit: 0.0,
-        spared: None,
+        conditional_work: None,
         work: points * (periods * costing.period() + costing.patterns(periods) + costing.reading(samples)),
     }
 }
@@ -287,7 +287,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             extremes.end();
         }
         if let Some(reduction) = prepared.system.reduction_evidence().filter(|_| !prepared.system.joints().is_empty()) {
-            Note::InTime(reduction.up_to).join(&mut part.notes);
+            Note::TimeHistory(reduction.up_to).join(&mut part.notes);
         }
         if excitation == Excitation::Free {
             let unread = read_off(prepared, &decays, step, &mut decay, &mut summary);

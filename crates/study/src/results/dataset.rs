@@ -299,7 +299,8 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// True for a picture of a plane: both axes have the same scale and are not drawn.
     #[serde(default)]
-    pub picture: bool,
+    #[serde(rename = "picture")]
+    pub equal_axes: bool,
 }
 
 /// An axis: its quantity and unit. The values of the series are already in this unit.
@@ -489,7 +490,8 @@ pub enum Style {
 pub struct Failure {
     /// The point in words, for example `Ft = 2 N, frequency = 121.25 Hz`; empty if the study
     /// has only one point.
-    pub at: String,
+    #[serde(rename = "at")]
+    pub location: String,
     /// The reason and a suggestion.
     pub reason: String,
 }
@@ -497,7 +499,7 @@ pub struct Failure {
 impl fmt::Display for Failure {
     /// Writes `failed at PLACE: REASON`, or `failed: REASON` if the study has only one point.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.at.as_str() {
+        match self.location.as_str() {
             "" => write!(f, "failed: {}", self.reason),
             at => write!(f, "failed at {at}: {}", self.reason),
         }

@@ -67,7 +67,7 @@ enum CaseSelection {
     /// The first cases, up to this number.
     First(usize),
     /// Every n-th case.
-    Each(usize),
+    EveryNth(usize),
 }
 
 /// The kept rows of a table.
@@ -78,10 +78,10 @@ struct DecimatedTable {
     /// Number of neighbouring rows in a bin, of which only the extremes stay.
     bin: Option<usize>,
     /// Number of leading columns that identify a case.
-    keys: usize,
+    key_columns: usize,
     /// Key and number of the current case.
-    now: Option<(Vec<u64>, usize)>,
-    open: Table,
+    current_case: Option<(Vec<u64>, usize)>,
+    open_bin: Table,
 }
 
 impl DecimatedTable {
@@ -97,13 +97,13 @@ impl DecimatedTable {
                 first
             } else {
                 let each = study.cases().div_ceil(MOST_CURVES);
-                cases = CaseSelection::Each(each);
+                cases = CaseSelection::EveryNth(each);
                 study.cases().div_ceil(each)
             };
             // a bin keeps at most two rows for every column: a few dozen
             bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * EXTREMES);
         }
-        DecimatedTable { rows: empty.clone(), cases, bin, keys, now: None, open: empty }
+        DecimatedTable { rows: empty.clone(), cases, bin, key_columns: keys, current_case: None, open_bin: empty }
     }
 
     fn add(&mut self, table: Table) {
@@ -112,27 +112,27 @@ impl DecimatedTable {
         }
         let mut from = 0;
         while from < table.rows() {
-            let key = key(&table, from, self.keys);
-            if self.now.as_ref().is_none_or(|(now, _)| *now != key) {
+            let key = key(&table, from, self.key_columns);
+            if self.current_case.as_ref().is_none_or(|(now, _)| *now != key) {
                 self.close();
-                let number = self.now.as_ref().map_or(0, |(_, number)| number + 1);
-                self.now = Some((key, number));
+                let number = self.current_case.as_ref().map_or(0, |(_, number)| number + 1);
+                self.current_case = Some((key, number));
             }
-            let (now, number) = match &self.now {
+            let (now, number) = match &self.current_case {
                 Some((now, number)) => (now, *number),
                 None => return,
             };
-            let room = self.bin.map_or(usize::MAX, |bin| bin - self.open.rows());
+            let room = self.bin.map_or(usize::MAX, |bin| bin - self.open_bin.rows());
             let more = table.rows().min(from.saturating_add(room));
             let to = (from + 1..more).find(|row| key_differs(&table, *row, now)).unwrap_or(more);
             let keeps = match self.cases {
                 CaseSelection::All => true,
                 CaseSelection::First(first) => number < first,
-                CaseSelection::Each(each) => number % each == 0,
+                CaseSelection::EveryNth(each) => number % each == 0,
             };
             if keeps {
-                self.open.append(rows(&table, &(from..to).collect::<Vec<_>>()));
-                if self.bin.is_none_or(|bin| self.open.rows() >= bin) {
+                self.open_bin.append(rows(&table, &(from..to).collect::<Vec<_>>()));
+                if self.bin.is_none_or(|bin| self.open_bin.rows() >= bin) {
                     self.close();
                 }
             }
@@ -142,7 +142,7 @@ impl DecimatedTable {
 
     /// Closes the open bin: keeps all its rows, or its extremes.
     fn close(&mut self) {
-        let open = Table { name: self.open.name.clone(), columns: std::mem::take(&mut self.open.columns) };
+        let open = Table { name: self.open_bin.name.clone(), columns: std::mem::take(&mut self.open_bin.columns) };
         if open.rows() == 0 {
             return;
         }

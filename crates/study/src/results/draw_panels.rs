@@ -35,7 +35,7 @@ pub(crate) fn panels(
 
 /// Combines the panels of all draws into one; returns `None` for pictures.
 fn together(draws: &[&Panel]) -> Option<Panel> {
-    let first = draws.first().filter(|panel| !panel.picture)?;
+    let first = draws.first().filter(|panel| !panel.equal_axes)?;
     let lines: Vec<Vec<&Series>> = draws.iter().map(|panel| curves(panel, is_line)).collect();
     let alike = |one: &[&Series]| {
         let same = |(a, b): (&&Series, &&Series)| a.label == b.label && a.style == b.style;
@@ -185,7 +185,7 @@ mod tests {
             assert_eq!(made.series.len(), 2);
             assert!(made.series.iter().all(|line| line.emphasis == Emphasis::Pale && line.style == Style::Solid));
         }
-        let wheel = Panel { picture: true, ..straight("shape") };
+        let wheel = Panel { equal_axes: true, ..straight("shape") };
         assert!(together(&[&wheel, &wheel]).is_none());
     }
 }

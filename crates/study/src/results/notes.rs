@@ -36,9 +36,11 @@ const SPREAD: f64 = 1e-3;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Note {
     /// A sentence about the whole study.
-    Said(String),
+    #[serde(rename = "Said")]
+    Sentence(String),
     /// A sentence about one or several cases.
-    Of {
+    #[serde(rename = "Of")]
+    Cases {
         /// Number of cases.
         cases: usize,
         /// The first cases, at most [`MOST_NAMED`].
@@ -54,22 +56,26 @@ pub enum Note {
     /// Like `Truncated`, on a branch: its harmonics are given, and it has no other method.
     TruncatedOnBranch(usize, f64),
     /// Number of points whose series was not compared with a longer one.
-    Unchecked(usize),
+    #[serde(rename = "Unchecked")]
+    UnknownError(usize),
     /// Number of points whose orbit is unstable. The second number counts those of them whose
     /// orbit repeats after fewer periods than requested.
     Unstable(usize, usize),
     /// Number of points with a permanently stuck part of a joint in a motion without
     /// half-period symmetry.
-    History(usize),
-    /// Like `History`, with another joint whose force depends on the positions of the bodies.
+    #[serde(rename = "History")]
+    StuckOffset(usize),
+    /// Like `StuckOffset`, with another joint whose force depends on the positions of the bodies.
     /// The names are those of the first point.
-    Several {
+    #[serde(rename = "Several")]
+    SeveralOrbits {
         /// Number of points.
         points: usize,
         /// The stuck joint.
         stuck: String,
         /// The joint whose force depends on the positions.
-        knows: String,
+        #[serde(rename = "knows")]
+        position_dependent: String,
     },
     /// Points of a curve that has another orbit there when it is followed in the other
     /// direction.
@@ -85,7 +91,8 @@ pub enum Note {
         ratios: [f64; 2],
     },
     /// Points at which the method chosen by `auto` found no orbit and another method did.
-    Instead {
+    #[serde(rename = "Instead")]
+    OtherMethod {
         /// Number of points.
         points: usize,
         /// The chosen method.
@@ -94,10 +101,12 @@ pub enum Note {
         found: String,
     },
     /// Number of points with unknown stability: the friction falls with velocity.
-    Unjudged(usize),
+    #[serde(rename = "Unjudged")]
+    UnknownStability(usize),
     /// Time histories on a reduced model. Its error is known for harmonic forces up to this
     /// frequency, rad/s.
-    InTime(f64),
+    #[serde(rename = "InTime")]
+    TimeHistory(f64),
     /// Points at which joints slip on a reduced model.
     Slipping(SlipReductionCheck),
     /// Points of one case at which a joint is permanently stuck.
@@ -107,17 +116,19 @@ pub enum Note {
         /// Number of points with a stuck joint.
         points: usize,
         /// Number of all points.
-        of: usize,
+        #[serde(rename = "of")]
+        total: usize,
     },
     /// Number of points with a stuck joint in the cases beyond [`MOST_STUCK`].
-    StuckElsewhere(usize),
+    #[serde(rename = "StuckElsewhere")]
+    StuckInOtherCases(usize),
 }
 
 impl Note {
     /// A sentence about one case or one of its points. `case` is empty if there is only one.
     /// The text begins with [`WARNING`] if it is a warning.
     pub(crate) fn of_case(case: &str, text: impl Into<String>) -> Note {
-        Note::Of { cases: 1, named: vec![case.to_owned()], text: text.into() }
+        Note::Cases { cases: 1, named: vec![case.to_owned()], text: text.into() }
     }
 
     /// Returns the notes of one orbit. They state a method that replaced the chosen one, and
@@ -128,16 +139,16 @@ impl Note {
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
         let accuracy = match orbit.evidence.accuracy {
             Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.truncation.unwrap_or(0.0))),
-            Accuracy::Unchecked => Some(Note::Unchecked(1)),
+            Accuracy::Unchecked => Some(Note::UnknownError(1)),
             Accuracy::Converged => None,
         };
-        let instead = orbit.evidence.instead_of.map(|chosen| Note::Instead {
+        let instead = orbit.evidence.instead_of.map(|chosen| Note::OtherMethod {
             points: 1,
             chosen: chosen.to_owned(),
             found: orbit.method.to_owned(),
         });
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
-        let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::Unjudged(1));
+        let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::UnknownStability(1));
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
         let spread = orbit.evidence.history_spread.filter(|spread| *spread > SPREAD);
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
@@ -170,8 +181,8 @@ impl Note {
                 None => is_curved(joint, motion),
             })
         });
-        let Some(knows) = knows.map(|motion| motion.name.clone()) else { return Some(Note::History(1)) };
-        Some(Note::Several { points: 1, stuck, knows })
+        let Some(knows) = knows.map(|motion| motion.name.clone()) else { return Some(Note::StuckOffset(1)) };
+        Some(Note::SeveralOrbits { points: 1, stuck, position_dependent: knows })
     }
 
     /// Changes the note to its form for an orbit of a branch.
@@ -194,10 +205,10 @@ impl Note {
     /// begins. The first note of the list stays, because it may continue the last note of
     /// another list.
     fn stuck_joined(self, notes: &mut Vec<Note>) -> Option<Note> {
-        let Note::Stuck { case, points, of } = self else { return Some(self) };
+        let Note::Stuck { case, points, total: of } = self else { return Some(self) };
         let is_stuck = |note: &Note| matches!(note, Note::Stuck { .. });
         let (first, last) = (notes.iter().position(is_stuck), notes.iter().rposition(is_stuck));
-        if let Some(Note::Stuck { case: known, points: before, of: all }) = last.and_then(|at| notes.get_mut(at)) {
+        if let Some(Note::Stuck { case: known, points: before, total: all }) = last.and_then(|at| notes.get_mut(at)) {
             if *known == case {
                 *before += points;
                 *all += of;
@@ -209,17 +220,17 @@ impl Note {
         }
         let named = notes.iter().filter(|note| matches!(note, Note::Stuck { points: 1.., .. })).count();
         match (named < MOST_STUCK, points) {
-            (true, _) => Some(Note::Stuck { case, points, of }),
+            (true, _) => Some(Note::Stuck { case, points, total: of }),
             (false, 0) => None,
-            (false, _) => Some(Note::StuckElsewhere(points)),
+            (false, _) => Some(Note::StuckInOtherCases(points)),
         }
     }
 
     fn joined(self, notes: &mut Vec<Note>) {
         for known in notes.iter_mut() {
             match (known, &self) {
-                (Note::Said(known), Note::Said(more)) if known == more => return,
-                (Note::Of { cases, named, text }, Note::Of { cases: more, named: others, text: same })
+                (Note::Sentence(known), Note::Sentence(more)) if known == more => return,
+                (Note::Cases { cases, named, text }, Note::Cases { cases: more, named: others, text: same })
                     if text == same =>
                 {
                     *cases += more;
@@ -243,25 +254,25 @@ impl Note {
                     *largest = largest.max(*other);
                     return;
                 }
-                (Note::Unchecked(points), Note::Unchecked(more))
-                | (Note::History(points), Note::History(more))
-                | (Note::Unjudged(points), Note::Unjudged(more))
-                | (Note::StuckElsewhere(points), Note::StuckElsewhere(more)) => {
+                (Note::UnknownError(points), Note::UnknownError(more))
+                | (Note::StuckOffset(points), Note::StuckOffset(more))
+                | (Note::UnknownStability(points), Note::UnknownStability(more))
+                | (Note::StuckInOtherCases(points), Note::StuckInOtherCases(more)) => {
                     *points += more;
                     return;
                 }
-                (Note::Several { points, .. }, Note::Several { points: more, .. }) => {
+                (Note::SeveralOrbits { points, .. }, Note::SeveralOrbits { points: more, .. }) => {
                     *points += more;
                     return;
                 }
                 (
-                    Note::Instead { points, chosen, found },
-                    Note::Instead { points: more, chosen: first, found: second },
+                    Note::OtherMethod { points, chosen, found },
+                    Note::OtherMethod { points: more, chosen: first, found: second },
                 ) if (&*chosen, &*found) == (first, second) => {
                     *points += more;
                     return;
                 }
-                (Note::InTime(up_to), Note::InTime(more)) => {
+                (Note::TimeHistory(up_to), Note::TimeHistory(more)) => {
                     *up_to = up_to.min(*more);
                     return;
                 }
@@ -284,8 +295,8 @@ impl Note {
     pub(crate) fn text(&self) -> Option<String> {
         let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
         match self {
-            Note::Said(text) => Some(text.clone()),
-            Note::Of { cases, named, text } => {
+            Note::Sentence(text) => Some(text.clone()),
+            Note::Cases { cases, named, text } => {
                 let (warning, said) = text.strip_prefix(WARNING).map_or(("", text.as_str()), |said| (WARNING, said));
                 let first = named.join("; ");
                 Some(match cases - named.len() {
@@ -312,7 +323,7 @@ impl Note {
                  with other methods, use kind = \"response\".",
                 points(*count)
             )),
-            Note::Unchecked(count) => Some(format!(
+            Note::UnknownError(count) => Some(format!(
                 "At {} the error of the series is unknown: the longer series for the comparison has too many \
                  unknowns or was not found. Use fewer `harmonics`.",
                 points(*count)
@@ -333,12 +344,12 @@ impl Note {
                     points(*count)
                 ))
             }
-            Note::History(count) => Some(format!(
+            Note::StuckOffset(count) => Some(format!(
                 "At {} a joint, or a part of it, sticks permanently in a motion without half-period symmetry: its \
                  position and the mean values depend on the history. {SHOWN}",
                 points(*count)
             )),
-            Note::Several { points: count, stuck, knows } => Some(format!(
+            Note::SeveralOrbits { points: count, stuck, position_dependent: knows } => Some(format!(
                 "warning: at {} several orbits are possible: `{stuck}`, or a part of it, sticks permanently. Its \
                  position depends on the history, and so do the force of `{knows}` and the amplitudes. {SHOWN} \
                  kind = \"transient\" follows the motion from a given start.",
@@ -363,17 +374,17 @@ impl Note {
                     size.join(" and ")
                 ))
             }
-            Note::Instead { points: count, chosen, found } => Some(format!(
+            Note::OtherMethod { points: count, chosen, found } => Some(format!(
                 "At {} `{chosen}`, the choice of `auto`, found no orbit; `{found}` found one.",
                 points(*count)
             )),
-            Note::Unjudged(count) => Some(format!(
+            Note::UnknownStability(count) => Some(format!(
                 "At {} the stability of the orbit is unknown, because no time integration supports friction that \
                  falls with velocity: the real motion may be stick-slip with other amplitudes. Compare with \
                  kind = \"transient\" and a `width` (m/s) over which friction changes its sign.",
                 points(*count)
             )),
-            Note::InTime(up_to) => {
+            Note::TimeHistory(up_to) => {
                 let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
                 Some(format!(
                     "`reduction_error` is that of harmonic forces up to {}. It does not include higher frequencies, \
@@ -384,12 +395,12 @@ impl Note {
                 ))
             }
             Note::Slipping(slipping) => Some(slipping.text(WARNING)),
-            Note::StuckElsewhere(count) => Some(format!(
+            Note::StuckInOtherCases(count) => Some(format!(
                 "In other cases a joint sticks permanently at {}; its offset is not unique there either.",
                 points(*count)
             )),
             Note::Stuck { points: 0, .. } => None,
-            Note::Stuck { case, points: count, of } => {
+            Note::Stuck { case, points: count, total: of } => {
                 let label = if case.is_empty() { String::new() } else { format!("{case}: ") };
                 Some(format!(
                     "{label}at {count} of {} a joint sticks permanently; its offset is not unique there, and the \
@@ -415,23 +426,26 @@ mod tests {
 
     #[test]
     fn notes_of_one_sort_become_one() {
-        let stuck = |case: &str, points| Note::Stuck { case: case.to_owned(), points, of: 10 };
-        let instead =
-            |chosen: &str| Note::Instead { points: 1, chosen: chosen.to_owned(), found: "harmonic-balance".to_owned() };
+        let stuck = |case: &str, points| Note::Stuck { case: case.to_owned(), points, total: 10 };
+        let instead = |chosen: &str| Note::OtherMethod {
+            points: 1,
+            chosen: chosen.to_owned(),
+            found: "harmonic-balance".to_owned(),
+        };
         let mut notes = Vec::new();
         for note in [
             stuck("Ft = 1 N", 0),
             Note::Truncated(1, 1e-2),
             stuck("Ft = 1 N", 3),
             Note::Truncated(2, 5e-2),
-            Note::History(1),
+            Note::StuckOffset(1),
             Note::Unstable(1, 0),
-            Note::Unjudged(1),
+            Note::UnknownStability(1),
             Note::Unstable(1, 1),
-            Note::Unjudged(2),
-            Note::History(1),
+            Note::UnknownStability(2),
+            Note::StuckOffset(1),
             stuck("Ft = 2 N", 0),
-            Note::Said("It is so.".to_owned()),
+            Note::Sentence("It is so.".to_owned()),
             instead("shooting"),
             instead("event-driven"),
             instead("shooting"),
@@ -471,7 +485,7 @@ mod tests {
             for case in 1..=cases {
                 Note::of_case(&format!("k = {case} N/m"), "warning: it moves too fast").join(&mut notes);
                 Note::of_case(&format!("k = {case} N/m"), "No joint slips.").join(&mut notes);
-                Note::Said("There is no speed.".to_owned()).join(&mut notes);
+                Note::Sentence("There is no speed.".to_owned()).join(&mut notes);
             }
             notes.iter().filter_map(Note::text).collect::<Vec<_>>()
         };
@@ -489,7 +503,7 @@ mod tests {
     #[test]
     fn what_helps_a_branch_is_said_of_a_branch() {
         let mut notes = Vec::new();
-        for note in [Note::Truncated(1, 1e-2), Note::Truncated(2, 3e-2), Note::History(1)] {
+        for note in [Note::Truncated(1, 1e-2), Note::Truncated(2, 3e-2), Note::StuckOffset(1)] {
             note.on_branch().join(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
@@ -511,13 +525,13 @@ mod tests {
                 let (case, points) = (format!("case {}", unit / 3), if unit % 7 < 2 { 0 } else { unit % 5 });
                 let of_case = Note::of_case(&case, format!("It is so in {} ways.", unit % 3));
                 [
-                    Note::Stuck { case, points, of: 10 },
+                    Note::Stuck { case, points, total: 10 },
                     Note::Truncated(unit % 2, unit as f64),
-                    Note::History(1),
+                    Note::StuckOffset(1),
                     of_case,
                 ]
             })
-            .chain((0..700).map(|unit| Note::Stuck { case: format!("late {}", unit / 3), points: unit % 4, of: 10 }))
+            .chain((0..700).map(|unit| Note::Stuck { case: format!("late {}", unit / 3), points: unit % 4, total: 10 }))
             .collect();
         let joined = |stretch: usize| {
             let mut whole = Vec::new();

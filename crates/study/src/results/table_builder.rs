@@ -10,28 +10,29 @@ use stickslip::model::ReductionEvidence;
 #[derive(Debug, Default)]
 pub struct TableBuilder {
     columns: Vec<Column>,
-    next: usize,
+    next_column: usize,
     /// Number of finished rows.
-    ended: usize,
+    finished_rows: usize,
     /// True if the motions are linear, so that joints produce no harmonics.
-    linear: bool,
+    is_linear: bool,
 }
 
 impl TableBuilder {
     /// Rows of motions in which no joint slips.
     pub fn linear() -> Self {
-        TableBuilder { linear: true, ..TableBuilder::default() }
+        TableBuilder { is_linear: true, ..TableBuilder::default() }
     }
 
     fn cells(&mut self, name: &str, empty: CellValues) -> &mut CellValues {
         let name = column_name(name);
-        let at = self.columns[self.next..].iter().position(|column| column.name == name);
-        self.next += at.unwrap_or(0);
+        let at = self.columns[self.next_column..].iter().position(|column| column.name == name);
+        self.next_column += at.unwrap_or(0);
         if at.is_none() {
-            self.columns.insert(self.next, Column { name: name.to_string(), values: empty.blank(self.ended) });
+            self.columns
+                .insert(self.next_column, Column { name: name.to_string(), values: empty.blank(self.finished_rows) });
         }
-        self.next += 1;
-        &mut self.columns[self.next - 1].values
+        self.next_column += 1;
+        &mut self.columns[self.next_column - 1].values
     }
 
     /// Adds a real number.
@@ -81,7 +82,7 @@ impl TableBuilder {
     /// Raises the reduction error of all rows to at least `error`, unless the motions are
     /// linear.
     pub fn err(&mut self, error: f64) {
-        let known = self.columns.iter_mut().filter(|column| column.name == REDUCTION_ERROR && !self.linear);
+        let known = self.columns.iter_mut().filter(|column| column.name == REDUCTION_ERROR && !self.is_linear);
         for column in known {
             if let CellValues::Number(errors) = &mut column.values {
                 errors.iter_mut().for_each(|known| *known = known.max(error));
@@ -91,11 +92,11 @@ impl TableBuilder {
 
     /// Ends a row: columns that the row did not write get an empty cell.
     pub fn end(&mut self) {
-        self.next = 0;
-        for column in self.columns.iter_mut().filter(|column| column.values.len() == self.ended) {
+        self.next_column = 0;
+        for column in self.columns.iter_mut().filter(|column| column.values.len() == self.finished_rows) {
             column.values.extend(column.values.blank(1));
         }
-        self.ended += 1;
+        self.finished_rows += 1;
     }
 
     /// Returns the finished table.

@@ -20,7 +20,7 @@ use stickslip_numerics::maximum::maximum;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WeibullMaxima {
     /// λ, the upper bound of all values.
-    pub bound: f64,
+    pub upper_bound: f64,
     /// δ.
     pub scale: f64,
     /// β.
@@ -88,7 +88,7 @@ impl WeibullMaxima {
         let ends = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
         let Ok((s, _)) = maximum(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
         let ProfileLikelihood { scale, shape, .. } = profile(s)?;
-        let found = WeibullMaxima { bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
+        let found = WeibullMaxima { upper_bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
         // the bound counts as known at the far end, and if the likelihood is not regular in it
         let known = best == STEPS || shape <= REGULAR;
         Some(WeibullMaxima { covariance: found.covariance(values, known)?, ..found })
@@ -96,7 +96,7 @@ impl WeibullMaxima {
 
     /// Returns the probability that a value is not exceeded.
     fn share(&self, value: f64) -> f64 {
-        libm::exp(-libm::pow(((self.bound - value) / self.scale).max(0.0), self.shape))
+        libm::exp(-libm::pow(((self.upper_bound - value) / self.scale).max(0.0), self.shape))
     }
 
     /// Returns whether the values follow the distribution, rather than a mixture of two
@@ -115,7 +115,7 @@ impl WeibullMaxima {
 
     /// Returns the value that is not exceeded with the probability `share`.
     pub fn quantile(&self, share: f64) -> f64 {
-        self.bound - self.scale * libm::pow(-libm::log(share), 1.0 / self.shape)
+        self.upper_bound - self.scale * libm::pow(-libm::log(share), 1.0 / self.shape)
     }
 
     /// Returns the ends of the 95 % confidence interval of this quantile, from the curvature of
@@ -132,7 +132,7 @@ impl WeibullMaxima {
 
     /// Returns the probability density at a value.
     pub fn density(&self, value: f64) -> f64 {
-        let depth = (self.bound - value) / self.scale;
+        let depth = (self.upper_bound - value) / self.scale;
         if depth <= 0.0 {
             return 0.0;
         }
@@ -146,7 +146,7 @@ impl WeibullMaxima {
         let (shape, scale) = (self.shape, self.scale);
         let mut information = [[0.0; 3]; 3];
         for value in values {
-            let y = self.bound - value;
+            let y = self.upper_bound - value;
             let log = libm::log(y / scale);
             let w = libm::exp(shape * log);
             // minus the second derivatives of ln β - β ln δ + (β - 1) ln y - (y/δ)^β by β, δ, λ
@@ -273,7 +273,7 @@ mod tests {
             assert!((found / expected - 1.0).abs() < within, "{what}: {found} {expected}");
         };
         near("shape", fit.shape, 2.5492621, 1e-6);
-        near("bound", fit.bound, 1.8892929, 1e-6);
+        near("bound", fit.upper_bound, 1.8892929, 1e-6);
         near("scale", fit.scale, 0.48775526, 1e-6);
         near("99 %", fit.quantile(0.99), 1.8090296797848229, 1e-7);
         near("99.9 %", fit.quantile(0.999), 1.856823367544346, 1e-7);
@@ -284,7 +284,7 @@ mod tests {
         // the density is the derivative of the distribution
         near("density", fit.density(1.4), (fit.share(1.4 + 1e-5) - fit.share(1.4 - 1e-5)) / 2e-5, 1e-8);
         near("share", fit.share(fit.quantile(0.3)), 0.3, 1e-12);
-        assert_eq!(fit.density(fit.bound + 0.1), 0.0);
+        assert_eq!(fit.density(fit.upper_bound + 0.1), 0.0);
     }
 
     /// A mixture of two families of peaks is rejected; draws from one distribution are accepted
@@ -326,6 +326,6 @@ mod tests {
         // the values of a Gumbel distribution, for which the best bound is very large
         let rising: Vec<f64> = (1..100).map(|i| -(-(f64::from(i) / 100.0).ln()).ln()).collect();
         let fit = WeibullMaxima::fit(&rising).unwrap();
-        assert!((fit.quantile(0.99) - 4.6).abs() < 0.5 && fit.bound > 10.0, "{fit:?}");
+        assert!((fit.quantile(0.99) - 4.6).abs() < 0.5 && fit.upper_bound > 10.0, "{fit:?}");
     }
 }

@@ -50,7 +50,7 @@ pub struct SlipReductionCheck {
     up_to: f64,
     /// The points of a unit of work in order, until some were solved again.
     #[serde(skip)]
-    all: Vec<CurvePoint>,
+    candidates: Vec<CurvePoint>,
     /// The worst result of solving again.
     again: Option<BasisDifference>,
 }
@@ -70,8 +70,10 @@ pub struct BasisDifference {
     pub error: f64,
     place: String,
     /// The point in words, and the number of points solved again.
-    at: String,
-    of: usize,
+    #[serde(rename = "at")]
+    point_text: String,
+    #[serde(rename = "of")]
+    solved_points: usize,
     coordinates: usize,
     /// Frequency limit of the larger basis, rad/s.
     up_to: f64,
@@ -101,7 +103,7 @@ impl SlipReductionCheck {
         let amplitudes = orbit.places.iter().map(|place| place.size()).collect();
         let all = vec![CurvePoint { omega: orbit.omega, amplitudes }];
         let counts = slips && highest.is_none_or(|highest| highest > up_to);
-        counts.then_some(SlipReductionCheck { points: 1, up_to, all, again: None })
+        counts.then_some(SlipReductionCheck { points: 1, up_to, candidates: all, again: None })
     }
 
     /// Appends the record of the following points.
@@ -109,7 +111,7 @@ impl SlipReductionCheck {
         let error = |again: &Option<BasisDifference>| again.as_ref().map_or(-1.0, |again| again.error);
         self.points += more.points;
         self.up_to = self.up_to.min(more.up_to);
-        self.all.extend(more.all.iter().cloned());
+        self.candidates.extend(more.candidates.iter().cloned());
         if error(&more.again) > error(&self.again) {
             self.again.clone_from(&more.again);
         }
@@ -125,17 +127,17 @@ impl SlipReductionCheck {
         (model, system, method): (&Model, &System, &dyn Method),
         at: &dyn Fn(f64) -> String,
     ) -> Option<f64> {
-        let all = std::mem::take(&mut self.all);
+        let all = std::mem::take(&mut self.candidates);
         let farther = if turn { farther(model, system) } else { None }?;
         let mut of = 0;
         for index in chosen(&all) {
             let Some(again) = again(&farther, method, &all[index]) else { continue };
             of += 1;
             if self.again.as_ref().is_none_or(|worst| again.error > worst.error) {
-                self.again = Some(BasisDifference { at: at(all[index].omega), ..again });
+                self.again = Some(BasisDifference { point_text: at(all[index].omega), ..again });
             }
         }
-        self.again.iter_mut().for_each(|again| again.of = of);
+        self.again.iter_mut().for_each(|again| again.solved_points = of);
         self.again.as_ref().map(|again| again.error)
     }
 
@@ -157,7 +159,7 @@ impl SlipReductionCheck {
                  reduce = {{ up_to = \"{twice}\" }} or with reduce = false.",
                 &slips[1..]
             ),
-            Some(BasisDifference { error, place, at, of, coordinates, up_to }) => {
+            Some(BasisDifference { error, place, point_text: at, solved_points: of, coordinates, up_to }) => {
                 let some = if *of == 1 {
                     "the largest was".to_owned()
                 } else {
@@ -216,8 +218,8 @@ fn again(farther: &System, method: &dyn Method, point: &CurvePoint) -> Option<Ba
     error.is_finite().then(|| BasisDifference {
         error,
         place: orbit.places[worst].name.clone(),
-        at: String::new(),
-        of: 1,
+        point_text: String::new(),
+        solved_points: 1,
         coordinates: reduced.dofs(),
         up_to: reduced.up_to(),
     })

@@ -39,7 +39,8 @@ pub struct Tally {
     points: BTreeMap<String, u64>,
     /// True if a unit was stopped before it finished.
     #[serde(default)]
-    cut: bool,
+    #[serde(rename = "cut")]
+    interrupted: bool,
 }
 
 impl Block {
@@ -51,11 +52,11 @@ impl Block {
 
     /// Builds the block of one unit.
     pub(crate) fn of(kind: &KindInfo, unit: usize, part: UnitResult) -> Block {
-        let UnitResult { tables: rows, notes, failures, points, cut } = part;
+        let UnitResult { tables: rows, notes, failures, points, interrupted: cut } = part;
         let mut block = Block { units: unit..unit + 1, ..Block::empty(kind, unit) };
         // the part of a unit that was not reached has no tables
         block.tables.iter_mut().zip(rows).for_each(|(table, rows)| table.columns = rows.table(&table.name).columns);
-        block.tally.append(Tally { notes, failures, more_failures: 0, points, cut });
+        block.tally.append(Tally { notes, failures, more_failures: 0, points, interrupted: cut });
         block
     }
 
@@ -76,7 +77,7 @@ impl Tally {
     /// Appends the notes, failures and counts of the next units.
     pub fn append(&mut self, next: Tally) {
         next.notes.into_iter().for_each(|note| note.join(&mut self.notes));
-        self.cut |= next.cut;
+        self.interrupted |= next.interrupted;
         let room = MOST_FAILURES - self.failures.len();
         self.more_failures += next.more_failures + next.failures.len().saturating_sub(room) as u64;
         self.failures.extend(next.failures.into_iter().take(room));
@@ -97,7 +98,7 @@ impl Tally {
 
     /// Returns true if the run reached every point, converged or not, and finished every unit.
     pub fn is_whole(&self) -> bool {
-        !self.cut && !self.points.contains_key(NOT_REACHED)
+        !self.interrupted && !self.points.contains_key(NOT_REACHED)
     }
 
     /// Returns the sentences that a reader of the results must know.

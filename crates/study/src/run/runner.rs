@@ -127,7 +127,7 @@ impl CheckedStudy {
     /// the dataset lists them as failures.
     pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
         let start = Instant::now();
-        if let Some(error) = self.summary.size.refusal(&self.study, self.summary.size.whole) {
+        if let Some(error) = self.summary.size.refusal(&self.study, self.summary.size.memory_all_tables) {
             return Err(error);
         }
         let Block { tables, tally, .. } = self.block(0..self.units(), context)?;
@@ -267,7 +267,7 @@ pub fn units(study: &Study) -> usize {
 
 /// Divides a study into its units.
 fn cut(study: &Study) -> WorkUnits {
-    WorkUnits::of(study, (kinds::of(study).grain)(study))
+    WorkUnits::of(study, (kinds::of(study).unit_size)(study))
 }
 
 /// Interval at which a run checks for a stop request.
@@ -370,7 +370,7 @@ fn compute(
         solve_again(&work, index, part);
     }
     // kinds check for a stop in many places
-    part.map(|part| UnitResult { cut: context.stopped(), ..part }).map_err(|(index, error)| {
+    part.map(|part| UnitResult { interrupted: context.stopped(), ..part }).map_err(|(index, error)| {
         match work.cases.iter().find(|prepared| prepared.case.index == index) {
             Some(prepared) => refused(study, &prepared.case, &error),
             None => study.error_at("study", 0, "kind", error.to_string(), None),

@@ -184,7 +184,7 @@ pub struct WorkUnits {
     /// Number of frequencies of every case.
     points: usize,
     /// Number of cases of a curve.
-    curve: usize,
+    cases_per_curve: usize,
 }
 
 impl WorkUnits {
@@ -192,7 +192,7 @@ impl WorkUnits {
     pub fn of(study: &Study, grain: UnitSize) -> Self {
         let cases = study.cases();
         let points = (study.points() / cases.max(1)).max(1);
-        WorkUnits { grain, cases, points, curve: study.last_varied().max(1) }
+        WorkUnits { grain, cases, points, cases_per_curve: study.last_varied().max(1) }
     }
 
     /// Returns the number of blocks of frequencies of one case.
@@ -205,7 +205,7 @@ impl WorkUnits {
         match self.grain {
             UnitSize::Frequencies => self.cases * self.stretches(),
             UnitSize::Case => self.cases,
-            UnitSize::Curve => self.cases / self.curve,
+            UnitSize::Curve => self.cases / self.cases_per_curve,
         }
     }
 
@@ -222,7 +222,10 @@ impl WorkUnits {
                 WorkUnit { cases: case..case + 1, points: stretch * BLOCK..((stretch + 1) * BLOCK).min(self.points) }
             }
             UnitSize::Case => WorkUnit { cases: index..index + 1, points: 0..self.points },
-            UnitSize::Curve => WorkUnit { cases: index * self.curve..(index + 1) * self.curve, points: 0..self.points },
+            UnitSize::Curve => WorkUnit {
+                cases: index * self.cases_per_curve..(index + 1) * self.cases_per_curve,
+                points: 0..self.points,
+            },
         }
     }
 }
@@ -274,7 +277,7 @@ pub struct UnitResult {
     pub points: BTreeMap<String, u64>,
     /// True if the run was stopped before the unit was finished. Results after the points, such
     /// as peaks, may then be missing even if all points are present.
-    pub cut: bool,
+    pub interrupted: bool,
 }
 
 /// Status of a point that converged,
@@ -288,7 +291,7 @@ impl UnitResult {
     pub(crate) fn count(&mut self, at: impl FnOnce() -> String, status: &str, failure: Option<String>) {
         *self.points.entry(status.to_owned()).or_default() += 1;
         if let Some(reason) = failure {
-            self.failures.push(crate::results::dataset::Failure { at: at(), reason });
+            self.failures.push(crate::results::dataset::Failure { location: at(), reason });
         }
     }
 
@@ -303,7 +306,7 @@ mod tests {
     use super::*;
 
     fn units(grain: UnitSize) -> Vec<WorkUnit> {
-        let units = WorkUnits { grain, cases: 6, points: 150, curve: 3 };
+        let units = WorkUnits { grain, cases: 6, points: 150, cases_per_curve: 3 };
         (0..units.len()).map(|index| units.get(index)).collect()
     }
 

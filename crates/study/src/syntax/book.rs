@@ -31,7 +31,7 @@ pub fn markdown() -> String {
     // nested tables follow the table that contains them
     let inner = |book: &mut String, of: &str, keys: &[Key]| {
         for key in keys.iter().filter(|key| key.is_taken()) {
-            if let ValueType::Table(keys) | ValueType::TableOrNone(keys) = key.takes {
+            if let ValueType::Table(keys) | ValueType::TableOrFalse(keys) = key.takes {
                 rows(book, &format!("`{}` of {of}", key.name), key.doc, keys);
             }
         }

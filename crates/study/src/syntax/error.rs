@@ -69,11 +69,11 @@ pub struct StudyError(Box<ErrorDetails>);
 struct ErrorDetails {
     source: Arc<Source>,
     /// Byte range in the text, line and column; `None` for a file that could not be read.
-    at: Option<(Range<usize>, usize, usize)>,
+    position: Option<(Range<usize>, usize, usize)>,
     key: Option<String>,
     message: String,
     help: Option<String>,
-    others: Vec<StudyError>,
+    related: Vec<StudyError>,
 }
 
 impl StudyError {
@@ -82,11 +82,11 @@ impl StudyError {
         let source = Arc::new(Source { name: name.to_owned(), text: String::new() });
         StudyError(Box::new(ErrorDetails {
             source,
-            at: None,
+            position: None,
             key: None,
             message: message.into(),
             help,
-            others: Vec::new(),
+            related: Vec::new(),
         }))
     }
 
@@ -101,11 +101,11 @@ impl StudyError {
         let (line, column) = line_and_column(&source.text, start);
         StudyError(Box::new(ErrorDetails {
             source,
-            at: Some((start..end, line, column)),
+            position: Some((start..end, line, column)),
             key: (!problem.key.is_empty()).then_some(problem.key),
             message: problem.message,
             help: problem.help,
-            others: Vec::new(),
+            related: Vec::new(),
         }))
     }
 
@@ -116,7 +116,7 @@ impl StudyError {
         problems.dedup_by(|later, first| later.location == first.location && later.key == first.key);
         let mut errors = problems.into_iter().map(|problem| StudyError::at(sources, problem));
         let mut first = errors.next()?;
-        first.0.others = errors.collect();
+        first.0.related = errors.collect();
         Some(first)
     }
 
@@ -127,12 +127,12 @@ impl StudyError {
 
     /// Line of the wrong value, from 1; `None` if the file could not be read at all.
     pub fn line(&self) -> Option<usize> {
-        self.0.at.as_ref().map(|at| at.1)
+        self.0.position.as_ref().map(|at| at.1)
     }
 
     /// Column of the wrong value in characters, from 1.
     pub fn column(&self) -> Option<usize> {
-        self.0.at.as_ref().map(|at| at.2)
+        self.0.position.as_ref().map(|at| at.2)
     }
 
     /// Key that the error is about, for example `stiffness`.
@@ -152,12 +152,12 @@ impl StudyError {
 
     /// Returns the text that is wrong.
     pub fn underlined(&self) -> Option<&str> {
-        self.0.at.as_ref().and_then(|(span, _, _)| self.0.source.text.get(span.clone()))
+        self.0.position.as_ref().and_then(|(span, _, _)| self.0.source.text.get(span.clone()))
     }
 
     /// Returns the other errors that were found in the same file.
     pub fn others(&self) -> &[StudyError] {
-        &self.0.others
+        &self.0.related
     }
 }
 
@@ -170,7 +170,7 @@ impl StudyError {
     /// Returns the bytes to underline if their lines and the adjacent lines are short enough to
     /// draw.
     fn drawable(&self) -> Option<&Range<usize>> {
-        let (span, _, _) = self.0.at.as_ref()?;
+        let (span, _, _) = self.0.position.as_ref()?;
         let text = &self.0.source.text;
         let back = |from: usize| text[..from].rfind('\n');
         let on = |from: usize| text[from..].find('\n').map_or(text.len(), |i| from + i);
@@ -200,7 +200,7 @@ fn line_and_column(text: &str, at: usize) -> (usize, usize) {
 impl fmt::Display for StudyError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:", self.0.source.name)?;
-        if let Some((_, line, column)) = &self.0.at {
+        if let Some((_, line, column)) = &self.0.position {
             write!(f, "{line}:{column}:")?;
         }
         match &self.0.key {
@@ -247,10 +247,10 @@ impl Diagnostic for StudyError {
     }
 
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        if self.0.others.is_empty() {
+        if self.0.related.is_empty() {
             return None;
         }
-        Some(Box::new(self.0.others.iter().map(|error| error as &dyn Diagnostic)))
+        Some(Box::new(self.0.related.iter().map(|error| error as &dyn Diagnostic)))
     }
 }
 

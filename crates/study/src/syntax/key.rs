@@ -90,7 +90,7 @@ pub enum ValueType {
     /// A file: its path, or `{ file, name, format }`.
     File,
     /// A table with these keys, or `false`.
-    TableOrNone(&'static [Key]),
+    TableOrFalse(&'static [Key]),
     /// A row of the matrices: its name, or its number from 1.
     Row,
     /// A list of rows, or of nodes.
@@ -103,7 +103,7 @@ pub enum ValueType {
     Quantities(Dimension, Bounds),
     /// No value, with the reason: a user may look for this key, but the study file has no such
     /// key. The key's `doc` says what to do instead.
-    Refused(&'static str),
+    Unsupported(&'static str),
 }
 
 /// The range of a quantity.
@@ -151,7 +151,7 @@ impl Bounds {
 impl Key {
     /// Returns whether the key takes a value.
     pub fn is_taken(&self) -> bool {
-        !matches!(self.takes, ValueType::Refused(_))
+        !matches!(self.takes, ValueType::Unsupported(_))
     }
 }
 
@@ -160,7 +160,7 @@ pub(crate) const RATIO: &str = "damping_ratio";
 
 /// A key that users look for but that does not exist, with the reason and the alternative.
 pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {
-    Key { name, takes: ValueType::Refused(why), presence: Presence::Optional, doc: instead, example: "" }
+    Key { name, takes: ValueType::Unsupported(why), presence: Presence::Optional, doc: instead, example: "" }
 }
 
 /// A required key.

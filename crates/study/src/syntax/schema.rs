@@ -173,7 +173,7 @@ pub const STRUCTURE: &[Key] = &[
     ),
     optional(
         "reduce",
-        ValueType::TableOrNone(REDUCE),
+        ValueType::TableOrFalse(REDUCE),
         "reduction of the structure. Absent: the range is five times the highest excitation frequency, and up to \
          fifteen times with joints if it contains at most 60 modes; a structure of up to 100 rows with joints of \
          exact laws is not reduced. false: no reduction",
@@ -689,7 +689,7 @@ pub fn described(takes: &ValueType) -> String {
         ValueType::Method => "a table with `kind` and the options of that method".to_owned(),
         ValueType::Study => "a table with `kind` and the keys of that kind".to_owned(),
         ValueType::File => "the path of a file, or { file = …, name = …, format = … }".to_owned(),
-        ValueType::TableOrNone(keys) => format!("{}, or false", described(&ValueType::Table(keys))),
+        ValueType::TableOrFalse(keys) => format!("{}, or false", described(&ValueType::Table(keys))),
         ValueType::Row => "the name of a row, or its number".to_owned(),
         ValueType::Rows => "a list of names or numbers".to_owned(),
         ValueType::Weights => "a table from names of rows to numbers, or a list of such tables".to_owned(),
@@ -701,7 +701,7 @@ pub fn described(takes: &ValueType) -> String {
             let one = described(&ValueType::Quantity(*dimension, *within));
             format!("{one}, or a list of them")
         }
-        ValueType::Refused(why) => format!("nothing: {why}"),
+        ValueType::Unsupported(why) => format!("nothing: {why}"),
     }
 }
 
@@ -768,9 +768,9 @@ fn takes_schema(takes: &ValueType) -> Value {
         ValueType::ByName(_) | ValueType::Parameters => json!({
             "type": "object", "additionalProperties": quantity(), "propertyNames": { "pattern": NAME_PATTERN },
         }),
-        ValueType::Refused(_) => json!({ "not": {} }),
+        ValueType::Unsupported(_) => json!({ "not": {} }),
         ValueType::File => json!({ "anyOf": [{ "type": "string" }, object(FILE_KEYS)] }),
-        ValueType::TableOrNone(keys) => json!({ "anyOf": [object(keys), { "const": false }] }),
+        ValueType::TableOrFalse(keys) => json!({ "anyOf": [object(keys), { "const": false }] }),
         ValueType::Row => json!({ "type": ["string", "integer"] }),
         ValueType::Rows => json!({ "type": "array", "items": { "type": ["string", "integer"] }, "minItems": 1 }),
         ValueType::Weights => {

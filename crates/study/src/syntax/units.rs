@@ -274,7 +274,7 @@ pub(crate) struct ReservedNames<'a> {
 /// parameter: `/m`, `/s`.
 pub(crate) fn divides(text: &str, names: &ReservedNames<'_>) -> bool {
     let Some(after) = text.strip_prefix('/') else { return false };
-    let reader = UnitParser { text: after.trim_start(), at: 0, names, depth: 0 };
+    let reader = UnitParser { text: after.trim_start(), position: 0, names, depth: 0 };
     reader.unit_here() && !(names.parameter)(reader.word())
 }
 
@@ -283,14 +283,14 @@ pub(crate) fn divides(text: &str, names: &ReservedNames<'_>) -> bool {
 ///
 /// The text at `start` must satisfy [`starts_unit`] or [`divides`].
 pub(crate) fn read(text: &str, start: usize, names: &ReservedNames<'_>) -> Result<(Unit, usize), TextError> {
-    let mut reader = UnitParser { text, at: start, names, depth: 0 };
+    let mut reader = UnitParser { text, position: start, names, depth: 0 };
     let unit = reader.product(false)?;
-    Ok((unit, reader.at))
+    Ok((unit, reader.position))
 }
 
 struct UnitParser<'a> {
     text: &'a str,
-    at: usize,
+    position: usize,
     names: &'a ReservedNames<'a>,
     depth: usize,
 }
@@ -302,7 +302,7 @@ const HIGHEST_POWER: i32 = 9;
 
 impl UnitParser<'_> {
     fn rest(&self) -> &str {
-        &self.text[self.at..]
+        &self.text[self.position..]
     }
 
     fn peek(&self) -> Option<char> {
@@ -310,9 +310,9 @@ impl UnitParser<'_> {
     }
 
     fn skip_space(&mut self) -> bool {
-        let before = self.at;
-        self.at += self.rest().len() - self.rest().trim_start().len();
-        self.at > before
+        let before = self.position;
+        self.position += self.rest().len() - self.rest().trim_start().len();
+        self.position > before
     }
 
     fn word(&self) -> &str {
@@ -329,11 +329,11 @@ impl UnitParser<'_> {
     }
 
     fn product(&mut self, group: bool) -> Result<Unit, TextError> {
-        let start = self.at;
+        let start = self.position;
         let mut unit = if self.peek() == Some('/') { ONE } else { self.factor()? };
         let mut divided = false;
         loop {
-            let before = self.at;
+            let before = self.position;
             let space = self.skip_space();
             let Some(next) = self.peek() else { break };
             let (inverse, operator) = match next {
@@ -341,13 +341,13 @@ impl UnitParser<'_> {
                 '/' => (true, true),
                 c if starts_unit(c) => (false, false),
                 _ => {
-                    self.at = before;
+                    self.position = before;
                     break;
                 }
             };
-            let symbol = self.at;
+            let symbol = self.position;
             if operator {
-                self.at += next.len_utf8();
+                self.position += next.len_utf8();
                 let space_after = self.skip_space();
                 match self.peek() {
                     None => {
@@ -359,10 +359,10 @@ impl UnitParser<'_> {
                     Some(_) if self.unit_here() => {
                         let word = self.word();
                         if space && space_after && (self.names.parameter)(word) {
-                            let span = self.at..self.at + word.len();
+                            let span = self.position..self.position + word.len();
                             let message =
                                 format!("`{word}` is ambiguous here: the unit `{word}` or the parameter `{word}`");
-                            let (before, after) = (self.text[..symbol].trim(), &self.text[self.at..]);
+                            let (before, after) = (self.text[..symbol].trim(), &self.text[self.position..]);
                             let help = format!(
                                 "for the unit remove the spaces around `{next}`; for the parameter write \"({}) \
                                  {next} {}\"",
@@ -375,7 +375,7 @@ impl UnitParser<'_> {
                     Some(_) if group => return Err(self.unknown()),
                     // the operator belongs to the expression, not to the unit
                     Some(_) => {
-                        self.at = before;
+                        self.position = before;
                         break;
                     }
                 }
@@ -386,9 +386,8 @@ impl UnitParser<'_> {
                 if divided {
                     let word = self.word();
                     let message = format!("it is not clear whether `{word}` belongs to the denominator");
-                    return Err(
-                        TextError::new(self.at..self.at + word.len(), message).help("write \"N s/m\" or \"N/(m s)\"")
-                    );
+                    return Err(TextError::new(self.position..self.position + word.len(), message)
+                        .help("write \"N s/m\" or \"N/(m s)\""));
                 }
             }
             divided |= inverse;
@@ -401,33 +400,33 @@ impl UnitParser<'_> {
 
     /// Returns whether the parenthesis at the current position contains only a unit.
     fn group_here(&self) -> bool {
-        let mut trial = UnitParser { text: self.text, at: self.at, names: self.names, depth: self.depth };
+        let mut trial = UnitParser { text: self.text, position: self.position, names: self.names, depth: self.depth };
         trial.factor().is_ok()
     }
 
     fn factor(&mut self) -> Result<Unit, TextError> {
-        let start = self.at;
+        let start = self.position;
         let unit = if self.peek() == Some('(') {
             self.depth += 1;
             if self.depth > DEEPEST {
                 return Err(TextError::new(start..start + 1, "too many parentheses in a unit"));
             }
-            self.at += 1;
+            self.position += 1;
             self.skip_space();
             if !self.peek().is_some_and(|c| starts_unit(c) || c == '(') {
-                return Err(TextError::new(self.at..self.at, "a unit is missing here"));
+                return Err(TextError::new(self.position..self.position, "a unit is missing here"));
             }
             let inner = self.product(true)?;
             self.skip_space();
             if self.peek() != Some(')') {
                 return Err(TextError::new(start..start + 1, "this parenthesis is not closed"));
             }
-            self.at += 1;
+            self.position += 1;
             self.depth -= 1;
             inner
         } else {
             let unit = find(self.word()).ok_or_else(|| self.unknown())?;
-            self.at += self.word().len();
+            self.position += self.word().len();
             unit
         };
         match self.exponent()? {
@@ -438,7 +437,7 @@ impl UnitParser<'_> {
 
     fn exponent(&mut self) -> Result<Option<i32>, TextError> {
         const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-        let start = self.at;
+        let start = self.position;
         let raised: String = self.rest().chars().take_while(|c| *c == '⁻' || RAISED.contains(c)).collect();
         let digits: String = if raised.is_empty() {
             let rest = self.rest().trim_start();
@@ -455,10 +454,10 @@ impl UnitParser<'_> {
                 rest = rest.strip_prefix(')').unwrap_or("\0");
             }
             let fault = rest.starts_with('\0') || digits.is_empty();
-            self.at = if fault { self.text.len() } else { self.text.len() - rest.len() };
+            self.position = if fault { self.text.len() } else { self.text.len() - rest.len() };
             if fault { String::new() } else { digits }
         } else {
-            self.at += raised.len();
+            self.position += raised.len();
             let plain = |c: char| match RAISED.iter().position(|r| *r == c) {
                 Some(digit) => (b'0' + digit as u8) as char,
                 None => '-',
@@ -468,7 +467,7 @@ impl UnitParser<'_> {
         match digits.parse::<i32>() {
             Ok(exponent) if exponent.abs() <= HIGHEST_POWER => Ok(Some(exponent)),
             _ => Err(TextError::new(
-                start..self.at,
+                start..self.position,
                 format!("the power of a unit must be a whole number from -{HIGHEST_POWER} to {HIGHEST_POWER}"),
             )
             .help("to raise a quantity to another power, put it in parentheses: \"(2 m)^0.5\"")),
@@ -476,15 +475,15 @@ impl UnitParser<'_> {
     }
 
     fn too_large(&self, start: usize) -> TextError {
-        TextError::new(start..self.at, "the powers in this unit are too large")
+        TextError::new(start..self.position, "the powers in this unit are too large")
     }
 
     fn unknown(&self) -> TextError {
         let word = self.word();
         if word.is_empty() {
-            return TextError::new(self.at..self.at, "a unit is missing here");
+            return TextError::new(self.position..self.position, "a unit is missing here");
         }
-        let span = self.at..self.at + word.len();
+        let span = self.position..self.position + word.len();
         let fault = TextError::new(span, format!("there is no unit `{}`", shown(word)));
         if (self.names.parameter)(word) {
             return fault.help(format!("a number is followed by its unit; for the parameter write \"* {word}\""));

@@ -53,12 +53,12 @@ pub struct ModelSummary {
     /// Size of the results and the memory.
     pub size: StudySize,
     /// Usual time on one thread, s; a rough estimate.
-    pub usual_seconds: f64,
+    pub usual_time_s: f64,
     /// Time without the work that only some results need, s, and the condition for it, in
     /// words.
-    pub spared: Option<(f64, &'static str)>,
+    pub time_without: Option<(f64, &'static str)>,
     /// Time if orbits are hard to find, s; a rough estimate on the high side.
-    pub seconds: f64,
+    pub longest_time_s: f64,
 }
 
 /// Number of orbits at one frequency.
@@ -105,12 +105,12 @@ pub struct JointSummary {
     /// Relative displacement at which it begins to slip, m; `None` if it is rigid until then.
     pub displacement: Option<f64>,
     /// True if it slips gradually before: micro-slip first, macro-slip at the limit.
-    pub gradual: bool,
+    pub micro_slip: bool,
     /// For the normal direction of a contact: its force if nothing deforms, N, zero if it is
     /// open. `None` for directions that slip.
-    pub pressed: Option<f64>,
+    pub normal_force: Option<f64>,
     /// The normal force at rest, after the structure has deformed, N; `None` if it is unknown.
-    pub at_rest: Option<f64>,
+    pub normal_force_at_rest: Option<f64>,
     /// Load by the excitation while all joints stick. `None` if the study has no excitation or
     /// the model is too large for a quick answer.
     pub onset: Option<Onset>,
@@ -174,9 +174,9 @@ impl ModelSummary {
             name: slip.joint,
             limit: slip.limit,
             displacement: slip.displacement,
-            gradual: slip.gradual,
-            pressed: slip.pressed,
-            at_rest: slip.at_rest,
+            micro_slip: slip.gradual,
+            normal_force: slip.pressed,
+            normal_force_at_rest: slip.at_rest,
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
@@ -190,7 +190,7 @@ impl ModelSummary {
         let (slow, usual) = (&costings[0], costings[0].usual());
         let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
         let whole = usual.seconds(&usual_cost);
-        let spared = usual_cost.spared.map(|(work, place)| {
+        let spared = usual_cost.conditional_work.map(|(work, place)| {
             let rest = Cost { work: usual_cost.work - work, ..usual_cost };
             (usual_seconds * usual.seconds(&rest) / whole, place)
         });
@@ -207,17 +207,17 @@ impl ModelSummary {
             orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| OrbitCount::new(first.system())),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
-            size: slow.size(&cost, WorkUnits::of(study, (kind.grain)(study)).len()),
-            usual_seconds,
-            spared,
-            seconds: seconds.max(usual_seconds),
+            size: slow.size(&cost, WorkUnits::of(study, (kind.unit_size)(study)).len()),
+            usual_time_s: usual_seconds,
+            time_without: spared,
+            longest_time_s: seconds.max(usual_seconds),
         })
     }
 
     /// Returns the announcement of a long run; `None` for a short one. The estimate is rough
     /// and for one thread.
     pub fn long_run(&self) -> Option<String> {
-        (self.seconds >= LONG_RUN).then(|| {
+        (self.longest_time_s >= LONG_RUN).then(|| {
             let time = self.time();
             format!(
                 "this run takes {time}; `check` estimates this in advance; Ctrl-C ends the run and keeps the \
@@ -228,16 +228,16 @@ impl ModelSummary {
 
     /// Describes the expected time in words.
     pub(crate) fn time(&self) -> String {
-        let mut usual = format!("{} on one thread", crate::syntax::format::about(self.usual_seconds));
-        if let Some((seconds, place)) = self.spared
-            && self.usual_seconds >= (WIDE * seconds).max(SOON)
+        let mut usual = format!("{} on one thread", crate::syntax::format::about(self.usual_time_s));
+        if let Some((seconds, place)) = self.time_without
+            && self.usual_time_s >= (WIDE * seconds).max(SOON)
         {
             usual += &format!(", {} {place}", crate::syntax::format::about(seconds));
         }
-        if self.seconds < WIDE * self.usual_seconds || self.seconds < SOON {
+        if self.longest_time_s < WIDE * self.usual_time_s || self.longest_time_s < SOON {
             return usual;
         }
-        format!("{usual}, up to {} if orbits are hard to find", crate::syntax::format::duration(self.seconds))
+        format!("{usual}, up to {} if orbits are hard to find", crate::syntax::format::duration(self.longest_time_s))
     }
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.
@@ -254,9 +254,9 @@ impl ModelSummary {
             json!({
                 "name": joint.name,
                 "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
-                "slips_gradually": joint.gradual,
-                "pressed_N": joint.pressed,
-                "pressed_at_rest_N": joint.at_rest,
+                "slips_gradually": joint.micro_slip,
+                "pressed_N": joint.normal_force,
+                "pressed_at_rest_N": joint.normal_force_at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
                 "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / load(onset)).filter(|x| x.is_finite()),
                 "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| load(onset) > 0.0).map(|onset| onset.at / TAU),
@@ -276,8 +276,8 @@ impl ModelSummary {
             "rows": self.size.rows,
             "result_bytes": self.size.results,
             "memory_bytes": self.size.memory,
-            "usual_time_s": self.usual_seconds,
-            "estimated_time_s": self.seconds,
+            "usual_time_s": self.usual_time_s,
+            "estimated_time_s": self.longest_time_s,
         })
     }
 }

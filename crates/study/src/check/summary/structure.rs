@@ -23,14 +23,14 @@ pub struct StructureSummary {
     /// Number of rows.
     pub rows: usize,
     /// Number of constrained rows of the files, which are left out.
-    pub left_out: usize,
+    pub constrained_rows: usize,
     /// Numbers of nonzero entries of stiffness and mass.
     pub entries: [usize; 2],
     /// Mass along x, y and z without the constrained rows, kg; `None` along a direction that no
     /// row name has.
     pub mass: [Option<f64>; 3],
     /// Error of an earlier reduction that produced the files.
-    pub earlier: Option<ReductionEvidence>,
+    pub earlier_reduction: Option<ReductionEvidence>,
     /// The reduced model; `None` if all rows are degrees of freedom.
     pub reduced: Option<ReducedSummary>,
 }
@@ -48,7 +48,7 @@ pub struct ReducedSummary {
     pub up_to: f64,
     /// Number of rigid-body motions of the whole structure; `None` for a sector, because the
     /// disk has a different number.
-    pub free: Option<usize>,
+    pub rigid_body_modes: Option<usize>,
     /// Its lowest elastic frequencies, rad/s.
     pub frequencies: Vec<f64>,
 }
@@ -62,22 +62,22 @@ impl StructureSummary {
             kind: reduced.kind().to_owned(),
             error: reduced.error(),
             up_to: reduced.up_to(),
-            free: Some(reduced.free()).filter(|_| one.case.model.ring.is_none()),
+            rigid_body_modes: Some(reduced.free()).filter(|_| one.case.model.ring.is_none()),
             frequencies: reduced.frequencies().iter().skip(reduced.free()).take(LISTED).copied().collect(),
         });
         Some(StructureSummary {
             rows: component.dofs(),
-            left_out: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.left_out),
+            constrained_rows: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.constrained_rows),
             entries: [stiffness.len(), mass.len()],
             mass: DIRECTIONS.map(|along| mass_along(component.rows(), component.matrices().0, along)),
-            earlier: *earlier,
+            earlier_reduction: *earlier,
             reduced,
         })
     }
 
     /// Returns the lines for a terminal: a name and a text each.
     pub(super) fn lines(&self) -> Vec<(&'static str, String)> {
-        let Self { rows, left_out, entries: [stiffness, mass], .. } = self;
+        let Self { rows, constrained_rows: left_out, entries: [stiffness, mass], .. } = self;
         let mut text = format!(
             "{rows} rows, {stiffness} entries of stiffness, {mass} of mass, symmetric, mass definite or semidefinite"
         );
@@ -88,8 +88,9 @@ impl StructureSummary {
         let hertz = |omega: f64| significant(omega / TAU, 6);
         let within =
             |error: f64, up_to: f64| format!("error {} % up to {} Hz", significant(100.0 * error, 2), hertz(up_to));
-        let before =
-            self.earlier.map(|earlier| format!("by an earlier reduction, {}", within(earlier.error, earlier.up_to)));
+        let before = self
+            .earlier_reduction
+            .map(|earlier| format!("by an earlier reduction, {}", within(earlier.error, earlier.up_to)));
         let Some(reduced) = &self.reduced else {
             lines.push(("reduced", before.unwrap_or_else(|| "no".to_owned())));
             return lines;
@@ -97,7 +98,7 @@ impl StructureSummary {
         lines.extend(before.map(|before| ("reduced", before)));
         let own: Vec<String> = reduced.frequencies.iter().map(|omega| hertz(*omega)).collect();
         let own = if own.is_empty() { "none computed".to_owned() } else { format!("{} Hz", own.join(", ")) };
-        let free = match reduced.free {
+        let free = match reduced.rigid_body_modes {
             None | Some(0) => String::new(),
             Some(free) => format!(", {free} rigid-body motion{}", plural(free)),
         };
@@ -136,17 +137,17 @@ impl StructureSummary {
                 "kind": reduced.kind,
                 "reduction_error": reduced.error,
                 "up_to_Hz": reduced.up_to / TAU,
-                "free_motions": reduced.free,
+                "free_motions": reduced.rigid_body_modes,
                 "frequencies_Hz": reduced.frequencies.iter().map(|omega| omega / TAU).collect::<Vec<_>>(),
             })
         });
         json!({
             "rows": self.rows,
-            "constrained_rows": self.left_out,
+            "constrained_rows": self.constrained_rows,
             "entries_of_stiffness": self.entries[0],
             "entries_of_mass": self.entries[1],
             "mass_kg": self.mass,
-            "reduced_before": self.earlier.map(|earlier| {
+            "reduced_before": self.earlier_reduction.map(|earlier| {
                 json!({ "reduction_error": earlier.error, "up_to_Hz": earlier.up_to / TAU })
             }),
             "reduced": reduced,

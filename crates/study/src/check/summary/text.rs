@@ -55,9 +55,9 @@ impl ModelSummary {
     }
 
     fn joint(&self, joint: &JointSummary) -> String {
-        match joint.pressed {
+        match joint.normal_force {
             Some(0.0) => return "open in static equilibrium: it closes and opens".to_owned(),
-            Some(preload) => return pressed(preload, joint.at_rest),
+            Some(preload) => return pressed(preload, joint.normal_force_at_rest),
             None => {}
         }
         if joint.limit == 0.0 {
@@ -66,11 +66,11 @@ impl ModelSummary {
         if joint.limit.is_infinite() {
             return "acts as a spring, never slips".to_owned();
         }
-        let (limit, slip) = (quantity(joint.limit, "N"), if joint.gradual { "macro-slip" } else { "slip" });
+        let (limit, slip) = (quantity(joint.limit, "N"), if joint.micro_slip { "macro-slip" } else { "slip" });
         let mut text = match joint.displacement {
             Some(displacement) => {
-                let verb = if joint.gradual { "macro-slip at" } else { "slips at" };
-                let before = if joint.gradual { ", micro-slip before" } else { "" };
+                let verb = if joint.micro_slip { "macro-slip at" } else { "slips at" };
+                let before = if joint.micro_slip { ", micro-slip before" } else { "" };
                 format!("{verb} {limit}, {} of relative displacement{before}", quantity(displacement, "m"))
             }
             None => format!("slips at {limit}, rigid until then"),
@@ -88,7 +88,7 @@ impl ModelSummary {
             text += "; the excitation does not reach it";
         } else if load(onset) == 0.0 {
             text += "; sticks, even under a million times the excitation";
-        } else if onset.slips.is_empty() && joint.gradual {
+        } else if onset.slips.is_empty() && joint.micro_slip {
             let share = significant(100.0 * onset.largest, 3);
             text += &format!("; only micro-slip, up to {share} % of the slip limit{at}");
         } else if onset.slips.is_empty() {

@@ -44,7 +44,7 @@ impl Reader {
 
     /// Reads the node coordinates of a sector, if a file is named.
     fn nodes(&mut self, stated: &CompiledTable) -> Option<Vec<Node>> {
-        let entry = stated.entry("nodes").filter(|_| !self.without_files)?;
+        let entry = stated.entry("nodes").filter(|_| !self.study_file_only)?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let read = self.text_of(name).and_then(|text| {
             let deck = text.trim_start_matches('\u{feff}').trim_start().starts_with('*');
@@ -67,7 +67,7 @@ impl Reader {
         columns: [&str; N],
         help: &str,
     ) -> Option<Vec<CsvRow<N>>> {
-        let entry = stated.entry(key).filter(|_| !self.without_files)?;
+        let entry = stated.entry(key).filter(|_| !self.study_file_only)?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let refuse =
             |(message, help): (String, Option<String>)| Problem::new(&entry.location, key, message).maybe_help(help);
@@ -82,7 +82,7 @@ impl Reader {
     /// Reads the deviations of a file, if a file is named.
     fn pattern(&mut self, mistuning: &CompiledTable) -> Option<Vec<f64>> {
         let file = mistuning.entry("file").map(|entry| (&entry.value, entry.location.clone()));
-        if self.without_files && file.is_some() {
+        if self.study_file_only && file.is_some() {
             return None;
         }
         let Some((CompiledValue::Fixed(ResolvedValue::Text(name)), location)) = file else {

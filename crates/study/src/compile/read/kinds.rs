@@ -160,7 +160,7 @@ impl Reader {
         let stated = root.get("figure").zip(key).and_then(|(entry, key)| self.value(key, &entry.node));
         match stated {
             Some(CompiledValue::Table(table)) => table,
-            _ => CompiledTable { location: Location::default(), entries: Vec::new(), turn: Default::default() },
+            _ => CompiledTable { location: Location::default(), entries: Vec::new(), repetition: Default::default() },
         }
     }
 }

@@ -102,7 +102,7 @@ impl Reader {
         self.repetition = repetition;
         let mut all = Vec::with_capacity(self.repetition.count());
         for number in 0..self.repetition.count() {
-            self.number = number;
+            self.turn_number = number;
             let before = self.problems.len();
             let mut stated = self.table(table, keys, owner);
             let turn = self.turn().words();
@@ -110,14 +110,14 @@ impl Reader {
                 for problem in &mut self.problems[before..] {
                     problem.message = format!("{} ({turn})", problem.message);
                 }
-                stated.turn = format!("{owner}, {turn}");
+                stated.repetition = format!("{owner}, {turn}");
             }
             all.push(stated);
             if self.problems.len() > before {
                 break;
             }
         }
-        (self.repetition, self.number) = (Repetition::default(), 0);
+        (self.repetition, self.turn_number) = (Repetition::default(), 0);
         all
     }
 
@@ -158,7 +158,7 @@ impl Reader {
                 refuse(key_location, format!("`{key}` is already a parameter"), help);
             } else {
                 match range.filter(|(from, to)| from <= to) {
-                    Some((from, to)) => indices.push(Index { name: key.clone(), from, to, wraps: false }),
+                    Some((from, to)) => indices.push(Index { name: key.clone(), from, to, wrap: false }),
                     None => {
                         let message = format!(
                             "expected a number of repetitions or [first, last], found {}",
@@ -186,7 +186,7 @@ impl Reader {
     fn wrap(&mut self, entry: &TomlEntry, indices: &mut [Index]) {
         let node = &entry.node;
         let named: Vec<&TomlNode> = match &node.value {
-            TomlValue::Flag(flag) => return indices.iter_mut().for_each(|index| index.wraps = *flag),
+            TomlValue::Flag(flag) => return indices.iter_mut().for_each(|index| index.wrap = *flag),
             TomlValue::List(list) => list.iter().collect(),
             _ => vec![node],
         };
@@ -197,7 +197,7 @@ impl Reader {
                 return;
             };
             match indices.iter_mut().find(|index| index.name == *text) {
-                Some(index) => index.wraps = true,
+                Some(index) => index.wrap = true,
                 None => {
                     let message = format!("there is no index `{}` in this entry", shown(text));
                     self.problems.push(Problem::new(&node.location, "wrap", message));

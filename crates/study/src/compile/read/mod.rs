@@ -170,7 +170,7 @@ pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Res
 /// # Errors
 /// Those of [`read_study`].
 pub fn read_stored(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
-    read(name, text, overrides, Reader { without_files: true, ..Reader::default() })
+    read(name, text, overrides, Reader { study_file_only: true, ..Reader::default() })
 }
 
 fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Reader) -> Result<Study, StudyError> {

@@ -25,10 +25,10 @@ pub(super) struct Reader {
     pub(super) template: Option<usize>,
     /// The repetition of the current entry, and the number of its current turn.
     pub(super) repetition: Repetition,
-    pub(super) number: usize,
+    pub(super) turn_number: usize,
     /// True if only the study file is read. Then only the names of a structure given by
     /// matrices are known.
-    pub(super) without_files: bool,
+    pub(super) study_file_only: bool,
 }
 
 impl Reader {
@@ -48,7 +48,7 @@ impl Reader {
 
     /// Returns the current turn of the repetition.
     pub(super) fn turn(&self) -> Iteration<'_> {
-        self.repetition.turn(self.number)
+        self.repetition.turn(self.turn_number)
     }
 
     /// Compiles an expression over the parameters and the indices of the turn.

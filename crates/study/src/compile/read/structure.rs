@@ -33,14 +33,17 @@ impl Reader {
         if self.problems.len() > before {
             return None;
         }
-        if self.without_files {
-            return Some(MatrixSource { table: stated, component: None, stiffened: None, left_out: 0 });
+        if self.study_file_only {
+            return Some(MatrixSource { table: stated, component: None, stress_stiffening: None, constrained_rows: 0 });
         }
         let folder = Path::new(study_file).parent().unwrap_or(Path::new(""));
         match read(&stated, folder) {
-            Ok((component, stiffened, left_out)) => {
-                Some(MatrixSource { table: stated, component: Some(component), stiffened, left_out })
-            }
+            Ok((component, stiffened, left_out)) => Some(MatrixSource {
+                table: stated,
+                component: Some(component),
+                stress_stiffening: stiffened,
+                constrained_rows: left_out,
+            }),
             Err(problem) => {
                 self.problems.push(problem);
                 None

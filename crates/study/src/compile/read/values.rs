@@ -89,7 +89,7 @@ impl Reader {
             };
             entries.extend(value.map(|value| CompiledEntry { key: key.name, location, value }));
         }
-        CompiledTable { location: table.location.clone(), turn: String::new(), entries }
+        CompiledTable { location: table.location.clone(), repetition: String::new(), entries }
     }
 
     /// Reads the default value of an absent key.
@@ -126,7 +126,7 @@ impl Reader {
                 self.name(key.name, text, *inner, &node.location)?,
                 node.location.clone(),
             )])),
-            (ValueType::Refused(why), _) => {
+            (ValueType::Unsupported(why), _) => {
                 self.problems.push(Problem::new(&node.location, key.name, *why).help(key.doc));
                 None
             }
@@ -178,10 +178,10 @@ impl Reader {
             (ValueType::File, TomlValue::Table(table)) => {
                 Some(CompiledValue::Table(self.table(table, schema::FILE_KEYS, &format!("`{}`", key.name))))
             }
-            (ValueType::TableOrNone(_), TomlValue::Flag(false)) => {
+            (ValueType::TableOrFalse(_), TomlValue::Flag(false)) => {
                 Some(CompiledValue::Fixed(ResolvedValue::Flag(false)))
             }
-            (ValueType::TableOrNone(keys), TomlValue::Table(table)) => {
+            (ValueType::TableOrFalse(keys), TomlValue::Table(table)) => {
                 Some(CompiledValue::Table(self.table(table, keys, &format!("`{}`", key.name))))
             }
             (ValueType::Row, TomlValue::Text { .. } | TomlValue::Number { whole: Some(_), .. }) => {
@@ -377,7 +377,7 @@ impl Reader {
                 Ok(expression) => {
                     return Some(CompiledQuantity {
                         location: location.clone(),
-                        inner: *inner,
+                        text_start: *inner,
                         text: text.clone(),
                         expression,
                     });
@@ -388,7 +388,7 @@ impl Reader {
                 let text = value.to_string();
                 return Some(CompiledQuantity {
                     location: location.clone(),
-                    inner: None,
+                    text_start: None,
                     text,
                     expression: Expression::number(*value),
                 });

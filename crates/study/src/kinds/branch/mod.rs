@@ -75,7 +75,7 @@ pub(super) const KIND: Kind = Kind {
         tables: &["branch", "peaks", "turns"],
     },
     // the cases of one branch along a parameter differ in the last parameter only
-    grain: |study| if along_parameter(study) { UnitSize::Curve } else { UnitSize::Case },
+    unit_size: |study| if along_parameter(study) { UnitSize::Curve } else { UnitSize::Case },
     cost,
     warnings: |cases| resonant(cases).into_iter().chain(undamped(cases)).collect(),
     compute,
@@ -107,7 +107,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         ],
         drawn: rows * costing.places,
         unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
-        spared: None,
+        conditional_work: None,
         work: rows * costing.extra() + steps * FOLLOWED * costing.sector() * costing.series(harmonics),
     }
 }

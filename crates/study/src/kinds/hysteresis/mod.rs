@@ -61,7 +61,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[LOOPS, SUMMARY],
     },
-    grain: |_| UnitSize::Frequencies,
+    unit_size: |_| UnitSize::Frequencies,
     cost,
     warnings: driven,
     compute,
@@ -85,7 +85,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         ],
         drawn: rows,
         unit: costing.kept_orbits() + costing.samples_bytes(),
-        spared: None,
+        conditional_work: None,
         work: points * (costing.orbit() + costing.reading(read)),
     }
 }
@@ -197,7 +197,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             summary.text(JOINT, name);
             summary.number(DISSIPATION, exact_loss(prepared, &orbit, source).unwrap_or(first.loss));
             summary.number(STIFFNESS, first.stiffness);
-            summary.number(DAMPING, first.damping);
+            summary.number(DAMPING, first.equivalent_damping);
             summary.number(RESIDUAL, orbit.evidence.residual);
             summary.number(ENERGY_GAP, orbit.evidence.energy_gap);
             summary.reduced(prepared.system.reduction_evidence());
@@ -284,7 +284,7 @@ fn exact_loss(prepared: &PreparedCase, orbit: &Orbit, source: &LoopSource) -> Op
 struct FirstHarmonic {
     loss: f64,
     stiffness: f64,
-    damping: f64,
+    equivalent_damping: f64,
 }
 
 /// Intervals of the quadrature per period. They end at the switches, so exact laws are smooth
@@ -320,7 +320,7 @@ impl FirstHarmonic {
                 0.5 * (a.1 + b.1) * (b.0 - a.0)
             })
             .sum();
-        FirstHarmonic { loss: area, stiffness, damping: reactive / omega }
+        FirstHarmonic { loss: area, stiffness, equivalent_damping: reactive / omega }
     }
 }
 

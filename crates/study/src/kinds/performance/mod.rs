@@ -41,7 +41,7 @@ pub(super) const KIND: Kind = Kind {
         adapts: false,
         tables: &[tables::PERFORMANCE, tables::OPTIMUM],
     },
-    grain: |_| UnitSize::Curve,
+    unit_size: |_| UnitSize::Curve,
     cost,
     warnings: sampled,
     compute,
@@ -65,7 +65,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: cases,
         unit: costing.orbit_bytes(),
         work: (cases + tried) * peak,
-        spared: (tried > 0.0).then_some((tried * peak, "if no optimum lies between the values")),
+        conditional_work: (tried > 0.0).then_some((tried * peak, "if no optimum lies between the values")),
     }
 }
 
@@ -85,7 +85,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
 fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     if work.case().case.varied.is_empty() || work.cases.len() < FEWEST_VALUES {
-        part.notes.push(Note::Said(format!(
+        part.notes.push(Note::Sentence(format!(
             "A performance curve needs at least {FEWEST_VALUES} values of one parameter: add vary = {{ Ft = [ … ] }} to [study]."
         )));
     }

@@ -35,7 +35,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         drawing,
         curve,
         index: curve.index(),
-        way_back: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.stretches(table))),
+        reverse_sweep: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.stretches(table))),
         references: drawing.table(tables::REFERENCES).map(|table| (table, references_by_case(drawing, table))),
         peaks: peaks_by_case(drawing),
         shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.stretches(table))),
@@ -47,15 +47,15 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         system: &system,
         shown,
         joints,
-        faces,
+        contact_joints: faces,
         failed: 0,
-        left_out: drawing.left_out(stretches.len()),
+        case_count_text: drawing.left_out(stretches.len()),
     };
     drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
     let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
         PanelLayout::Cases => {
             // the colour scale belongs to maps; the curves of one panel have names
-            let varied = (!drawn.faces.is_empty()).then(|| contact_states::axis("share of the period"));
+            let varied = (!drawn.contact_joints.is_empty()).then(|| contact_states::axis("share of the period"));
             Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
         }
         PanelLayout::Masses => Figure {

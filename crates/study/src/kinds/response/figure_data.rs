@@ -41,7 +41,7 @@ pub(super) struct FigureData<'a> {
     /// Names and indices of the shown places.
     pub(super) shown: Vec<(String, usize)>,
     /// Other orbits of the reverse sweep, and the rows of each case.
-    pub(super) way_back: Option<(&'a Table, Vec<CaseRows>)>,
+    pub(super) reverse_sweep: Option<(&'a Table, Vec<CaseRows>)>,
     /// The linear references, and the rows of each case that has different ones.
     pub(super) references: Option<(&'a Table, Vec<CaseRows>)>,
     /// The peaks inside the frequency range.
@@ -51,7 +51,7 @@ pub(super) struct FigureData<'a> {
     /// Names of the joints whose forces are shown.
     pub(super) joints: Vec<String>,
     /// Names of the joints whose contact states are shown.
-    pub(super) faces: Vec<String>,
+    pub(super) contact_joints: Vec<String>,
     /// The system of the first case; the other cases differ in numbers only.
     pub(super) system: &'a System,
     pub(super) axes: (Axis, Axis),
@@ -62,7 +62,7 @@ pub(super) struct FigureData<'a> {
     /// Number of points without an orbit among all drawn points.
     pub(super) failed: usize,
     /// States how many of the cases are shown, if not all.
-    pub(super) left_out: Option<String>,
+    pub(super) case_count_text: Option<String>,
 }
 
 impl FigureData<'_> {
@@ -86,7 +86,7 @@ impl FigureData<'_> {
     /// The curve belongs to one place with its peaks, or to the largest of several, in the same
     /// colour. Most figures have no such curve.
     pub(super) fn way_back(&self, stretch: &CaseRows, names: &[&str], colour: usize) -> Option<Series> {
-        let (table, stretches) = self.way_back.as_ref()?;
+        let (table, stretches) = self.reverse_sweep.as_ref()?;
         let rows = stretches.iter().find(|of| of.case == stretch.case)?.rows.clone();
         let x = numbers(table, DRIVE, rows.clone());
         let all: Vec<Vec<f64>> = names.iter().map(|name| numbers(table, &amplitude_of(name), rows.clone())).collect();

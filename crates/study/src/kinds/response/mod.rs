@@ -78,7 +78,7 @@ pub(super) const KIND: Kind = Kind {
         ],
     },
     // an amplification needs the whole curve
-    grain: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
+    unit_size: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
         true => UnitSize::Case,
         false => orbit_sweep::grain(study),
     },
@@ -142,7 +142,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
-        spared: None,
+        conditional_work: None,
         work: points * costing.extra()
             + (points + OTHERS * back + tuned * costing.frequencies) * costing.orbit()
             + (back + REFINING * refined) * costing.between()
@@ -181,7 +181,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let (points, others) = found.map_err(|error| (case.index, error))?;
     let mut part = stretch.part;
     let of = part.points.values().sum::<u64>() as usize;
-    part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, of });
+    part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, total: of });
     part.tables = vec![stretch.rows];
     let (mut amplified, mut shapes) = (TableBuilder::default(), TableBuilder::default());
     if !points.is_empty() && !work.context.stopped() {
@@ -200,7 +200,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
             if both_ways::is_followed(&prepared.system) {
-                peaks.flag(WAY_BACK, Some(found.way_back));
+                peaks.flag(WAY_BACK, Some(found.reverse_sweep));
             }
             peaks.reduced(prepared.system.reduction_evidence());
             peaks.end();
@@ -218,11 +218,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     if work.study.wants_references() && !references::are_known(work.study, case) {
         let (rows, absent) = references(work, &stretch.omegas);
         part.tables.push(rows);
-        part.notes.extend(absent.into_iter().map(Note::Said));
+        part.notes.extend(absent.into_iter().map(Note::Sentence));
     } else {
         part.tables.push(TableBuilder::default());
     }
-    part.tables.extend([amplified, shapes, stretch.way_back]);
+    part.tables.extend([amplified, shapes, stretch.reverse_sweep]);
     Ok(part)
 }
 
@@ -253,7 +253,7 @@ struct ResponseBuilder<'a> {
     part: UnitResult,
     rows: TableBuilder,
     /// Rows of the reverse sweep.
-    way_back: TableBuilder,
+    reverse_sweep: TableBuilder,
     omegas: Vec<f64>,
     stuck: usize,
 }
@@ -264,7 +264,7 @@ impl<'a> ResponseBuilder<'a> {
             prepared,
             part: UnitResult::default(),
             rows: TableBuilder::default(),
-            way_back: TableBuilder::default(),
+            reverse_sweep: TableBuilder::default(),
             omegas: Vec::new(),
             stuck: 0,
         }
@@ -292,7 +292,7 @@ impl<'a> ResponseBuilder<'a> {
         let points = others.iter().map(|Other { orbit, ratio }| {
             let note = Note::OtherOrbit { points: 1, from: orbit.omega, to: orbit.omega, ratios: [*ratio; 2] };
             note.join(&mut self.part.notes);
-            orbit_row(prepared, orbit.omega, &PointRow::new(prepared, Ok(orbit)), &mut self.way_back);
+            orbit_row(prepared, orbit.omega, &PointRow::new(prepared, Ok(orbit)), &mut self.reverse_sweep);
             Point::new(orbit, &|orbit| sought.quantities(orbit))
         });
         Ok(points.collect())

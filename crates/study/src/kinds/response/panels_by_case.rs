@@ -53,7 +53,13 @@ impl FigureData<'_> {
                 numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
             let over = (&x[..], &self.axes.0);
             let label = stretch.label();
-            panels.extend(contact_states::panels(self.curve, &self.faces, &stretch.rows, over, (&label, of_shares)));
+            panels.extend(contact_states::panels(
+                self.curve,
+                &self.contact_joints,
+                &stretch.rows,
+                over,
+                (&label, of_shares),
+            ));
         }
         if let Some(first) = panels.first_mut().filter(|_| room < stretches.len()) {
             let some = format!("the first {room} of {} cases", stretches.len());
@@ -66,7 +72,8 @@ impl FigureData<'_> {
     ///
     /// The shape of a disk is not counted, because it is left out if the figure is full.
     pub(super) fn panels_of_a_case(&self) -> usize {
-        let shares = if self.faces.is_empty() { 0 } else { contact_states::count(self.curve, &self.faces) };
+        let shares =
+            if self.contact_joints.is_empty() { 0 } else { contact_states::count(self.curve, &self.contact_joints) };
         usize::from(!self.shown.is_empty()) + usize::from(self.ring()) + usize::from(!self.joints.is_empty()) + shares
     }
 
@@ -140,7 +147,7 @@ impl FigureData<'_> {
             disk_shape::leaders(&all, disk_shape::MOST).into_iter().map(|place| all[place].clone()).collect();
         let bars = |colour: usize| {
             let around = &shape[colour];
-            let (x, y) = around.of.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
+            let (x, y) = around.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&around.place, x, y, first + colour)
         };
         let fit = (BARS / ring.sectors.max(1)).clamp(1, disk_shape::MOST);

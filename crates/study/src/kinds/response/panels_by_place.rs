@@ -36,7 +36,7 @@ impl FigureData<'_> {
             joints.map(move |(joint, alone)| self.cases_of_joint(&joint, group, outer, alone))
         });
         let of_faces = groups.iter().flat_map(|(group, outer)| {
-            let groups = contact_states::groups(&self.faces).into_iter().zip(of_shares..);
+            let groups = contact_states::groups(&self.contact_joints).into_iter().zip(of_shares..);
             groups.flat_map(move |(joints, alone)| self.shares_in_cases(&joints, group, outer, alone))
         });
         of_masses.chain(of_joints).chain(of_faces).take(MOST_PANELS).collect()
@@ -74,7 +74,7 @@ impl FigureData<'_> {
         for (name, joints) in self.pulling() {
             panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
         }
-        for named in contact_states::groups(&self.faces) {
+        for named in contact_states::groups(&self.contact_joints) {
             let of_case = |stretch: &CaseRows| self.share_line(stretch, &named.1, ContactState::Slip);
             let shares = self.share_panel(&named, ContactState::Slip, String::new());
             let title = shares.title.clone();
@@ -90,7 +90,7 @@ impl FigureData<'_> {
         let named = mass.filter(|_| panels > 1).map(str::to_owned);
         let thinned_out = match group.len() > MOST_CURVES {
             true => Some(format!("{MOST_CURVES} of {} cases", group.len())),
-            false => self.left_out.clone(),
+            false => self.case_count_text.clone(),
         };
         let mut panel = self.panel(join(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
         if mass.is_none() {

@@ -90,7 +90,7 @@ pub(super) struct FoundPeak {
     /// Amplitude (m) and phase (degrees) of every place, for a refined peak of a disk.
     pub(super) shape: Vec<f64>,
     /// True if only the reverse sweep has the peak.
-    pub(super) way_back: bool,
+    pub(super) reverse_sweep: bool,
 }
 
 impl FoundPeak {
@@ -110,7 +110,7 @@ pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> 
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
         let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
         let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
-        of_others.extend(found.map(|found| FoundPeak { way_back: true, ..found }));
+        of_others.extend(found.map(|found| FoundPeak { reverse_sweep: true, ..found }));
     }
     let sought = PeakQuantities::new(work.case());
     of_others.retain(|found| !is_of_the_way_there(found, &points, others, &sought));
@@ -119,7 +119,7 @@ pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> 
     all.retain(|found| !is_edge(found, &omegas, others, &sought));
     for found in of_others {
         match all.iter_mut().find(|other| is_same(other, &found, &omegas)) {
-            Some(same) if found.peak.value > same.peak.value => *same = FoundPeak { way_back: false, ..found },
+            Some(same) if found.peak.value > same.peak.value => *same = FoundPeak { reverse_sweep: false, ..found },
             Some(_) => {}
             None => all.push(found),
         }
@@ -132,7 +132,10 @@ pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> 
 fn is_same(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
     let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
     let (a, b) = (&there.peak, &back.peak);
-    !there.way_back && there.mass == back.mass && below(a) == below(b) && (a.value - b.value).abs() <= SAME * a.value
+    !there.reverse_sweep
+        && there.mass == back.mass
+        && below(a) == below(b)
+        && (a.value - b.value).abs() <= SAME * a.value
 }
 
 /// Returns true if a peak of the reverse sweep is only its jump to the orbits of the forward
@@ -178,7 +181,7 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
             .filter(falls)
             .map(|q| {
                 let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
-                FoundPeak { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), way_back: false }
+                FoundPeak { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), reverse_sweep: false }
             })
             .collect()
     };
@@ -201,7 +204,7 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
     inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
-        FoundPeak { mass, peak: found.peak, shape: found.values[count..].to_vec(), way_back: false }
+        FoundPeak { mass, peak: found.peak, shape: found.values[count..].to_vec(), reverse_sweep: false }
     });
     Ok(first.into_iter().chain(inner).chain(last).filter(|found| moves(&found.peak)).collect())
 }

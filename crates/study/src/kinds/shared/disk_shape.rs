@@ -12,7 +12,7 @@ use stickslip_numerics::leading::leading;
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::kinds) struct PlaceInSectors {
     pub(in crate::kinds) place: String,
-    pub(in crate::kinds) of: Vec<(usize, f64, f64)>,
+    pub(in crate::kinds) sectors: Vec<(usize, f64, f64)>,
 }
 
 impl PlaceInSectors {
@@ -25,7 +25,7 @@ impl PlaceInSectors {
         sectors: usize,
     ) -> PlaceInSectors {
         let lead = |sector: usize| 360.0 * (diameter * sector % sectors) as f64 / sectors as f64;
-        PlaceInSectors { place, of: (0..sectors).map(|sector| (sector, size, phase + lead(sector))).collect() }
+        PlaceInSectors { place, sectors: (0..sectors).map(|sector| (sector, size, phase + lead(sector))).collect() }
     }
 
     /// Groups places of a ring, with amplitude and phase, by their name in the sector.
@@ -38,15 +38,15 @@ impl PlaceInSectors {
         for (name, size, phase) in places {
             let (place, sector) = of_sector(name)?;
             match all.iter_mut().find(|around| around.place == place) {
-                Some(around) => around.of.push((sector, size, phase)),
-                None => all.push(PlaceInSectors { place, of: vec![(sector, size, phase)] }),
+                Some(around) => around.sectors.push((sector, size, phase)),
+                None => all.push(PlaceInSectors { place, sectors: vec![(sector, size, phase)] }),
             }
         }
         Some(all)
     }
 
     fn largest(&self) -> f64 {
-        self.of.iter().map(|(_, size, _)| *size).filter(|size| size.is_finite()).fold(0.0, f64::max)
+        self.sectors.iter().map(|(_, size, _)| *size).filter(|size| size.is_finite()).fold(0.0, f64::max)
     }
 }
 
@@ -93,10 +93,10 @@ pub(in crate::kinds) fn panel(
     colour: usize,
 ) -> Option<Panel> {
     let largest = places.iter().map(PlaceInSectors::largest).fold(0.0, f64::max);
-    let all = places.iter().flat_map(|around| &around.of);
+    let all = places.iter().flat_map(|around| &around.sectors);
     // the first of equal displacements determines the instant
     let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
-    if sectors < LEAST || places.iter().all(|around| around.of.len() < LEAST) {
+    if sectors < LEAST || places.iter().all(|around| around.sectors.len() < LEAST) {
         return None;
     }
     let shown = leaders(places, MOST);
@@ -111,7 +111,7 @@ pub(in crate::kinds) fn panel(
             let turn = *sector as f64 / sectors as f64;
             (at(turn, 1.0), at(turn, 1.0 + LARGEST * out))
         };
-        let PlaceInSectors { place: name, of } = &places[place];
+        let PlaceInSectors { place: name, sectors: of } = &places[place];
         let mut tips: Vec<_> = of.iter().map(tip).collect();
         // spokes from the circle at rest
         let nothing = (f64::NAN, f64::NAN);
@@ -127,7 +127,7 @@ pub(in crate::kinds) fn panel(
     series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
     let title = join([title, left_out]);
     let axis = || Axis::default().between(-ROOM, ROOM);
-    Some(Panel { title, x: axis(), y: axis(), series, picture: true })
+    Some(Panel { title, x: axis(), y: axis(), series, equal_axes: true })
 }
 
 #[cfg(test)]
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(of_sector("blade"), None);
         let all = PlaceInSectors::of_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
         assert_eq!(
-            all.iter().map(|around| (around.place.as_str(), around.of.len())).collect::<Vec<_>>(),
+            all.iter().map(|around| (around.place.as_str(), around.sectors.len())).collect::<Vec<_>>(),
             [("a", 2), ("b", 1)]
         );
         assert!(PlaceInSectors::of_ring([("rotor", 1.0, 0.0)]).is_none());

@@ -77,7 +77,7 @@ impl Expression {
         constant: &dyn Fn(&str) -> Option<f64>,
         names: &[&str],
     ) -> Result<Self, TextError> {
-        let mut parser = Parser { text, at: 0, index, constant, names, depth: 0, steps: Vec::new() };
+        let mut parser = Parser { text, position: 0, index, constant, names, depth: 0, steps: Vec::new() };
         parser.space();
         if parser.peek().is_none() {
             return Err(TextError::new(0..text.len(), "the text is empty: write a number or an expression"));

@@ -19,7 +19,7 @@ const DEEPEST: usize = 64;
 
 pub(super) struct Parser<'a> {
     pub(super) text: &'a str,
-    pub(super) at: usize,
+    pub(super) position: usize,
     pub(super) index: &'a dyn Fn(&str) -> Option<usize>,
     pub(super) constant: &'a dyn Fn(&str) -> Option<f64>,
     pub(super) names: &'a [&'a str],
@@ -29,7 +29,7 @@ pub(super) struct Parser<'a> {
 
 impl Parser<'_> {
     fn rest(&self) -> &str {
-        &self.text[self.at..]
+        &self.text[self.position..]
     }
 
     pub(super) fn peek(&self) -> Option<char> {
@@ -37,16 +37,16 @@ impl Parser<'_> {
     }
 
     pub(super) fn space(&mut self) {
-        self.at += self.rest().len() - self.rest().trim_start().len();
+        self.position += self.rest().len() - self.rest().trim_start().len();
     }
 
     fn next(&mut self, c: char) {
-        self.at += c.len_utf8();
+        self.position += c.len_utf8();
         self.space();
     }
 
     fn push(&mut self, operation: Operation, start: usize) {
-        let end = self.text[..self.at].trim_end().len().max(start);
+        let end = self.text[..self.position].trim_end().len().max(start);
         self.steps.push((operation, start..end));
     }
 
@@ -54,13 +54,14 @@ impl Parser<'_> {
         self.depth += 1;
         if self.depth > DEEPEST {
             let message = format!("more than {DEEPEST} nested parentheses or powers");
-            return Err(TextError::new(self.at..self.at, message).help("define parts of the expression as parameters"));
+            return Err(TextError::new(self.position..self.position, message)
+                .help("define parts of the expression as parameters"));
         }
         Ok(())
     }
 
     pub(super) fn sum(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         self.product()?;
         while let Some(c @ ('+' | '-' | '−')) = self.peek() {
             self.next(c);
@@ -71,13 +72,12 @@ impl Parser<'_> {
     }
 
     fn product(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         self.signed()?;
         while let Some(c @ ('*' | '/' | '·' | '⋅' | '×')) = self.peek() {
             if self.rest().starts_with("**") {
-                return Err(
-                    TextError::new(self.at..self.at + 2, "`**` is not an operator").help("write a power with `^`")
-                );
+                return Err(TextError::new(self.position..self.position + 2, "`**` is not an operator")
+                    .help("write a power with `^`"));
             }
             self.next(c);
             self.signed()?;
@@ -87,7 +87,7 @@ impl Parser<'_> {
     }
 
     fn signed(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         let mut negative = false;
         while let Some(c @ ('+' | '-' | '−')) = self.peek() {
             negative ^= c != '+';
@@ -101,7 +101,7 @@ impl Parser<'_> {
     }
 
     fn power(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         self.atom()?;
         if self.peek() == Some('^') {
             self.next('^');
@@ -114,7 +114,7 @@ impl Parser<'_> {
     }
 
     fn atom(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         match self.peek() {
             None => Err(TextError::new(start..start, "the expression ends too early: a value is missing here")),
             Some('(') => {
@@ -146,7 +146,7 @@ impl Parser<'_> {
     }
 
     fn number(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         let bytes = self.text.as_bytes();
         let digits = |mut at: usize| {
             while bytes.get(at).is_some_and(u8::is_ascii_digit) {
@@ -173,24 +173,24 @@ impl Parser<'_> {
             return Err(TextError::new(start..digits(end + 1), "this is not one number")
                 .help("use a decimal point and no digit grouping: \"10000.5 N/m\""));
         }
-        self.at = end;
+        self.position = end;
         self.space();
         let parameter = |name: &str| (self.index)(name).is_some() || (self.constant)(name).is_some();
         let function = |name: &str| FUNCTIONS.contains(&name);
         let names = ReservedNames { parameter: &parameter, function: &function };
         // `5000 1/m` means `5000 /m`; two numbers in a row have no other meaning
         if self.rest().strip_prefix('1').is_some_and(|rest| units::divides(rest, &names)) {
-            self.at += 1;
+            self.position += 1;
         }
         let value = match self.peek() {
             Some(c) if units::starts_unit(c) || units::divides(self.rest(), &names) => {
-                let (unit, end) = units::read(self.text, self.at, &names)?;
-                self.at = end;
+                let (unit, end) = units::read(self.text, self.position, &names)?;
+                self.position = end;
                 ExpressionValue::of(unit.scale(literal), unit.dimension)
             }
             Some('/') => match self.inverse_unit() {
                 Some((unit, inverse, end)) => {
-                    self.at = end;
+                    self.position = end;
                     ExpressionValue::of(literal.parse().unwrap_or(f64::NAN) / unit.scale("1"), inverse)
                 }
                 None => ExpressionValue::bare(literal.parse().unwrap_or(f64::NAN)),
@@ -216,7 +216,7 @@ impl Parser<'_> {
     ///
     /// Returns `None` if a parameter has the name of the unit.
     fn inverse_unit(&self) -> Option<(units::Unit, Dimension, usize)> {
-        let start = self.at + 1;
+        let start = self.position + 1;
         let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let name = self.text[start..].split(|c| !word(c)).next().filter(|name| !name.is_empty())?;
         let end = start + name.len();
@@ -228,11 +228,11 @@ impl Parser<'_> {
     }
 
     fn name(&mut self) -> Result<(), TextError> {
-        let start = self.at;
+        let start = self.position;
         let rest = self.rest();
         let end = start + rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
         let name = &self.text[start..end];
-        self.at = end;
+        self.position = end;
         self.space();
         if self.peek() == Some('(') {
             return self.call(name, start..end);
@@ -283,7 +283,7 @@ impl Parser<'_> {
                 None => fault.help(format!("the functions are {}; write a product with `*`", FUNCTIONS.join(", "))),
             });
         };
-        let open = self.at;
+        let open = self.position;
         self.next('(');
         self.deeper()?;
         let mut arguments = 1;
@@ -298,14 +298,17 @@ impl Parser<'_> {
         let several = matches!(function, "min" | "max");
         if several != (arguments > 1) {
             let needed = if several { "two or more arguments" } else { "one argument" };
-            return Err(TextError::new(span.start..self.at, format!("`{function}` takes {needed}, found {arguments}")));
+            return Err(TextError::new(
+                span.start..self.position,
+                format!("`{function}` takes {needed}, found {arguments}"),
+            ));
         }
         self.push(Operation::Call { function, arguments }, span.start);
         Ok(())
     }
 
     pub(super) fn unexpected(&self, c: char) -> TextError {
-        let span = self.at..self.at + c.len_utf8();
+        let span = self.position..self.position + c.len_utf8();
         match c {
             ')' => TextError::new(span, "this closing parenthesis has no opening parenthesis"),
             ',' => {
