@@ -99,7 +99,7 @@ fn main() -> ExitCode {
 /// study.
 fn new(name: &str, file: Option<&Path>) -> Ending {
     let Some(template) = templates::find(name) else {
-        let meant = templates::nearest(name).map_or_else(String::new, |near| format!("did you mean `{near}`? "));
+        let meant = templates::suggest(name).map_or_else(String::new, |near| format!("did you mean `{near}`? "));
         let names: Vec<&str> = templates::TABLE.iter().map(|t| t.name).collect();
         complain!("error: there is no template `{name}`; {meant}there are {}", names.join(", "));
         return Ending::WrongInput;

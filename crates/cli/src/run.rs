@@ -52,7 +52,7 @@ impl Request<'_> {
                 })
                 .and_then(|study| check_study(&study))
                 // With several studies, each releases the data that its run can compute again.
-                .map(|checked| if self.files.len() > 1 { checked.lean() } else { checked });
+                .map(|checked| if self.files.len() > 1 { checked.without_first_case() } else { checked });
             match study {
                 Ok(study) => studies.push(study),
                 Err(error) => {
@@ -457,7 +457,7 @@ pub fn paper(destination: &Destination, open: bool) -> Ending {
         Ok(threads) => threads,
         Err(ending) => return ending,
     };
-    let context = Context { stop: progress::stop_flag(), ..Context::unwatched(threads) };
+    let context = Context { stop: progress::stop_flag(), ..Context::without_progress(threads) };
     let say = |line: &str| {
         if std::io::stderr().is_terminal() {
             complain!("{line}");

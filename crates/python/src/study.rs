@@ -14,7 +14,7 @@ use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 use stickslip_study::dataset::{self, CellValues, Column};
 use stickslip_study::result_block::{Block, Tally};
-use stickslip_study::run::{CheckedStudy, check, redrawn, units};
+use stickslip_study::run::{CheckedStudy, check, figure_of_tables, units};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
 
 /// A study, read and checked.
@@ -318,7 +318,7 @@ impl PyStudy {
     /// Identification of the matrices in its files; ``None`` without such files.
     #[getter]
     fn _matrices(&self) -> Option<String> {
-        self.study.matrices_check()
+        self.study.matrices_checksum()
     }
 
     /// Computes the units from `start` to `stop` (exclusive) on one thread.
@@ -407,8 +407,8 @@ pub fn _joined<'py>(
         tally.append(serde_json::from_str(text).map_err(|cause| error::report(py, cause))?);
     }
     let mut whole = py.detach(|| {
-        let figure = redrawn(checked.study(), &all);
-        checked.outline(1).completed(all, figure, tally, Duration::ZERO)
+        let figure = figure_of_tables(checked.study(), &all);
+        checked.dataset_without_results(1).with_results(all, figure, tally, Duration::ZERO)
     });
     // The wall time of all batches, on all machines.
     whole.record.wall_time_s = seconds;

@@ -15,7 +15,7 @@ use stickslip_study::Study;
 use stickslip_study::dataset::Dataset;
 use stickslip_study::decimation::Decimation;
 use stickslip_study::result_block::{Block, Tally};
-use stickslip_study::run::drawn;
+use stickslip_study::run::draw;
 
 /// Reason why results cannot be assembled from journals.
 #[derive(Debug, thiserror::Error)]
@@ -135,8 +135,8 @@ fn written(
         rows.end()?;
     }
     let tables = thinning.tables();
-    let figure = drawn(study, &tables);
-    let dataset = parts.outline.clone().completed(tables, figure, tally, Duration::from_secs_f64(time));
+    let figure = draw(study, &tables);
+    let dataset = parts.outline.clone().with_results(tables, figure, tally, Duration::from_secs_f64(time));
     let mut files = Vec::new();
     // A run that was stopped before its first result has nothing to draw.
     let empty = dataset.record.interrupted && shapes.iter().all(|shape| shape.rows == 0);

@@ -57,7 +57,7 @@ pub struct Head {
 impl Head {
     /// Describes a run of these units.
     pub fn new(checked: &CheckedStudy, range: Range<usize>, threads: usize) -> Head {
-        Head { outline: checked.outline(threads), units: checked.units(), range }
+        Head { outline: checked.dataset_without_results(threads), units: checked.units(), range }
     }
 
     /// Returns a description of the difference between the runs of two journals.
@@ -502,7 +502,7 @@ mod tests {
     }
 
     fn units(checked: &CheckedStudy) -> Vec<Block> {
-        let context = Context::unwatched(1);
+        let context = Context::without_progress(1);
         (0..checked.units()).map(|unit| checked.block(unit..unit + 1, &context).unwrap()).collect()
     }
 

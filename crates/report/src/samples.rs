@@ -335,8 +335,8 @@ pub(crate) fn cases(count: usize) -> Dataset {
         let limit = (k + 1) as f64;
         let y = curve(120.0 + 20.0 * part, 0.012 + 0.12 * part * (1.0 - part));
         let top = (0..y.len()).max_by(|i, j| y[*i].total_cmp(&y[*j])).unwrap();
-        list.push(Series::marks("peak", vec![f[top]], vec![y[top]], k).of(limit));
-        list.push(Series::line(format!("Ft = {limit} N"), f.clone(), y, k).of(limit));
+        list.push(Series::marks("peak", vec![f[top]], vec![y[top]], k).with_value(limit));
+        list.push(Series::line(format!("Ft = {limit} N"), f.clone(), y, k).with_value(limit));
     }
     list.push(Series::line("free", f.clone(), curve(120.0, 0.001), 0).reference());
     list.push(Series { style: Style::Dotted, ..Series::line("stuck", f.clone(), curve(140.0, 0.004), 0).reference() });
@@ -362,7 +362,7 @@ pub(crate) fn masses() -> Dataset {
     let panel = |name: &str, height: f64| {
         let list = (0..12).map(|k| {
             let y = f.iter().map(|f| height * resonance(*f, 115.0 + 2.5 * f64::from(k), 0.02)).collect();
-            Series::line(name, f.clone(), y, k as usize).of(f64::from(1u32 << k))
+            Series::line(name, f.clone(), y, k as usize).with_value(f64::from(1u32 << k))
         });
         Panel {
             title: name.into(),

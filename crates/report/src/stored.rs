@@ -10,7 +10,7 @@ use crate::output::{FIGURES, Outputs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use stickslip_study::dataset::{CellValues, Column, Dataset, Record, Table};
-use stickslip_study::{Study, StudyError, read_stored, run};
+use stickslip_study::{Study, StudyError, read_for_results, run};
 
 /// Kind of a dataset that compares runs. Such a dataset has no study.
 pub const COMPARISON: &str = "comparison";
@@ -146,7 +146,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
         title: study.title().to_owned(),
         source: record["source"].as_str().map(str::to_owned),
         kind,
-        figure: run::redrawn(&study, &tables),
+        figure: run::figure_of_tables(&study, &tables),
         tables,
         notes: serde_json::from_value(part("notes")).unwrap_or_default(),
         failures: serde_json::from_value(part("failures")).unwrap_or_default(),
@@ -183,7 +183,7 @@ pub fn study_of(stored: &Value, path: &Path) -> Result<Study, StoredError> {
     };
     let set: Vec<(String, String)> = serde_json::from_value(stored["set"].clone()).unwrap_or_default();
     let failed = |cause| StoredError::Study { path: path.to_owned(), cause: Box::new(cause) };
-    let study = read_stored(&format!("{name}.toml"), text, &set).map_err(failed)?;
+    let study = read_for_results(&format!("{name}.toml"), text, &set).map_err(failed)?;
     match stored["cases"][0]["method"]["kind"].as_str() {
         Some(method) => study.with_method(method).map_err(failed),
         None => Ok(study),
@@ -336,11 +336,11 @@ impl Stored {
     ///
     /// Returns `true` if that version still describes the stored results.
     pub fn draw_like(&mut self, like: &Study) -> bool {
-        let cases = |study: &Study| study.resolved()["cases"].take();
+        let cases = |study: &Study| study.to_record()["cases"].take();
         let same = like.kind().name == self.study.kind().name && cases(like) == cases(&self.study);
-        self.study = self.study.clone().drawn_like(like);
+        self.study = self.study.clone().with_figure_of(like);
         self.dataset.title = self.study.title().to_owned();
-        self.dataset.figure = run::redrawn(&self.study, &self.dataset.tables);
+        self.dataset.figure = run::figure_of_tables(&self.study, &self.dataset.tables);
         same
     }
 }
@@ -389,7 +389,7 @@ amplitude = "2 N"
 
     fn ran(kind: &str) -> Dataset {
         let study = read_study("rub.toml", &format!("{STUDY}[study]\n{kind}\n"), &[]).unwrap();
-        run::run(&study, &Context::unwatched(1)).unwrap()
+        run::run(&study, &Context::without_progress(1)).unwrap()
     }
 
     fn written(kind: &str) -> (TempDir, PathBuf) {
@@ -519,7 +519,7 @@ amplitude = "2 N"
                     cut.columns.remove(column);
                     let mut tables = stored.dataset.tables.clone();
                     tables[t] = cut;
-                    assert_eq!(run::redrawn(&stored.study, &tables).title, "Rubbing");
+                    assert_eq!(run::figure_of_tables(&stored.study, &tables).title, "Rubbing");
                 }
             }
         }

@@ -187,7 +187,7 @@ pub fn compute(
 ) -> Result<Vec<Block>, StreamError> {
     let mut rest: Option<Block> = None;
     let missing = journal.units().end..journal.head().range.end;
-    let computed = checked.each(missing, context, &mut |block| {
+    let computed = checked.for_each_block(missing, context, &mut |block| {
         match &mut rest {
             Some(rest) => rest.append(block),
             None if !block.tally.is_whole() => rest = Some(block),

@@ -75,7 +75,7 @@ fn reduced(text: &str) -> String {
 }
 
 fn dataset(name: &str, text: &str) -> Dataset {
-    run(&study(name, text), &Context::unwatched(1)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    run(&study(name, text), &Context::without_progress(1)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn picture(dataset: &Dataset) -> String {

@@ -25,7 +25,7 @@ pub use case::stress_stiffening::StiffnessExports;
 pub use case::study::{Case, MethodChoice, Study, VariedValue};
 pub use case::values::{Frequencies, Values, hertz};
 pub use check::{cost, memory_limit, summary};
-pub use compile::read::{TemplateParameter, read_bytes, read_document, read_file, read_stored, read_study};
+pub use compile::read::{TemplateParameter, read_bytes, read_document, read_file, read_for_results, read_study};
 pub use compile::templates;
 pub use results::{dataset, decimation};
 pub use run::{result_block, work};

@@ -407,7 +407,7 @@ fn files_that_are_no_studies() {
 fn survives(text: &str) {
     match read_study("any.toml", text, &[]) {
         Ok(study) => {
-            study.resolved();
+            study.to_record();
         }
         Err(error) => {
             let line = error.to_string();

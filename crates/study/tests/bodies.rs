@@ -55,7 +55,7 @@ output = ["velocity", "acceleration", "harmonics"]
 
 fn dataset(text: &str) -> Dataset {
     let study = read_study("body.toml", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let found = run(&study, &Context::unwatched(1)).unwrap_or_else(|error| panic!("{error}"));
+    let found = run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"));
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     found
 }

@@ -8,7 +8,7 @@ use stickslip_study::{
 
 fn dataset(text: &str) -> Dataset {
     let study = read_study("study.toml", text, &[]).unwrap();
-    run(&study, &Context::unwatched(1)).unwrap()
+    run(&study, &Context::without_progress(1)).unwrap()
 }
 
 fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
@@ -440,7 +440,7 @@ frequency = { from = "1 rad/s", to = "2 rad/s", points = 2 }
 harmonics = 3
 "#;
     let study = read_study("study.toml", text, &[]).unwrap();
-    let error = run(&study, &Context::unwatched(1)).unwrap_err();
+    let error = run(&study, &Context::without_progress(1)).unwrap_err();
     assert_eq!(error.key(), Some("harmonics"));
     assert_eq!(error.line(), Some(17), "{error}");
 }

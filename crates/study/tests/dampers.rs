@@ -12,7 +12,7 @@ fn study(template: &str, parameters: &[(&str, String)], study: &str) -> Dataset 
     let parameters: String = parameters.iter().map(|(name, value)| format!("{name} = \"{value}\"\n")).collect();
     let text = format!("schema = 1\nmodel = {{ template = \"{template}\" }}\n[parameters]\n{parameters}\n{study}");
     let study = read_study("damper.toml", &text, &[]).unwrap_or_else(|error| panic!("{template}: {error}"));
-    let found = run(&study, &Context::unwatched(1)).unwrap_or_else(|error| panic!("{template}: {error}"));
+    let found = run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{template}: {error}"));
     assert!(found.failures.is_empty(), "{template}: {:?}", found.failures);
     found
 }

@@ -19,7 +19,7 @@ fn checked(files: &[(&str, &str)], text: &str) -> CheckedStudy {
 }
 
 fn run(checked: &CheckedStudy) -> Dataset {
-    let data = checked.run(&Context::unwatched(1)).unwrap();
+    let data = checked.run(&Context::without_progress(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     data
 }

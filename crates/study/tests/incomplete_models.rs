@@ -239,14 +239,14 @@ fn lacks(dataset: &Dataset) -> Option<String> {
 fn one(text: &str) -> Result<Ending, String> {
     let Ok(study) = read_study("study.toml", text, &[]) else { return Ok(Ending::Refused) };
     if check(&study).is_err() {
-        return match run(&study, &Context::unwatched(1)) {
+        return match run(&study, &Context::without_progress(1)) {
             Err(_) => Ok(Ending::Refused),
             Ok(_) => Err("check refuses it, and it runs".to_owned()),
         };
     }
     ModelSummary::new(&study).map_err(|error| format!("it has no summary: {error}"))?;
     let dataset =
-        run(&study, &Context::unwatched(1)).map_err(|error| format!("accepted, and then refused: {error}"))?;
+        run(&study, &Context::without_progress(1)).map_err(|error| format!("accepted, and then refused: {error}"))?;
     lacks(&dataset).map_or(Ok(Ending::Ran), Err)
 }
 
@@ -313,7 +313,7 @@ frequency = "100 Hz"
 "#;
     let study = read_study("study.toml", text, &[]).unwrap();
     check(&study).unwrap();
-    let found = run(&study, &Context::unwatched(1)).unwrap();
+    let found = run(&study, &Context::without_progress(1)).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     let work: f64 = found.tables.iter().find_map(|table| table.numbers("dissipation_J")).unwrap().iter().sum();
     // reference: 200,000 steps of a period in Python, for a slider whose limit is 0.4 of the

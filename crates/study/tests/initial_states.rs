@@ -6,7 +6,7 @@ use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
 fn dataset(text: &str) -> Dataset {
-    run(&read_study("study.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap()
+    run(&read_study("study.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap()
 }
 
 fn displacement(dataset: &Dataset, place: &str) -> Vec<f64> {

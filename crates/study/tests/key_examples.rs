@@ -271,7 +271,7 @@ fn walk(
     kind: Option<&'static kinds::Kind>,
     tried: &mut dyn FnMut(&str, &Key, Table),
 ) {
-    for key in keys.iter().filter(|key| key.is_taken()) {
+    for key in keys.iter().filter(|key| key.is_supported()) {
         if key.example != "[]" {
             tried(table, key, study_with(table, key, outer, kind));
         }

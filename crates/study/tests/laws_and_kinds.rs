@@ -67,7 +67,7 @@ fn refusals(outcome: &Result<Dataset, StudyError>) -> Vec<String> {
 /// Checks and runs a study; returns whether it was accepted.
 fn hold(what: &str, text: &str) -> bool {
     let study = read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{what}: {error}\n{text}"));
-    let (checked, run) = (check(&study), run(&study, &Context::unwatched(1)));
+    let (checked, run) = (check(&study), run(&study, &Context::without_progress(1)));
     match checked {
         Ok(_) => assert_eq!(refusals(&run), Vec::<String>::new(), "{what}: checked, and refused when it runs"),
         // the run refuses in the same words

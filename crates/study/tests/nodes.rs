@@ -59,7 +59,7 @@ fn read(study: &str) -> Result<Study, StudyError> {
 }
 
 fn dataset(study: &str) -> Dataset {
-    run(&read(study).unwrap(), &Context::unwatched(1)).unwrap()
+    run(&read(study).unwrap(), &Context::without_progress(1)).unwrap()
 }
 
 fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
@@ -201,7 +201,8 @@ fn a_turned_face_is_the_same_contact() {
             if place.is_empty() { "z" } else { "n" },
         )
     };
-    let result = |text: &str| run(&read_study("turned.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+    let result =
+        |text: &str| run(&read_study("turned.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
     let straight = result(&text("m", ""));
     let turned = result(&text("face", "[[place]]\nname = \"face\"\nof = \"m\"\nnormal = [\"-sin(a)\", 0, \"cos(a)\"]"));
     let column = |found: &Dataset, name: &str| found.tables[0].numbers(name).unwrap().to_vec();
@@ -257,7 +258,7 @@ fn normals_and_sizes_that_mislead_are_refused() {
             Ok(study) => study,
             Err(error) => return Some(error.to_string()),
         };
-        run(&study, &Context::unwatched(1)).err().map(|error| error.to_string())
+        run(&study, &Context::without_progress(1)).err().map(|error| error.to_string())
     };
     assert_eq!(refused(&good), None);
     let turned = good.replace(

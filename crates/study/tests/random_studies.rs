@@ -183,7 +183,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>, slowness: f64) -> R
     }
     let clock = Clock::start();
     let dataset =
-        run(&study, &Context::unwatched(1)).map_err(|error| format!("accepted, and then refused: {error}"))?;
+        run(&study, &Context::without_progress(1)).map_err(|error| format!("accepted, and then refused: {error}"))?;
     match fault(&study, &dataset) {
         Some(fault) => Err(fault),
         None => {

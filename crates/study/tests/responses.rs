@@ -7,7 +7,7 @@ use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
 fn dataset(text: &str) -> Dataset {
-    run(&read_study("study.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap()
+    run(&read_study("study.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap()
 }
 
 fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
@@ -953,7 +953,7 @@ fn a_unit_without_its_peaks_is_not_whole() {
     let rows = |block: &stickslip_study::result_block::Block, name: &str| {
         block.tables.iter().find(|table| table.name == name).unwrap().rows()
     };
-    let whole = checked.block(0..1, &Context::unwatched(1)).unwrap();
+    let whole = checked.block(0..1, &Context::without_progress(1)).unwrap();
     let points = rows(&whole, "curve");
     assert!(whole.tally.is_whole() && rows(&whole, "peaks") > 0 && points == 41);
     for last in [points - 1, points] {
@@ -964,7 +964,7 @@ fn a_unit_without_its_peaks_is_not_whole() {
                 set.store(true, Ordering::Relaxed);
             }
         };
-        let context = Context { stop, finished: Arc::new(count), ..Context::unwatched(1) };
+        let context = Context { stop, finished: Arc::new(count), ..Context::without_progress(1) };
         let cut = checked.block(0..1, &context).unwrap();
         assert!(!cut.tally.is_whole(), "stopped after {last} of {points} points");
     }

@@ -11,7 +11,7 @@ use stickslip_study::{Study, read_study};
 
 fn of(text: &str) -> (Study, Dataset) {
     let study = read_study("study.toml", text, &[]).unwrap();
-    let dataset = run(&study, &Context::unwatched(1)).unwrap();
+    let dataset = run(&study, &Context::without_progress(1)).unwrap();
     (study, dataset)
 }
 
@@ -187,11 +187,11 @@ const REFINED: f64 = 1e-9;
 #[test]
 fn performance_curves_are_made_of_the_peaks_of_responses() {
     let study = couple("performance", r#"kt = ["8000 N/m", "10000 N/m"], Ft = ["4 N", "6.5 N", "9 N"]"#);
-    let dataset = run(&study, &Context::unwatched(1)).unwrap();
+    let dataset = run(&study, &Context::without_progress(1)).unwrap();
     let curves = performance::curves(&study, &dataset).unwrap();
     let peak_of_response = |kt: f64, limit: f64| {
         let study = couple("response", &format!(r#"kt = ["{kt} N/m"], Ft = ["{limit} N"]"#));
-        let dataset = run(&study, &Context::unwatched(1)).unwrap();
+        let dataset = run(&study, &Context::without_progress(1)).unwrap();
         response::curves(&study, &dataset).unwrap()[0].masses[0].highest_peak().unwrap()
     };
     assert_eq!(curves.len(), 2);
@@ -240,7 +240,7 @@ vary = { c = ["0.1 kg/s", "0.2 kg/s", "0.3 kg/s"] }
 fn an_interrupted_run_has_what_was_finished() {
     let stopped = |kind: &str| {
         let study = couple(kind, r#"Ft = ["4 N", "6 N", "8 N"]"#);
-        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
+        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::without_progress(1) };
         let dataset = run(&study, &context).unwrap();
         assert!(dataset.record.interrupted);
         (study, dataset)

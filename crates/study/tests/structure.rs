@@ -83,7 +83,7 @@ fn results(folder: &Path, text: &str) -> Dataset {
     let path = folder.join("study.toml");
     std::fs::write(&path, text).unwrap();
     let study = read_file(&path, &[]).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     data
 }

@@ -253,7 +253,7 @@ fn warnings_stand_in_the_record() {
         "blade-couple",
         &[("from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241", "from = \"100 Hz\", to = \"110 Hz\", points = 3")],
     );
-    let context = Context::unwatched(1);
+    let context = Context::without_progress(1);
     let dataset = run(&study(&text), &context).unwrap();
     assert!(dataset.notes[0].starts_with("warning: no resonance"), "{:?}", dataset.notes);
     let record = &dataset.record.study["summary"];
@@ -272,7 +272,7 @@ fn an_optimum_at_the_edge_is_warned_of() {
             ("\"2 N\", \"4 N\", \"6 N\", \"8 N\"", "\"2 N\", \"3 N\", \"4 N\""),
         ],
     );
-    let context = Context::unwatched(1);
+    let context = Context::without_progress(1);
     let notes = run(&study(&text), &context).unwrap().notes;
     assert!(
         notes.iter().any(|note| note.starts_with("warning: the lowest peak is at an end of the values of Ft")),
@@ -284,7 +284,7 @@ fn an_optimum_at_the_edge_is_warned_of() {
 /// memory limit.
 fn refused(text: &str, key: &str) {
     let study = study(text).with_memory_limit(2_000_000_000);
-    let context = Context { finished: Arc::new(|| panic!("nothing is computed")), ..Context::unwatched(1) };
+    let context = Context { finished: Arc::new(|| panic!("nothing is computed")), ..Context::without_progress(1) };
     let error = run(&study, &context).unwrap_err();
     assert!(error.message().contains("GB of memory") && error.message().contains("the limit is 2.0 GB"), "{error}");
     assert!(error.help_text().unwrap().contains(key) && error.line().is_some(), "{error:?}");
@@ -355,7 +355,7 @@ fn a_branch_is_counted_by_what_it_keeps() {
 
 #[test]
 fn sizes_are_those_of_the_tables() {
-    let context = Context::unwatched(1);
+    let context = Context::without_progress(1);
     let small = ("points = 241", "points = 7");
     let one = ("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", "");
     let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";
@@ -755,7 +755,7 @@ fn references_that_no_law_has_are_missed_before_the_run() {
         assert!(warning.contains(&words), "{warning}");
     }
     // a run reports it once
-    let notes = run(&study(&text), &Context::unwatched(1)).unwrap().notes;
+    let notes = run(&study(&text), &Context::without_progress(1)).unwrap().notes;
     assert_eq!(notes.iter().filter(|note| note.contains("no reference curve")).count(), 2, "{notes:?}");
     silent(&stop("kind = \"gap\", gap = \"1 mm\", stiffness = \"1 N/mm\"", references));
 }
@@ -769,7 +769,7 @@ fn references_of_draws_are_missed_before_the_run() {
     let text = stop(law, sample).replace("schema = 1", "schema = 1\n[parameters]\nc = \"1 kg/s\"");
     let text = text.replace("damping = \"5 N s/m\"", "damping = \"c\"");
     warns(&text, &["`references` has no effect", "[sample]"]);
-    let found = run(&study(&text), &Context::unwatched(1)).unwrap();
+    let found = run(&study(&text), &Context::without_progress(1)).unwrap();
     assert!(found.tables.iter().all(|table| table.name != "references"));
     assert_eq!(found.notes.iter().filter(|note| note.contains("`references` has no effect")).count(), 1);
 }
@@ -845,7 +845,7 @@ fn what_the_structure_takes_of_a_preload() {
         };
         assert!(said.contains(words), "{words}: {said}");
         if left > 0.0 {
-            let data = run(&study(&text), &Context::unwatched(1)).unwrap();
+            let data = run(&study(&text), &Context::without_progress(1)).unwrap();
             let column =
                 data.tables[0].columns.iter().find(|c| c.name.starts_with("face_") && c.name.contains("z_force_mean"));
             let column = column.unwrap_or_else(|| panic!("{:?}", data.tables[0].columns.iter().map(|c| &c.name)));
@@ -1040,7 +1040,7 @@ fn bouc_wen_has_one_limit_and_both_references() {
     let found = summary(&text);
     assert!(found.to_string().contains("slips at 18.75 N, 1.25 mm of relative displacement"), "{found}");
     assert!(found.warnings.iter().all(|warning| !warning.contains("slip limit")), "{:?}", found.warnings);
-    let data = run(&study(&text), &Context::unwatched(1)).unwrap();
+    let data = run(&study(&text), &Context::without_progress(1)).unwrap();
     let table = data.tables.iter().find(|table| table.name == "references").unwrap();
     let column = |name: &str| table.numbers(name).unwrap();
     let linear = |k: f64, f: f64| {

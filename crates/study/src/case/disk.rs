@@ -1,13 +1,13 @@
 //! `[disk]`: the ring of a model that states one sector, tuned or mistuned.
 
-use crate::case::model_builder::{sector_of, whole};
+use crate::case::model_builder::{build_model, whole_number};
 use crate::case::values::{ResolvedValue, Values};
 use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
-use crate::compile::source_model::{DiskSource, SourceModel, problem_of};
+use crate::compile::source_model::{DiskSource, SourceModel, model_problem};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::ExpressionValue;
 use crate::syntax::key::MOST_MASSES;
-use crate::syntax::suggest::{nearest, shown};
+use crate::syntax::suggest::{excerpt, suggest};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Mistuned, Model, normal_pattern, too_far};
@@ -40,13 +40,13 @@ pub(crate) fn ring_of(
     problems: &mut Vec<Problem>,
 ) -> Model {
     let before = problems.len();
-    let (mut first, forces, motions) = sector_of(structure, environment, problems);
+    let (mut first, forces, motions) = build_model(structure, environment, problems);
     let values = disk.table.values(environment, problems);
     if problems.len() > before {
         return first;
     }
     let made = sectors(disk, &values).and_then(|sectors| {
-        tied(structure, disk, sectors, &mut first).map_err(|problem| vec![problem])?;
+        tie_sectors(structure, disk, sectors, &mut first).map_err(|problem| vec![problem])?;
         let around = Disk { sectors, forces, motions };
         let deviations = deviations(disk, &values, sectors)?;
         let all = match &deviations {
@@ -72,7 +72,7 @@ pub(crate) fn ring_of(
             vec![if error.element == Element::Whole {
                 Problem::new(disk.table.location_of(error.key, None), error.key, error.message.clone())
             } else {
-                problem_of(structure, &error, &first)
+                model_problem(structure, &error, &first)
             }]
         })
     });
@@ -83,7 +83,7 @@ pub(crate) fn ring_of(
 }
 
 /// Ties a sector given by matrices to the next sector.
-fn tied(structure: &SourceModel, disk: &DiskSource, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
+fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
     let problem = |key: &'static str, message: String| Problem::new(table.location_of(key, None), key, message);
     if structure.matrices.is_none() {
@@ -111,7 +111,7 @@ fn tied(structure: &SourceModel, disk: &DiskSource, sectors: usize, sector: &mut
     let nodes = disk.blade.as_deref();
     let blade = blade_rows(component, nodes.unwrap_or_default());
     let blade =
-        blade.map_err(|node| problem("blade", format!("the structure has no rows of node `{}`", shown(node))))?;
+        blade.map_err(|node| problem("blade", format!("the structure has no rows of node `{}`", excerpt(node))))?;
     if nodes.is_some() && blade.is_empty() {
         let help = "list all nodes of the blade, without the nodes of the disk";
         return Err(problem("blade", "the file contains no node".to_owned()).help(help));
@@ -120,7 +120,7 @@ fn tied(structure: &SourceModel, disk: &DiskSource, sectors: usize, sector: &mut
     if let Some(row) = blade.iter().find(|row| shared.contains(*row)) {
         let message = format!(
             "row `{}` of the blade is on the boundary of the sector, so it would belong to two blades",
-            shown(&component.rows()[*row])
+            excerpt(&component.rows()[*row])
         );
         return Err(problem("blade", message).help("remove the nodes that `boundary` lists"));
     }
@@ -190,7 +190,7 @@ fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usiz
 }
 
 fn sectors(disk: &DiskSource, values: &Values) -> Result<usize, Vec<Problem>> {
-    let sectors = whole(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
+    let sectors = whole_number(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
     usize::try_from(sectors).ok().filter(|sectors| *sectors >= LEAST_SECTORS).ok_or_else(|| {
         let message = format!("a disk needs at least {LEAST_SECTORS} sectors, found {sectors}");
         vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]
@@ -207,7 +207,7 @@ fn deviations(disk: &DiskSource, values: &Values, sectors: usize) -> Result<Opti
         }
         return Ok(Some(pattern.clone()));
     }
-    let seed = whole(table, mistuning, "seed").map_err(|problem| vec![problem])?.unwrap_or(0);
+    let seed = whole_number(table, mistuning, "seed").map_err(|problem| vec![problem])?.unwrap_or(0);
     let deviation = mistuning.quantity("deviation").unwrap_or(0.0);
     Ok(Some(normal_pattern(sectors, deviation, seed as u64)))
 }
@@ -228,7 +228,7 @@ fn mistuned(
     let Some(CompiledValue::Table(table)) = disk.table.entry("mistuning").map(|entry| &entry.value) else {
         return Ok(Vec::new());
     };
-    let of = target(disk, table, environment, first).map_err(|problem| vec![problem])?;
+    let of = mistuned_quantity(disk, table, environment, first).map_err(|problem| vec![problem])?;
     if let Some(message) = too_far(deviations) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
         let problem = Problem::new(table.location_of(key, None), key, message);
@@ -243,7 +243,7 @@ fn mistuned(
                 let values = again(&[(*index, changed)]).map_err(|problem| vec![problem])?;
                 let mut problems = Vec::new();
                 let (model, ..) =
-                    sector_of(structure, &Environment { names: environment.names, values }, &mut problems);
+                    build_model(structure, &Environment { names: environment.names, values }, &mut problems);
                 if !problems.is_empty() {
                     problems.iter_mut().for_each(|problem| problem.message += &format!(" (sector {sector})"));
                     return Err(problems);
@@ -270,7 +270,7 @@ fn mistuned(
 }
 
 /// Finds the quantity that `of` names.
-fn target(
+fn mistuned_quantity(
     disk: &DiskSource,
     table: &CompiledTable,
     environment: &Environment<'_>,
@@ -299,21 +299,21 @@ fn target(
                 return Ok(MistunedQuantity::Part(mass));
             }
             let known = environment.names.iter().chain(sector.masses.iter().map(|mass| &mass.name));
-            let help = match nearest(name, known.map(String::as_str)) {
+            let help = match suggest(name, known.map(String::as_str)) {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => {
                     "name a parameter of [parameters], a mass, or the two ends of a spring: [\"blade\", \"ground\"]"
                         .into()
                 }
             };
-            Err(Problem::new(place, "of", format!("there is no parameter or mass `{}`", shown(name))).help(help))
+            Err(Problem::new(place, "of", format!("there is no parameter or mass `{}`", excerpt(name))).help(help))
         }
         [a, b] => {
             let spring = Mistuned::Spring([a.clone(), b.clone()]);
             if spring.is_in(sector) {
                 return Ok(MistunedQuantity::Part(spring));
             }
-            let message = format!("there is no spring between `{}` and `{}`", shown(a), shown(b));
+            let message = format!("there is no spring between `{}` and `{}`", excerpt(a), excerpt(b));
             Err(Problem::new(place, "of", message).help("write the ends as in [[spring]]"))
         }
         _ => Err(Problem::new(place, "of", "expected one name, or the two ends of a spring")),

@@ -10,7 +10,7 @@ pub(crate) const EQUILIBRIUM: &str = "equilibrium";
 pub(crate) const UNLOADED: &str = "unloaded";
 
 /// Returns the values of the key `begin` with their meaning.
-pub(crate) fn beginnings() -> Vec<(&'static str, &'static str)> {
+pub(crate) fn begin_values() -> Vec<(&'static str, &'static str)> {
     vec![
         (
             EQUILIBRIUM,
@@ -29,27 +29,27 @@ pub(crate) struct Start {
 
 /// Returns the value of each named place by its row. Skips places that are not a degree of
 /// freedom themselves.
-fn rows(system: &System, given: Option<&BTreeMap<String, f64>>) -> BTreeMap<usize, f64> {
+fn values_by_row(system: &System, given: Option<&BTreeMap<String, f64>>) -> BTreeMap<usize, f64> {
     let places = system.places().iter().zip(system.seen());
     let named = places.filter_map(|(place, along)| Some((along.rows(), *given?.get(place)?)));
     named.filter_map(|(rows, value)| if let [(row, _)] = rows { Some((*row, value)) } else { None }).collect()
 }
 
 /// Returns displacements or velocities of all degrees of freedom: as given, zero elsewhere.
-pub(crate) fn given(system: &System, given: Option<&BTreeMap<String, f64>>) -> Vec<f64> {
+pub(crate) fn state_vector(system: &System, given: Option<&BTreeMap<String, f64>>) -> Vec<f64> {
     let mut state = vec![0.0; system.dofs()];
-    rows(system, given).into_iter().for_each(|(row, value)| state[row] = value);
+    values_by_row(system, given).into_iter().for_each(|(row, value)| state[row] = value);
     state
 }
 
 /// Returns the static equilibrium with the places of `start` held; `None` if it is not found.
-pub(crate) fn pulled(model: &Model, system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
+pub(crate) fn held_equilibrium(model: &Model, system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
     let mut held = model.clone();
     for (place, value) in start.into_iter().flatten() {
         held.motions.push(Motion { on: place.clone(), amplitude: *value, phase: 0.0, harmonic: 0 });
     }
     let held = held.assemble().ok()?;
-    let fixed = rows(system, start);
+    let fixed = values_by_row(system, start);
     let equilibrium = StaticEquilibrium::of(&held)?;
     // restores the held rows, which the equilibrium does not contain
     let mut free = equilibrium.displacement().iter();

@@ -35,14 +35,14 @@ impl LinearReference {
                 LinearReference::Stuck => law.stuck(),
             };
             let none =
-                || self.missing(&format!("the law `{}` of joint `{}` has no slip limit", law.name(), joint.name));
+                || self.no_reference(&format!("the law `{}` of joint `{}` has no slip limit", law.name(), joint.name));
             joint.law = changed.ok_or_else(none)?;
         }
         Ok(model)
     }
 
     /// Returns the sentence that says why there is no such reference curve.
-    pub fn missing(self, why: &str) -> String {
+    pub fn no_reference(self, why: &str) -> String {
         format!("there is no reference curve with all joints {}: {why}", self.name())
     }
 }

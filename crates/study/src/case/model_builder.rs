@@ -14,13 +14,13 @@ use stickslip::model::{
 };
 
 /// Returns the places of the structure given by matrices.
-fn own(lists: &ModelLists) -> impl Iterator<Item = &CompiledTable> {
+fn structure_places(lists: &ModelLists) -> impl Iterator<Item = &CompiledTable> {
     lists.place.iter().filter(|table| table.entry("of").is_none())
 }
 
 /// Builds the model that the lists state, and the distribution of its forces and imposed
 /// motions over the sectors.
-pub(crate) fn sector_of(
+pub(crate) fn build_model(
     structure: &SourceModel,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
@@ -31,19 +31,19 @@ pub(crate) fn sector_of(
     let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());
     match (matrices, component) {
         (Some(matrices), Some(component)) => {
-            model.substructure = Some(substructure::of(matrices, component, environment, problems));
-            for table in own(lists) {
+            model.substructure = Some(substructure::structure_from_table(matrices, component, environment, problems));
+            for table in structure_places(lists) {
                 model.places.extend(substructure::place(table, component, environment, problems));
             }
         }
         // the matrices were not read: masses stand in for the places, and only their names
         // count
         (Some(_), None) => {
-            let values = own(lists).map(|table| (table, table.values(environment, problems)));
-            model.masses.extend(values.map(|(table, values)| substructure::stand_in(table, &values)));
+            let values = structure_places(lists).map(|table| (table, table.values(environment, problems)));
+            model.masses.extend(values.map(|(table, values)| substructure::placeholder_mass(table, &values)));
         }
         (None, _) => {
-            if let Some(place) = own(lists).next() {
+            if let Some(place) = structure_places(lists).next() {
                 let message = "this place belongs to a structure, but the study has no [structure]";
                 let help = "add [structure] with `stiffness` and `mass`; for a point mass use [[mass]]; for a point \
                     or a face of a [[body]] or [[mass]] add `of` to the place";
@@ -91,7 +91,7 @@ pub(crate) fn sector_of(
         if values.entries.len() < table.entries.len() {
             continue; // an unreadable value was reported already
         }
-        match substructure::view(table, &values, &model) {
+        match substructure::place_on_element(table, &values, &model) {
             Ok(place) => model.places.push(place),
             Err(problem) => wrong.push(*problem),
         }
@@ -106,7 +106,7 @@ pub(crate) fn sector_of(
         if let Some(ratio) = values.quantity(RATIO) {
             match critical_damping(&spring, lists, &model.masses) {
                 Ok(critical) => spring.damping = ratio * critical,
-                Err(why) => wrong.push(no_ratio(table, &why)),
+                Err(why) => wrong.push(damping_ratio_problem(table, &why)),
             }
         }
         model.springs.push(spring);
@@ -123,20 +123,20 @@ pub(crate) fn sector_of(
         // without a law there is a problem, and the model is not used
         if let Some(law) = values.law("law") {
             let between = between(&values);
-            let law = for_nodes(law, table, &between, &nodes);
+            let law = with_node_tangents(law, table, &between, &nodes);
             model.joints.push(Joint { name: text(&values, "name"), between, law });
         }
     }
     for (i, table) in lists.force.iter().enumerate() {
         let values = resolve(Element::Force(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
-        forces.push(around(table, &values, &mut wrong));
+        forces.push(sector_distribution(table, &values, &mut wrong));
         model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     for (i, table) in lists.motion.iter().enumerate() {
         let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
-        motions.push(around(table, &values, &mut wrong));
+        motions.push(sector_distribution(table, &values, &mut wrong));
         model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     problems.append(&mut wrong);
@@ -163,7 +163,7 @@ fn inertia(table: &CompiledTable, directions: &[String], stated: &[f64]) -> Resu
                 2 => "give a list of two moments of inertia",
                 _ => "give a list of the moments about x, y, z, or of the six entries xx, yy, zz, xy, yz, zx",
             };
-            let problem = Problem::new(table.location_of("inertia", None), "inertia", table.with_turn(&message));
+            let problem = Problem::new(table.location_of("inertia", None), "inertia", table.with_repetition(&message));
             return Err(problem.help(help));
         }
     }
@@ -200,9 +200,9 @@ fn critical_damping(spring: &Spring, lists: &ModelLists, masses: &[Mass]) -> Res
 }
 
 /// Returns the problem that a damping ratio has no meaning at this spring.
-fn no_ratio(table: &CompiledTable, why: &str) -> Problem {
+fn damping_ratio_problem(table: &CompiledTable, why: &str) -> Problem {
     let message = format!("a damping ratio needs a stiffness and a mass, but {why}");
-    Problem::new(table.location_of(RATIO, None), RATIO, table.with_turn(&message)).help(
+    Problem::new(table.location_of(RATIO, None), RATIO, table.with_repetition(&message)).help(
         "write damping = \"2*zeta*sqrt(k*m)\" with the parameters zeta, k and the moving mass m; for a structure \
          given by matrices use `modal_damping` in [structure]",
     )
@@ -210,7 +210,7 @@ fn no_ratio(table: &CompiledTable, why: &str) -> Problem {
 
 /// Sets the number of tangents of a law to that of the nodes that the joint connects: all their
 /// directions except the normal. A number in the file takes precedence.
-fn for_nodes(
+fn with_node_tangents(
     law: &SharedLaw,
     joint: &CompiledTable,
     between: &[String; 2],
@@ -228,10 +228,10 @@ fn for_nodes(
 }
 
 /// Returns the distribution of an entry of a list over the sectors.
-pub(crate) fn around(table: &CompiledTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
+pub(crate) fn sector_distribution(table: &CompiledTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
     let mut found = Vec::new();
     for key in ["engine_order", "nodal_diameter", "sector"] {
-        match whole(table, values, key) {
+        match whole_number(table, values, key) {
             Ok(Some(number)) => found.push((key, number)),
             Ok(None) => {}
             Err(problem) => problems.push(problem),
@@ -253,7 +253,7 @@ pub(crate) fn around(table: &CompiledTable, values: &Values, problems: &mut Vec<
 }
 
 /// Reports an entry that states a distribution over sectors although the study has no disk.
-pub(crate) fn none_around(table: &CompiledTable, problems: &mut Vec<Problem>) {
+pub(crate) fn refuse_without_disk(table: &CompiledTable, problems: &mut Vec<Problem>) {
     for key in ["engine_order", "nodal_diameter", "sector"] {
         if let Some(entry) = table.entry(key) {
             let message = format!("`{key}` needs a bladed disk, but the study has no [disk]");
@@ -267,7 +267,7 @@ pub(crate) fn none_around(table: &CompiledTable, problems: &mut Vec<Problem>) {
 const MOST: f64 = 1e9;
 
 /// Returns the value of a key, which must be a whole number; `None` if the key is absent.
-pub(crate) fn whole(table: &CompiledTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
+pub(crate) fn whole_number(table: &CompiledTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
     let Some(value) = values.quantity(key) else { return Ok(None) };
     if value.fract() == 0.0 && value.abs() <= MOST {
         return Ok(Some(value as i64));

@@ -5,7 +5,7 @@
 //! takes one place refuses such a name and lists the directions.
 
 use crate::kinds::info::KeyError;
-use crate::syntax::suggest::{nearest, one_of, shown};
+use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use std::collections::BTreeSet;
 use stickslip::model::Model;
 
@@ -28,28 +28,28 @@ fn entries(name: &str, labels: Vec<String>) -> Vec<(String, Vec<String>)> {
     entries
 }
 
-fn of_bodies(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
+fn body_places(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.bodies.iter().flat_map(|body| entries(&body.name, body.places()))
 }
 
-fn of_masses(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
+fn mass_places(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places()))
 }
 
 impl ModelNames {
     /// The places of the structure, of masses and of bodies, and their nodes.
-    pub fn of_places(model: &Model) -> ModelNames {
+    pub fn places(model: &Model) -> ModelNames {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
-        let mut names = ModelNames { known: places.chain(of_masses(model)).chain(of_bodies(model)).collect() };
-        names.around(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
-        names.around(model, model.bodies.iter().map(|body| (body.name.as_str(), body.places())).collect());
-        names.around(model, model.places.iter().map(|place| (place.name.as_str(), place.places())).collect());
+        let mut names = ModelNames { known: places.chain(mass_places(model)).chain(body_places(model)).collect() };
+        names.add_sector_names(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
+        names.add_sector_names(model, model.bodies.iter().map(|body| (body.name.as_str(), body.places())).collect());
+        names.add_sector_names(model, model.places.iter().map(|place| (place.name.as_str(), place.places())).collect());
         names
     }
 
     /// Adds the sector's names: `blade` stands for the blades of all sectors. `all` are the
     /// elements of the ring, in order.
-    fn around(&mut self, model: &Model, all: Vec<(&str, Vec<String>)>) {
+    fn add_sector_names(&mut self, model: &Model, all: Vec<(&str, Vec<String>)>) {
         let Some(ring) = model.ring else { return };
         let each = all.len() / ring.sectors.max(1);
         for (i, (name, _)) in all.iter().enumerate().take(each) {
@@ -67,21 +67,21 @@ impl ModelNames {
     }
 
     /// The places that are displacements, not rotations: their amplitudes can be compared.
-    pub fn of_displacements(model: &Model) -> ModelNames {
-        let mut names = ModelNames::of_places(model);
+    pub fn displacements(model: &Model) -> ModelNames {
+        let mut names = ModelNames::places(model);
         names.known.iter_mut().for_each(|(_, places)| places.retain(|place| !model.is_rotation(place)));
         names.known.retain(|(_, places)| !places.is_empty());
         names
     }
 
     /// The displacements of masses and bodies whose motion is not imposed.
-    pub fn of_free_masses(model: &Model) -> ModelNames {
-        let displacements = of_bodies(model).map(|(name, mut places)| {
+    pub fn free_displacements(model: &Model) -> ModelNames {
+        let displacements = body_places(model).map(|(name, mut places)| {
             places.retain(|place| !model.is_rotation(place));
             (name, places)
         });
         let of_bodies = displacements.filter(|(_, places)| !places.is_empty());
-        let mut names = ModelNames { known: of_masses(model).chain(of_bodies).collect() };
+        let mut names = ModelNames { known: mass_places(model).chain(of_bodies).collect() };
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
@@ -89,17 +89,17 @@ impl ModelNames {
 
     /// Adds the joints and their directions.
     #[must_use]
-    pub fn and_joints(mut self, model: &Model) -> ModelNames {
+    pub fn with_joints(mut self, model: &Model) -> ModelNames {
         let labels = model.joint_labels();
         let all: Vec<(&str, Vec<String>)> = model.joints.iter().map(|joint| joint.name.as_str()).zip(labels).collect();
         self.known.extend(all.iter().flat_map(|(name, labels)| entries(name, labels.clone())));
-        self.around(model, all);
+        self.add_sector_names(model, all);
         self
     }
 
     /// Adds the places with an imposed motion, except rotations.
     #[must_use]
-    pub fn and_moved(mut self, model: &Model) -> ModelNames {
+    pub fn with_imposed_motions(mut self, model: &Model) -> ModelNames {
         let moved = model.motions.iter().filter(|motion| !model.is_rotation(&motion.on));
         self.known.extend(moved.map(|motion| (motion.on.clone(), vec![motion.on.clone()])));
         self
@@ -112,25 +112,25 @@ impl ModelNames {
 
     /// Returns the labels that a name stands for: itself, or all its directions. `what` names
     /// the expected object for the message.
-    pub fn all(&self, key: &'static str, what: &str, name: &str) -> Result<&[String], KeyError> {
+    pub fn labels(&self, key: &'static str, what: &str, name: &str) -> Result<&[String], KeyError> {
         let found = self.known.iter().find(|(known, _)| known == name).map(|(_, labels)| labels.as_slice());
         found.ok_or_else(|| {
             let words = || self.known.iter().map(|(known, _)| known.as_str());
             let help = match self.directions_of(name) {
-                Some(directions) => format!("write {}", one_of(directions.iter().map(String::as_str))),
-                None => match nearest(name, words()) {
+                Some(directions) => format!("write {}", alternatives(directions.iter().map(String::as_str))),
+                None => match suggest(name, words()) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None if self.is_empty() => format!("the model has no {what}"),
-                    None => format!("choose {}", one_of(words().take(LISTED))),
+                    None => format!("choose {}", alternatives(words().take(LISTED))),
                 },
             };
-            KeyError { name: Some(name.to_owned()), ..KeyError::new(key, self.missing(what, name), help) }
+            KeyError { name: Some(name.to_owned()), ..KeyError::new(key, self.unknown_name(what, name), help) }
         })
     }
 
     /// Returns the one place or joint that a name stands for.
-    pub fn one(&self, key: &'static str, what: &str, name: &str) -> Result<&str, KeyError> {
-        match self.all(key, what, name)? {
+    pub fn single_label(&self, key: &'static str, what: &str, name: &str) -> Result<&str, KeyError> {
+        match self.labels(key, what, name)? {
             [one] => Ok(one),
             several => {
                 let of_node =
@@ -140,7 +140,7 @@ impl ModelNames {
                     // on a disk: the places with this name in every sector
                     false => format!("`{name}` stands for {} places; this key needs one of them", several.len()),
                 };
-                let help = format!("write {}", one_of(several.iter().take(LISTED).map(String::as_str)));
+                let help = format!("write {}", alternatives(several.iter().take(LISTED).map(String::as_str)));
                 Err(KeyError { name: Some(name.to_owned()), ..KeyError::new(key, message, help) })
             }
         }
@@ -155,10 +155,10 @@ impl ModelNames {
     }
 
     /// Returns the message that a name is unknown.
-    pub fn missing(&self, what: &str, name: &str) -> String {
-        let none = format!("there is no {what} `{}`", shown(name));
+    pub fn unknown_name(&self, what: &str, name: &str) -> String {
+        let none = format!("there is no {what} `{}`", excerpt(name));
         match name.split_once('.').filter(|_| self.directions_of(name).is_some()) {
-            Some((node, direction)) => format!("{none}: `{node}` has no direction {}", shown(direction)),
+            Some((node, direction)) => format!("{none}: `{node}` has no direction {}", excerpt(direction)),
             None => none,
         }
     }
@@ -185,20 +185,20 @@ mod tests {
 
     #[test]
     fn a_node_stands_for_its_directions_or_names_them() {
-        let names = ModelNames::of_places(&model()).and_joints(&model());
-        assert_eq!(names.all("only", "mass", "tip").unwrap(), ["tip.x", "tip.z"]);
-        assert_eq!(names.all("only", "mass", "rub").unwrap(), ["rub.x", "rub.z"]);
+        let names = ModelNames::places(&model()).with_joints(&model());
+        assert_eq!(names.labels("only", "mass", "tip").unwrap(), ["tip.x", "tip.z"]);
+        assert_eq!(names.labels("only", "mass", "rub").unwrap(), ["rub.x", "rub.z"]);
         assert_eq!(
-            (names.one("start", "mass", "tip.z"), names.one("start", "mass", "root")),
+            (names.single_label("start", "mass", "tip.z"), names.single_label("start", "mass", "root")),
             (Ok("tip.z"), Ok("root"))
         );
         let help = |found: Result<&str, KeyError>| found.unwrap_err().help.unwrap();
         for wrong in ["tip", "tip.y"] {
-            assert_eq!(help(names.one("start", "mass", wrong)), "write `tip.x` or `tip.z`", "{wrong}");
+            assert_eq!(help(names.single_label("start", "mass", wrong)), "write `tip.x` or `tip.z`", "{wrong}");
         }
-        let wrong = names.one("start", "mass", "tip.y").unwrap_err();
+        let wrong = names.single_label("start", "mass", "tip.y").unwrap_err();
         assert_eq!(wrong.message, "there is no mass `tip.y`: `tip` has no direction y");
-        assert_eq!(help(names.one("start", "mass", "roof")), "did you mean `root`?");
-        assert!(help(names.one("start", "mass", "q")).contains("`root`"));
+        assert_eq!(help(names.single_label("start", "mass", "roof")), "did you mean `root`?");
+        assert!(help(names.single_label("start", "mass", "q")).contains("`root`"));
     }
 }

@@ -45,7 +45,7 @@ impl StressStiffening {
 
     /// Returns the component with `share` times the difference added, where `share` is
     /// `(Ω/Ω₁)²`.
-    pub fn at(&self, component: &Component, share: f64) -> Result<Component, StructureError> {
+    pub fn component_at(&self, component: &Component, share: f64) -> Result<Component, StructureError> {
         if share == 0.0 {
             return Ok(component.clone());
         }
@@ -67,7 +67,7 @@ impl StressStiffening {
     }
 
     /// Returns the difference of the two stiffness matrices.
-    pub fn more(&self) -> &Matrix {
+    pub fn difference(&self) -> &Matrix {
         &self.difference
     }
 }

@@ -1,23 +1,25 @@
 //! A study that was read: its cases, each with its model and the values of its kind.
 
 use crate::case::disk::{self, Reevaluate};
-use crate::case::model_builder::{none_around, sector_of};
+use crate::case::model_builder::{build_model, refuse_without_disk};
 use crate::case::sample::{DrawnParameter, SampleSettings};
 use crate::case::stress_stiffening::StiffnessExports;
 use crate::case::substructure;
-use crate::case::values::{Frequencies, ResolvedValue, Values, between, in_table_unit, quantity_json, table_unit};
+use crate::case::values::{Frequencies, ResolvedValue, Values, in_table_unit, quantity_json, range_point, table_unit};
 use crate::check::figure;
 use crate::check::memory_limit;
-use crate::check::overstiff::{immovable, too_slow, too_soft};
-use crate::compile::bare_numbers::with_unit;
-use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, not_empty};
-use crate::compile::source_model::{MatrixSource, SourceModel, problem_of};
+use crate::check::overstiff::{overstiff_element, too_slow, too_soft};
+use crate::compile::bare_numbers::literal_unit;
+use crate::compile::compiled::{
+    CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, check_range,
+};
+use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
-use crate::syntax::expression::{ExpressionValue, displayed};
+use crate::syntax::expression::{ExpressionValue, quantity_text};
 use crate::syntax::key::VERSION;
-use crate::syntax::suggest::{nearest, one_of, shown};
+use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use crate::syntax::units;
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
@@ -165,22 +167,22 @@ impl VariedValue {
     }
 
     /// Returns the value and the unit as the file states them, for a colour scale.
-    pub fn as_written(&self) -> (f64, String) {
+    pub fn in_file_unit(&self) -> (f64, String) {
         match self.unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
-            Some((name, unit)) => (rounded(self.si / unit.scale("1")), name.to_owned()),
-            None => self.on_axis(),
+            Some((name, unit)) => (without_rounding(self.si / unit.to_si("1")), name.to_owned()),
+            None => self.in_axis_unit(),
         }
     }
 
     /// Returns the value and the unit for the axis of a figure, as in [`VariedValue::column`].
-    pub fn on_axis(&self) -> (f64, String) {
+    pub fn in_axis_unit(&self) -> (f64, String) {
         let unit = self.dimension.and_then(table_unit).map_or(String::new(), |(_, unit)| unit);
         (self.column().1, unit)
     }
 }
 
 /// Removes the rounding error of a change of units.
-fn rounded(value: f64) -> f64 {
+fn without_rounding(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
 }
 
@@ -216,7 +218,7 @@ pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
     varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Largest number of cases that [`Study::resolved`] lists. A run can be repeated from the text
+/// Largest number of cases that [`Study::to_record`] lists. A run can be repeated from the text
 /// alone.
 const MOST_RESOLVED: usize = 1_000;
 
@@ -268,7 +270,7 @@ impl Study {
     /// Returns the number of cases: the product of the number of draws and the numbers of
     /// values in `vary`; 1 if nothing is drawn or varied.
     pub fn cases(&self) -> usize {
-        self.draws().unwrap_or(1) * self.cases_of_a_draw()
+        self.draws().unwrap_or(1) * self.cases_per_draw()
     }
 
     /// Returns the number of draws of the uncertain parameters, if there are any.
@@ -277,18 +279,18 @@ impl Study {
     }
 
     /// Returns the number of cases with the same draw: the combinations of `vary`.
-    pub(crate) fn cases_of_a_draw(&self) -> usize {
-        self.listed().map(|varied| varied.points.len()).product()
+    pub(crate) fn cases_per_draw(&self) -> usize {
+        self.vary_parameters().map(|varied| varied.points.len()).product()
     }
 
     /// Returns the parameters of `vary`.
-    fn listed(&self) -> impl DoubleEndedIterator<Item = &VariedParameter> {
+    fn vary_parameters(&self) -> impl DoubleEndedIterator<Item = &VariedParameter> {
         self.varied.iter().filter(|varied| !varied.points.is_drawn())
     }
 
     /// Returns the number of drawn parameters, which come first in [`Study::varied`].
-    pub(crate) fn drawn(&self) -> usize {
-        self.varied.len() - self.listed().count()
+    pub(crate) fn drawn_parameter_count(&self) -> usize {
+        self.varied.len() - self.vary_parameters().count()
     }
 
     /// Returns the seed of the draws, if there are any.
@@ -321,14 +323,14 @@ impl Study {
 
     /// Returns the number of values of the last varied parameter, which changes fastest; 1 if
     /// nothing is varied.
-    pub(crate) fn last_varied(&self) -> usize {
-        self.listed().next_back().map_or(1, |varied| varied.points.len())
+    pub(crate) fn values_per_curve(&self) -> usize {
+        self.vary_parameters().next_back().map_or(1, |varied| varied.points.len())
     }
 
     /// Returns the varied parameters of a case without its model; `None` if there is no such
     /// case.
     pub(crate) fn varied_values(&self, index: usize) -> Option<Vec<VariedValue>> {
-        let choice = self.choice(index);
+        let choice = self.value_indices(index);
         let environment = evaluate(&self.names, &self.parameters, &self.order, &choice, &[]).ok()?;
         Some(self.varied_of(&environment, &choice))
     }
@@ -345,11 +347,11 @@ impl Study {
         let MatrixSource { table, component, stress_stiffening: stiffened, .. } = self.structure.matrices.as_ref()?;
         let CompiledValue::Table(spin) = &table.entry("stiffened")?.value else { return None };
         let CompiledValue::Quantity { quantity: speed, .. } = &spin.entry("speed")?.value else { return None };
-        let values = evaluate(&self.names, &self.parameters, &self.order, &self.choice(0), &[]).ok()?;
+        let values = evaluate(&self.names, &self.parameters, &self.order, &self.value_indices(0), &[]).ok()?;
         let environment = Environment { names: &self.names, values };
         let at = spin.values(&environment, &mut Vec::new()).quantity("at")?;
         let rest = component.clone()?;
-        let there = stiffened.as_ref()?.at(&rest, 1.0).ok()?.matrices().2.clone();
+        let there = stiffened.as_ref()?.component_at(&rest, 1.0).ok()?.matrices().2.clone();
         Some(StiffnessExports { at_rest: rest, at_speed: there, export_speed: at, speed: speed.text.clone() })
     }
 
@@ -366,7 +368,7 @@ impl Study {
     /// [`StudyError`] if there is no such case. The cases of a study that was read have been
     /// checked.
     pub fn case(&self, index: usize) -> Result<Case, StudyError> {
-        self.case_where(index, None)
+        self.build_case(index, None)
     }
 
     /// Returns case `index` with the parameter `name` at another value (SI), for searches
@@ -374,26 +376,26 @@ impl Study {
     ///
     /// # Errors
     /// [`StudyError`]: there is no such case or parameter, or the model cannot have this value.
-    pub fn case_with(&self, index: usize, name: &str, si: f64) -> Result<Case, StudyError> {
+    pub fn case_with_parameter(&self, index: usize, name: &str, si: f64) -> Result<Case, StudyError> {
         match self.names.iter().position(|n| n == name) {
-            Some(parameter) => self.case_where(index, Some((parameter, si))),
+            Some(parameter) => self.build_case(index, Some((parameter, si))),
             None => {
-                let message = format!("there is no parameter `{}`", shown(name));
+                let message = format!("there is no parameter `{}`", excerpt(name));
                 Err(StudyError::file(&self.sources[0].name, message, None))
             }
         }
     }
 
-    fn case_where(&self, index: usize, fixed: Option<(usize, f64)>) -> Result<Case, StudyError> {
+    fn build_case(&self, index: usize, fixed: Option<(usize, f64)>) -> Result<Case, StudyError> {
         if index >= self.cases() {
             let message = format!("there is no case {index}; the study has {} cases", self.cases());
             return Err(StudyError::file(&self.sources[0].name, message, None));
         }
         let mut problems = Vec::new();
-        let parts = self.parts(index, CheckScope::NumbersOnly(fixed), &mut problems);
-        let error = StudyError::all(&self.sources, problems);
+        let parts = self.resolve_with_case_name(index, CheckScope::NumbersOnly(fixed), &mut problems);
+        let error = StudyError::from_problems(&self.sources, problems);
         match (parts, error) {
-            (Some(parts), None) => Ok(self.finished(index, parts)),
+            (Some(parts), None) => Ok(self.into_case(index, parts)),
             (_, Some(error)) => Err(error),
             (None, None) => {
                 Err(StudyError::file(&self.sources[0].name, "the values of this case could not be computed", None))
@@ -410,9 +412,12 @@ impl Study {
             let words = method::TABLE.iter().map(|row| row.name);
             let source = Arc::new(Source { name: "--method".to_owned(), text: name.to_owned() });
             let location = Location { source: 0, span: 0..name.len() };
-            let message = format!("there is no method `{}`, expected {}", shown(name), one_of(words.clone()));
-            let help = nearest(name, words).map(|near| format!("did you mean `{near}`?"));
-            return Err(StudyError::at(&[source], Problem::new(&location, "method", message).maybe_help(help)));
+            let message = format!("there is no method `{}`, expected {}", excerpt(name), alternatives(words.clone()));
+            let help = suggest(name, words).map(|near| format!("did you mean `{near}`?"));
+            return Err(StudyError::at_location(
+                &[source],
+                Problem::new(&location, "method", message).maybe_help(help),
+            ));
         };
         let same = |entry: &CompiledEntry| matches!(&entry.value, CompiledValue::Fixed(ResolvedValue::Text(text)) if text == row.name);
         if !self.method.entry("kind").is_some_and(same) {
@@ -424,12 +429,12 @@ impl Study {
     }
 
     /// Returns whether a flag of `[study]` is set.
-    pub(crate) fn wants(&self, key: &str) -> bool {
+    pub(crate) fn has_flag(&self, key: &str) -> bool {
         matches!(self.study.entry(key).map(|entry| &entry.value), Some(CompiledValue::Fixed(ResolvedValue::Flag(true))))
     }
 
     /// Returns the study without the mistuning of its disk.
-    pub(crate) fn tuned(&self) -> Study {
+    pub(crate) fn without_mistuning(&self) -> Study {
         let mut study = self.clone();
         if let Some(disk) = &mut study.structure.lists.disk {
             disk.table.entries.retain(|entry| entry.key != "mistuning");
@@ -441,17 +446,17 @@ impl Study {
     /// Returns whether a run must compute the reference curves of `[figure]`. A study with
     /// draws has none, because each draw has its own references.
     pub fn wants_references(&self) -> bool {
-        self.draws().is_none() && self.asks_for_references()
+        self.draws().is_none() && self.requests_references()
     }
 
     /// Returns whether `[figure]` asks for reference curves, with or without draws.
-    pub(crate) fn asks_for_references(&self) -> bool {
+    pub(crate) fn requests_references(&self) -> bool {
         self.figure_values().flag("references") == Some(true)
     }
 
     /// Returns the study with the title and the `[figure]` of another study.
     #[must_use]
-    pub fn drawn_like(mut self, other: &Study) -> Study {
+    pub fn with_figure_of(mut self, other: &Study) -> Study {
         self.title.clone_from(&other.title);
         self.figure = other.figure.clone();
         self
@@ -486,13 +491,13 @@ impl Study {
             (None, Some(_)) => table.location_of("template", None),
             _ => table.location_of(key, None),
         });
-        StudyError::at(&self.sources, Problem::new(location, key, message).maybe_help(help))
+        StudyError::at_location(&self.sources, Problem::new(location, key, message).maybe_help(help))
     }
 
     /// Returns a checksum of the matrices of `[structure]` and of the sector's files; `None`
     /// without matrices.
-    pub fn matrices_check(&self) -> Option<String> {
-        let own = self.structure.matrices.as_ref().and_then(MatrixSource::check)?;
+    pub fn matrices_checksum(&self) -> Option<String> {
+        let own = self.structure.matrices.as_ref().and_then(MatrixSource::checksum)?;
         let sector = self.structure.lists.disk.as_ref().map_or(0, |disk| {
             let files = format!("{:?} {:?} {:?} {:?}", disk.pattern, disk.boundary, disk.nodes, disk.blade);
             crc32fast::hash(files.as_bytes())
@@ -502,7 +507,7 @@ impl Study {
 
     /// Returns the study as it was understood, for the record of a run. All values are in SI;
     /// the file's text is included.
-    pub fn resolved(&self) -> Json {
+    pub fn to_record(&self) -> Json {
         let mut cases = Vec::new();
         for index in 0..self.cases().min(MOST_RESOLVED) {
             if let Ok(case) = self.case(index) {
@@ -529,7 +534,7 @@ impl Study {
                 .collect::<Vec<_>>(),
             "number_of_cases": self.cases(),
             "seed": self.seed(),
-            "matrices": self.matrices_check(),
+            "matrices": self.matrices_checksum(),
             "units": self.written_units(),
             "cases": cases,
         })
@@ -548,7 +553,7 @@ impl Study {
         let mut sectors = None;
         for index in 0..self.cases() {
             let mut problems = Vec::new();
-            let parts = self.parts(index, CheckScope::First, &mut problems);
+            let parts = self.resolve_with_case_name(index, CheckScope::First, &mut problems);
             if let Some(found) = parts.and_then(|parts| parts.model.ring).map(|ring| ring.sectors)
                 && *sectors.get_or_insert(found) != found
             {
@@ -557,16 +562,24 @@ impl Study {
                 let location =
                     self.structure.lists.disk.as_ref().map(|disk| disk.table.location_of("sectors", None).clone());
                 let problem = Problem::new(&location.unwrap_or_default(), "sectors", message);
-                return Err(StudyError::at(&self.sources, problem.help("write one study for each number of sectors")));
+                return Err(StudyError::at_location(
+                    &self.sources,
+                    problem.help("write one study for each number of sectors"),
+                ));
             }
-            if let Some(error) = StudyError::all(&self.sources, problems) {
+            if let Some(error) = StudyError::from_problems(&self.sources, problems) {
                 return Err(error);
             }
         }
         Ok(())
     }
 
-    fn parts(&self, index: usize, look: CheckScope, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
+    fn resolve_with_case_name(
+        &self,
+        index: usize,
+        look: CheckScope,
+        problems: &mut Vec<Problem>,
+    ) -> Option<ResolvedCase> {
         let parts = self.resolve(index, look, problems);
         if !problems.is_empty() && self.cases() > 1 {
             // a problem of both the first and the last case does not depend on the case
@@ -586,14 +599,14 @@ impl Study {
 
     /// Describes a case with its number: `N = 0 N, case 1 of 8`.
     pub(crate) fn case_words(&self, index: usize) -> String {
-        let choice = self.choice(index);
+        let choice = self.value_indices(index);
         let words = match evaluate(&self.names, &self.parameters, &self.order, &choice, &[]) {
             Ok(environment) => varied_text(&self.varied_of(&environment, &choice)),
             // without values: the texts of the file
             Err(_) => {
                 let words = self.varied.iter().filter_map(|varied| match (&varied.points, choice.get(&varied.index)) {
                     (ParameterValues::List(list), Some((_, point))) => {
-                        Some(format!("{} = {}", self.names[varied.index], shown(list[*point].text.trim())))
+                        Some(format!("{} = {}", self.names[varied.index], excerpt(list[*point].text.trim())))
                     }
                     _ => None,
                 });
@@ -605,10 +618,10 @@ impl Study {
     }
 
     /// Returns the index of the point of every varied parameter in a case.
-    fn choice(&self, index: usize) -> HashMap<usize, (&VariedParameter, usize)> {
+    fn value_indices(&self, index: usize) -> HashMap<usize, (&VariedParameter, usize)> {
         let mut remainder = index;
         let mut choice = HashMap::new();
-        for varied in self.listed().rev() {
+        for varied in self.vary_parameters().rev() {
             choice.insert(varied.index, (varied, remainder % varied.points.len()));
             remainder /= varied.points.len();
         }
@@ -640,8 +653,8 @@ impl Study {
                     quantity.text.trim().to_owned()
                 }
                 _ => match unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
-                    Some((name, unit)) => format!("{} {name}", displayed(value.si / unit.scale("1"), None)),
-                    None => displayed(value.si, value.dimension),
+                    Some((name, unit)) => format!("{} {name}", quantity_text(value.si / unit.to_si("1"), None)),
+                    None => quantity_text(value.si, value.dimension),
                 },
             };
             VariedValue { text: format!("{name} = {text}"), name, si: value.si, dimension: value.dimension, unit }
@@ -654,7 +667,7 @@ impl Study {
     fn written_unit(&self, varied: &VariedParameter) -> Option<(String, Dimension)> {
         let own = &self.parameters[varied.index].quantity;
         let mut all = varied.points.quantities().chain([own]);
-        all.find_map(with_unit).map(|(unit, _, dimension)| (unit.to_owned(), dimension))
+        all.find_map(literal_unit).map(|(unit, _, dimension)| (unit.to_owned(), dimension))
     }
 
     /// Returns the units of the file for the table columns that are in SI, by column.
@@ -666,7 +679,7 @@ impl Study {
             CompiledValue::Range { from, .. } | CompiledValue::Adaptive { from, .. } => Some(from),
             _ => None,
         });
-        let drive = frequency.and_then(with_unit).map(|(unit, ..)| ("frequency_Hz".to_owned(), Json::from(unit)));
+        let drive = frequency.and_then(literal_unit).map(|(unit, ..)| ("frequency_Hz".to_owned(), Json::from(unit)));
         of_varied.chain(drive).collect()
     }
 
@@ -675,16 +688,16 @@ impl Study {
             CheckScope::First => (index == 0, None),
             CheckScope::NumbersOnly(fixed) => (false, fixed),
         };
-        let choice = self.choice(index);
+        let choice = self.value_indices(index);
         let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
             Ok(values) => values,
             Err(problem) => {
                 let template = self.structure.template.as_ref().map(|template| template.source);
-                problems.push(template_errors::blame(
+                problems.push(template_errors::locate_at_user_value(
                     problem,
                     template,
                     &self.names,
-                    &stated(&self.parameters, &choice),
+                    &stated_parameters(&self.parameters, &choice),
                 ));
                 return None;
             }
@@ -697,11 +710,11 @@ impl Study {
         let mut model = model_of(&self.structure, &environment, &again, problems);
         let values = self.study.values(&environment, problems);
         let method = self.method.values(&environment, problems);
-        substructure::settle(&mut model, &values, &method);
+        substructure::set_frequency_range(&mut model, &values, &method);
         if !problems.is_empty() {
             return None;
         }
-        if (first_look || !numbers_hold(&model))
+        if (first_look || !numbers_in_range(&model))
             && let Err(error) = model.assemble()
         {
             problems.push(self.model_problem(&error, &model));
@@ -713,12 +726,12 @@ impl Study {
             return None;
         }
         let highest = values.frequencies("frequency").and_then(Frequencies::highest);
-        let unseen = lowest.and_then(|omega| immovable(&model, omega));
+        let unseen = lowest.and_then(|omega| overstiff_element(&model, omega));
         if let Some(error) = unseen.or_else(|| highest.and_then(|omega| too_soft(&model, omega))) {
             problems.push(self.model_problem(&error, &model));
             return None;
         }
-        if let Err(complaint) = (self.kind.check)(&values, &model, self.last_varied()) {
+        if let Err(complaint) = (self.kind.check)(&values, &model, self.values_per_curve()) {
             problems.push(self.complaint(complaint));
             return None;
         }
@@ -730,9 +743,9 @@ impl Study {
         Some(ResolvedCase { environment: environment.values, model, values, method })
     }
 
-    fn finished(&self, index: usize, parts: ResolvedCase) -> Case {
+    fn into_case(&self, index: usize, parts: ResolvedCase) -> Case {
         let ResolvedCase { environment, model, values, method } = parts;
-        let varied = self.varied_of(&environment, &self.choice(index));
+        let varied = self.varied_of(&environment, &self.value_indices(index));
         let parameters = self
             .names
             .iter()
@@ -755,9 +768,9 @@ impl Study {
             // element numbers of the file: those of one sector
             Some(ring) => {
                 let element = ring.in_sector(error.element, model);
-                problem_of(&self.structure, &ModelError { element, ..error.clone() }, model)
+                model_problem(&self.structure, &ModelError { element, ..error.clone() }, model)
             }
-            None => problem_of(&self.structure, error, model),
+            None => model_problem(&self.structure, error, model),
         }
     }
 
@@ -798,17 +811,17 @@ pub(crate) fn evaluate(
         let (parameter, name) = (&parameters[index], &names[index]);
         let dimension = parameter.dimension;
         let value = match choice.get(&index).map(|(varied, point)| (&varied.points, *point)) {
-            None => parameter.quantity.settled(name, dimension, &environment)?,
-            Some((ParameterValues::List(list), point)) => list[point].settled(name, dimension, &environment)?,
+            None => parameter.quantity.parameter_value(name, dimension, &environment)?,
+            Some((ParameterValues::List(list), point)) => list[point].parameter_value(name, dimension, &environment)?,
             Some((ParameterValues::Drawn(drawn), point)) => drawn.value(name, dimension, point, &environment)?,
             Some((ParameterValues::Range { from, to, points }, point)) => {
                 let start = from.value("from", &environment)?;
                 let end = to.value("to", &environment)?;
                 let dimension = dimension.or(start.dimension).or(end.dimension);
-                let start = from.in_dimension(start, name, dimension, &environment)?;
-                let end = to.in_dimension(end, name, dimension, &environment)?;
-                not_empty(start.si, end.si, to, dimension)?;
-                ExpressionValue { si: between(start.si, end.si, dimension, point, *points), ..start }
+                let start = from.convert_parameter(start, name, dimension, &environment)?;
+                let end = to.convert_parameter(end, name, dimension, &environment)?;
+                check_range(start.si, end.si, to, dimension)?;
+                ExpressionValue { si: range_point(start.si, end.si, dimension, point, *points), ..start }
             }
         };
         environment.values[index] = match fixed.iter().rfind(|(parameter, _)| *parameter == index) {
@@ -820,7 +833,7 @@ pub(crate) fn evaluate(
 }
 
 /// Returns the parameters as stated, with the chosen points of the varied ones.
-pub(crate) fn stated<'a>(
+pub(crate) fn stated_parameters<'a>(
     parameters: &'a [Parameter],
     choice: &HashMap<usize, (&'a VariedParameter, usize)>,
 ) -> Vec<template_errors::StatedValue<'a>> {
@@ -850,15 +863,15 @@ pub(crate) fn model_of(
         Some(disk) => disk::ring_of(structure, disk, environment, again, problems),
         None => {
             let tables = structure.lists.force.iter().chain(&structure.lists.motion);
-            tables.for_each(|table| none_around(table, problems));
-            sector_of(structure, environment, problems).0
+            tables.for_each(|table| refuse_without_disk(table, problems));
+            build_model(structure, environment, problems).0
         }
     }
 }
 
 /// Returns whether the numbers of a model are in their ranges. Its names are the same in every
 /// case.
-fn numbers_hold(model: &Model) -> bool {
+fn numbers_in_range(model: &Model) -> bool {
     let not_negative = |value: f64| value.is_finite() && value >= 0.0;
     model.masses.iter().all(|mass| not_negative(mass.mass))
         && model.bodies.iter().all(|body| body.is_sound())

@@ -4,7 +4,7 @@ use crate::case::values::Values;
 use crate::compile::compiled::{CompiledTable, Environment};
 use crate::compile::source_model::MatrixSource;
 use crate::syntax::error::Problem;
-use crate::syntax::suggest::{nearest, one_of, shown};
+use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use stickslip::method::WIDTH;
 use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;
@@ -58,12 +58,12 @@ pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
     ),
 ];
 
-/// No reduction; [`settle`] sets the frequency up to which modes are damped.
+/// No reduction; [`set_frequency_range`] sets the frequency up to which modes are damped.
 const WHOLE: Reduction = Reduction::None { up_to: 0.0 };
 
-/// Builds the structure of `[structure]`. If the file does not state a reduction, [`settle`]
+/// Builds the structure of `[structure]`. If the file does not state a reduction, [`set_frequency_range`]
 /// decides later.
-pub(crate) fn of(
+pub(crate) fn structure_from_table(
     MatrixSource { table, stress_stiffening: stiffened, .. }: &MatrixSource,
     component: &Component,
     environment: &Environment<'_>,
@@ -71,7 +71,8 @@ pub(crate) fn of(
 ) -> Substructure {
     let values = table.values(environment, problems);
     let share = values.table("stiffened").and_then(|spin| Some(spin.quantity("speed")? / spin.quantity("at")?));
-    let spinning = stiffened.as_ref().zip(share).map(|(stiffened, share)| stiffened.at(component, share * share));
+    let spinning =
+        stiffened.as_ref().zip(share).map(|(stiffened, share)| stiffened.component_at(component, share * share));
     let component = spinning.unwrap_or_else(|| Ok(component.clone())).unwrap_or_else(|error| {
         problems.push(Problem::new(table.location_of("stiffened", None), "stiffened", error.to_string()));
         component.clone()
@@ -150,7 +151,7 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
 /// With a given number of modes, the error is stated up to the highest excited frequency,
 /// because no reduction is accurate near its last modes. A small structure with joints is not
 /// reduced if `method` treats all laws exactly.
-pub(crate) fn settle(model: &mut Model, values: &Values, method: &Values) {
+pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &Values) {
     let harmonic =
         model.forces.iter().map(|force| force.harmonic).chain(model.motions.iter().map(|motion| motion.harmonic));
     let most = f64::from(harmonic.max().unwrap_or(1).max(1));
@@ -161,12 +162,12 @@ pub(crate) fn settle(model: &mut Model, values: &Values, method: &Values) {
     let joints = !model.joints.is_empty() && excited > 0.0;
     let exact = method.quantity(WIDTH).is_none() && model.joints.iter().all(|joint| joint.law.pieces().is_some());
     let Some(Substructure { component, reduction, disk, .. }) = model.substructure.as_mut() else { return };
-    if joints && exact && disk.is_none() && *reduction == Reduction::up_to(0.0) && keeps_all(component) {
+    if joints && exact && disk.is_none() && *reduction == Reduction::up_to(0.0) && is_unreduced(component) {
         *reduction = WHOLE;
     }
     match reduction {
         Reduction::UpTo { up_to, .. } | Reduction::None { up_to } if *up_to <= 0.0 => {
-            *up_to = if joints { reach(component, excited) } else { f64::from(HARMONICS) * excited };
+            *up_to = if joints { joint_frequency_range(component, excited) } else { f64::from(HARMONICS) * excited };
         }
         Reduction::Modes { up_to, .. } => *up_to = excited,
         _ => {}
@@ -175,13 +176,13 @@ pub(crate) fn settle(model: &mut Model, values: &Values, method: &Values) {
 
 /// Returns whether the structure is small and has a definite mass matrix, so that every method
 /// accepts all its rows.
-fn keeps_all(component: &Component) -> bool {
+fn is_unreduced(component: &Component) -> bool {
     component.dofs() <= KEPT && component.has_definite_mass()
 }
 
 /// Returns the upper end of the frequency range with joints, rad/s: the highest odd harmonic of
 /// `excited` (rad/s) up to which the number of modes stays within its limit.
-fn reach(component: &Component, excited: f64) -> f64 {
+fn joint_frequency_range(component: &Component, excited: f64) -> f64 {
     let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= MODES_OF_HARMONICS);
     let mut beyond =
         (HARMONICS + 1..=HARMONICS_OF_JOINTS).rev().step_by(2).map(|harmonic| f64::from(harmonic) * excited);
@@ -200,10 +201,10 @@ pub(crate) fn place(
     if problems.len() > before {
         return None;
     }
-    match made(table, &values, component) {
+    match build_place(table, &values, component) {
         Ok(place) => Some(place),
         Err(mut problem) => {
-            problem.message = table.with_turn(&problem.message);
+            problem.message = table.with_repetition(&problem.message);
             problems.push(*problem);
             None
         }
@@ -249,9 +250,9 @@ impl ViewedElement<'_> {
 /// Builds a `[[place]]` that is a rotated frame of a mass or a body, or a point of a body.
 ///
 /// Its directions are those of the body, or one or two tangents and the normal.
-pub(crate) fn view(table: &CompiledTable, values: &Values, model: &Model) -> Result<Place, Box<Problem>> {
+pub(crate) fn place_on_element(table: &CompiledTable, values: &Values, model: &Model) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
-        Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
+        Box::new(Problem::new(table.location_of(key, None), key, table.with_repetition(&message)))
     };
     if let Some(key) = ["dof", "dofs", "nodes", "sum"].into_iter().find(|key| table.entry(key).is_some()) {
         let message =
@@ -261,11 +262,11 @@ pub(crate) fn view(table: &CompiledTable, values: &Values, model: &Model) -> Res
     let of = values.text("of").unwrap_or_default();
     let Some(viewed) = ViewedElement::find(model, of) else {
         let names = model.masses.iter().map(|mass| &mass.name).chain(model.bodies.iter().map(|body| &body.name));
-        let help = match nearest(of, names.map(String::as_str)) {
+        let help = match suggest(of, names.map(String::as_str)) {
             Some(near) => format!("did you mean `{near}`?"),
             None => "name a [[body]], or a [[mass]] with `directions`".to_owned(),
         };
-        return Err(problem("of", format!("there is no mass and no body `{}`", shown(of))).map_help(&help));
+        return Err(problem("of", format!("there is no mass and no body `{}`", excerpt(of))).map_help(&help));
     };
     let offset = values.vector("offset");
     if let (ViewedElement::Mass(mass), Some(_)) = (&viewed, offset) {
@@ -332,7 +333,7 @@ pub(crate) fn view(table: &CompiledTable, values: &Values, model: &Model) -> Res
 /// Builds a point of a body, with all directions of its points or those that are named.
 fn point(table: &CompiledTable, values: &Values, body: &Body, name: &str) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| {
-        Box::new(Problem::new(table.location_of(key, None), key, table.with_turn(&message)))
+        Box::new(Problem::new(table.location_of(key, None), key, table.with_repetition(&message)))
     };
     if values.vector("tangent").is_some() {
         return Err(problem("tangent", "a local frame needs a normal; only `tangent` is stated".to_owned())
@@ -357,7 +358,7 @@ fn point(table: &CompiledTable, values: &Values, body: &Body, name: &str) -> Res
 }
 
 /// Returns a mass that stands in for a place if only names are known.
-pub(crate) fn stand_in(table: &CompiledTable, values: &Values) -> Mass {
+pub(crate) fn placeholder_mass(table: &CompiledTable, values: &Values) -> Mass {
     let (directions, _) = directions(table, values).unwrap_or_default();
     Mass { name: values.text("name").unwrap_or_default().to_owned(), mass: 1.0, directions }
 }
@@ -417,7 +418,7 @@ impl WithHelp for Box<Problem> {
     }
 }
 
-fn made(table: &CompiledTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
+fn build_place(table: &CompiledTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
     let problem = |key: &str, message: String| Box::new(Problem::new(table.location_of(key, None), key, message));
     let stated: Vec<&str> =
         ["dof", "dofs", "nodes", "sum"].into_iter().filter(|key| table.entry(key).is_some()).collect();
@@ -434,8 +435,8 @@ fn made(table: &CompiledTable, values: &Values, component: &Component) -> Result
         component.row(name).ok_or_else(|| {
             let place = table.location_of(key, Some(name));
             Box::new(
-                Problem::new(place, key, format!("the structure has no row `{}`", shown(name)))
-                    .help(near(component, name)),
+                Problem::new(place, key, format!("the structure has no row `{}`", excerpt(name)))
+                    .help(row_help(component, name)),
             )
         })
     };
@@ -454,21 +455,21 @@ fn made(table: &CompiledTable, values: &Values, component: &Component) -> Result
             let weight = 1.0 / nodes.len() as f64;
             for along in &along {
                 let row: Result<Row, Box<Problem>> =
-                    nodes.iter().map(|node| Ok((find_of(component, table, node, along)?, weight))).collect();
+                    nodes.iter().map(|node| Ok((node_row(component, table, node, along)?, weight))).collect();
                 rows.push(row?);
             }
         }
         _ => {
             let names = values.names(key).unwrap_or_default();
             if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-                let (place, name) = (table.location_of(key, Some(twice.1)), shown(twice.1));
+                let (place, name) = (table.location_of(key, Some(twice.1)), excerpt(twice.1));
                 let message = format!("the row `{name}` is named twice; a node has each direction once");
                 return Err(Box::new(
                     Problem::new(place, key, message).help("name each row once; for a weighted sum use sum = { … }"),
                 ));
             }
             let framed = values.vector("normal").is_some();
-            let ordered = if framed { in_space(names) } else { Some(names.iter().collect()) };
+            let ordered = if framed { in_frame_order(names) } else { Some(names.iter().collect()) };
             let ordered = ordered.ok_or_else(|| {
                 problem("normal", format!("a local frame needs the rows of x, y and z, not {}", names.join(", ")))
                     .map_help("name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]")
@@ -502,7 +503,7 @@ fn made(table: &CompiledTable, values: &Values, component: &Component) -> Result
 ///
 /// Rows without such ends keep their order. Returns `None` if the ends do not contain each axis
 /// exactly once.
-fn in_space(names: &[String]) -> Option<Vec<&String>> {
+fn in_frame_order(names: &[String]) -> Option<Vec<&String>> {
     let end =
         |name: &String| CARTESIAN.iter().position(|axis| name.rsplit_once('.').is_some_and(|(_, end)| end == *axis));
     if names.iter().all(|name| end(name).is_none()) {
@@ -513,13 +514,13 @@ fn in_space(names: &[String]) -> Option<Vec<&String>> {
 }
 
 /// Returns the row of a node along a direction.
-fn find_of(component: &Component, table: &CompiledTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
+fn node_row(component: &Component, table: &CompiledTable, node: &str, along: &str) -> Result<usize, Box<Problem>> {
     let name = format!("{node}.{along}");
     component.row(&name).ok_or_else(|| {
         let place = table.location_of("nodes", Some(node));
-        Box::new(Problem::new(place, "nodes", format!("the structure has no row `{}`", shown(&name))).help(format!(
+        Box::new(Problem::new(place, "nodes", format!("the structure has no row `{}`", excerpt(&name))).help(format!(
             "{}; or add directions = [\"x\", …] with directions that all these nodes have",
-            near(component, &name)
+            row_help(component, &name)
         )))
     })
 }
@@ -531,7 +532,7 @@ const LOOKED_AT: usize = 200_000;
 
 /// Returns the help for an unknown row: the rows of the same node, a similar name, or the first
 /// rows.
-fn near(component: &Component, name: &str) -> String {
+fn row_help(component: &Component, name: &str) -> String {
     let rows = component.rows();
     let node = name.rsplit_once('.').map_or(name, |(node, _)| node);
     let same: Vec<&str> = rows
@@ -543,10 +544,10 @@ fn near(component: &Component, name: &str) -> String {
     if !same.is_empty() {
         return format!(
             "the rows of this node are {}; missing directions are constrained",
-            one_of(same).replace(" or ", ", ")
+            alternatives(same).replace(" or ", ", ")
         );
     }
-    match nearest(name, rows.iter().take(LOOKED_AT).map(String::as_str)) {
+    match suggest(name, rows.iter().take(LOOKED_AT).map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`?"),
         None => {
             let first = rows.iter().take(LISTED).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");

@@ -1,6 +1,6 @@
 //! Values of a table of the study file, resolved for one case: checked, in SI.
 
-use crate::syntax::expression::displayed;
+use crate::syntax::expression::quantity_text;
 use crate::syntax::units;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
@@ -41,15 +41,15 @@ pub(crate) fn in_table_unit(si: f64, dimension: Dimension) -> f64 {
         _ => return si,
     };
     if unit == "Hz" {
-        let near = decimal(si / TAU, decimals(si / TAU));
+        let near = nearest_decimal(si / TAU, decimals(si / TAU));
         if let Some(near) = near.filter(|near| radians(*near) == si) {
             return near;
         }
     }
     let Some(unit) = units::find(unit).filter(|_| si.is_finite()) else { return si };
-    let near = si / unit.scale("1");
+    let near = si / unit.to_si("1");
     // 17 digits distinguish all doubles; 15 digits of any decimal number survive in a double
-    let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.scale_signed(text) == si);
+    let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.signed_to_si(text) == si);
     typed.and_then(|text| text.parse().ok()).unwrap_or(near)
 }
 
@@ -66,7 +66,7 @@ fn decimals(size: f64) -> i32 {
 
 /// Returns the decimal number with `decimals` decimals nearest to `value`; `None` if it needs
 /// more than one rounding.
-fn decimal(value: f64, decimals: i32) -> Option<f64> {
+fn nearest_decimal(value: f64, decimals: i32) -> Option<f64> {
     // These powers of ten and whole numbers of 15 digits are exact, so the quotient is the
     // double nearest to the decimal number.
     let power = (0..=22).contains(&decimals).then(|| 10f64.powi(decimals))?;
@@ -140,11 +140,11 @@ impl Frequencies {
         match self {
             Frequencies::List(list) => list.get(index).copied(),
             Frequencies::Range { from, to, points } => {
-                (index < *points).then(|| between(*from, *to, Some(Dimension::FREQUENCY), index, *points))
+                (index < *points).then(|| range_point(*from, *to, Some(Dimension::FREQUENCY), index, *points))
             }
             Frequencies::Adaptive { from, to, .. } => {
                 let points = self.len();
-                (index < points).then(|| between(*from, *to, Some(Dimension::FREQUENCY), index, points))
+                (index < points).then(|| range_point(*from, *to, Some(Dimension::FREQUENCY), index, points))
             }
         }
     }
@@ -201,7 +201,7 @@ impl Frequencies {
 ///
 /// Both ends are exact. The points between are the intended decimal numbers in the unit of the
 /// tables: 0.1 to 0.7 in seven points contains 0.3, not 0.30000000000000004.
-pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: usize, points: usize) -> f64 {
+pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, index: usize, points: usize) -> f64 {
     if index == 0 || index + 1 >= points {
         return if index == 0 { from } else { to };
     }
@@ -211,7 +211,7 @@ pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: u
     // 15 digits of the larger end: less than the rounding of the sum, and more than users type
     let digits = decimals(start.abs().max(end.abs()));
     let cycles = matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE);
-    if let Some(value) = decimal(value, digits).filter(|_| dimension != Dimension::ANGLE) {
+    if let Some(value) = nearest_decimal(value, digits).filter(|_| dimension != Dimension::ANGLE) {
         return if cycles { radians(value) } else { value };
     }
     let decimal = match usize::try_from(digits) {
@@ -220,7 +220,7 @@ pub(crate) fn between(from: f64, to: f64, dimension: Option<Dimension>, index: u
     };
     let unit = if dimension == Dimension::ANGLE { "deg" } else { "Hz" };
     match units::find(unit).filter(|_| cycles || dimension == Dimension::ANGLE) {
-        Some(unit) => unit.scale_signed(&decimal),
+        Some(unit) => unit.signed_to_si(&decimal),
         None => decimal.parse().unwrap_or(value),
     }
 }
@@ -338,7 +338,7 @@ impl ResolvedValue {
 pub(crate) fn quantity_json(si: f64, dimension: Option<Dimension>) -> Json {
     let mut object = Map::new();
     object.insert("si".to_owned(), json!(si));
-    object.insert("reads".to_owned(), json!(displayed(si, dimension)));
+    object.insert("reads".to_owned(), json!(quantity_text(si, dimension)));
     Json::Object(object)
 }
 
@@ -357,7 +357,7 @@ mod tests {
 
     #[test]
     fn values_come_back_as_typed() {
-        let omega = |text: &str| units::find("Hz").unwrap().scale(text);
+        let omega = |text: &str| units::find("Hz").unwrap().to_si(text);
         // numbers of up to eight digits
         for i in 1..20_000u32 {
             for text in [format!("{}", f64::from(i) / 40.0), format!("{:.5}", f64::from(i) * 1.7e-4)] {
@@ -367,7 +367,7 @@ mod tests {
         let lost = (1..2000).filter(|&i| f64::from(i) / 10.0 * TAU / TAU != f64::from(i) / 10.0).count();
         assert!(lost > 100, "the division alone loses {lost} of 2000");
         for (i, text) in ["30", "0.1", "-45", "12.345678", "0"].iter().enumerate() {
-            let si = units::find("deg").unwrap().scale_signed(text);
+            let si = units::find("deg").unwrap().signed_to_si(text);
             assert_eq!(in_table_unit(si, Dimension::ANGLE), text.parse::<f64>().unwrap(), "{i}");
         }
         // the fast path and the unit agree bitwise, also beyond the powers of ten that are
@@ -385,7 +385,7 @@ mod tests {
 
     #[test]
     fn points_of_a_range_are_decimal_numbers() {
-        let at = |i| between(0.1, 0.7, None, i, 7);
+        let at = |i| range_point(0.1, 0.7, None, i, 7);
         assert_eq!((0..7).map(at).collect::<Vec<_>>(), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]);
         let range = Frequencies::Range { from: 119.0 * TAU, to: 123.0 * TAU, points: 41 };
         for i in 0..41 {
@@ -401,10 +401,10 @@ mod tests {
         assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
         // very large and very small ends, a range through zero, and ends that are not decimal
         // numbers
-        assert_eq!(between(1e-320, 3e-320, None, 1, 3), 2e-320);
-        assert_eq!(between(1e300, 3e300, None, 1, 3), 2e300);
-        assert_eq!(between(-0.3, 0.3, None, 3, 7), 0.0);
-        let third = between(1.0 / 3.0, 2.0 / 3.0, None, 1, 3);
+        assert_eq!(range_point(1e-320, 3e-320, None, 1, 3), 2e-320);
+        assert_eq!(range_point(1e300, 3e300, None, 1, 3), 2e300);
+        assert_eq!(range_point(-0.3, 0.3, None, 3, 7), 0.0);
+        let third = range_point(1.0 / 3.0, 2.0 / 3.0, None, 1, 3);
         assert!((third - 0.5).abs() < 1e-15);
     }
 

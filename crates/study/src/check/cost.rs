@@ -4,13 +4,13 @@
 //! Each study kind supplies the counts.
 
 use crate::case::study::{Case, Study};
-use crate::check::survey::{SurveyedCase, range};
+use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::results::decimation::MOST_ROWS;
 use crate::run::basis_check;
 use crate::run::output_columns;
 use crate::run::work::AHEAD;
 use crate::syntax::error::{Problem, StudyError};
-use crate::syntax::format::bytes_text;
+use crate::syntax::format::format_bytes;
 use std::collections::BTreeSet;
 use std::f64::consts::{LN_10, TAU};
 use stickslip::curve::sweep::BLOCK;
@@ -159,7 +159,7 @@ enum Difficulty {
 }
 
 impl Difficulty {
-    fn of<T>(self, usual: T, slow: T) -> T {
+    fn select<T>(self, usual: T, slow: T) -> T {
         match self {
             Difficulty::Typical => usual,
             Difficulty::Hard => slow,
@@ -210,7 +210,7 @@ impl<'a> CostInputs<'a> {
     }
 
     /// Returns the costing of the same study with typical orbits.
-    pub(crate) fn usual(&self) -> Self {
+    pub(crate) fn typical(&self) -> Self {
         CostInputs { pace: Difficulty::Typical, ..self.clone() }
     }
 
@@ -226,11 +226,11 @@ impl<'a> CostInputs<'a> {
 
     /// Returns the number of groups of cases that differ in the last parameter of `vary` only.
     pub fn curves(&self) -> f64 {
-        self.cases / self.study.last_varied().max(1) as f64
+        self.cases / self.study.values_per_curve().max(1) as f64
     }
 
     /// Returns the number of frequency columns: 1 for several frequencies, otherwise 0.
-    pub fn several(&self) -> f64 {
+    pub fn frequency_columns(&self) -> f64 {
         if self.frequencies > 1.0 { 1.0 } else { 0.0 }
     }
 
@@ -278,12 +278,12 @@ impl<'a> CostInputs<'a> {
             (nearest > 0 && nearest + 1 < given.len()).then_some(nearest)
         };
         let peaks = || all.iter().map(|modes| modes.iter().filter_map(inner).collect::<BTreeSet<_>>().len());
-        self.pace.of(peaks().min(), peaks().max()).map(|peaks| peaks as f64)
+        self.pace.select(peaks().min(), peaks().max()).map(|peaks| peaks as f64)
     }
 
     /// Returns the lowest and highest excitation frequency, rad/s.
     pub fn range(&self) -> Option<(f64, f64)> {
-        range(self.case)
+        frequency_range(self.case)
     }
 
     /// Returns the lowest natural frequency with all joints stuck, rad/s; zero without one.
@@ -349,7 +349,7 @@ impl Cost {
     }
 
     /// Returns the cells of at most as many rows as a figure shows.
-    fn shown(&self, number: f64, word: f64) -> f64 {
+    fn figure_cells(&self, number: f64, word: f64) -> f64 {
         let rows = |table: &TableShape| table.rows.min(MOST_ROWS as f64);
         self.tables.iter().map(|table| rows(table) * (number * table.numbers + word * table.words)).sum()
     }
@@ -363,7 +363,7 @@ impl CostInputs<'_> {
         // finished units wait until they are in order; a figure reads back at most
         // [`MOST_ROWS`] rows of a table
         let waiting = tables * ((AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
-        let shown = cost.shown(NUMBER + WRITTEN, WORD + WRITTEN);
+        let shown = cost.figure_cells(NUMBER + WRITTEN, WORD + WRITTEN);
         let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.places + self.joints));
         let factor = self.factor_bytes;
         let factors = factor + (KEPT_FACTORS.0 * factor).min(KEPT_FACTORS.1);
@@ -385,12 +385,19 @@ impl CostInputs<'_> {
         let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { MODES * self.dofs.powi(3) };
         let preparing = self.cases * (PREPARING + modes + ASSEMBLING * elements);
         let writing = CELL * cost.cells(1.0, 1.0);
-        OVERHEAD + GENEROUS * (cost.work + self.matrices() + self.again() + preparing + writing + POINT * cost.drawn)
+        OVERHEAD
+            + GENEROUS
+                * (cost.work
+                    + self.reduction_seconds()
+                    + self.basis_check_seconds()
+                    + preparing
+                    + writing
+                    + POINT * cost.drawn)
     }
 
     /// Returns the time to read and reduce a structure given by matrices, s; all cases share
     /// it.
-    fn matrices(&self) -> f64 {
+    fn reduction_seconds(&self) -> f64 {
         let reduced = self.system().reduced().and(self.case.model.substructure.as_ref());
         let rows = reduced.map_or(0.0, |substructure| substructure.component.dofs() as f64);
         MATRICES.0 * rows.powf(MATRICES.1) + SEEN * rows * self.places
@@ -398,7 +405,7 @@ impl CostInputs<'_> {
 
     /// Returns the time of the basis check, s: points with slip are solved again in a larger
     /// reduction basis.
-    fn again(&self) -> f64 {
+    fn basis_check_seconds(&self) -> f64 {
         let Some(reduced) = self.system().reduced() else { return 0.0 };
         let rows = self.case.model.substructure.as_ref().map_or(0, |own| own.component.dofs());
         let harmonics = self.case.method.options.get("harmonics").filter(|_| self.is_series());
@@ -407,7 +414,8 @@ impl CostInputs<'_> {
         if self.joints == 0.0 || within || rows > basis_check::ROWS || !self.study.kind().uses_method {
             return 0.0;
         }
-        AGAIN.0 * self.matrices() + AGAIN.1 * basis_check::count(self.points(), self.cases) * self.orbit()
+        AGAIN.0 * self.reduction_seconds()
+            + AGAIN.1 * basis_check::checked_points(self.points(), self.cases) * self.orbit()
     }
 }
 
@@ -423,9 +431,9 @@ impl StudySize {
         }
         let message = format!(
             "the study needs about {} of memory for {} rows of results; the limit is {}",
-            bytes_text(memory),
+            format_bytes(memory),
             self.rows,
-            bytes_text(limit)
+            format_bytes(limit)
         );
         let lengths = ["samples", "samples_per_cycle", "cycles", "duration", "steps"].into_iter();
         let given: Vec<String> =
@@ -438,7 +446,7 @@ impl StudySize {
             (Some(varied), frequencies) if study.cases() >= frequencies => &varied.location,
             _ => study.study.location_of("frequency", None),
         };
-        Some(StudyError::at(&study.sources, Problem::new(place, "memory", message).help(help)))
+        Some(StudyError::at_location(&study.sources, Problem::new(place, "memory", message).help(help)))
     }
 }
 
@@ -651,19 +659,22 @@ impl CostInputs<'_> {
     pub fn orbit(&self) -> f64 {
         let case = self.case;
         let size = self.dofs + self.joints;
-        let shooting = self.pace.of(SHOOTING_USUAL, SHOOTING);
-        let shooting = size * size * self.ringing() * if self.has_states { shooting.1 } else { shooting.0 };
+        let shooting = self.pace.select(SHOOTING_USUAL, SHOOTING);
+        let shooting = size * size * self.fast_mode_factor() * if self.has_states { shooting.1 } else { shooting.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
             _ if self.is_series() => {
-                let whole = series * self.sector() * self.unheld();
+                let whole = series * self.solved_share() * self.contact_held_factor();
                 let given = case.method.options.get("harmonics").copied();
-                whole.max(self.rigid_series(given)) + self.beside_rigid(given) + self.factored(given) + self.judged()
+                whole.max(self.rigid_series(given))
+                    + self.memory_laws_with_rigid(given)
+                    + self.factored(given)
+                    + self.return_check()
             }
             "transient" => {
                 let digit = LN_10 / (TAU * self.least_damping());
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
-                let share = self.pace.of(0.0, UNSETTLED);
+                let share = self.pace.select(0.0, UNSETTLED);
                 let restless = if self.unbounded_force { share * UNSETTLED_PERIODS } else { 0.0 };
                 (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
             }
@@ -678,7 +689,7 @@ impl CostInputs<'_> {
         let counted = ELIMINATED * event_driven::orbit_work(self.system()).unwrap_or(0.0);
         let far = event_driven::ALONE * counted;
         let usual = if self.is_dense(FAR) { counted } else { far };
-        self.pace.of(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + EVENTS_WAITED * far)
+        self.pace.select(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + EVENTS_WAITED * far)
     }
 
     /// Returns true if there are several frequencies, spaced by at most `widths` widths of a
@@ -694,29 +705,29 @@ impl CostInputs<'_> {
     ///
     /// A linear reference has no joint that slips or opens, so its orbits are easy to find.
     pub fn reference(&self) -> f64 {
-        if self.is_series() { self.orbit() / self.unheld() } else { self.orbit() }
+        if self.is_series() { self.orbit() / self.contact_held_factor() } else { self.orbit() }
     }
 
     /// Returns the factor on the time of orbits if only contacts hold some bodies.
-    fn unheld(&self) -> f64 {
+    fn contact_held_factor(&self) -> f64 {
         let survey = &self.surveyed.survey;
         let contacts = self.smooth && self.equal_steps;
         if !contacts || survey.free().rigid == 0 || survey.system().cyclic().is_some() {
             return 1.0;
         }
-        self.pace.of(if self.is_dense(FAR) { UNHELD.0 } else { UNHELD.1 }, 1.0)
+        self.pace.select(if self.is_dense(FAR) { UNHELD.0 } else { UNHELD.1 }, 1.0)
     }
 
     /// Returns the number of steps along a curve: `usual` in the typical case, otherwise
     /// `hard`.
     pub fn steps(&self, (usual, hard): (f64, f64)) -> f64 {
-        self.pace.of(usual, hard)
+        self.pace.select(usual, hard)
     }
 
     /// Returns the share of the structure that is solved for an orbit.
     ///
     /// A ring in a travelling wave is solved by one sector of twice the size.
-    pub fn sector(&self) -> f64 {
+    pub fn solved_share(&self) -> f64 {
         self.system().cyclic().map_or(1.0, |ring| (2.0 / ring.sectors as f64).min(1.0))
     }
 
@@ -725,12 +736,12 @@ impl CostInputs<'_> {
     /// With `harmonics = None` the method chooses the number of harmonics.
     pub fn series(&self, harmonics: Option<f64>) -> f64 {
         let factor = match (self.smooth, self.is_rigid(), harmonics) {
-            (_, _, None) if self.falling_friction => self.pace.of(HARD_FALLING.0, HARD_FALLING.1),
+            (_, _, None) if self.falling_friction => self.pace.select(HARD_FALLING.0, HARD_FALLING.1),
             (false, false, _) => 1.0,
             (_, _, None) => HARD,
             (true, _, Some(_)) => HARD_SMOOTH,
             (false, true, Some(_)) if self.is_dense(FAR) => HARD_RIGID.0,
-            (false, true, Some(_)) => self.pace.of(HARD_RIGID.1, HARD_RIGID.0),
+            (false, true, Some(_)) => self.pace.select(HARD_RIGID.1, HARD_RIGID.0),
         };
         let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
         let length = match harmonics {
@@ -739,8 +750,8 @@ impl CostInputs<'_> {
         };
         // friction that falls with velocity is hard to solve in the typical case too
         let usual = if self.falling_friction { SERIES } else { SERIES_USUAL };
-        let each = self.pace.of(usual, SERIES) * (self.dofs + self.joints).max(1.0);
-        (each + self.coupled()) * factor * length.max(1.0).powf(SERIES_LENGTH)
+        let each = self.pace.select(usual, SERIES) * (self.dofs + self.joints).max(1.0);
+        (each + self.coupled_contacts()) * factor * length.max(1.0).powf(SERIES_LENGTH)
     }
 
     /// Returns the time to eliminate `unknowns` unknowns, s.
@@ -749,7 +760,7 @@ impl CostInputs<'_> {
     }
 
     /// Returns the time that contacts add if a reduced structure couples all of them, s.
-    fn coupled(&self) -> f64 {
+    fn coupled_contacts(&self) -> f64 {
         let system = self.system();
         let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
         let all = system.reduced().is_some() && system.cyclic().is_none();
@@ -765,13 +776,14 @@ impl CostInputs<'_> {
         }
         let step = |harmonics: f64| ELIMINATED * harmonic_balance::step_work(system, harmonics as usize);
         if let Some(given) = harmonics {
-            let (own, estimate) = self.pace.of(RIGID_STEPS_USUAL, RIGID_STEPS);
+            let (own, estimate) = self.pace.select(RIGID_STEPS_USUAL, RIGID_STEPS);
             return own * step(given) + estimate * step(2.0 * given);
         }
         let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
-        let longest = self.pace.of(RIGID_HARMONICS.0, RIGID_HARMONICS.1) * (SERIES_TOLERANCE / asked).powf(RIGID_ORDER);
+        let longest =
+            self.pace.select(RIGID_HARMONICS.0, RIGID_HARMONICS.1) * (SERIES_TOLERANCE / asked).powf(RIGID_ORDER);
         let longest = longest.min(MOST_HARMONICS);
-        let each = self.pace.of(RIGID_EACH.0, RIGID_EACH.1);
+        let each = self.pace.select(RIGID_EACH.0, RIGID_EACH.1);
         let sought = each * harmonic_balance::doubling_work(system, longest);
         ELIMINATED * sought.min(harmonic_balance::most_work(system))
     }
@@ -779,7 +791,7 @@ impl CostInputs<'_> {
     /// Returns the time of laws with memory in a model with rigid planar friction, s.
     ///
     /// Returns zero for given harmonics, which are fewer.
-    fn beside_rigid(&self, harmonics: Option<f64>) -> f64 {
+    fn memory_laws_with_rigid(&self, harmonics: Option<f64>) -> f64 {
         let laws = || self.system().joints().iter().map(|joint| joint.law());
         let is_rigid =
             |law: &SharedLaw| law.directions() > 1 && law.prox().is_some_and(|prox| prox.compliance() == 0.0);
@@ -788,7 +800,7 @@ impl CostInputs<'_> {
         }
         let remembers = |law: &&SharedLaw| law.step().is_some() || law.rate().is_some_and(|rate| rate.states() > 0);
         let pairs: usize = laws().filter(remembers).map(|law| law.directions().pow(2)).sum();
-        (self.pace.of(BESIDE_RIGID.0, BESIDE_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
+        (self.pace.select(BESIDE_RIGID.0, BESIDE_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
     }
 
     /// Returns the time to factor the dynamic stiffness for one orbit, s; zero if no factor is
@@ -812,27 +824,27 @@ impl CostInputs<'_> {
         let exact = self.dofs + self.sliders;
         // `width` makes methods integrate sliders that have no smooth replacement
         if self.equal_steps && (self.smooth || self.case.method.options.contains_key("width")) {
-            return self.pace.of(STEPS.0, STEPS.1) * self.step();
+            return self.pace.select(STEPS.0, STEPS.1) * self.step();
         }
         match (self.smooth, self.has_states) {
             (false, _) => PERIOD_EVENTS.0 * exact + PERIOD_EVENTS.1 * exact.powi(3),
-            (true, false) => PERIOD.0 * size * size * self.ringing(),
-            (true, true) => PERIOD.1 * size * size * self.ringing(),
+            (true, false) => PERIOD.0 * size * size * self.fast_mode_factor(),
+            (true, true) => PERIOD.1 * size * size * self.fast_mode_factor(),
         }
     }
 
     /// Returns the time of the return check of a harmonic balance orbit in equal steps, s.
     ///
     /// Returns zero if the check takes no time compared with the orbit.
-    fn judged(&self) -> f64 {
+    fn return_check(&self) -> f64 {
         let Some((steps, with_derivatives)) = evidence_steps(self.system()) else { return 0.0 };
         let derivatives = if with_derivatives { JUDGED * self.dofs.powi(2) } else { 0.0 };
         steps as f64 * (self.step() + derivatives)
     }
 
     /// Returns the time of an intermediate orbit, whose return is not checked, s.
-    pub fn between(&self) -> f64 {
-        self.orbit() - if self.is_series() { self.judged() } else { 0.0 }
+    pub fn unchecked_orbit(&self) -> f64 {
+        self.orbit() - if self.is_series() { self.return_check() } else { 0.0 }
     }
 
     /// Returns the time of one equal step, s.
@@ -853,7 +865,7 @@ impl CostInputs<'_> {
 
     /// Returns the factor on the integration time of a period due to the fastest mode that does
     /// not decay within the period.
-    fn ringing(&self) -> f64 {
+    fn fast_mode_factor(&self) -> f64 {
         let drive = self.range().map_or(self.slowest_mode(), |(lowest, _)| lowest);
         let modes = &self.surveyed.survey.stuck().elastic;
         let rings = modes.iter().filter(|mode| TAU * mode.damping * mode.omega < RINGING * LN_10 * drive);
@@ -872,7 +884,7 @@ impl CostInputs<'_> {
     }
 
     /// Returns the time to evaluate the motion at `instants` instants, s.
-    pub fn reading(&self, instants: f64) -> f64 {
+    pub fn evaluation(&self, instants: f64) -> f64 {
         INSTANT * instants * (self.dofs + self.joints)
     }
 
@@ -880,7 +892,7 @@ impl CostInputs<'_> {
     pub fn extra(&self) -> f64 {
         match self.case.values.names("output").unwrap_or_default().len() {
             0 => 0.0,
-            some => self.reading(some as f64 * output_columns::INSTANTS as f64),
+            some => self.evaluation(some as f64 * output_columns::INSTANTS as f64),
         }
     }
 }

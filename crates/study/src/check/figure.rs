@@ -9,14 +9,14 @@ use stickslip::model::Model;
 
 /// Checks the values of `[figure]`.
 pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), KeyError> {
-    let known = ModelNames::of_places(model).and_joints(model);
+    let known = ModelNames::places(model).with_joints(model);
     for name in figure.names("only").unwrap_or_default() {
         if model.is_rotation(name) {
             let message = format!("`{name}` is a rotation; figures show displacements only");
             let help = "name a [[place]] of the body; the tables contain its rotations in rad";
             return Err(KeyError { name: Some(name.clone()), ..KeyError::new("only", message, help) });
         }
-        known.all("only", "mass or joint", name)?;
+        known.labels("only", "mass or joint", name)?;
     }
     for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
         let Some(text) = figure.text(key) else { continue };
@@ -30,7 +30,7 @@ pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(
             found => {
                 let what = if found.is_some() { "a unit of another quantity" } else { "not a known unit" };
                 let help = format!("write a unit such as {example}");
-                return Err(KeyError::new(key, format!("`{}` is {what}", suggest::shown(text)), help));
+                return Err(KeyError::new(key, format!("`{}` is {what}", suggest::excerpt(text)), help));
             }
         }
     }

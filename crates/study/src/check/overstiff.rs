@@ -8,7 +8,7 @@
 //! motion; they cancel, and only rounding remains.
 
 use crate::kinds::info::KeyError;
-use crate::syntax::expression::displayed;
+use crate::syntax::expression::quantity_text;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -32,7 +32,7 @@ impl AttachedMass<'_> {
 /// Iterates over the masses with an attached stiffness.
 ///
 /// Places without mass and places with an imposed motion are left out.
-fn held(model: &Model) -> impl Iterator<Item = AttachedMass<'_>> {
+fn attached_masses(model: &Model) -> impl Iterator<Item = AttachedMass<'_>> {
     let mut stiffest: HashMap<&str, (f64, Element)> = HashMap::new();
     let springs = model.springs.iter().enumerate().map(|(i, s)| (&s.between, s.stiffness, Element::Spring(i)));
     let joints = model.joints.iter().enumerate().map(|(i, j)| (&j.between, stiffness(&*j.law), Element::Joint(i)));
@@ -53,17 +53,17 @@ fn held(model: &Model) -> impl Iterator<Item = AttachedMass<'_>> {
 
 /// Returns the error of an element so stiff that a mass does not move at `omega`, rad/s; `None`
 /// without one.
-pub(crate) fn immovable(model: &Model, omega: f64) -> Option<ModelError> {
-    let AttachedMass { mass, stiffness, element: by } = held(model).find(|held| omega < held.slowest())?;
+pub(crate) fn overstiff_element(model: &Model, omega: f64) -> Option<ModelError> {
+    let AttachedMass { mass, stiffness, element: by } = attached_masses(model).find(|held| omega < held.slowest())?;
     let message = format!(
         "a stiffness of {} is too high for a mass of {}: `{}` cannot move at {}, because its inertia is lost in \
          rounding; replace this place by `ground`, merge the two masses, or use the law `coulomb` for rigid friction",
-        displayed(stiffness, Some(Dimension::STIFFNESS)),
-        displayed(mass.mass, Some(Dimension::MASS)),
+        quantity_text(stiffness, Some(Dimension::STIFFNESS)),
+        quantity_text(mass.mass, Some(Dimension::MASS)),
         mass.name,
-        displayed(omega, Some(Dimension::FREQUENCY)),
+        quantity_text(omega, Some(Dimension::FREQUENCY)),
     );
-    Some(refused(by, message))
+    Some(element_error(by, message))
 }
 
 /// Share of a motion that rounding may reach because of a mode far below the excitation.
@@ -76,20 +76,20 @@ const LOST: f64 = 1e-6;
 /// without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     let lost = |held: &AttachedMass<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
-    let AttachedMass { mass, stiffness, element: by } = held(model).find(lost)?;
+    let AttachedMass { mass, stiffness, element: by } = attached_masses(model).find(lost)?;
     let message = format!(
         "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
          rounding; remove it, or correct the mass",
-        displayed(stiffness, Some(Dimension::STIFFNESS)),
-        displayed(mass.mass, Some(Dimension::MASS)),
+        quantity_text(stiffness, Some(Dimension::STIFFNESS)),
+        quantity_text(mass.mass, Some(Dimension::MASS)),
         mass.name,
-        displayed(omega, Some(Dimension::FREQUENCY)),
+        quantity_text(omega, Some(Dimension::FREQUENCY)),
     );
-    Some(refused(by, message))
+    Some(element_error(by, message))
 }
 
 /// Builds the error of an element.
-fn refused(by: Element, message: String) -> ModelError {
+fn element_error(by: Element, message: String) -> ModelError {
     let key = if matches!(by, Element::Joint(_)) { "law" } else { "stiffness" };
     ModelError { element: by, key, message, wrong_name: None }
 }
@@ -103,7 +103,7 @@ const SEEN: f64 = 100.0;
 pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
     let mut slowest = 0.0f64;
     let mut softest: Option<(f64, &str)> = None;
-    for held in held(model) {
+    for held in attached_masses(model) {
         if omega >= held.slowest() {
             return None;
         }
@@ -114,7 +114,7 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
         }
     }
     let (own, name) = softest?;
-    let shown = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+    let shown = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
     let enough = TAU * 10f64.powf((SEEN.sqrt() * slowest / TAU).log10().ceil());
     let message = format!(
         "at {} inertia has no effect, because it is lost in rounding; the lowest natural frequency of a single mass is \

@@ -25,7 +25,7 @@ impl SurveyedCase {
 }
 
 /// Returns the lowest and the highest excitation frequency of a case, rad/s.
-pub(crate) fn range(case: &Case) -> Option<(f64, f64)> {
+pub(crate) fn frequency_range(case: &Case) -> Option<(f64, f64)> {
     if let Some(run_up) = case.values.table("run_up") {
         let (a, b) = (run_up.quantity("from")?, run_up.quantity("to")?);
         return Some((a.min(b), a.max(b)));

@@ -1,32 +1,32 @@
 //! Warnings about likely mistakes in a study. Each study kind selects those that concern it.
 
 use crate::case::values::{Frequencies, Values};
-use crate::check::survey::{SurveyedCase, range};
-use crate::syntax::format::{quantity, significant};
+use crate::check::survey::{SurveyedCase, frequency_range};
+use crate::syntax::format::{format_significant, format_with_prefix};
 use crate::syntax::key::MOST_POINTS;
 use std::f64::consts::TAU;
 use stickslip::curve::modes::unit;
 use stickslip::model::{Cyclic, LinearMode, Modes};
 
 /// Warnings of a kind that needs an excitation.
-pub(crate) fn driven(cases: &[SurveyedCase]) -> Vec<String> {
+pub(crate) fn excitation_warnings(cases: &[SurveyedCase]) -> Vec<String> {
     no_excitation(cases, false).into_iter().collect()
 }
 
 /// Warnings of a kind that needs an excitation or an initial state.
-pub(crate) fn moved(cases: &[SurveyedCase]) -> Vec<String> {
+pub(crate) fn motion_warnings(cases: &[SurveyedCase]) -> Vec<String> {
     no_excitation(cases, true).into_iter().collect()
 }
 
 /// Warnings of a kind that looks for resonances in a range of frequencies.
-pub(crate) fn resonant(cases: &[SurveyedCase]) -> Vec<String> {
+pub(crate) fn resonance_warnings(cases: &[SurveyedCase]) -> Vec<String> {
     no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
 }
 
-/// Warnings of a kind with given frequencies: those of `resonant`, and frequencies too far
+/// Warnings of a kind with given frequencies: those of [`resonance_warnings`], and frequencies too far
 /// apart for a resonance.
-pub(crate) fn sampled(cases: &[SurveyedCase]) -> Vec<String> {
-    resonant(cases).into_iter().chain(coarse(cases)).collect()
+pub(crate) fn sampling_warnings(cases: &[SurveyedCase]) -> Vec<String> {
+    resonance_warnings(cases).into_iter().chain(coarse_frequencies(cases)).collect()
 }
 
 fn no_excitation(cases: &[SurveyedCase], starts_count: bool) -> Option<String> {
@@ -55,14 +55,14 @@ fn no_excitation(cases: &[SurveyedCase], starts_count: bool) -> Option<String> {
 
 /// Warns of a resonance within the range that only the joints damp. Kinds that search for the
 /// best joint compare peaks; for them an undamped structure is a textbook case.
-pub(crate) fn undamped(cases: &[SurveyedCase]) -> Option<String> {
+pub(crate) fn undamped_resonance(cases: &[SurveyedCase]) -> Option<String> {
     let found = |one: &SurveyedCase| {
-        let (from, to) = range(&one.case)?;
+        let (from, to) = frequency_range(&one.case)?;
         one.survey.undamped(from, to).first().copied()
     };
     // the warning must be true for every case
     let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
-    let hertz = significant(all.first()? / TAU, 6);
+    let hertz = format_significant(all.first()? / TAU, 6);
     let advice = "add `damping` or damping_ratio = \"0.5 %\" to a spring";
     Some(match cases[0].survey.system().joints().is_empty() {
         true => format!("the resonance at {hertz} Hz is undamped: the response has no bound there; {advice}"),
@@ -74,7 +74,7 @@ pub(crate) fn undamped(cases: &[SurveyedCase]) -> Option<String> {
 }
 
 fn no_resonance(cases: &[SurveyedCase]) -> Option<String> {
-    let (from, to) = range(&cases[0].case).filter(|(from, to)| from < to)?;
+    let (from, to) = frequency_range(&cases[0].case).filter(|(from, to)| from < to)?;
     let mut nearest: Option<(f64, f64, &str)> = None;
     for one in cases {
         let harmonics = one.survey.harmonics();
@@ -108,7 +108,7 @@ fn no_resonance(cases: &[SurveyedCase]) -> Option<String> {
             }
         }
     }
-    let hertz = |omega: f64| significant(omega / TAU, 6);
+    let hertz = |omega: f64| format_significant(omega / TAU, 6);
     // A model without any frequency has no mass, or no spring holds it, which another warning
     // reports.
     let (_, omega, name) = nearest?;
@@ -132,20 +132,20 @@ struct NarrowResonance {
 ///
 /// The width is that at half power, twice damping times frequency, with joints free or stuck,
 /// the larger one. Friction only adds to it.
-fn coarse(cases: &[SurveyedCase]) -> Option<String> {
+fn coarse_frequencies(cases: &[SurveyedCase]) -> Option<String> {
     let Some(Frequencies::Range { points, .. }) = cases[0].case.frequencies else { return None };
     // the warning must be true for every case
     let narrow = cases.iter().map(narrowest).collect::<Option<Vec<NarrowResonance>>>()?;
     // modes by nodal diameter take time, so they are only computed if there is a warning
     // without them
     let narrow = match cases.iter().any(|one| one.case.model.ring.is_some_and(|ring| ring.order.is_some())) {
-        true => cases.iter().map(narrowest_met).collect::<Option<Vec<NarrowResonance>>>()?,
+        true => cases.iter().map(narrowest_in_wave).collect::<Option<Vec<NarrowResonance>>>()?,
         false => narrow,
     };
     let NarrowResonance { frequency: at, width, points: enough } =
         narrow.into_iter().max_by(|a, b| a.points.total_cmp(&b.points))?;
-    let (from, to) = range(&cases[0].case)?;
-    let hertz = |omega: f64, digits: i32| significant(omega / TAU, digits);
+    let (from, to) = frequency_range(&cases[0].case)?;
+    let hertz = |omega: f64, digits: i32| format_significant(omega / TAU, digits);
     let step = (to - from) / (points - 1) as f64;
     let several = if enough <= MOST_POINTS as f64 {
         format!("{enough} points are enough")
@@ -175,7 +175,7 @@ fn narrowest(one: &SurveyedCase) -> Option<NarrowResonance> {
 
 /// Like [`narrowest`], for a tuned disk in a travelling wave. Each harmonic of the excitation
 /// meets the modes of one nodal diameter.
-fn narrowest_met(one: &SurveyedCase) -> Option<NarrowResonance> {
+fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let ring = one.case.model.ring.filter(|ring| ring.equal);
     let Some((sectors, order)) = ring.and_then(|ring| Some((ring.sectors, ring.order?))) else {
@@ -234,12 +234,12 @@ const UNLOADED: f64 = 1e6;
 
 /// Warnings of a nonlinear mode: its amplitudes end before any joint slips, or a constant force
 /// acts on the structure.
-pub(crate) fn of_mode(cases: &[SurveyedCase]) -> Vec<String> {
-    sticks(cases).into_iter().chain(displaced(cases)).collect()
+pub(crate) fn mode_warnings(cases: &[SurveyedCase]) -> Vec<String> {
+    no_slip_warning(cases).into_iter().chain(constant_force(cases)).collect()
 }
 
 /// Warns of constant forces: a mode is a motion without any forces.
-fn displaced(cases: &[SurveyedCase]) -> Option<String> {
+fn constant_force(cases: &[SurveyedCase]) -> Option<String> {
     let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
     let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
     Some(format!(
@@ -248,7 +248,7 @@ fn displaced(cases: &[SurveyedCase]) -> Option<String> {
     ))
 }
 
-fn sticks(cases: &[SurveyedCase]) -> Option<String> {
+fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {
     let mut needed = f64::INFINITY;
     let mut asked = 0.0;
     for one in cases {
@@ -269,7 +269,7 @@ fn sticks(cases: &[SurveyedCase]) -> Option<String> {
     }
     Some(format!(
         "no joint slips in this mode: the amplitudes end at {}, and the first slip is at about {}",
-        quantity(asked, "m"),
-        quantity(needed, "m")
+        format_with_prefix(asked, "m"),
+        format_with_prefix(needed, "m")
     ))
 }

@@ -3,8 +3,8 @@
 
 use crate::compile::compiled::CompiledQuantity;
 use crate::syntax::error::Problem;
-use crate::syntax::expression::displayed;
-use crate::syntax::suggest::shown;
+use crate::syntax::expression::quantity_text;
+use crate::syntax::suggest::excerpt;
 use crate::syntax::units;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -14,26 +14,29 @@ const ROUNDING: f64 = 1e-12;
 
 /// Returns a problem if one quantity is a bare number and another one has a unit with a
 /// different factor to SI.
-pub(crate) fn mixed<'a>(key: &str, all: impl IntoIterator<Item = &'a CompiledQuantity>) -> Option<Problem> {
+pub(crate) fn bare_number_problem<'a>(
+    key: &str,
+    all: impl IntoIterator<Item = &'a CompiledQuantity>,
+) -> Option<Problem> {
     let all: Vec<&CompiledQuantity> = all.into_iter().collect();
     // a bare frequency is in Hz
     let bare = |dimension| if matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE) { TAU } else { 1.0 };
     let counts_so = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= ROUNDING;
     // no problem if one of the quantities has the unit in which a bare number counts
-    if all.iter().filter_map(|q| with_unit(q)).any(|(_, factor, dimension)| counts_so(factor, dimension)) {
+    if all.iter().filter_map(|q| literal_unit(q)).any(|(_, factor, dimension)| counts_so(factor, dimension)) {
         return None;
     }
-    let (unit, _, dimension) = all.iter().find_map(|quantity| with_unit(quantity))?;
+    let (unit, _, dimension) = all.iter().find_map(|quantity| literal_unit(quantity))?;
     let bare = bare(dimension);
     let (quantity, number) = all.iter().find_map(|quantity| Some((quantity, bare_number(quantity)?)))?;
-    let counts = displayed(number * bare, Some(dimension));
-    let text = shown(quantity.text.trim());
+    let counts = quantity_text(number * bare, Some(dimension));
+    let text = excerpt(quantity.text.trim());
     let message = format!("the bare number {text} counts as {counts}, but other values of this key are in {unit}");
     Some(quantity.problem(key, message).help(format!("add the unit: \"{text} {unit}\" or \"{counts}\"")))
 }
 
 /// Returns the unit of a literal, its factor to SI and its dimension.
-pub(crate) fn with_unit(quantity: &CompiledQuantity) -> Option<(&str, f64, Dimension)> {
+pub(crate) fn literal_unit(quantity: &CompiledQuantity) -> Option<(&str, f64, Dimension)> {
     if !quantity.expression.is_literal() {
         return None;
     }
@@ -43,7 +46,7 @@ pub(crate) fn with_unit(quantity: &CompiledQuantity) -> Option<(&str, f64, Dimen
     let unit =
         if unit.starts_with(['e', 'E']) && units::find(unit).is_none() { unit.split_once(' ')?.1.trim() } else { unit };
     let found = units::parse(unit)?;
-    Some((unit, found.scale("1"), found.dimension))
+    Some((unit, found.to_si("1"), found.dimension))
 }
 
 /// Returns the value of a literal without a unit, unless it is zero.

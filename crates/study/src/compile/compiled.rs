@@ -3,7 +3,7 @@
 
 use crate::case::values::{Frequencies, ResolvedValue, Values};
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::expression::{Expression, ExpressionValue, described, displayed};
+use crate::syntax::expression::{Expression, ExpressionValue, dimension_text, quantity_text};
 use crate::syntax::key::Bounds;
 use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
@@ -69,7 +69,7 @@ impl CompiledTable {
     }
 
     /// Appends the indices of the repetition to a message.
-    pub fn with_turn(&self, message: &str) -> String {
+    pub fn with_repetition(&self, message: &str) -> String {
         if self.repetition.is_empty() { message.to_owned() } else { format!("{message} ({})", self.repetition) }
     }
 
@@ -148,10 +148,10 @@ impl CompiledQuantity {
     ) -> Result<f64, Problem> {
         let value = self.value(key, environment)?;
         let number = self.convert(value, dimension, key, example, environment)?;
-        if within.holds(number) {
+        if within.contains(number) {
             return Ok(number);
         }
-        let message = format!("must be {}, found {}", within.described(), displayed(number, Some(dimension)));
+        let message = format!("must be {}, found {}", within.description(), quantity_text(number, Some(dimension)));
         Err(self.problem(key, message))
     }
 
@@ -185,19 +185,19 @@ impl CompiledQuantity {
 
     /// Returns the value of this quantity for the parameter `name`, in the dimension that the
     /// parameter must have.
-    pub fn settled(
+    pub fn parameter_value(
         &self,
         name: &str,
         dimension: Option<Dimension>,
         environment: &Environment<'_>,
     ) -> Result<ExpressionValue, Problem> {
         let value = self.value(name, environment)?;
-        self.in_dimension(value, name, dimension, environment)
+        self.convert_parameter(value, name, dimension, environment)
     }
 
     /// Converts `value`, the value of this quantity, to the dimension that the parameter `name`
     /// must have.
-    pub fn in_dimension(
+    pub fn convert_parameter(
         &self,
         value: ExpressionValue,
         name: &str,
@@ -206,10 +206,10 @@ impl CompiledQuantity {
     ) -> Result<ExpressionValue, Problem> {
         let Some(dimension) = dimension else { return Ok(value) };
         let number = self.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
-            None => problem.help(format!("the parameter `{name}` is {}", described(dimension))),
+            None => problem.help(format!("the parameter `{name}` is {}", dimension_text(dimension))),
             Some(_) => problem,
         })?;
-        Ok(ExpressionValue::of(number, dimension))
+        Ok(ExpressionValue::new(number, dimension))
     }
 
     pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
@@ -227,14 +227,14 @@ impl CompiledTable {
         let before = problems.len();
         let mut entries = Vec::with_capacity(self.entries.len());
         for entry in &self.entries {
-            match entry.value.given(entry.key, environment, problems) {
+            match entry.value.evaluate(entry.key, environment, problems) {
                 Ok(given) => entries.push((entry.key, given)),
                 Err(problem) => problems.push(problem),
             }
         }
         if !self.repetition.is_empty() {
             for problem in &mut problems[before..] {
-                problem.message = self.with_turn(&problem.message);
+                problem.message = self.with_repetition(&problem.message);
             }
         }
         Values { entries }
@@ -242,7 +242,7 @@ impl CompiledTable {
 }
 
 impl CompiledValue {
-    fn given(
+    fn evaluate(
         &self,
         key: &'static str,
         environment: &Environment<'_>,
@@ -264,7 +264,7 @@ impl CompiledValue {
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
                 if *order == RangeOrder::Rising || start == end {
-                    not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
+                    check_range(start, end, to, Some(Dimension::FREQUENCY))?;
                 }
                 ResolvedValue::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
             }
@@ -272,7 +272,7 @@ impl CompiledValue {
                 let frequency = (Dimension::FREQUENCY, Bounds::Positive);
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
-                not_empty(start, end, to, Some(Dimension::FREQUENCY))?;
+                check_range(start, end, to, Some(Dimension::FREQUENCY))?;
                 let share =
                     tolerance.number("tolerance", (Dimension::NONE, Bounds::Positive), "\"1 %\"", environment)?;
                 if !(FINEST..=COARSEST).contains(&share) {
@@ -364,7 +364,7 @@ const FINEST: f64 = 1e-5;
 const COARSEST: f64 = 0.5;
 
 /// Refuses a range whose end is not above its start.
-pub(crate) fn not_empty(
+pub(crate) fn check_range(
     from: f64,
     to: f64,
     end: &CompiledQuantity,
@@ -373,7 +373,7 @@ pub(crate) fn not_empty(
     if from < to {
         return Ok(());
     }
-    let (from, to) = (displayed(from, dimension), displayed(to, dimension));
+    let (from, to) = (quantity_text(from, dimension), quantity_text(to, dimension));
     Err(end
         .problem("to", format!("the range is empty: `to` must be greater than `from`, found {from} to {to}"))
         .help("exchange both values, or write a single value"))

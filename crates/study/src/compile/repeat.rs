@@ -31,7 +31,7 @@ impl Repetition {
     }
 
     /// Returns the element with this number, from 0.
-    pub fn turn(&self, number: usize) -> Iteration<'_> {
+    pub fn iteration(&self, number: usize) -> Iteration<'_> {
         let mut rest = number as i64;
         let mut values = vec![0; self.indices.len()];
         for (value, index) in values.iter_mut().zip(&self.indices).rev() {
@@ -63,7 +63,7 @@ impl Iteration<'_> {
     }
 
     /// Describes the indices in words: `i = 3, j = 1`; empty without an index.
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         let words = self.indices.iter().zip(&self.values).map(|(index, value)| format!("{} = {value}", index.name));
         words.collect::<Vec<_>>().join(", ")
     }
@@ -83,7 +83,7 @@ impl Iteration<'_> {
             };
             name.push_str(&text[at..open]);
             let inner = &text[open + 1..close];
-            let value = self.whole(inner).map_err(|mut fault| {
+            let value = self.whole_number(inner).map_err(|mut fault| {
                 fault.span = open + 1 + fault.span.start..open + 1 + fault.span.end;
                 fault
             })?;
@@ -95,7 +95,7 @@ impl Iteration<'_> {
     }
 
     /// Evaluates the whole number inside braces.
-    fn whole(&self, inner: &str) -> Result<i64, TextError> {
+    fn whole_number(&self, inner: &str) -> Result<i64, TextError> {
         let names: Vec<&str> = self.names().collect();
         let expression = Expression::compile_with(inner, &|_| None, &|name| self.value(name), &names)?;
         let value = expression.evaluate(&[])?;
@@ -128,31 +128,31 @@ mod tests {
     #[test]
     fn names_are_filled_in() {
         let ring = Repetition { indices: vec![index("i", 1, 12, true)] };
-        let name = |number, text: &str| ring.turn(number).name(text).unwrap();
+        let name = |number, text: &str| ring.iteration(number).name(text).unwrap();
         assert_eq!((ring.count(), name(0, "blade{i}").as_str()), (12, "blade1"));
         assert_eq!(name(11, "blade{i}_to_{i+1}"), "blade12_to_1");
         assert_eq!(name(0, "blade{i - 1}"), "blade12");
         assert_eq!(name(0, "blade{i+24}"), "blade1");
         assert_eq!(name(2, "plain"), "plain");
         let open = Repetition { indices: vec![index("i", 2, 4, false)] };
-        assert_eq!(open.turn(2).name("b{2*i+1}").unwrap(), "b9");
+        assert_eq!(open.iteration(2).name("b{2*i+1}").unwrap(), "b9");
         for (text, words) in
             [("b{i", "not closed"), ("b{i/2}", "whole number, found 1.5"), ("b{k}", "no parameter"), ("b{}", "empty")]
         {
-            let fault = open.turn(1).name(text).unwrap_err();
+            let fault = open.iteration(1).name(text).unwrap_err();
             assert!(fault.message.contains(words), "{text}: {}", fault.message);
         }
-        assert!(open.turn(1).name("b{1 kg}").is_err());
+        assert!(open.iteration(1).name("b{1 kg}").is_err());
     }
 
     #[test]
     fn a_grid_turns_the_last_index_fastest() {
         let grid = Repetition { indices: vec![index("i", 1, 3, true), index("j", 5, 6, false)] };
-        let words: Vec<String> = (0..grid.count()).map(|n| grid.turn(n).words()).collect();
+        let words: Vec<String> = (0..grid.count()).map(|n| grid.iteration(n).description()).collect();
         assert_eq!(words[..3], ["i = 1, j = 5", "i = 1, j = 6", "i = 2, j = 5"]);
         assert_eq!((words.len(), words[5].as_str()), (6, "i = 3, j = 6"));
-        assert_eq!(grid.turn(5).name("m{i+1}_{j+1}").unwrap(), "m1_7");
-        assert!(grid.turn(5).name("m{i+j}").unwrap_err().message.contains("one index"));
-        assert_eq!(Repetition::default().turn(0).words(), "");
+        assert_eq!(grid.iteration(5).name("m{i+1}_{j+1}").unwrap(), "m1_7");
+        assert!(grid.iteration(5).name("m{i+j}").unwrap_err().message.contains("one index"));
+        assert_eq!(Repetition::default().iteration(0).description(), "");
     }
 }

@@ -6,8 +6,8 @@ use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::expression::displayed;
-use crate::syntax::suggest::{nearest, one_of};
+use crate::syntax::expression::quantity_text;
+use crate::syntax::suggest::{alternatives, suggest};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};
@@ -36,19 +36,19 @@ pub(crate) struct MatrixSource {
 
 impl MatrixSource {
     /// Returns whether `model` rotates at a speed that changes its stiffness.
-    fn spins(&self, model: &Model) -> bool {
+    fn is_stiffened(&self, model: &Model) -> bool {
         let (own, of_model) = (self.component.as_ref(), model.substructure.as_ref().map(|own| &own.component));
         own.zip(of_model).is_some_and(|(own, of_model)| own.matrices().2 != of_model.matrices().2)
     }
 
     /// Returns a CRC-32 of the names of rows and of all entries. It detects files that changed
     /// between two runs.
-    pub fn check(&self) -> Option<String> {
+    pub fn checksum(&self) -> Option<String> {
         let component = self.component.as_ref()?;
         let mut hasher = crc32fast::Hasher::new();
         component.rows().iter().for_each(|name| hasher.update(name.as_bytes()));
         let (mass, damping, stiffness) = component.matrices();
-        let more = self.stress_stiffening.as_ref().map(StressStiffening::more);
+        let more = self.stress_stiffening.as_ref().map(StressStiffening::difference);
         for (number, matrix) in [Some(mass), damping, Some(stiffness), more].into_iter().enumerate() {
             for (row, column, value) in matrix.into_iter().flat_map(Matrix::entries) {
                 let place = [number, row, column].map(|index| index as u64);
@@ -77,13 +77,13 @@ impl TemplateSource {
     /// location becomes that of the template's name in the study.
     pub fn reword(&self, element: Element, table: &CompiledTable, problem: &mut Problem) {
         if problem.location.source == self.source {
-            problem.message = self.blame(element, Some(table), &problem.key, &problem.message);
+            problem.message = self.describe_error(element, Some(table), &problem.key, &problem.message);
             problem.location = self.table.location_of("template", None).clone();
         }
     }
 
     /// Describes an error of an element, with the parameters on which its key `key` depends.
-    fn blame(&self, element: Element, table: Option<&CompiledTable>, key: &str, message: &str) -> String {
+    fn describe_error(&self, element: Element, table: Option<&CompiledTable>, key: &str, message: &str) -> String {
         let (mut own, mut all) = (BTreeSet::new(), BTreeSet::new());
         if let Some(table) = table {
             table.each_quantity(&mut |of, quantity, _| {
@@ -136,7 +136,7 @@ impl ModelLists {
     }
 
     /// Gives quantities at rotations of bodies the dimensions of moments and angles.
-    pub fn turn(&mut self) {
+    pub fn use_rotation_dimensions(&mut self) {
         let named = self.body.iter().filter_map(|table| match table.entry("name").map(|entry| &entry.value) {
             Some(CompiledValue::Fixed(ResolvedValue::Text(name))) => Some(name.clone()),
             _ => None,
@@ -215,7 +215,7 @@ pub(crate) struct DiskSource {
 
 impl DiskSource {
     /// Returns the index of the parameter that differs from sector to sector, if there is one.
-    pub fn mistuned(&self, names: &[String]) -> Option<usize> {
+    pub fn mistuned_parameter(&self, names: &[String]) -> Option<usize> {
         let CompiledValue::Table(table) = &self.table.entry("mistuning")?.value else { return None };
         match &table.entry("of")?.value {
             CompiledValue::Names(of) if of.len() == 1 => names.iter().position(|name| *name == of[0].0),
@@ -226,12 +226,12 @@ impl DiskSource {
 
 /// Converts a model error to a problem at its location in the file. `model` provides the
 /// existing names.
-pub(crate) fn problem_of(structure: &SourceModel, error: &ModelError, model: &Model) -> Problem {
+pub(crate) fn model_problem(structure: &SourceModel, error: &ModelError, model: &Model) -> Problem {
     let (list, index) = error.element.entry();
     let whole = Location::default();
     // if the export at rest is valid, the error lies in its sum with the second export
     let softened =
-        structure.matrices.as_ref().is_some_and(|matrices| error.key == "stiffness" && matrices.spins(model));
+        structure.matrices.as_ref().is_some_and(|matrices| error.key == "stiffness" && matrices.is_stiffened(model));
     let key = if softened { "stiffened" } else { error.key };
     let (location, message) = match &structure.template {
         None => {
@@ -239,31 +239,34 @@ pub(crate) fn problem_of(structure: &SourceModel, error: &ModelError, model: &Mo
             let table =
                 matrices.map(|matrices| &matrices.table).or_else(|| structure.lists.get(list).get(index.unwrap_or(0)));
             let location = table.map_or(&whole, |table| table.location_of(key, error.wrong_name.as_deref()));
-            let end = without_end(model).filter(|_| error.key == "reduce");
+            let end = missing_frequency_range(model).filter(|_| error.key == "reduce");
             let message = end.map_or(&error.message[..], |(message, _)| message);
-            (location, table.map_or_else(|| message.to_owned(), |table| table.with_turn(message)))
+            (location, table.map_or_else(|| message.to_owned(), |table| table.with_repetition(message)))
         }
         Some(template) => {
             let location = template.table.location_of(if error.key == "law" { "law" } else { "template" }, None);
             let table = index.and_then(|index| structure.lists.get(list).get(index));
-            (location, template.blame(error.element, table, error.key, &error.message))
+            (location, template.describe_error(error.element, table, error.key, &error.message))
         }
     };
     let places = model.place_names();
-    let nodes = ModelNames::of_places(model);
+    let nodes = ModelNames::places(model);
     let help = match &error.wrong_name {
-        Some(wrong) => Some(match (nodes.directions_of(wrong), nearest(wrong, places.iter().map(String::as_str))) {
-            (Some(directions), _) => format!("write {}", one_of(directions.iter().map(String::as_str))),
+        Some(wrong) => Some(match (nodes.directions_of(wrong), suggest(wrong, places.iter().map(String::as_str))) {
+            (Some(directions), _) => format!("write {}", alternatives(directions.iter().map(String::as_str))),
             (None, Some(near)) => format!("did you mean `{near}`?"),
             (None, None) => {
-                format!("the places are {}", one_of(places.iter().take(20).map(String::as_str)).replace(" or ", ", "))
+                format!(
+                    "the places are {}",
+                    alternatives(places.iter().take(20).map(String::as_str)).replace(" or ", ", ")
+                )
             }
         }),
         None if error.element == Element::Whole && model.substructure.is_some() => {
             Some("add a [[place]] with a name and a dof".to_owned())
         }
         None if error.element == Element::Whole => Some("add a [[mass]], a [[body]] or a [[motion]]".to_owned()),
-        None if error.key == "reduce" => advice_on_reduction(model),
+        None if error.key == "reduce" => reduction_advice(model),
         None if softened => Some(
             "lower `speed`: at this speed the sum of both exports loses more stiffness than rotation adds; or check \
              `at` and the sign of the second export"
@@ -280,7 +283,7 @@ const LOWEST: usize = 3;
 
 /// Returns the message and the help for a structure without any frequency that limits its
 /// reduction.
-fn without_end(model: &Model) -> Option<(&'static str, &'static str)> {
+fn missing_frequency_range(model: &Model) -> Option<(&'static str, &'static str)> {
     match model.substructure.as_ref()?.reduction {
         Reduction::UpTo { up_to, .. } if up_to <= 0.0 => Some((
             "the structure must be reduced, but the study has no excitation frequency that defines the frequency \
@@ -297,9 +300,9 @@ fn without_end(model: &Model) -> Option<(&'static str, &'static str)> {
 
 /// Returns advice for a structure that cannot be reduced. Mistaken units shift its frequencies
 /// by powers of ten.
-fn advice_on_reduction(model: &Model) -> Option<String> {
+fn reduction_advice(model: &Model) -> Option<String> {
     let substructure = model.substructure.as_ref()?;
-    if let Some((_, help)) = without_end(model) {
+    if let Some((_, help)) = missing_frequency_range(model) {
         return Some(help.to_owned());
     }
     if matches!(substructure.reduction, Reduction::UpTo { kind: Some(ReductionKind::CraigBampton), .. }) {
@@ -309,12 +312,12 @@ fn advice_on_reduction(model: &Model) -> Option<String> {
     }
     let component = &substructure.component;
     let lowest = component.frequencies(LOWEST).ok()?;
-    let listed: Vec<String> = lowest.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
+    let listed: Vec<String> = lowest.iter().map(|omega| quantity_text(*omega, Some(Dimension::FREQUENCY))).collect();
     let absurd = lowest.iter().all(|omega| *omega < SLOWEST);
     let (mass, _, stiffness) = component.matrices();
     let exchanged = || Component::new(component.rows().to_vec(), stiffness.clone(), None, mass.clone()).ok();
-    let advice = match absurd.then(exchanged).flatten().as_ref().and_then(sensible) {
-        Some(frequencies) => exchange(&frequencies),
+    let advice = match absurd.then(exchanged).flatten().as_ref().and_then(plausible_frequencies) {
+        Some(frequencies) => exchange_advice(&frequencies),
         None => "check the units and `up_to`; if the excitation is far above these frequencies, no modes are needed: \
             reduce = false"
             .to_owned(),
@@ -328,7 +331,7 @@ const FASTEST: f64 = 1e8 * std::f64::consts::TAU;
 
 /// Returns the lowest frequencies of a component (rad/s) if they are plausible: one within the
 /// limits, none above.
-pub(crate) fn sensible(component: &Component) -> Option<Vec<f64>> {
+pub(crate) fn plausible_frequencies(component: &Component) -> Option<Vec<f64>> {
     let lowest = component.frequencies(LOWEST.min(component.dofs())).ok()?;
     let elastic = |omega: &&f64| (SLOWEST..=FASTEST).contains(*omega);
     (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= FASTEST)).then_some(lowest)
@@ -336,8 +339,9 @@ pub(crate) fn sensible(component: &Component) -> Option<Vec<f64>> {
 
 /// Returns the advice to exchange the files of stiffness and mass, with the frequencies that
 /// result.
-pub(crate) fn exchange(frequencies: &[f64]) -> String {
-    let listed: Vec<String> = frequencies.iter().map(|omega| displayed(*omega, Some(Dimension::FREQUENCY))).collect();
+pub(crate) fn exchange_advice(frequencies: &[f64]) -> String {
+    let listed: Vec<String> =
+        frequencies.iter().map(|omega| quantity_text(*omega, Some(Dimension::FREQUENCY))).collect();
     format!(
         "are the files of `stiffness` and `mass` exchanged? With exchanged files the lowest frequencies are {}",
         listed.join(", ")

@@ -4,7 +4,7 @@
 
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
-use crate::syntax::suggest::shown;
+use crate::syntax::suggest::excerpt;
 use std::collections::BTreeSet;
 
 /// The value of a parameter in a case, as stated.
@@ -17,7 +17,7 @@ pub(crate) struct StatedValue<'a> {
 
 /// Returns the parameters outside the template file on which the parameters `of` depend, `of`
 /// included, in index order.
-pub(crate) fn given(
+pub(crate) fn user_parameters(
     template: usize,
     stated: &[StatedValue<'_>],
     of: impl IntoIterator<Item = usize>,
@@ -34,7 +34,7 @@ pub(crate) fn given(
 
 /// Moves a problem of a template parameter to the first user value that causes it; returns
 /// other problems unchanged.
-pub(crate) fn blame(
+pub(crate) fn locate_at_user_value(
     problem: Problem,
     template: Option<usize>,
     names: &[String],
@@ -42,9 +42,9 @@ pub(crate) fn blame(
 ) -> Problem {
     let Some(template) = template.filter(|source| *source == problem.location.source) else { return problem };
     let Some(wrong) = names.iter().position(|name| *name == problem.key) else { return problem };
-    let given = given(template, stated, [wrong]);
+    let given = user_parameters(template, stated, [wrong]);
     let Some(first) = given.first() else { return problem };
-    let value = |index: &usize| format!("{} = {}", names[*index], shown(stated[*index].text.trim()));
+    let value = |index: &usize| format!("{} = {}", names[*index], excerpt(stated[*index].text.trim()));
     let values: Vec<String> = given.iter().map(value).collect();
     let Problem { key, message, help, .. } = problem;
     let text = stated[wrong].text.trim();

@@ -51,22 +51,22 @@ pub fn find(name: &str) -> Option<&'static Template> {
 /// # Example
 /// ```
 /// use stickslip_study::templates;
-/// assert_eq!(templates::nearest("bladed-rign"), Some("bladed-ring"));
-/// assert_eq!(templates::nearest("bicycle"), None);
+/// assert_eq!(templates::suggest("bladed-rign"), Some("bladed-ring"));
+/// assert_eq!(templates::suggest("bicycle"), None);
 /// ```
-pub fn nearest(name: &str) -> Option<&'static str> {
-    crate::syntax::suggest::nearest(name, TABLE.iter().map(|template| template.name))
+pub fn suggest(name: &str) -> Option<&'static str> {
+    crate::syntax::suggest::suggest(name, TABLE.iter().map(|template| template.name))
 }
 
 impl Template {
     /// Returns the first line of its file, which describes it.
     pub fn summary(&self) -> &'static str {
-        comment_behind(self.study, 0)
+        trailing_comment(self.study, 0)
     }
 }
 
 /// Returns the comment that fills the rest of the line after byte `at`; empty if there is none.
-pub(crate) fn comment_behind(text: &str, at: usize) -> &str {
+pub(crate) fn trailing_comment(text: &str, at: usize) -> &str {
     let line = text[at..].lines().next().unwrap_or("");
     line.trim_start().strip_prefix('#').map_or("", str::trim)
 }
@@ -77,9 +77,9 @@ mod tests {
 
     #[test]
     fn a_comment_ends_with_its_line() {
-        assert_eq!(comment_behind("# a \n# b", 0), "a");
-        assert_eq!(comment_behind("m = 1   # kg # or so", 5), "kg # or so");
-        assert_eq!(comment_behind("m = 1\n# b", 5), "");
-        assert_eq!(comment_behind("m = 1", 5), "");
+        assert_eq!(trailing_comment("# a \n# b", 0), "a");
+        assert_eq!(trailing_comment("m = 1   # kg # or so", 5), "kg # or so");
+        assert_eq!(trailing_comment("m = 1\n# b", 5), "");
+        assert_eq!(trailing_comment("m = 1", 5), "");
     }
 }

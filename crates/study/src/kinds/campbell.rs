@@ -6,7 +6,7 @@
 //! one nodal diameter: the distance from `e` to the nearest multiple of the sector count.
 
 use super::nodal_diameter::{STATES, waves};
-use super::shared::keys::anything;
+use super::shared::keys::no_requirements;
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
@@ -65,7 +65,7 @@ pub(super) const KIND: Kind = Kind {
         check,
         axes: [Some(Dimension::FREQUENCY), Some(Dimension::FREQUENCY)],
         uses_method: false,
-        needs: anything,
+        needs: no_requirements,
         adapts: false,
         tables: &[TABLE, CROSSINGS],
     },
@@ -157,20 +157,20 @@ fn naturals(model: &Model, most: usize) -> Result<Vec<NaturalFrequency>, String>
 }
 
 /// Returns the nodal diameter that an engine order excites.
-fn excited(order: usize, sectors: usize) -> usize {
+fn excited_diameter(order: usize, sectors: usize) -> usize {
     let turns = order % sectors;
     turns.min(sectors - turns)
 }
 
 /// Pairs every engine order with the modes that it can excite; on a tuned disk, those of its
 /// nodal diameter.
-fn met(
+fn excited_modes(
     found: &[NaturalFrequency],
     orders: usize,
     sectors: Option<usize>,
 ) -> impl Iterator<Item = (f64, &NaturalFrequency)> {
     let meets = move |natural: &NaturalFrequency, order: usize| match (natural.diameter, sectors) {
-        (Some(diameter), Some(sectors)) => diameter == excited(order, sectors),
+        (Some(diameter), Some(sectors)) => diameter == excited_diameter(order, sectors),
         _ => true,
     };
     (1..=orders).flat_map(move |order| {
@@ -202,8 +202,11 @@ impl CampbellDiagram<'_> {
             return same.clone();
         }
         let name = self.prepared.case.values.text("parameter").unwrap_or(PARAMETER);
-        let case =
-            self.work.study.case_with(self.prepared.case.index, name, speed).map_err(|error| error.to_string())?;
+        let case = self
+            .work
+            .study
+            .case_with_parameter(self.prepared.case.index, name, speed)
+            .map_err(|error| error.to_string())?;
         naturals(&case.model, self.mode_count)
     }
 
@@ -284,10 +287,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         part.count(place, CONVERGED, None);
         for natural in &found {
             write(prepared, speed, natural, &mut rows);
-            rows.end();
+            rows.end_row();
         }
         if let Some((last, all)) = &before {
-            for (order, natural) in met(&found, orders, sectors) {
+            for (order, natural) in excited_modes(&found, orders, sectors) {
                 let Some(was) = all.iter().find(|was| was.is_like(natural)) else { continue };
                 if work.context.stopped() || (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
                     continue; // an interrupted unit is computed again
@@ -296,7 +299,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                     Ok(at) => {
                         write(prepared, at, &NaturalFrequency { omega: order * at, ..*natural }, &mut crossings);
                         crossings.integer(ORDER, order as u64);
-                        crossings.end();
+                        crossings.end_row();
                     }
                     Err(reason) => part.count(place, "failed", Some(reason)),
                 }
@@ -323,7 +326,7 @@ fn write(prepared: &PreparedCase, speed: f64, natural: &NaturalFrequency, rows: 
     rows.integer(MODE, natural.mode as u64 + 1);
     rows.number(SPEED, speed / TAU);
     rows.number(FREQUENCY, hertz(natural.omega));
-    rows.reduced(natural.reduction);
+    rows.reduction_error(natural.reduction);
 }
 
 /// Draws a panel per case: frequencies, engine order lines and crossings. For a tuned disk it
@@ -333,13 +336,13 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (x, x_factor) = drawing.axis(0, "speed of rotation", largest(table, [SPEED.to_owned()]), "Hz");
     let (y, y_factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
     let crossings = drawing.table(CROSSINGS);
-    let marks = crossings.map(|table| drawing.stretches(table)).unwrap_or_default();
+    let marks = crossings.map(|table| drawing.case_rows(table)).unwrap_or_default();
     let panel = |stretch: &CaseRows, title: String| {
         let case = drawing.study.case(stretch.case).ok();
         let orders = case.as_ref().and_then(|case| case.values.count("engine_orders")).unwrap_or(6) as usize;
         let ring = case.and_then(|case| case.model.ring).filter(|ring| ring.equal);
         let shown = |diameter: Option<u64>| match (diameter, ring) {
-            (Some(diameter), Some(ring)) => (1..=orders).any(|o| excited(o, ring.sectors) as u64 == diameter),
+            (Some(diameter), Some(ring)) => (1..=orders).any(|o| excited_diameter(o, ring.sectors) as u64 == diameter),
             _ => true,
         };
         let mut series = frequencies(table, stretch, (x_factor, y_factor), &shown);
@@ -368,7 +371,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         }
         vec![Panel { title, x: x.clone(), y: y.clone().between(0.0, top), series, ..Panel::default() }]
     };
-    Figure { panels: draw_panels::panels(drawing, &drawing.stretches(table), &panel), ..Figure::default() }
+    Figure { panels: draw_panels::panels(drawing, &drawing.case_rows(table), &panel), ..Figure::default() }
 }
 
 /// Top of the panel as a multiple of the highest frequency.

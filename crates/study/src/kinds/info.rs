@@ -57,13 +57,13 @@ impl KeyError {
 
     /// Returns the complaint about a name in the value of `key` that is not one of
     /// `candidates`.
-    pub(crate) fn unknown(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
-        let help = match suggest::nearest(name, candidates.iter().copied()) {
+    pub(crate) fn unknown_name(key: &'static str, what: &str, name: &str, candidates: &[&str]) -> Self {
+        let help = match suggest::suggest(name, candidates.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
             None if candidates.is_empty() => format!("the model has no {what}"),
-            None => format!("choose {}", suggest::one_of(candidates.iter().take(12).copied())),
+            None => format!("choose {}", suggest::alternatives(candidates.iter().take(12).copied())),
         };
-        let message = format!("there is no {what} `{}`", suggest::shown(name));
+        let message = format!("there is no {what} `{}`", suggest::excerpt(name));
         KeyError { key, name: Some(name.to_owned()), message, help: Some(help) }
     }
 }

@@ -45,7 +45,7 @@ pub fn find(name: &str) -> Option<&'static Kind> {
 }
 
 /// Returns the kind of a study.
-pub(crate) fn of(study: &Study) -> &'static Kind {
+pub(crate) fn kind_of(study: &Study) -> &'static Kind {
     let name = study.kind().name;
     find(name).unwrap_or_else(|| unreachable!("the reader takes kinds from this table, `{name}` is not in it"))
 }

@@ -4,18 +4,18 @@ use super::shared::disk_shape::{self, PlaceInSectors};
 use super::shared::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
-use crate::check::warnings::of_mode;
+use crate::check::warnings::mode_warnings;
 use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{amplitude_in, amplitude_of, first_harmonic_in, first_harmonic_of, phase_of};
 use crate::results::dataset::{Axis, CellValues, Figure, Panel, Series, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join_title, largest, numbers};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::format::{display_unit, significant};
+use crate::syntax::format::{format_significant, prefixed_unit};
 use crate::syntax::key::{Bounds, Key, ValueType, default, required};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode, unit};
 use stickslip::dimension::Dimension;
@@ -59,7 +59,7 @@ pub(super) const KIND: Kind = Kind {
     },
     unit_size: |_| UnitSize::Case,
     cost,
-    warnings: of_mode,
+    warnings: mode_warnings,
     compute,
     draw,
 };
@@ -121,10 +121,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     };
     let mode = follow(prepared, unit).map_err(|error| (prepared.case.index, error))?;
     (work.context.finished)();
-    let (status, reason) = judged(unit, &mode);
+    let (status, reason) = mode_status(unit, &mode);
     part.count(|| location_of(prepared), status, reason);
     let place = location_of(prepared);
-    part.notes.extend(remarks(unit, &mode).into_iter().map(|text| Note::of_case(&place, text)));
+    part.notes.extend(remarks(unit, &mode).into_iter().map(|text| Note::for_case(&place, text)));
     let (mut rows, mut summary) = (TableBuilder::default(), TableBuilder::default());
     let (mut stretch, mut before) = (1, f64::INFINITY);
     let reduction = prepared.system.reduction_evidence();
@@ -144,8 +144,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.number(&phase_of(place), phase.to_degrees());
         }
         rows.integer("stretch", stretch);
-        rows.reduced(reduction);
-        rows.end();
+        rows.reduction_error(reduction);
+        rows.end_row();
     }
     summary.varied(&prepared.case);
     let end = |point: Option<&ModePoint>| point.map_or(f64::NAN, |point| hertz(point.omega));
@@ -155,8 +155,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     summary.number("largest_damping_ratio", largest.map_or(f64::NAN, |point| point.damping));
     summary.number("amplitude_there_m", largest.map_or(f64::NAN, |point| point.amplitude / unit));
     summary.number("frequency_there_Hz", end(largest));
-    summary.reduced(reduction);
-    summary.end();
+    summary.reduction_error(reduction);
+    summary.end_row();
     part.tables = vec![rows, summary];
     Ok(part)
 }
@@ -200,12 +200,12 @@ fn location_of(prepared: &PreparedCase) -> String {
 /// that moves most.
 fn amplitude(unit: f64, modal: f64) -> String {
     let si = modal / unit;
-    let (name, factor) = display_unit(si, "m");
+    let (name, factor) = prefixed_unit(si, "m");
     format!("{:.3} {name}", si * factor)
 }
 
 /// Returns the status of a mode, and the reason if it is incomplete or uncertain.
-fn judged(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
+fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     let words = |modal: f64| amplitude(unit, modal);
     if let Some(lost) = mode.lost {
         let from = if lost.at.is_finite() { format!("stopped at {}: ", words(lost.at)) } else { String::new() };
@@ -273,7 +273,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         .map(|(name, _)| name.clone())
         .collect();
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, displacements.iter().map(column)), "m");
-    let stretches = drawing.stretches(table);
+    let stretches = drawing.case_rows(table);
     let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
         Some(CellValues::Integer(parts)) => parts.clone(),
         _ => vec![1; table.rows()],
@@ -323,7 +323,9 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let mut panels = both(&stretches, "");
     if panels.len() + 2 * stretches.len() <= MOST_PANELS {
         panels.extend(
-            stretches.iter().flat_map(|stretch| wheels(drawing, table, &displacements, (stretch, stretches.len()))),
+            stretches
+                .iter()
+                .flat_map(|stretch| disk_shapes(drawing, table, &displacements, (stretch, stretches.len()))),
         );
     }
     Figure { panels, ..Figure::default() }
@@ -333,7 +335,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
 /// largest.
 ///
 /// The colours begin after those of the `cases` curves.
-fn wheels(
+fn disk_shapes(
     drawing: &FigureInput<'_>,
     table: &Table,
     places: &[String],
@@ -348,9 +350,9 @@ fn wheels(
     let wheel = |row: usize| {
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
         let most = places.iter().map(|name| at(&amplitude_of(name))).fold(0.0, f64::max);
-        let (unit, factor) = display_unit(most, "m");
-        let words = format!("{mode} at {} {unit}", significant(most * factor, 3));
-        let frequency = format!("{} Hz", significant(at("frequency_Hz"), 5));
+        let (unit, factor) = prefixed_unit(most, "m");
+        let words = format!("{mode} at {} {unit}", format_significant(most * factor, 3));
+        let frequency = format!("{} Hz", format_significant(at("frequency_Hz"), 5));
         let size = |name: &str| match table.column(&first_harmonic_of(name)) {
             Some(_) => at(&first_harmonic_of(name)),
             None => at(&amplitude_of(name)),
@@ -359,7 +361,7 @@ fn wheels(
         disk_shape::panel(
             &PlaceInSectors::of_ring(moves)?,
             ring.sectors,
-            join([stretch.label(), words, frequency]),
+            join_title([stretch.label(), words, frequency]),
             cases,
         )
     };

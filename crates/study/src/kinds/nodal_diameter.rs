@@ -2,7 +2,7 @@
 //! and mode shapes.
 
 use super::shared::disk_shape::{self, PlaceInSectors, of_sector};
-use super::shared::keys::anything;
+use super::shared::keys::no_requirements;
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
@@ -10,10 +10,10 @@ use crate::kinds::kind::Kind;
 use crate::results::columns::{FREQUENCY, phase_of, shape_of};
 use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join_title, largest, numbers, words};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::format::significant;
+use crate::syntax::format::format_significant;
 use crate::syntax::key::{ValueType, default, optional};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Model, WaveModes};
@@ -60,7 +60,7 @@ pub(super) const KIND: Kind = Kind {
         check,
         axes: [Some(Dimension::NONE), Some(Dimension::FREQUENCY)],
         uses_method: false,
-        needs: anything,
+        needs: no_requirements,
         adapts: false,
         tables: &[TABLE],
     },
@@ -195,8 +195,8 @@ fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) 
                     rows.number(&shape_of(place), at.map_or(f64::NAN, |(size, _)| size));
                     rows.number(&phase_of(place), at.map_or(f64::NAN, |(_, phase)| phase.to_degrees()));
                 }
-                rows.reduced(prepared.system.reduction_evidence());
-                rows.end();
+                rows.reduction_error(prepared.system.reduction_evidence());
+                rows.end_row();
             }
         }
     }
@@ -221,7 +221,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         series: lines(table, stretch, factor),
         ..Panel::default()
     };
-    let stretches = drawing.stretches(table);
+    let stretches = drawing.case_rows(table);
     let room = stretches.len() * (1 + WHEELS) <= MOST_PANELS;
     let of_case = |stretch: &CaseRows, title: String| {
         let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
@@ -264,11 +264,11 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, stretch: &CaseRows) -> Vec<P
             PlaceInSectors::of_wave(place.clone(), moves, diameter as usize, ring.sectors)
         };
         let many = if diameter == 1 { "" } else { "s" };
-        let frequency = format!("{} Hz", significant(frequencies[row], 5));
+        let frequency = format!("{} Hz", format_significant(frequencies[row], 5));
         let joints = if state == STATES[0] { String::new() } else { format!("joints {state}") };
         let title =
             [stretch.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
-        disk_shape::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join(title), STATES.len())
+        disk_shape::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join_title(title), STATES.len())
     };
     stretch.rows.clone().filter(wanted).take(WHEELS).filter_map(wheel).collect()
 }

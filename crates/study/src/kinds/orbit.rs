@@ -1,20 +1,20 @@
 //! Orbits over one period, in time.
 
-use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, anything, check_output};
+use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
 use super::shared::orbit_sweep;
 use crate::case::values::hertz;
 use crate::check::cost::{Cost, CostInputs, TableShape};
-use crate::check::warnings::driven;
+use crate::check::warnings::excitation_warnings;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join_title, largest, numbers};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
-use crate::run::point_row::{PointRow, location_of};
+use crate::run::point_row::{PointRow, describe_location};
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
-use crate::syntax::format::{display_unit, shown_hertz};
+use crate::syntax::format::{format_hertz, prefixed_unit};
 use crate::syntax::key::{ValueType, default};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
@@ -44,13 +44,13 @@ pub(super) const KIND: Kind = Kind {
         check: |values, _, _| check_output(values),
         axes: [Some(Dimension::TIME), None],
         uses_method: true,
-        needs: anything,
+        needs: no_requirements,
         adapts: false,
         tables: &["orbit", "orbits", "multipliers"],
     },
     unit_size: orbit_sweep::grain,
     cost,
-    warnings: driven,
+    warnings: excitation_warnings,
     compute,
     draw,
 };
@@ -74,7 +74,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
         conditional_work: None,
-        work: points * (costing.orbit() + followed + map + costing.extra() + costing.reading(costing.instants())),
+        work: points * (costing.orbit() + followed + map + costing.extra() + costing.evaluation(costing.instants())),
     }
 }
 
@@ -85,10 +85,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     for (orbit, stable) in orbit_sweep::found(work, &mut part)? {
         let omega = orbit.omega;
-        one_of_many(prepared, &orbit).into_iter().for_each(|note| note.join(&mut part.notes));
+        continuum_note(prepared, &orbit).into_iter().for_each(|note| note.merge_into(&mut part.notes));
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
-        let mut row = PointRow::of(prepared, &orbit, stable);
+        let mut row = PointRow::with_stability(prepared, &orbit, stable);
         if orbit.start.len() <= FOLLOWED {
             row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
         }
@@ -97,13 +97,13 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         summary.number("viscous_J", orbit.energy.viscous);
         summary.number("friction_J", orbit.energy.friction);
         summary.integer("switches", orbit.evidence.switches as u64);
-        summary.end();
+        summary.end_row();
         let wanted = prepared.case.values.flag("multipliers") == Some(true);
         let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
         if all.is_none() {
-            let place = location_of(&prepared.case, omega);
+            let place = describe_location(&prepared.case, omega);
             let text = "the multipliers are unknown, because the orbit has no return map.";
-            Note::of_case(&place, text).join(&mut part.notes);
+            Note::for_case(&place, text).merge_into(&mut part.notes);
         }
         for (index, multiplier) in all.unwrap_or_default().iter().enumerate() {
             multipliers.varied(&prepared.case);
@@ -112,15 +112,15 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             multipliers.number("real", multiplier.re);
             multipliers.number("imaginary", multiplier.im);
             multipliers.number("modulus", multiplier.norm());
-            multipliers.reduced(prepared.system.reduction_evidence());
-            multipliers.end();
+            multipliers.reduction_error(prepared.system.reduction_evidence());
+            multipliers.end_row();
         }
         for time in orbit_sweep::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {
             motion.varied(&prepared.case);
             motion.number("frequency_Hz", hertz(omega));
             motion.number("time_s", time);
             write_sample(prepared, &orbit.sample(time), &mut motion);
-            motion.end();
+            motion.end_row();
         }
     }
     part.tables = vec![motion, summary, multipliers];
@@ -130,12 +130,12 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 /// Returns the note that a permanently stuck joint makes the orbit one of a continuum.
 ///
 /// It covers orbits with half-period symmetry; [`Note::StuckOffset`] covers the others.
-fn one_of_many(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
+fn continuum_note(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
     (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");
         let text =
             format!("permanently stuck: {stuck}; the orbit is one of a continuum, and the symmetric orbit is shown.");
-        Note::of_case(&location_of(&prepared.case, orbit.omega), text)
+        Note::for_case(&describe_location(&prepared.case, orbit.omega), text)
     })
 }
 
@@ -180,11 +180,11 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let times = times_of(rows.clone());
         // draws in one panel share one unit
         let last = if drawing.study.draws().is_some() { longest } else { times.last().copied().unwrap_or(0.0) };
-        let (time_unit, time_factor) = display_unit(last, "s");
+        let (time_unit, time_factor) = prefixed_unit(last, "s");
         let x: Vec<f64> = times.iter().map(|time| time * time_factor).collect();
         let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
             let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
-            let (unit, factor) = display_unit(largest(motion, columns.clone()), si);
+            let (unit, factor) = prefixed_unit(largest(motion, columns.clone()), si);
             let line = |(i, column): (usize, &String)| {
                 let y = numbers(motion, column, rows.clone()).iter().map(|value| value * factor).collect();
                 Series::line(names[i], x.clone(), y, colour + i)
@@ -217,11 +217,11 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let of_run = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
-            of_orbit(&join([title.clone(), shown_hertz(run[0])]), rows)
+            of_orbit(&join_title([title.clone(), format_hertz(run[0])]), rows)
         };
         runs.flat_map(of_run).collect()
     };
-    let mut panels = draw_panels::panels(drawing, &drawing.stretches(motion), &of_case);
+    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);
     panels.truncate(MOST_PANELS);
     Figure { panels, ..Figure::default() }
 }

@@ -3,11 +3,11 @@
 
 use super::orbit::write_sample;
 use super::shared::keys::MOST_SAMPLES;
-use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, beginnings, given, pulled};
+use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, begin_values, held_equilibrium, state_vector};
 use crate::case::names::ModelNames;
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
-use crate::check::warnings::moved;
+use crate::check::warnings::motion_warnings;
 use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
@@ -15,13 +15,13 @@ use crate::results::dataset::{Axis, Figure, Panel, Series, Table};
 use crate::results::decay::{Decay, PlaceMotionFn};
 use crate::results::draw_panels;
 use crate::results::drawing::{
-    CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, join, largest, numbers, thinned, words,
+    CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, evenly_chosen, join_title, largest, numbers, words,
 };
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
-use crate::run::point_row::location_of;
+use crate::run::point_row::describe_location;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::format::{display_unit, shown_hertz};
+use crate::syntax::format::{format_hertz, prefixed_unit};
 use crate::syntax::key::RANGE;
 use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
 use std::f64::consts::TAU;
@@ -72,7 +72,7 @@ pub(super) const KIND: Kind = Kind {
             ),
             optional(
                 "begin",
-                ValueType::Choice(beginnings),
+                ValueType::Choice(begin_values),
                 "initial state of the other masses and joints; default: `equilibrium` with `start`, otherwise \
                  `unloaded`",
                 "\"unloaded\"",
@@ -102,7 +102,7 @@ pub(super) const KIND: Kind = Kind {
     },
     unit_size: |_| UnitSize::Case,
     cost,
-    warnings: moved,
+    warnings: motion_warnings,
     compute,
     draw,
 };
@@ -133,23 +133,27 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let summaries = if free { points } else { 0.0 };
     Cost {
         tables: vec![
-            TableShape { numbers: table.numbers + costing.several(), ..table },
-            TableShape { rows: points * costing.places, numbers: costing.varied + costing.several() + 2.0, words: 1.0 },
+            TableShape { numbers: table.numbers + costing.frequency_columns(), ..table },
+            TableShape {
+                rows: points * costing.places,
+                numbers: costing.varied + costing.frequency_columns() + 2.0,
+                words: 1.0,
+            },
             TableShape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
             TableShape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
         ],
         drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
         unit: 0.0,
         conditional_work: None,
-        work: points * (periods * costing.period() + costing.patterns(periods) + costing.reading(samples)),
+        work: points * (periods * costing.period() + costing.patterns(periods) + costing.evaluation(samples)),
     }
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
-    let free = ModelNames::of_free_masses(model);
+    let free = ModelNames::free_displacements(model);
     for key in ["start", "start_velocity"] {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
-            free.one(key, "free mass", name)?;
+            free.single_label(key, "free mass", name)?;
         }
     }
     let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
@@ -212,13 +216,14 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     let pull = values.by_name("start");
     let begin = values.text("begin").unwrap_or(if pull.is_some() { EQUILIBRIUM } else { UNLOADED });
-    let pulled = if begin == EQUILIBRIUM { pulled(&case.model, &prepared.system, pull) } else { None };
+    let pulled = if begin == EQUILIBRIUM { held_equilibrium(&case.model, &prepared.system, pull) } else { None };
     if begin == EQUILIBRIUM && pulled.is_none() {
         let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
             with begin = \"unloaded\"";
-        part.notes.push(Note::of_case(&case.label(), format!("{WARNING}{text}")));
+        part.notes.push(Note::for_case(&case.label(), format!("{WARNING}{text}")));
     }
-    let start = pulled.unwrap_or_else(|| Start { displacement: given(&prepared.system, pull), states: Vec::new() });
+    let start =
+        pulled.unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, pull), states: Vec::new() });
     let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
     let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
     for drive in drives {
@@ -236,7 +241,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
         let transient = TimeHistory {
             displacement: start.displacement.clone(),
-            velocity: given(&prepared.system, values.by_name("start_velocity")),
+            velocity: state_vector(&prepared.system, values.by_name("start_velocity")),
             states: start.states.clone(),
             excitation,
             duration,
@@ -256,10 +261,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.number(TIME, time);
             rows.number("frequency_Hz", hertz(omega));
             write_sample(prepared, sample, &mut rows);
-            rows.end();
+            rows.end_row();
             sampled = true;
             // the turning points are located exactly only for the place that moves most
-            let most = leader(&decays).filter(|_| excitation == Excitation::Free);
+            let most = largest_range(&decays).filter(|_| excitation == Excitation::Free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
                 let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
                 let [x, v] = of_place(sample);
@@ -283,18 +288,18 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             extremes.text("mass", place);
             extremes.number("largest_displacement_m", displacement);
             extremes.number(TIME, time);
-            extremes.reduced(prepared.system.reduction_evidence());
-            extremes.end();
+            extremes.reduction_error(prepared.system.reduction_evidence());
+            extremes.end_row();
         }
         if let Some(reduction) = prepared.system.reduction_evidence().filter(|_| !prepared.system.joints().is_empty()) {
-            Note::TimeHistory(reduction.up_to).join(&mut part.notes);
+            Note::TimeHistory(reduction.up_to).merge_into(&mut part.notes);
         }
         if excitation == Excitation::Free {
-            let unread = read_off(prepared, &decays, step, &mut decay, &mut summary);
-            part.notes.extend(unread.map(|text| Note::of_case(&case.label(), text)));
+            let unread = write_decay(prepared, &decays, step, &mut decay, &mut summary);
+            part.notes.extend(unread.map(|text| Note::for_case(&case.label(), text)));
         }
         (work.context.finished)();
-        let at = || drive.map_or_else(|| case.label(), |omega| location_of(case, omega));
+        let at = || drive.map_or_else(|| case.label(), |omega| describe_location(case, omega));
         match end {
             Ok(()) if stopped => part.count(at, NOT_REACHED, None),
             Ok(()) => part.count(at, CONVERGED, None),
@@ -307,7 +312,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 }
 
 /// Returns the place with the largest range of samples.
-fn leader(decays: &[Decay]) -> Option<usize> {
+fn largest_range(decays: &[Decay]) -> Option<usize> {
     (0..decays.len()).max_by(|&a, &b| decays[a].extent().total_cmp(&decays[b].extent()))
 }
 
@@ -320,7 +325,7 @@ const PER_CYCLE: f64 = 20.0;
 /// Writes frequency and damping, cycle by cycle, of the place that moves most.
 ///
 /// Returns the warning for too few samples.
-fn read_off(
+fn write_decay(
     prepared: &PreparedCase,
     decays: &[Decay],
     step: f64,
@@ -343,8 +348,8 @@ fn read_off(
         rows.number("amplitude_m", cycle.amplitude);
         rows.number("frequency_Hz", cycle.frequency);
         rows.number("damping_ratio", cycle.damping_ratio);
-        rows.reduced(prepared.system.reduction_evidence());
-        rows.end();
+        rows.reduction_error(prepared.system.reduction_evidence());
+        rows.end_row();
     }
     let highest = cycles.iter().max_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
     let (Some(first), Some(last), Some(highest)) = (cycles.first(), cycles.last(), highest) else { return None };
@@ -355,8 +360,8 @@ fn read_off(
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio));
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_amplitude_m"), cycle.amplitude));
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_frequency_Hz"), cycle.frequency));
-    summary.reduced(prepared.system.reduction_evidence());
-    summary.end();
+    summary.reduction_error(prepared.system.reduction_evidence());
+    summary.end_row();
     None
 }
 
@@ -366,8 +371,8 @@ const TIME: &str = "time_s";
 /// Draws damping over amplitude, cycle by cycle, of the place that moves most, with a curve for
 /// every case.
 fn damping(drawing: &FigureInput<'_>, table: &Table, places: &[String]) -> Panel {
-    let (unit, factor) = display_unit(largest(table, ["amplitude_m".to_owned()]), "m");
-    let stretches = drawing.stretches(table);
+    let (unit, factor) = prefixed_unit(largest(table, ["amplitude_m".to_owned()]), "m");
+    let stretches = drawing.case_rows(table);
     let line = |(colour, stretch): (usize, &&CaseRows)| {
         let x = numbers(table, "amplitude_m", stretch.rows.clone()).iter().map(|x| x * factor).collect();
         let y = numbers(table, "damping_ratio", stretch.rows.clone()).iter().map(|y| 100.0 * y).collect();
@@ -383,7 +388,7 @@ fn damping(drawing: &FigureInput<'_>, table: &Table, places: &[String]) -> Panel
         title: "damping of each cycle".to_owned(),
         x: Axis::new("amplitude", unit).log(),
         y: Axis::new("equivalent damping ratio", "%"),
-        series: thinned(&stretches, MOST_CURVES).iter().enumerate().map(line).collect(),
+        series: evenly_chosen(&stretches, MOST_CURVES).iter().enumerate().map(line).collect(),
         ..Panel::default()
     }
 }
@@ -416,12 +421,12 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let of_drive = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
-            panel(join([title.clone(), format!("frequency = {}", shown_hertz(run[0]))]), rows)
+            panel(join_title([title.clone(), format!("frequency = {}", format_hertz(run[0]))]), rows)
         };
         let runs = drives[stretch.rows.clone()].chunk_by(|a, b| a == b);
         runs.take(MOST_PANELS).map(of_drive).collect()
     };
-    let mut panels = draw_panels::panels(drawing, &drawing.stretches(motion), &of_case);
+    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);
     panels.truncate(MOST_PANELS);
     if let Some(decay) =
         drawing.table("decay").filter(|_| drawing.study.draws().is_none() && panels.len() < MOST_PANELS)

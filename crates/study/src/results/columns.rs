@@ -48,16 +48,16 @@ pub(crate) fn shape_of(place: &str) -> String {
 }
 
 /// Name of the column with the fraction of the period in which a joint slips.
-pub(crate) fn slips(joint: &str) -> String {
+pub(crate) fn slip_fraction(joint: &str) -> String {
     format!("{joint}_slip_fraction")
 }
 
 /// Name of the column with the fraction of the period in which the faces stick.
-pub(crate) fn sticks(joint: &str) -> String {
+pub(crate) fn stick_fraction(joint: &str) -> String {
     format!("{joint}_stick_fraction")
 }
 
 /// Name of the column with the fraction of the period in which the faces are apart.
-pub(crate) fn open(joint: &str) -> String {
+pub(crate) fn open_fraction(joint: &str) -> String {
     format!("{joint}_open_fraction")
 }

@@ -129,7 +129,7 @@ impl Column {
             return None;
         }
         let ends = self.name.match_indices('_').map(|(at, _)| &self.name[at + 1..]);
-        ends.filter(|end| !end.starts_with("per_")).find_map(written_unit)
+        ends.filter(|end| !end.starts_with("per_")).find_map(parse_unit_suffix)
     }
 
     /// Builds a column of numbers.
@@ -153,7 +153,7 @@ impl Column {
 
 /// Parses the unit at the end of a column name; the inverse of
 /// [`table_unit`](crate::case::values::table_unit).
-fn written_unit(end: &str) -> Option<String> {
+fn parse_unit_suffix(end: &str) -> Option<String> {
     let mut unit = String::new();
     for (i, part) in end.replace("_to_minus_", "^-").split("_per_").enumerate() {
         unit += if i > 0 { "/" } else { "" };
@@ -224,8 +224,8 @@ impl Table {
     ///
     /// # Example
     /// ```
-    /// use stickslip_study::dataset::{Column, Table, Values};
-    /// let column = |name: &str| Column { name: name.to_owned(), values: Values::Number(vec![1.0]) };
+    /// use stickslip_study::dataset::{Column, Table, CellValues};
+    /// let column = |name: &str| Column { name: name.to_owned(), values: CellValues::Number(vec![1.0]) };
     /// let mut table = Table { name: "curve".to_owned(), columns: vec![column("a"), column("c")] };
     /// table.append(Table { name: "curve".to_owned(), columns: vec![column("a"), column("b"), column("c")] });
     /// let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
@@ -428,11 +428,11 @@ impl Series {
         Series { emphasis: Emphasis::Reference, ..self }
     }
     /// Makes the curve the reference of one case among several, in the colour of the case.
-    pub fn reference_of_its_own(self) -> Series {
+    pub fn case_reference(self) -> Series {
         Series { emphasis: Emphasis::OwnReference, ..self }
     }
     /// Sets the value of the varied parameter.
-    pub fn of(self, value: f64) -> Series {
+    pub fn with_value(self, value: f64) -> Series {
         Series { value: Some(value), ..self }
     }
 }

@@ -22,7 +22,7 @@ pub const MOST_ROWS: usize = 500_000;
 /// use stickslip_study::{read_study, run::{Context, check}, decimation::Decimation};
 /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
-/// let block = check(&study).unwrap().block(0..4, &Context::unwatched(1)).unwrap();
+/// let block = check(&study).unwrap().block(0..4, &Context::without_progress(1)).unwrap();
 /// let rows: Vec<_> = block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
 /// let mut decimation = Decimation::new(&study, &rows);
 /// block.tables.iter().cloned().for_each(|table| decimation.add(table));
@@ -114,7 +114,7 @@ impl DecimatedTable {
         while from < table.rows() {
             let key = key(&table, from, self.key_columns);
             if self.current_case.as_ref().is_none_or(|(now, _)| *now != key) {
-                self.close();
+                self.close_bin();
                 let number = self.current_case.as_ref().map_or(0, |(_, number)| number + 1);
                 self.current_case = Some((key, number));
             }
@@ -133,7 +133,7 @@ impl DecimatedTable {
             if keeps {
                 self.open_bin.append(rows(&table, &(from..to).collect::<Vec<_>>()));
                 if self.bin.is_none_or(|bin| self.open_bin.rows() >= bin) {
-                    self.close();
+                    self.close_bin();
                 }
             }
             from = to;
@@ -141,7 +141,7 @@ impl DecimatedTable {
     }
 
     /// Closes the open bin: keeps all its rows, or its extremes.
-    fn close(&mut self) {
+    fn close_bin(&mut self) {
         let open = Table { name: self.open_bin.name.clone(), columns: std::mem::take(&mut self.open_bin.columns) };
         if open.rows() == 0 {
             return;
@@ -164,7 +164,7 @@ impl DecimatedTable {
     }
 
     fn finished(mut self) -> Table {
-        self.close();
+        self.close_bin();
         self.rows
     }
 }

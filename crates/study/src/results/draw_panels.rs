@@ -8,7 +8,7 @@
 //! have them.
 
 use crate::results::dataset::{Emphasis, Panel, Series, Style};
-use crate::results::drawing::{CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, join, thinned};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, evenly_chosen, join_title};
 use crate::results::percentiles::percentiles;
 
 /// Returns the panels of all cases, as `of_case` draws them under a title.
@@ -24,17 +24,17 @@ pub(crate) fn panels(
         return cases.flat_map(|stretch| of_case(stretch, stretch.label())).collect();
     }
     let of_group = |(words, group): (String, Vec<&CaseRows>)| -> Vec<Panel> {
-        let title = join([words, drawing.draws(group.len())]);
+        let title = join_title([words, drawing.draws(group.len())]);
         let cases: Vec<Vec<Panel>> = group.iter().map(|stretch| of_case(stretch, title.clone())).collect();
         let most = cases.iter().map(Vec::len).max().unwrap_or(0);
         let same = |at: usize| cases.iter().filter_map(|case| case.get(at)).collect::<Vec<_>>();
-        (0..most).filter_map(|at| together(&same(at))).collect()
+        (0..most).filter_map(|at| combine_draws(&same(at))).collect()
     };
-    drawing.by_listed(stretches).into_iter().take(MOST_PANELS).flat_map(of_group).take(MOST_PANELS).collect()
+    drawing.group_draws(stretches).into_iter().take(MOST_PANELS).flat_map(of_group).take(MOST_PANELS).collect()
 }
 
 /// Combines the panels of all draws into one; returns `None` for pictures.
-fn together(draws: &[&Panel]) -> Option<Panel> {
+fn combine_draws(draws: &[&Panel]) -> Option<Panel> {
     let first = draws.first().filter(|panel| !panel.equal_axes)?;
     let lines: Vec<Vec<&Series>> = draws.iter().map(|panel| curves(panel, is_line)).collect();
     let alike = |one: &[&Series]| {
@@ -42,7 +42,7 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
         one.len() == lines[0].len() && one.iter().zip(&lines[0]).all(same)
     };
     let rises = |line: &&Series| line.x.is_sorted();
-    let common = |one: &[&Series]| one.iter().zip(&lines[0]).all(|(line, first)| resolves(&first.x, &line.x));
+    let common = |one: &[&Series]| one.iter().zip(&lines[0]).all(|(line, first)| is_as_fine_as(&first.x, &line.x));
     let bands = lines.iter().all(|one| alike(one) && one.iter().all(rises) && common(one));
     let mut series: Vec<Series> =
         first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
@@ -55,7 +55,7 @@ fn together(draws: &[&Panel]) -> Option<Panel> {
         series.extend(pairs.iter().flat_map(|pair| pair.get(1)).cloned());
         series.extend(of_points(draws));
     } else {
-        let shown = thinned(&lines, MOST_CURVES);
+        let shown = evenly_chosen(&lines, MOST_CURVES);
         series.extend(shown.into_iter().flatten().map(|line| (*line).clone().pale()));
     }
     let ends = draws.iter().map(|panel| panel.y.range).reduce(|a, b| {
@@ -76,7 +76,7 @@ const BETWEEN: usize = 2;
 /// detail.
 ///
 /// Adaptive steps fail this test: they put many points where other curves have few.
-fn resolves(grid: &[f64], x: &[f64]) -> bool {
+fn is_as_fine_as(grid: &[f64], x: &[f64]) -> bool {
     let mut cells = x.chunk_by(|a, b| grid.partition_point(|at| at < a) == grid.partition_point(|at| at < b));
     cells.all(|cell| cell.len() <= BETWEEN)
 }
@@ -150,7 +150,7 @@ mod tests {
                 panel
             })
             .collect();
-        let made = together(&draws.iter().collect::<Vec<_>>()).unwrap();
+        let made = combine_draws(&draws.iter().collect::<Vec<_>>()).unwrap();
         assert_eq!(made.y.range, Some([0.0, 4.0]));
         let [order, band, median, marks] = &made.series[..] else { panic!("{:?}", made.series) };
         assert_eq!(order.emphasis, Emphasis::Reference);
@@ -181,11 +181,11 @@ mod tests {
             [straight("stable"), bent],
             [straight("stable"), beyond],
         ] {
-            let made = together(&[&draws[0], &draws[1]]).unwrap();
+            let made = combine_draws(&[&draws[0], &draws[1]]).unwrap();
             assert_eq!(made.series.len(), 2);
             assert!(made.series.iter().all(|line| line.emphasis == Emphasis::Pale && line.style == Style::Solid));
         }
         let wheel = Panel { equal_axes: true, ..straight("shape") };
-        assert!(together(&[&wheel, &wheel]).is_none());
+        assert!(combine_draws(&[&wheel, &wheel]).is_none());
     }
 }

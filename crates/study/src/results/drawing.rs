@@ -4,7 +4,7 @@
 use crate::case::study::{Study, VariedValue};
 use crate::case::values::Values;
 use crate::results::dataset::{Axis, CellValues, Table, column_name};
-use crate::syntax::format::display_unit;
+use crate::syntax::format::prefixed_unit;
 use crate::syntax::units;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -102,9 +102,9 @@ impl<'a> FigureInput<'a> {
         let (unit_key, scale_key) = [("x_unit", "x"), ("y_unit", "y")][which];
         let asked = options.text(unit_key).and_then(|text| Some((text.to_owned(), units::parse(text)?)));
         let (unit, factor) = match asked {
-            Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.scale("1")) / unit.scale("1")),
+            Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.to_si("1")) / unit.to_si("1")),
             None if si == "Hz" => (si.to_owned(), 1.0),
-            None => display_unit(largest, si),
+            None => prefixed_unit(largest, si),
         };
         let axis = Axis::new(quantity, unit);
         (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
@@ -116,8 +116,8 @@ impl<'a> FigureInput<'a> {
     pub(crate) fn varied_axis(&self, stretches: &[CaseRows], which: usize) -> Option<Axis> {
         let last = stretches.first()?.varied.get(which)?;
         let values: Vec<f64> =
-            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.as_written().0)).collect();
-        let unit = last.as_written().1;
+            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.in_file_unit().0)).collect();
+        let unit = last.in_file_unit().1;
         let axis = Axis {
             whole: unit.is_empty() && values.iter().all(|value| value.fract() == 0.0),
             ..Axis::new(&last.name, unit)
@@ -132,8 +132,8 @@ impl<'a> FigureInput<'a> {
 
     /// Groups the stretches by their parameters of `vary`, without drawn parameters: text and
     /// stretches.
-    pub(crate) fn by_listed<'s>(&self, stretches: &'s [CaseRows]) -> Vec<(String, Vec<&'s CaseRows>)> {
-        let (drawn, combinations) = (self.study.drawn(), self.study.cases_of_a_draw());
+    pub(crate) fn group_draws<'s>(&self, stretches: &'s [CaseRows]) -> Vec<(String, Vec<&'s CaseRows>)> {
+        let (drawn, combinations) = (self.study.drawn_parameter_count(), self.study.cases_per_draw());
         let mut groups: BTreeMap<usize, Vec<&CaseRows>> = BTreeMap::new();
         stretches.iter().for_each(|stretch| groups.entry(stretch.case % combinations).or_default().push(stretch));
         let words =
@@ -150,7 +150,7 @@ impl<'a> FigureInput<'a> {
     }
 
     /// States how many of the cases are shown, if not all.
-    pub(crate) fn left_out(&self, shown: usize) -> Option<String> {
+    pub(crate) fn shown_cases_text(&self, shown: usize) -> Option<String> {
         let all = self.study.cases();
         (shown < all && self.study.draws().is_none()).then(|| format!("{shown} of {all} cases"))
     }
@@ -169,13 +169,13 @@ impl<'a> FigureInput<'a> {
     ///
     /// The first columns of the table are the varied parameters, all of them or all but the
     /// last.
-    pub(crate) fn stretches(&self, table: &Table) -> Vec<CaseRows> {
-        self.stretches_of(table, self.study.varied().len())
+    pub(crate) fn case_rows(&self, table: &Table) -> Vec<CaseRows> {
+        self.case_rows_by(table, self.study.varied().len())
     }
 
     /// Does the same by the first `keys` varied parameters; `case` is the first case of each
     /// stretch.
-    pub(crate) fn stretches_of(&self, table: &Table, keys: usize) -> Vec<CaseRows> {
+    pub(crate) fn case_rows_by(&self, table: &Table, keys: usize) -> Vec<CaseRows> {
         let columns: Vec<&[f64]> = table
             .columns
             .iter()
@@ -223,7 +223,7 @@ const MOST_CASES: usize = 6;
 const DECADES: f64 = 10.0;
 
 /// Returns at most `most` of `all`, evenly chosen, including both ends.
-pub(crate) fn thinned<T>(all: &[T], most: usize) -> Vec<&T> {
+pub(crate) fn evenly_chosen<T>(all: &[T], most: usize) -> Vec<&T> {
     if all.len() <= most {
         return all.iter().collect();
     }
@@ -231,7 +231,7 @@ pub(crate) fn thinned<T>(all: &[T], most: usize) -> Vec<&T> {
 }
 
 /// Joins the non-empty parts of a title.
-pub(crate) fn join(parts: impl IntoIterator<Item = String>) -> String {
+pub(crate) fn join_title(parts: impl IntoIterator<Item = String>) -> String {
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
 }
 

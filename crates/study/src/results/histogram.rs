@@ -24,7 +24,7 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     if sorted.len() < LEAST {
         return None;
     }
-    let width = width_of(&sorted);
+    let width = freedman_diaconis_width(&sorted);
     let bars = ((high - low) / width).floor() as usize + 1;
     let mut counts = vec![0.0; bars];
     sorted.iter().for_each(|value| counts[(((value - low) / width) as usize).min(bars - 1)] += 1.0);
@@ -40,7 +40,7 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
 
 /// Returns the bar width by Freedman and Diaconis (1981), `2 IQR n^(-1/3)`, within the limits
 /// [`BARS`].
-fn width_of(sorted: &[f64]) -> f64 {
+fn freedman_diaconis_width(sorted: &[f64]) -> f64 {
     let last = sorted.len() - 1;
     let range = sorted[last] - sorted[0];
     if range <= 0.0 {
@@ -67,12 +67,12 @@ pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str)
     let abscissae: Vec<f64> = (0..=CURVE.0).map(|i| from + (to - from) * i as f64 / CURVE.0 as f64).collect();
     let ordinates = abscissae.iter().map(|x| fit.density(*x) * all * width).collect();
     panel.series.push(Series::line("Weibull distribution", abscissae, ordinates, 1));
-    if !fit.is_of(&finite) {
+    if !fit.fits(&finite) {
         panel.title += "; no Weibull distribution fits (peaks of several resonances?)";
         return Some(panel);
     }
     for ((share, words), style) in HIGH.into_iter().zip([Style::Dashed, Style::Dotted]) {
-        let (at, (from, to)) = (fit.quantile(share), fit.interval(share));
+        let (at, (from, to)) = (fit.quantile(share), fit.confidence_interval(share));
         let line = Series::line(words, vec![at; 2], vec![0.0, top], 1);
         panel.series.push(Series { style, ..line });
         panel.title += &format!("; {words} below {at:.3} ({from:.3} to {to:.3})");

@@ -2,8 +2,8 @@
 //! become one sentence.
 
 use crate::run::basis_check::SlipReductionCheck;
-use crate::syntax::expression::displayed;
-use crate::syntax::format::significant;
+use crate::syntax::expression::quantity_text;
+use crate::syntax::format::format_significant;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -127,14 +127,14 @@ pub enum Note {
 impl Note {
     /// A sentence about one case or one of its points. `case` is empty if there is only one.
     /// The text begins with [`WARNING`] if it is a warning.
-    pub(crate) fn of_case(case: &str, text: impl Into<String>) -> Note {
+    pub(crate) fn for_case(case: &str, text: impl Into<String>) -> Note {
         Note::Cases { cases: 1, named: vec![case.to_owned()], text: text.into() }
     }
 
     /// Returns the notes of one orbit. They state a method that replaced the chosen one, and
     /// instability if it is known ([`Orbit::is_stable`]). They also state the accuracy of the
     /// series, other possible orbits and the limits of the reduced model.
-    pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
+    pub(crate) fn for_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
         let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
         let accuracy = match orbit.evidence.accuracy {
@@ -152,22 +152,25 @@ impl Note {
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
         let spread = orbit.evidence.history_spread.filter(|spread| *spread > SPREAD);
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
-        said.chain(Note::history(model, orbit)).chain(range).chain(Note::slipping(model, orbit)).collect()
+        said.chain(Note::stuck_offset_note(model, orbit))
+            .chain(range)
+            .chain(Note::slipping_note(model, orbit))
+            .collect()
     }
 
     /// Returns a note if friction produces harmonics above the frequency range of the reduced
     /// model.
-    fn slipping(model: &Model, orbit: &Orbit) -> Option<Note> {
+    fn slipping_note(model: &Model, orbit: &Orbit) -> Option<Note> {
         let up_to = match model.substructure.as_ref()?.reduction {
             Reduction::UpTo { up_to, .. } | Reduction::Modes { up_to, .. } => up_to,
             Reduction::None { .. } => return None,
         };
-        SlipReductionCheck::of(orbit, up_to).map(Note::Slipping)
+        SlipReductionCheck::from_orbit(orbit, up_to).map(Note::Slipping)
     }
 
     /// Returns a note if the orbit is one of several. Their amplitudes differ if the stiffness
     /// of another joint depends on the positions of the bodies.
-    fn history(model: &Model, orbit: &Orbit) -> Option<Note> {
+    fn stuck_offset_note(model: &Model, orbit: &Orbit) -> Option<Note> {
         let stuck = orbit.evidence.history.first()?.clone();
         let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
         let is_rigid = |piece: &Piece| matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
@@ -186,7 +189,7 @@ impl Note {
     }
 
     /// Changes the note to its form for an orbit of a branch.
-    pub(crate) fn on_branch(self) -> Note {
+    pub(crate) fn for_branch(self) -> Note {
         match self {
             Note::Truncated(points, largest) => Note::TruncatedOnBranch(points, largest),
             other => other,
@@ -195,16 +198,16 @@ impl Note {
 
     /// Adds the note to `notes`, to one of its kind if there is one. The result does not depend
     /// on the order of grouping.
-    pub(crate) fn join(self, notes: &mut Vec<Note>) {
-        let Some(note) = self.stuck_joined(notes) else { return };
-        note.joined(notes);
+    pub(crate) fn merge_into(self, notes: &mut Vec<Note>) {
+        let Some(note) = self.merge_stuck(notes) else { return };
+        note.merge(notes);
     }
 
     /// Joins a note of stuck points. Cases follow each other, so only the last stuck note of
     /// the list can continue. A last note without stuck points is removed when another case
     /// begins. The first note of the list stays, because it may continue the last note of
     /// another list.
-    fn stuck_joined(self, notes: &mut Vec<Note>) -> Option<Note> {
+    fn merge_stuck(self, notes: &mut Vec<Note>) -> Option<Note> {
         let Note::Stuck { case, points, total: of } = self else { return Some(self) };
         let is_stuck = |note: &Note| matches!(note, Note::Stuck { .. });
         let (first, last) = (notes.iter().position(is_stuck), notes.iter().rposition(is_stuck));
@@ -226,7 +229,7 @@ impl Note {
         }
     }
 
-    fn joined(self, notes: &mut Vec<Note>) {
+    fn merge(self, notes: &mut Vec<Note>) {
         for known in notes.iter_mut() {
             match (known, &self) {
                 (Note::Sentence(known), Note::Sentence(more)) if known == more => return,
@@ -309,7 +312,7 @@ impl Note {
                 "At {} the amplitudes depend on the history of a stuck joint: they change by up to {} % if the joint \
                  begins without the friction force of static equilibrium, or with the opposite one.",
                 points(*count),
-                significant(100.0 * largest, 2)
+                format_significant(100.0 * largest, 2)
             )),
             Note::Truncated(count, largest) => Some(format!(
                 "At {} the series is too short: its estimated error is up to {largest:.1e} and exceeds the \
@@ -356,9 +359,9 @@ impl Note {
                 points(*count)
             )),
             Note::OtherOrbit { points: count, from, to, ratios: [least, most] } => {
-                let hertz = |omega: f64| significant(omega / TAU, 6);
-                let higher = (*most >= 1.0).then(|| format!("up to {} times as high", significant(*most, 3)));
-                let lower = (*least < 1.0).then(|| format!("down to {} of the height", significant(*least, 3)));
+                let hertz = |omega: f64| format_significant(omega / TAU, 6);
+                let higher = (*most >= 1.0).then(|| format!("up to {} times as high", format_significant(*most, 3)));
+                let lower = (*least < 1.0).then(|| format!("down to {} of the height", format_significant(*least, 3)));
                 let size: Vec<String> = higher.into_iter().chain(lower).collect();
                 Some(format!(
                     "warning: at {} {} the reverse sweep finds another orbit, {}: the history of the motion decides \
@@ -385,7 +388,7 @@ impl Note {
                 points(*count)
             )),
             Note::TimeHistory(up_to) => {
-                let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+                let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
                 Some(format!(
                     "`reduction_error` is that of harmonic forces up to {}. It does not include higher frequencies, \
                      which the initial state and slipping joints excite. Compare with reduce = {{ up_to = \"{}\" }} \
@@ -452,7 +455,7 @@ mod tests {
             Note::OtherOrbit { points: 2, from: 3.0 * TAU, to: 4.0 * TAU, ratios: [2.0, 2.0] },
             Note::OtherOrbit { points: 1, from: 2.0 * TAU, to: 2.0 * TAU, ratios: [0.25, 0.25] },
         ] {
-            note.join(&mut notes);
+            note.merge_into(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
         assert_eq!(texts.len(), 9, "{texts:?}");
@@ -483,9 +486,9 @@ mod tests {
         let texts = |cases: usize| {
             let mut notes = Vec::new();
             for case in 1..=cases {
-                Note::of_case(&format!("k = {case} N/m"), "warning: it moves too fast").join(&mut notes);
-                Note::of_case(&format!("k = {case} N/m"), "No joint slips.").join(&mut notes);
-                Note::Sentence("There is no speed.".to_owned()).join(&mut notes);
+                Note::for_case(&format!("k = {case} N/m"), "warning: it moves too fast").merge_into(&mut notes);
+                Note::for_case(&format!("k = {case} N/m"), "No joint slips.").merge_into(&mut notes);
+                Note::Sentence("There is no speed.".to_owned()).merge_into(&mut notes);
             }
             notes.iter().filter_map(Note::text).collect::<Vec<_>>()
         };
@@ -496,7 +499,7 @@ mod tests {
         assert_eq!(many[0], "warning: 16 cases (k = 1 N/m; k = 2 N/m; k = 3 N/m and 13 more): it moves too fast");
         assert_eq!((many.len(), many[2].as_str()), (3, general));
         // the only case of a study has no name
-        assert_eq!(Note::of_case("", "warning: it moves too fast").text().unwrap(), "warning: it moves too fast");
+        assert_eq!(Note::for_case("", "warning: it moves too fast").text().unwrap(), "warning: it moves too fast");
     }
 
     /// A branch takes no other method, so its note names only its own keys.
@@ -504,7 +507,7 @@ mod tests {
     fn what_helps_a_branch_is_said_of_a_branch() {
         let mut notes = Vec::new();
         for note in [Note::Truncated(1, 1e-2), Note::Truncated(2, 3e-2), Note::StuckOffset(1)] {
-            note.on_branch().join(&mut notes);
+            note.for_branch().merge_into(&mut notes);
         }
         let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
         assert_eq!(texts.len(), 2, "{texts:?}");
@@ -523,7 +526,7 @@ mod tests {
         let all: Vec<Note> = (0..3 * MOST_STUCK)
             .flat_map(|unit| {
                 let (case, points) = (format!("case {}", unit / 3), if unit % 7 < 2 { 0 } else { unit % 5 });
-                let of_case = Note::of_case(&case, format!("It is so in {} ways.", unit % 3));
+                let of_case = Note::for_case(&case, format!("It is so in {} ways.", unit % 3));
                 [
                     Note::Stuck { case, points, total: 10 },
                     Note::Truncated(unit % 2, unit as f64),
@@ -537,8 +540,8 @@ mod tests {
             let mut whole = Vec::new();
             for notes in all.chunks(stretch) {
                 let mut part = Vec::new();
-                notes.iter().for_each(|note| note.clone().join(&mut part));
-                part.into_iter().for_each(|note| note.join(&mut whole));
+                notes.iter().for_each(|note| note.clone().merge_into(&mut part));
+                part.into_iter().for_each(|note| note.merge_into(&mut whole));
             }
             whole.iter().filter_map(Note::text).collect::<Vec<_>>()
         };

@@ -23,7 +23,7 @@ pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: 
     let Some(grid) = curves.iter().map(|(x, _)| x).reduce(|a, b| if b.len() > a.len() { b } else { a }) else {
         return Vec::new();
     };
-    let all: Vec<Vec<f64>> = curves.iter().map(|(x, y)| over(grid, x, y)).collect();
+    let all: Vec<Vec<f64>> = curves.iter().map(|(x, y)| resample(grid, x, y)).collect();
     let known = curves.iter().filter(|(_, y)| y.iter().any(|value| !value.is_nan())).count();
     let sorted = |at: usize| {
         let mut values: Vec<f64> = all.iter().map(|y| y[at]).filter(|value| !value.is_nan()).collect();
@@ -58,19 +58,19 @@ fn quantile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Returns whether two abscissae differ by rounding only.
-fn same(one: f64, other: f64) -> bool {
+fn is_same_abscissa(one: f64, other: f64) -> bool {
     (one - other).abs() <= SAME * one.abs().max(other.abs())
 }
 
 /// Returns a curve at other abscissae by linear interpolation; NaN outside its range.
-fn over(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
+fn resample(grid: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
     if grid == x {
         return y.to_vec();
     }
     grid.iter()
         .map(|at| match x.partition_point(|x| x < at) {
-            above if x.get(above).is_some_and(|x| same(*x, *at)) => y[above],
-            above if above > 0 && same(x[above - 1], *at) => y[above - 1],
+            above if x.get(above).is_some_and(|x| is_same_abscissa(*x, *at)) => y[above],
+            above if above > 0 && is_same_abscissa(x[above - 1], *at) => y[above - 1],
             above @ 1.. if above < x.len() => {
                 let share = (at - x[above - 1]) / (x[above] - x[above - 1]);
                 y[above - 1] + share * (y[above] - y[above - 1])

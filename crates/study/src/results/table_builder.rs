@@ -19,7 +19,7 @@ pub struct TableBuilder {
 
 impl TableBuilder {
     /// Rows of motions in which no joint slips.
-    pub fn linear() -> Self {
+    pub fn for_linear_motions() -> Self {
         TableBuilder { is_linear: true, ..TableBuilder::default() }
     }
 
@@ -73,7 +73,7 @@ impl TableBuilder {
 
     /// Adds the error of the reduced model at the places, for a row with an orbit or a
     /// frequency. Without a reduction it adds nothing.
-    pub fn reduced(&mut self, reduction: Option<ReductionEvidence>) {
+    pub fn reduction_error(&mut self, reduction: Option<ReductionEvidence>) {
         if let Some(ReductionEvidence { error, .. }) = reduction {
             self.number(REDUCTION_ERROR, error);
         }
@@ -81,7 +81,7 @@ impl TableBuilder {
 
     /// Raises the reduction error of all rows to at least `error`, unless the motions are
     /// linear.
-    pub fn err(&mut self, error: f64) {
+    pub fn raise_reduction_error(&mut self, error: f64) {
         let known = self.columns.iter_mut().filter(|column| column.name == REDUCTION_ERROR && !self.is_linear);
         for column in known {
             if let CellValues::Number(errors) = &mut column.values {
@@ -91,7 +91,7 @@ impl TableBuilder {
     }
 
     /// Ends a row: columns that the row did not write get an empty cell.
-    pub fn end(&mut self) {
+    pub fn end_row(&mut self) {
         self.next_column = 0;
         for column in self.columns.iter_mut().filter(|column| column.values.len() == self.finished_rows) {
             column.values.extend(column.values.blank(1));
@@ -100,7 +100,7 @@ impl TableBuilder {
     }
 
     /// Returns the finished table.
-    pub fn table(self, name: &str) -> Table {
+    pub fn finish(self, name: &str) -> Table {
         Table { name: name.to_owned(), columns: self.columns }
     }
 }

@@ -78,7 +78,7 @@ pub struct Evidence {
 /// use stickslip_study::{read_study, results::worst_evidence, run::{Context, run}};
 /// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
-/// let evidence = worst_evidence(&run(&study, &Context::unwatched(1)).unwrap());
+/// let evidence = worst_evidence(&run(&study, &Context::without_progress(1)).unwrap());
 /// assert!(evidence.energy_gap.unwrap() < 1e-9);
 /// ```
 pub fn worst_evidence(dataset: &Dataset) -> Evidence {
@@ -101,7 +101,7 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// The study or the dataset is of another kind.
-    pub fn of(kind: &'static str, study: &'a Study, dataset: &'a Dataset) -> Result<Self, ResultsError> {
+    pub fn new(kind: &'static str, study: &'a Study, dataset: &'a Dataset) -> Result<Self, ResultsError> {
         match [study.kind().name, &dataset.kind].into_iter().find(|found| *found != kind) {
             Some(found) => {
                 Err(ResultsError::Kind { dataset: dataset.name.clone(), found: found.to_owned(), expected: kind })
@@ -120,7 +120,7 @@ impl<'a> Results<'a> {
         };
         let written = TypedTable { dataset: self.dataset, table };
         match table.columns.iter().find(|column| column.values.len() != table.rows()) {
-            Some(column) => Err(written.no_column(&column.name)),
+            Some(column) => Err(written.missing_column(&column.name)),
             None => Ok(Some(written)),
         }
     }
@@ -129,11 +129,11 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// Some rows belong to no case.
-    pub fn stretches(&self, written: &TypedTable<'_>, keys: usize) -> Result<Vec<CaseRows>, ResultsError> {
+    pub fn case_rows(&self, written: &TypedTable<'_>, keys: usize) -> Result<Vec<CaseRows>, ResultsError> {
         let drawing = FigureInput { study: self.study, tables: &self.dataset.tables };
-        let stretches = drawing.stretches_of(written.table, keys);
+        let stretches = drawing.case_rows_by(written.table, keys);
         let all: usize = stretches.iter().map(|stretch| stretch.rows.len()).sum();
-        if all == written.table.rows() { Ok(stretches) } else { Err(written.other_rows()) }
+        if all == written.table.rows() { Ok(stretches) } else { Err(written.foreign_rows()) }
     }
 }
 
@@ -146,32 +146,32 @@ pub(crate) struct TypedTable<'a> {
 
 impl<'a> TypedTable<'a> {
     pub fn numbers(&self, column: &str) -> Result<&'a [f64], ResultsError> {
-        self.table.numbers(column).ok_or_else(|| self.no_column(column))
+        self.table.numbers(column).ok_or_else(|| self.missing_column(column))
     }
 
     pub fn integers(&self, column: &str) -> Result<&'a [u64], ResultsError> {
         let found = self.table.columns.iter().find(|c| c.name == column);
         match found.map(|c| &c.values) {
             Some(CellValues::Integer(values)) => Ok(values),
-            _ => Err(self.no_column(column)),
+            _ => Err(self.missing_column(column)),
         }
     }
 
     pub fn texts(&self, column: &str) -> Result<&'a [String], ResultsError> {
-        self.table.texts(column).ok_or_else(|| self.no_column(column))
+        self.table.texts(column).ok_or_else(|| self.missing_column(column))
     }
 
     pub fn flags(&self, column: &str) -> Result<&'a [Option<bool>], ResultsError> {
-        self.table.flags(column).ok_or_else(|| self.no_column(column))
+        self.table.flags(column).ok_or_else(|| self.missing_column(column))
     }
 
-    fn no_column(&self, column: &str) -> ResultsError {
+    fn missing_column(&self, column: &str) -> ResultsError {
         let (dataset, table) = (self.dataset.name.clone(), self.table.name.clone());
         ResultsError::Column { dataset, table, column: column.to_owned() }
     }
 
     /// The error for rows that do not belong to the study.
-    pub fn other_rows(&self) -> ResultsError {
+    pub fn foreign_rows(&self) -> ResultsError {
         ResultsError::Rows { dataset: self.dataset.name.clone(), table: self.table.name.clone() }
     }
 }

@@ -78,7 +78,7 @@ impl WeibullMaxima {
             return None;
         }
         let bound = |s: f64| high + range * libm::exp(s);
-        let profile = |s: f64| ProfileLikelihood::of(values, bound(s)).filter(|profile| profile.shape > PEAKED);
+        let profile = |s: f64| ProfileLikelihood::fit(values, bound(s)).filter(|profile| profile.shape > PEAKED);
         let height = |s: f64| profile(s).map_or(f64::NEG_INFINITY, |profile| profile.likelihood);
         let (from, to) = (libm::log(NEAR), libm::log(FAR));
         let step = (to - from) / STEPS as f64;
@@ -95,19 +95,19 @@ impl WeibullMaxima {
     }
 
     /// Returns the probability that a value is not exceeded.
-    fn share(&self, value: f64) -> f64 {
+    fn cumulative_probability(&self, value: f64) -> f64 {
         libm::exp(-libm::pow(((self.upper_bound - value) / self.scale).max(0.0), self.shape))
     }
 
     /// Returns whether the values follow the distribution, rather than a mixture of two
     /// distributions. The test uses the largest difference of the cumulative distributions
     /// (Kolmogorov and Smirnov).
-    pub fn is_of(&self, values: &[f64]) -> bool {
+    pub fn fits(&self, values: &[f64]) -> bool {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         let count = sorted.len() as f64;
         let apart = sorted.iter().enumerate().map(|(below, value)| {
-            let share = self.share(*value);
+            let share = self.cumulative_probability(*value);
             (share - below as f64 / count).max((below + 1) as f64 / count - share)
         });
         apart.fold(0.0, f64::max) * count.sqrt() <= STRANGE
@@ -120,7 +120,7 @@ impl WeibullMaxima {
 
     /// Returns the ends of the 95 % confidence interval of this quantile, from the curvature of
     /// the likelihood.
-    pub fn interval(&self, share: f64) -> (f64, f64) {
+    pub fn confidence_interval(&self, share: f64) -> (f64, f64) {
         let depth = -libm::log(share);
         let power = libm::pow(depth, 1.0 / self.shape);
         let slopes = [self.scale * power * libm::log(depth) / (self.shape * self.shape), -power, 1.0];
@@ -202,7 +202,7 @@ fn inverse(matrix: &[[f64; 3]; 3], size: usize) -> Option<[[f64; 3]; 3]> {
 
 impl ProfileLikelihood {
     /// Solves `1/β = Σ y^β ln y / Σ y^β - mean ln y` and `δ^β = mean y^β`, with `y = λ - x`.
-    fn of(values: &[f64], bound: f64) -> Option<ProfileLikelihood> {
+    fn fit(values: &[f64], bound: f64) -> Option<ProfileLikelihood> {
         let count = values.len() as f64;
         let logs: Vec<f64> = values.iter().map(|value| libm::log(bound - value)).collect();
         let highest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -278,12 +278,17 @@ mod tests {
         near("99 %", fit.quantile(0.99), 1.8090296797848229, 1e-7);
         near("99.9 %", fit.quantile(0.999), 1.856823367544346, 1e-7);
         for (share, deviation) in [(0.99, 0.03267047916133568), (0.999, 0.046330211794089214)] {
-            let (low, high) = fit.interval(share);
+            let (low, high) = fit.confidence_interval(share);
             near("interval", (high - low) / (2.0 * TWO_SIDED), deviation, 1e-4);
         }
         // the density is the derivative of the distribution
-        near("density", fit.density(1.4), (fit.share(1.4 + 1e-5) - fit.share(1.4 - 1e-5)) / 2e-5, 1e-8);
-        near("share", fit.share(fit.quantile(0.3)), 0.3, 1e-12);
+        near(
+            "density",
+            fit.density(1.4),
+            (fit.cumulative_probability(1.4 + 1e-5) - fit.cumulative_probability(1.4 - 1e-5)) / 2e-5,
+            1e-8,
+        );
+        near("share", fit.cumulative_probability(fit.quantile(0.3)), 0.3, 1e-12);
         assert_eq!(fit.density(fit.upper_bound + 0.1), 0.0);
     }
 
@@ -295,11 +300,11 @@ mod tests {
             |set: u64, i: u64| 1.5 - 0.4 * (-stickslip_numerics::random::Stream::new(set).uniform(i).ln()).powf(0.4);
         let of_one = (0..40).filter(|set| {
             let values: Vec<f64> = (0..200).map(|i| draw(*set, i)).collect();
-            WeibullMaxima::fit(&values).unwrap().is_of(&values)
+            WeibullMaxima::fit(&values).unwrap().fits(&values)
         });
         assert!(of_one.count() >= 39);
         let two: Vec<f64> = (0..200).map(|i| if i % 3 == 0 { draw(1, i) } else { 1.03 + 1e-4 * i as f64 }).collect();
-        assert!(!WeibullMaxima::fit(&two).unwrap().is_of(&two));
+        assert!(!WeibullMaxima::fit(&two).unwrap().fits(&two));
     }
 
     /// The 99th percentile lies in its interval about as often as stated, over many sets of 100
@@ -312,7 +317,8 @@ mod tests {
         let held = (0..sets).filter(|set| {
             let stream = stickslip_numerics::random::Stream::new(*set);
             let draw = |i: u64| bound - scale * (-stream.uniform(i).ln()).powf(1.0 / shape);
-            let (low, high) = WeibullMaxima::fit(&(0..100).map(draw).collect::<Vec<_>>()).unwrap().interval(0.99);
+            let (low, high) =
+                WeibullMaxima::fit(&(0..100).map(draw).collect::<Vec<_>>()).unwrap().confidence_interval(0.99);
             (low..=high).contains(&truth)
         });
         // 95 % of a hundred sets, less the effect of chance and of the skewness of the bound

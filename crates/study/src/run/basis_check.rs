@@ -5,7 +5,7 @@
 //! such an orbit again by the same method, from a cold start, in a basis with modes of much
 //! higher frequency.
 
-use crate::syntax::expression::displayed;
+use crate::syntax::expression::quantity_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use stickslip::curve::sweep::BLOCK;
@@ -83,12 +83,12 @@ pub struct BasisDifference {
 ///
 /// About [`POINTS`] of every [`BLOCK`] points are solved again, and [`POINTS`] of each of the
 /// first units.
-pub(crate) fn has_turn(unit: usize, points: usize) -> bool {
+pub(crate) fn is_checked(unit: usize, points: usize) -> bool {
     unit < FIRST || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
 }
 
 /// Returns the number of points solved again if joints slip at all points.
-pub(crate) fn count(points: f64, cases: f64) -> f64 {
+pub(crate) fn checked_points(points: f64, cases: f64) -> f64 {
     (POINTS as f64 * (points / BLOCK as f64).ceil().max(cases.min(FIRST as f64))).min(points)
 }
 
@@ -97,7 +97,7 @@ impl SlipReductionCheck {
     /// error, rad/s.
     ///
     /// Returns `None` if no joint slips, or if the series has no harmonic above the limit.
-    pub(crate) fn of(orbit: &Orbit, up_to: f64) -> Option<SlipReductionCheck> {
+    pub(crate) fn from_orbit(orbit: &Orbit, up_to: f64) -> Option<SlipReductionCheck> {
         let highest = orbit.evidence.harmonics.map(|h| h as f64 * orbit.omega / orbit.periods as f64);
         let slips = orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0);
         let amplitudes = orbit.places.iter().map(|place| place.size()).collect();
@@ -128,10 +128,10 @@ impl SlipReductionCheck {
         at: &dyn Fn(f64) -> String,
     ) -> Option<f64> {
         let all = std::mem::take(&mut self.candidates);
-        let farther = if turn { farther(model, system) } else { None }?;
+        let farther = if turn { larger_basis_system(model, system) } else { None }?;
         let mut of = 0;
         for index in chosen(&all) {
-            let Some(again) = again(&farther, method, &all[index]) else { continue };
+            let Some(again) = compare_point(&farther, method, &all[index]) else { continue };
             of += 1;
             if self.again.as_ref().is_none_or(|worst| again.error > worst.error) {
                 self.again = Some(BasisDifference { point_text: at(all[index].omega), ..again });
@@ -143,7 +143,7 @@ impl SlipReductionCheck {
 
     /// Returns the note for the reader.
     pub(crate) fn text(&self, warning: &str) -> String {
-        let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+        let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
         let SlipReductionCheck { points, up_to, again, .. } = self;
         let slips = format!(
             "at {points} point{} joints slip: `reduction_error` holds for forces up to {}, not for the higher \
@@ -197,7 +197,7 @@ fn chosen(points: &[CurvePoint]) -> BTreeSet<usize> {
 }
 
 /// Assembles the same model with a larger reduction basis, if it has few enough modes.
-fn farther(model: &Model, system: &System) -> Option<System> {
+fn larger_basis_system(model: &Model, system: &System) -> Option<System> {
     let (own, few) = (model.substructure.as_ref()?, system.reduced()?);
     if own.component.dofs() > ROWS {
         return None;
@@ -209,7 +209,7 @@ fn farther(model: &Model, system: &System) -> Option<System> {
 }
 
 /// Returns the difference of a point from the orbit in the larger basis, if that converges.
-fn again(farther: &System, method: &dyn Method, point: &CurvePoint) -> Option<BasisDifference> {
+fn compare_point(farther: &System, method: &dyn Method, point: &CurvePoint) -> Option<BasisDifference> {
     let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
     let reduced = farther.reduced()?;
     let differences = orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.size() - here).abs());

@@ -14,4 +14,6 @@ pub mod result_block;
 mod runner;
 pub mod work;
 
-pub use runner::{CONVERGED, CheckedStudy, Context, NOT_REACHED, PreparedCase, check, drawn, redrawn, run, units};
+pub use runner::{
+    CONVERGED, CheckedStudy, Context, NOT_REACHED, PreparedCase, check, draw, figure_of_tables, run, units,
+};

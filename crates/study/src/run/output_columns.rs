@@ -61,7 +61,9 @@ pub(crate) const TABLE: &[OutputColumns] = &[
             share",
         columns: |system| {
             let joints = system.joints().iter();
-            joints.flat_map(|joint| [columns::sticks(joint.name()), columns::open(joint.name())]).collect()
+            joints
+                .flat_map(|joint| [columns::stick_fraction(joint.name()), columns::open_fraction(joint.name())])
+                .collect()
         },
         values: |prepared, orbit, _| {
             let joints = prepared.system.joints().iter().zip(&orbit.joints);
@@ -155,23 +157,23 @@ fn harmonics(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
 }
 
 /// Iterates over the choices in `output` of a case, in the order of [`TABLE`].
-fn wanted(case: &Case) -> impl Iterator<Item = &'static OutputColumns> + '_ {
+fn selected(case: &Case) -> impl Iterator<Item = &'static OutputColumns> + '_ {
     let names = case.values.names("output").unwrap_or_default();
     TABLE.iter().filter(move |extra| names.iter().any(|name| name == extra.name))
 }
 
 /// Returns the names of the columns that `output` selects.
 pub(crate) fn columns(case: &Case, system: &System) -> Vec<String> {
-    wanted(case).flat_map(|extra| (extra.columns)(system)).collect()
+    selected(case).flat_map(|extra| (extra.columns)(system)).collect()
 }
 
 /// Returns the values of these columns.
 pub(crate) fn values(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
-    if wanted(&prepared.case).next().is_none() {
+    if selected(&prepared.case).next().is_none() {
         return Vec::new();
     }
     let mut times: Vec<f64> = (0..INSTANTS).map(|i| orbit.period() * i as f64 / INSTANTS as f64).collect();
     times.extend(orbit.switch_times());
     let samples: Vec<Sample> = times.iter().map(|time| orbit.sample(*time)).collect();
-    wanted(&prepared.case).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
+    selected(&prepared.case).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
 }

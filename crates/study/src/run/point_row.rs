@@ -9,7 +9,7 @@ use stickslip::method::OrbitError;
 use stickslip::orbit::{Orbit, Symmetry};
 
 /// Describes a point in words: the varied parameters and the frequency.
-pub(crate) fn location_of(case: &Case, omega: f64) -> String {
+pub(crate) fn describe_location(case: &Case, omega: f64) -> String {
     let frequency = format!("frequency = {:.6} Hz", omega / std::f64::consts::TAU);
     if case.varied.is_empty() { frequency } else { format!("{}, {frequency}", case.label()) }
 }
@@ -39,9 +39,9 @@ pub(crate) struct PointRow {
 impl PointRow {
     pub fn new(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitError>) -> Self {
         match outcome {
-            Ok(orbit) => PointRow::of(prepared, orbit, orbit.is_stable()),
+            Ok(orbit) => PointRow::with_stability(prepared, orbit, orbit.is_stable()),
             Err(error) => {
-                let mut row = PointRow::missing(prepared, error.status());
+                let mut row = PointRow::without_result(prepared, error.status());
                 row.failure = Some(error.to_string());
                 row
             }
@@ -49,7 +49,7 @@ impl PointRow {
     }
 
     /// The row of an orbit whose stability is known already.
-    pub fn of(prepared: &PreparedCase, orbit: &Orbit, stable: Option<bool>) -> Self {
+    pub fn with_stability(prepared: &PreparedCase, orbit: &Orbit, stable: Option<bool>) -> Self {
         PointRow {
             places: orbit.places.iter().map(|p| [p.amplitude(), p.mean, p.phase_deg()]).collect(),
             joints: orbit.joints.iter().map(|j| [j.dissipation, j.slip_fraction]).collect(),
@@ -68,7 +68,7 @@ impl PointRow {
     }
 
     /// The row of a point without a result.
-    pub fn missing(prepared: &PreparedCase, status: &str) -> Self {
+    pub fn without_result(prepared: &PreparedCase, status: &str) -> Self {
         let system = &prepared.system;
         PointRow {
             places: vec![[f64::NAN; 3]; system.places().len()],
@@ -97,7 +97,7 @@ impl PointRow {
         }
         for (joint, [dissipation, slip]) in system.joints().iter().zip(&self.joints) {
             rows.number(&format!("{}_dissipation_J", joint.name()), *dissipation);
-            rows.number(&columns::slips(joint.name()), *slip);
+            rows.number(&columns::slip_fraction(joint.name()), *slip);
         }
         output_columns::columns(&prepared.case, &prepared.system)
             .iter()
@@ -110,7 +110,7 @@ impl PointRow {
         if !prepared.method.closes_motions(&prepared.system) {
             rows.number("return_defect", self.return_defect);
         }
-        rows.reduced(system.reduction_evidence());
+        rows.reduction_error(system.reduction_evidence());
         rows.integer("iterations", self.iterations);
         rows.text("found_by", self.found_by);
         rows.text("status", &self.status);

@@ -55,7 +55,7 @@ impl Block {
         let UnitResult { tables: rows, notes, failures, points, interrupted: cut } = part;
         let mut block = Block { units: unit..unit + 1, ..Block::empty(kind, unit) };
         // the part of a unit that was not reached has no tables
-        block.tables.iter_mut().zip(rows).for_each(|(table, rows)| table.columns = rows.table(&table.name).columns);
+        block.tables.iter_mut().zip(rows).for_each(|(table, rows)| table.columns = rows.finish(&table.name).columns);
         block.tally.append(Tally { notes, failures, more_failures: 0, points, interrupted: cut });
         block
     }
@@ -76,7 +76,7 @@ impl Block {
 impl Tally {
     /// Appends the notes, failures and counts of the next units.
     pub fn append(&mut self, next: Tally) {
-        next.notes.into_iter().for_each(|note| note.join(&mut self.notes));
+        next.notes.into_iter().for_each(|note| note.merge_into(&mut self.notes));
         self.interrupted |= next.interrupted;
         let room = MOST_FAILURES - self.failures.len();
         self.more_failures += next.more_failures + next.failures.len().saturating_sub(room) as u64;

@@ -11,10 +11,10 @@ use crate::results::dataset::{Dataset, Figure, Record, Table};
 use crate::results::decimation::Decimation;
 use crate::results::drawing::FigureInput;
 use crate::results::notes::Note;
-use crate::run::basis_check::has_turn;
-use crate::run::point_row::location_of;
+use crate::run::basis_check::is_checked;
+use crate::run::point_row::describe_location;
 use crate::run::result_block::{Block, Tally};
-use crate::run::work::{AHEAD, UnitResult, UnitTask, WorkUnits, refused};
+use crate::run::work::{AHEAD, UnitResult, UnitTask, WorkUnits, refusal_at_location};
 use crate::syntax::error::StudyError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -37,7 +37,7 @@ pub use crate::run::work::{CONVERGED, Context, NOT_REACHED, PreparedCase};
 /// use stickslip_study::{read_study, run::{Context, run}};
 /// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
-/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
 /// let loss = dataset.tables[1].numbers("dissipation_J").unwrap();
 /// assert!((loss[1] - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
 /// ```
@@ -73,7 +73,7 @@ pub struct CheckedStudy {
 /// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let checked = check(&read_study("element.toml", text, &[]).unwrap()).unwrap();
 /// assert_eq!(checked.summary().joints.len(), 1);
-/// assert_eq!(checked.run(&Context::unwatched(1)).unwrap().tables.len(), 2);
+/// assert_eq!(checked.run(&Context::without_progress(1)).unwrap().tables.len(), 2);
 /// ```
 pub fn check(study: &Study) -> Result<CheckedStudy, StudyError> {
     let start = Instant::now();
@@ -110,7 +110,7 @@ impl CheckedStudy {
     /// Returns the checked study without its prepared first case, for callers that hold many
     /// studies. A first case of 2000 masses takes 0.1 GB. A run prepares it again.
     #[must_use]
-    pub fn lean(self) -> CheckedStudy {
+    pub fn without_first_case(self) -> CheckedStudy {
         CheckedStudy { first: None, ..self }
     }
 
@@ -131,8 +131,8 @@ impl CheckedStudy {
             return Err(error);
         }
         let Block { tables, tally, .. } = self.block(0..self.units(), context)?;
-        let figure = redrawn(&self.study, &tables);
-        Ok(self.outline(context.threads).completed(tables, figure, tally, start.elapsed()))
+        let figure = figure_of_tables(&self.study, &tables);
+        Ok(self.dataset_without_results(context.threads).with_results(tables, figure, tally, start.elapsed()))
     }
 
     /// Computes the units of a range and keeps their results in memory.
@@ -146,7 +146,7 @@ impl CheckedStudy {
     /// use stickslip_study::{read_study, run::{Context, check}};
     /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
     /// let checked = check(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
-    /// let context = Context::unwatched(1);
+    /// let context = Context::without_progress(1);
     /// let mut block = checked.block(0..3, &context).unwrap();
     /// block.append(checked.block(3..checked.units(), &context).unwrap());
     /// let whole = checked.block(0..checked.units(), &context).unwrap();
@@ -155,7 +155,7 @@ impl CheckedStudy {
     /// ```
     pub fn block(&self, range: Range<usize>, context: &Context) -> Result<Block, StudyError> {
         let mut whole = Block::empty(self.study.kind(), range.start);
-        self.each(range, context, &mut |block| {
+        self.for_each_block(range, context, &mut |block| {
             whole.append(block);
             Ok::<(), StudyError>(())
         })?;
@@ -172,7 +172,7 @@ impl CheckedStudy {
     /// A [`StudyError`]: the range has no such units, or a search between the cases met a model
     /// that the method refuses. An error that `take` returns ends the computation and is
     /// returned.
-    pub fn each<E: From<StudyError>>(
+    pub fn for_each_block<E: From<StudyError>>(
         &self,
         range: Range<usize>,
         context: &Context,
@@ -188,12 +188,12 @@ impl CheckedStudy {
             None => Arc::new(PreparedCase::new(&self.study, 0)?),
         };
         let kind = self.study.kind();
-        parts(&self.study, &first, range, context, &mut |unit, part| take(Block::of(kind, unit, part)))
+        compute_parts(&self.study, &first, range, context, &mut |unit, part| take(Block::of(kind, unit, part)))
     }
 
     /// Returns the dataset without its results, as known before the computation; see
-    /// [`Dataset::completed`].
-    pub fn outline(&self, threads: usize) -> Dataset {
+    /// [`Dataset::with_results`].
+    pub fn dataset_without_results(&self, threads: usize) -> Dataset {
         let CheckedStudy { study, summary, methods, .. } = self;
         let mut notes = summary.warnings.clone();
         notes.extend(study.notes());
@@ -208,7 +208,7 @@ impl CheckedStudy {
             failures: Vec::new(),
             record: Record {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
-                study: recorded(study, summary),
+                study: study_record(study, summary),
                 methods: methods.clone(),
                 seed: study.seed(),
                 threads,
@@ -223,7 +223,7 @@ impl CheckedStudy {
 impl Dataset {
     /// Adds the results to an outline: the tables, their figure, the notes and the failures.
     #[must_use]
-    pub fn completed(mut self, tables: Vec<Table>, figure: Figure, tally: Tally, time: Duration) -> Dataset {
+    pub fn with_results(mut self, tables: Vec<Table>, figure: Figure, tally: Tally, time: Duration) -> Dataset {
         // a table without any rows has no columns
         self.tables = tables.into_iter().filter(|table| !table.columns.is_empty()).collect();
         self.figure = figure;
@@ -238,36 +238,36 @@ impl Dataset {
 
 /// Draws the figure of finished tables, just computed or read from a disk. Tables of another
 /// study give an empty figure.
-pub fn redrawn(study: &Study, tables: &[Table]) -> Figure {
+pub fn figure_of_tables(study: &Study, tables: &[Table]) -> Figure {
     let rows: Vec<(&str, usize)> = tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
     let mut thinning = Decimation::new(study, &rows);
     if thinning.keeps_all() {
-        return drawn(study, tables);
+        return draw(study, tables);
     }
     tables.iter().for_each(|table| thinning.add(table.clone()));
-    drawn(study, &thinning.tables())
+    draw(study, &thinning.tables())
 }
 
 /// Draws the figure of the rows that a [`Decimation`] has kept.
-pub fn drawn(study: &Study, tables: &[Table]) -> Figure {
-    Figure { title: study.title().to_owned(), ..(kinds::of(study).draw)(&FigureInput { study, tables }) }
+pub fn draw(study: &Study, tables: &[Table]) -> Figure {
+    Figure { title: study.title().to_owned(), ..(kinds::kind_of(study).draw)(&FigureInput { study, tables }) }
 }
 
 /// Returns the study as it was understood, with its summary.
-fn recorded(study: &Study, summary: &ModelSummary) -> serde_json::Value {
-    let mut record = study.resolved();
+fn study_record(study: &Study, summary: &ModelSummary) -> serde_json::Value {
+    let mut record = study.to_record();
     record["summary"] = summary.to_json();
     record
 }
 
 /// Returns the number of units of work of a study, checked or not.
 pub fn units(study: &Study) -> usize {
-    cut(study).len()
+    divide(study).len()
 }
 
 /// Divides a study into its units.
-fn cut(study: &Study) -> WorkUnits {
-    WorkUnits::of(study, (kinds::of(study).unit_size)(study))
+fn divide(study: &Study) -> WorkUnits {
+    WorkUnits::of(study, (kinds::kind_of(study).unit_size)(study))
 }
 
 /// Interval at which a run checks for a stop request.
@@ -280,14 +280,14 @@ const GRACE: Duration = Duration::from_millis(500);
 ///
 /// Units run as tasks of the pool that own their data. An interrupted run can therefore return
 /// before a slow unit ends.
-fn parts<E: From<StudyError>>(
+fn compute_parts<E: From<StudyError>>(
     study: &Study,
     first: &Arc<PreparedCase>,
     range: Range<usize>,
     context: &Context,
     take: &mut dyn FnMut(usize, UnitResult) -> Result<(), E>,
 ) -> Result<(), E> {
-    let units = cut(study);
+    let units = divide(study);
     let shared = Arc::new(study.clone());
     let (send, receive) = mpsc::channel();
     let mut waiting: BTreeMap<usize, UnitResult> = BTreeMap::new();
@@ -307,7 +307,7 @@ fn parts<E: From<StudyError>>(
             });
             begun += 1;
         }
-        match next(&receive) {
+        match next_finished(&receive) {
             Some((index, part)) => {
                 // a panic in a unit becomes a panic of the run
                 waiting.insert(index, part.unwrap_or_else(|panic| resume_unwind(panic))?);
@@ -334,7 +334,7 @@ type Finished = (usize, std::thread::Result<Result<UnitResult, StudyError>>);
 
 /// Returns the next finished unit, or `None` after a while. A thread of the pool executes other
 /// tasks meanwhile, because it must not wait for itself.
-fn next(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
+fn next_finished(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     if rayon::current_thread_index().is_none() {
         return receive.recv_timeout(LOOK).ok();
     }
@@ -353,7 +353,7 @@ fn compute(
     index: usize,
     context: &Context,
 ) -> Result<UnitResult, StudyError> {
-    let unit = cut(study).get(index);
+    let unit = divide(study).get(index);
     if context.stopped() {
         return Ok(UnitResult::not_reached(unit.len()));
     }
@@ -363,16 +363,16 @@ fn compute(
     };
     let cases = unit.cases.clone().map(prepared).collect::<Result<Vec<_>, _>>()?;
     let work = UnitTask { study, cases, points: unit.points, context };
-    let mut part = (kinds::of(study).compute)(&work);
+    let mut part = (kinds::kind_of(study).compute)(&work);
     if let Ok(part) = &mut part
         && !context.stopped()
     {
-        solve_again(&work, index, part);
+        check_reduction(&work, index, part);
     }
     // kinds check for a stop in many places
     part.map(|part| UnitResult { interrupted: context.stopped(), ..part }).map_err(|(index, error)| {
         match work.cases.iter().find(|prepared| prepared.case.index == index) {
-            Some(prepared) => refused(study, &prepared.case, &error),
+            Some(prepared) => refusal_at_location(study, &prepared.case, &error),
             None => study.error_at("study", 0, "kind", error.to_string(), None),
         }
     })
@@ -380,7 +380,7 @@ fn compute(
 
 /// If joints slip on a reduced model, solves some points again with more modes and records the
 /// difference.
-fn solve_again(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
+fn check_reduction(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
     let (study, prepared) = (work.study, work.case());
     let points = part.points.values().sum::<u64>() as usize;
     let slipping = part.notes.iter_mut().find_map(|note| match note {
@@ -389,9 +389,9 @@ fn solve_again(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
     });
     let Some(slipping) = slipping else { return };
     let PreparedCase { case, system, method } = prepared;
-    let turn = study.kind().uses_method && has_turn(index, points);
-    let at = |omega: f64| location_of(case, omega);
+    let turn = study.kind().uses_method && is_checked(index, points);
+    let at = |omega: f64| describe_location(case, omega);
     if let Some(error) = slipping.solve_again(turn, (&case.model, system, &**method), &at) {
-        part.tables.iter_mut().for_each(|rows| rows.err(error));
+        part.tables.iter_mut().for_each(|rows| rows.raise_reduction_error(error));
     }
 }

@@ -9,7 +9,7 @@ use crate::case::study::{Case, Study};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::syntax::error::StudyError;
-use crate::syntax::expression::displayed;
+use crate::syntax::expression::quantity_text;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
@@ -37,7 +37,7 @@ pub struct Context {
 
 impl Context {
     /// Settings of a run without progress reports.
-    pub fn unwatched(threads: usize) -> Self {
+    pub fn without_progress(threads: usize) -> Self {
         Context { threads, stop: Arc::new(AtomicBool::new(false)), finished: Arc::new(|| ()) }
     }
 
@@ -74,10 +74,10 @@ impl PreparedCase {
         let row = method::find(&case.method.name).ok_or_else(|| {
             study.error_at("method", 0, "kind", format!("there is no method `{}`", case.method.name), None)
         })?;
-        let method = (row.build)(&case.method.options).map_err(|error| refused(study, &case, &error))?;
+        let method = (row.build)(&case.method.options).map_err(|error| refusal_at_location(study, &case, &error))?;
         let system =
             case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-        let told = |error: MethodError| refused(study, &case, &error.with(method::ways(&system)));
+        let told = |error: MethodError| refusal_at_location(study, &case, &error.with(method::ways(&system)));
         if study.kind().uses_method {
             method.solver(&system).map_err(told)?;
         }
@@ -87,7 +87,7 @@ impl PreparedCase {
 }
 
 /// Converts the refusal of a method to an error at its location in the file.
-pub(crate) fn refused(study: &Study, case: &Case, error: &MethodError) -> StudyError {
+pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodError) -> StudyError {
     let model = &case.model;
     // the first case is prepared first, so a later refusal depends on the case and names it
     let refusal = error.clone().alone();
@@ -134,7 +134,7 @@ fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
         Some(row) => format!(
             "give a velocity over which friction changes its sign: [method] with kind = \"{}\" and {WIDTH} = \"{}\"",
             row.name,
-            displayed(ANY_WIDTH, Some(Dimension::VELOCITY))
+            quantity_text(ANY_WIDTH, Some(Dimension::VELOCITY))
         ),
         None => format!(
             "a study of kind `{}` uses its own method, which does not accept this model; for kinds with a choice of \
@@ -192,18 +192,18 @@ impl WorkUnits {
     pub fn of(study: &Study, grain: UnitSize) -> Self {
         let cases = study.cases();
         let points = (study.points() / cases.max(1)).max(1);
-        WorkUnits { grain, cases, points, cases_per_curve: study.last_varied().max(1) }
+        WorkUnits { grain, cases, points, cases_per_curve: study.values_per_curve().max(1) }
     }
 
     /// Returns the number of blocks of frequencies of one case.
-    fn stretches(&self) -> usize {
+    fn blocks_per_case(&self) -> usize {
         self.points.div_ceil(BLOCK)
     }
 
     /// Returns the number of units.
     pub fn len(&self) -> usize {
         match self.grain {
-            UnitSize::Frequencies => self.cases * self.stretches(),
+            UnitSize::Frequencies => self.cases * self.blocks_per_case(),
             UnitSize::Case => self.cases,
             UnitSize::Curve => self.cases / self.cases_per_curve,
         }
@@ -218,7 +218,7 @@ impl WorkUnits {
     pub fn get(&self, index: usize) -> WorkUnit {
         match self.grain {
             UnitSize::Frequencies => {
-                let (case, stretch) = (index / self.stretches(), index % self.stretches());
+                let (case, stretch) = (index / self.blocks_per_case(), index % self.blocks_per_case());
                 WorkUnit { cases: case..case + 1, points: stretch * BLOCK..((stretch + 1) * BLOCK).min(self.points) }
             }
             UnitSize::Case => WorkUnit { cases: index..index + 1, points: 0..self.points },

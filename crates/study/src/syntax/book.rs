@@ -4,7 +4,7 @@
 use crate::compile::templates;
 use crate::kinds;
 use crate::kinds::kind::Kind;
-use crate::syntax::schema::{FILE, Key, Presence, SAMPLE, STUDY, ValueType, described};
+use crate::syntax::schema::{FILE, Key, Presence, SAMPLE, STUDY, ValueType, describe_value};
 use stickslip::{law, method};
 
 /// Returns the reference of study files, key by key, as Markdown tables.
@@ -16,21 +16,21 @@ pub fn markdown() -> String {
             book.push_str(&format!("{intro}\n\n"));
         }
         book.push_str("| key | value | default | meaning | example |\n| --- | --- | --- | --- | --- |\n");
-        for key in keys.iter().filter(|key| key.is_taken()) {
+        for key in keys.iter().filter(|key| key.is_supported()) {
             let absent = match key.presence {
                 Presence::Required => "required".to_owned(),
                 Presence::Optional => String::new(),
                 Presence::Default(value) => format!("`{value}`"),
             };
             let example = if key.example == "[]" { String::new() } else { format!("`{} = {}`", key.name, key.example) };
-            let cells = [format!("`{}`", key.name), described(&key.takes), absent, key.doc.to_owned(), example];
+            let cells = [format!("`{}`", key.name), describe_value(&key.takes), absent, key.doc.to_owned(), example];
             book.push_str(&format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | ")));
         }
         book.push('\n');
     };
     // nested tables follow the table that contains them
     let inner = |book: &mut String, of: &str, keys: &[Key]| {
-        for key in keys.iter().filter(|key| key.is_taken()) {
+        for key in keys.iter().filter(|key| key.is_supported()) {
             if let ValueType::Table(keys) | ValueType::TableOrFalse(keys) = key.takes {
                 rows(book, &format!("`{}` of {of}", key.name), key.doc, keys);
             }
@@ -58,7 +58,7 @@ pub fn markdown() -> String {
             book.push_str(&format!("  - `{key}` ({takes}): {doc}\n"));
         }
     };
-    let described = crate::syntax::expression::described;
+    let described = crate::syntax::expression::dimension_text;
     book.push_str("## Laws\n\n");
     for row in law::TABLE {
         let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc)).collect();

@@ -29,7 +29,7 @@ const TORSION: &str = "this quantity belongs to a rotation, but places move in m
 
 /// Returns advice for a quantity of dimension `found` where `expected` is required; `text` is
 /// the user's text.
-pub(crate) fn advice(expected: Dimension, found: Dimension, text: &str) -> Option<String> {
+pub(crate) fn dimension_advice(expected: Dimension, found: Dimension, text: &str) -> Option<String> {
     let said = match (expected, found) {
         _ if OF_ROTATION.contains(&(expected, found)) => TORSION,
         (Dimension::STIFFNESS, PRESSURE) => {

@@ -1,7 +1,7 @@
 //! A TOML text as a tree in which every key and value knows its location.
 
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::suggest::shown;
+use crate::syntax::suggest::excerpt;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
@@ -50,7 +50,7 @@ impl TomlValue {
     /// Describes the value for messages.
     pub fn described(&self) -> String {
         match self {
-            TomlValue::Text { text, .. } => format!("the text \"{}\"", shown(text)),
+            TomlValue::Text { text, .. } => format!("the text \"{}\"", excerpt(text)),
             TomlValue::Number { value, whole: None } => format!("the number {value}"),
             TomlValue::Number { whole: Some(whole), .. } => format!("the number {whole}"),
             TomlValue::Flag(flag) => format!("`{flag}`"),
@@ -76,7 +76,7 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<TomlTable, Problem> {
         let mut key = "";
         if message.starts_with("duplicate key") {
             key = text.get(span.clone()).unwrap_or("").trim();
-            message = format!("the key `{}` appears twice in one table", shown(key));
+            message = format!("the key `{}` appears twice in one table", excerpt(key));
             help = Some("remove one of them; for several masses, write `[[mass]]` several times".to_owned());
         } else if let Some(rest) = message.strip_prefix("cannot recurse further") {
             message = format!("brackets are nested too deeply{}", if rest.is_empty() { "" } else { " (80 at most)" });
@@ -84,7 +84,7 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<TomlTable, Problem> {
             message = format!("this is not TOML: {message}");
             help = Some("write texts and quantities in quotes: mass = \"182 g\"".to_owned());
         }
-        Problem::new(&Location { source, span }, shown(key), message).maybe_help(help)
+        Problem::new(&Location { source, span }, excerpt(key), message).maybe_help(help)
     })?;
     let reader = TreeBuilder { text, source };
     Ok(reader.table(tree.get_ref(), 0..0))

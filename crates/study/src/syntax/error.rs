@@ -91,7 +91,7 @@ impl StudyError {
     }
 
     /// Returns an error at a location in one of the sources.
-    pub(crate) fn at(sources: &[Arc<Source>], problem: Problem) -> Self {
+    pub(crate) fn at_location(sources: &[Arc<Source>], problem: Problem) -> Self {
         let source = match sources.get(problem.location.source) {
             Some(source) => Arc::clone(source),
             None => Arc::new(Source { name: String::new(), text: String::new() }),
@@ -110,11 +110,11 @@ impl StudyError {
     }
 
     /// Returns the first of several errors in file order, with the others attached.
-    pub(crate) fn all(sources: &[Arc<Source>], mut problems: Vec<Problem>) -> Option<Self> {
+    pub(crate) fn from_problems(sources: &[Arc<Source>], mut problems: Vec<Problem>) -> Option<Self> {
         problems.sort_by_key(|p| (p.location.source, p.location.span.start));
         // a repeated entry reports one mistake once
         problems.dedup_by(|later, first| later.location == first.location && later.key == first.key);
-        let mut errors = problems.into_iter().map(|problem| StudyError::at(sources, problem));
+        let mut errors = problems.into_iter().map(|problem| StudyError::at_location(sources, problem));
         let mut first = errors.next()?;
         first.0.related = errors.collect();
         Some(first)

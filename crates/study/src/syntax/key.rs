@@ -119,7 +119,7 @@ pub enum Bounds {
 
 /// Returns the range of a law's parameter for the reader. The law itself checks the exact
 /// bounds.
-pub(crate) fn within(range: law::Range) -> Bounds {
+pub(crate) fn parameter_bounds(range: law::Range) -> Bounds {
     match range {
         law::Range::Positive | law::Range::Count(_) => Bounds::Positive,
         law::Range::ZeroOrMore | law::Range::UpTo(_) => Bounds::AtLeastZero,
@@ -129,7 +129,7 @@ pub(crate) fn within(range: law::Range) -> Bounds {
 
 impl Bounds {
     /// Returns whether the number is in the range.
-    pub fn holds(self, value: f64) -> bool {
+    pub fn contains(self, value: f64) -> bool {
         value.is_finite()
             && match self {
                 Bounds::Finite => true,
@@ -139,7 +139,7 @@ impl Bounds {
     }
 
     /// Describes the range in words.
-    pub fn described(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Bounds::Finite => "a finite number",
             Bounds::AtLeastZero => "zero or more",
@@ -150,7 +150,7 @@ impl Bounds {
 
 impl Key {
     /// Returns whether the key takes a value.
-    pub fn is_taken(&self) -> bool {
+    pub fn is_supported(&self) -> bool {
         !matches!(self.takes, ValueType::Unsupported(_))
     }
 }

@@ -643,15 +643,15 @@ fn method_names() -> Vec<(&'static str, &'static str)> {
 }
 
 /// Describes the values that a key takes in a few words, for messages and for the book.
-pub fn described(takes: &ValueType) -> String {
+pub fn describe_value(takes: &ValueType) -> String {
     match takes {
         ValueType::Text => "a text in quotes".to_owned(),
         ValueType::Name => "a name in quotes".to_owned(),
         ValueType::Names => "a name in quotes or a list of names".to_owned(),
         ValueType::Pair => "a list of two names of places".to_owned(),
         ValueType::Quantity(dimension, within) => {
-            let range = if *within == Bounds::Finite { String::new() } else { format!(", {}", within.described()) };
-            format!("{}{range}", crate::syntax::expression::described(*dimension))
+            let range = if *within == Bounds::Finite { String::new() } else { format!(", {}", within.description()) };
+            format!("{}{range}", crate::syntax::expression::dimension_text(*dimension))
         }
         ValueType::Count(from, to) if from == to => format!("the number {from}"),
         ValueType::Count(from, to) => format!("a whole number from {from} to {to}"),
@@ -663,11 +663,11 @@ pub fn described(takes: &ValueType) -> String {
             format!("a frequency (Hz or rad/s), a list of them, or {{ {needed} }}{adaptive}")
         }
         ValueType::ByName(dimension) => {
-            format!("a table from names to {}", crate::syntax::expression::described(*dimension))
+            format!("a table from names to {}", crate::syntax::expression::dimension_text(*dimension))
         }
         ValueType::Table(keys) | ValueType::List(keys) => {
-            let taken = keys.iter().filter(|key| key.is_taken());
-            let names = crate::syntax::suggest::one_of(taken.map(|key| key.name)).replace(" or ", ", ");
+            let taken = keys.iter().filter(|key| key.is_supported());
+            let names = crate::syntax::suggest::alternatives(taken.map(|key| key.name)).replace(" or ", ", ");
             let many = matches!(takes, ValueType::List(_));
             format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
         }
@@ -676,29 +676,29 @@ pub fn described(takes: &ValueType) -> String {
         }
         ValueType::Law => "a law: { kind = \"…\", … }".to_owned(),
         ValueType::Choice(words) => {
-            format!("one of {}", crate::syntax::suggest::one_of(words().iter().map(|word| word.0)))
+            format!("one of {}", crate::syntax::suggest::alternatives(words().iter().map(|word| word.0)))
         }
         ValueType::Parameters => "a table of quantities by name".to_owned(),
         ValueType::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
         ValueType::Sample => "a table with `count`, `of`, `seed` and `design`".to_owned(),
         ValueType::Distributions => {
             let all = DISTRIBUTIONS.map(|(name, numbers, _)| format!("{{ {name} = [{numbers}] }}"));
-            let all = crate::syntax::suggest::one_of(all.iter().map(String::as_str));
+            let all = crate::syntax::suggest::alternatives(all.iter().map(String::as_str));
             format!("a table from parameters to {all}, the first two also with {WITHIN} = [least, most]")
         }
         ValueType::Method => "a table with `kind` and the options of that method".to_owned(),
         ValueType::Study => "a table with `kind` and the keys of that kind".to_owned(),
         ValueType::File => "the path of a file, or { file = …, name = …, format = … }".to_owned(),
-        ValueType::TableOrFalse(keys) => format!("{}, or false", described(&ValueType::Table(keys))),
+        ValueType::TableOrFalse(keys) => format!("{}, or false", describe_value(&ValueType::Table(keys))),
         ValueType::Row => "the name of a row, or its number".to_owned(),
         ValueType::Rows => "a list of names or numbers".to_owned(),
         ValueType::Weights => "a table from names of rows to numbers, or a list of such tables".to_owned(),
         ValueType::Vector(Dimension::NONE) => "a list of three numbers".to_owned(),
         ValueType::Vector(dimension) => {
-            format!("a list of three quantities: {}", crate::syntax::expression::described(*dimension))
+            format!("a list of three quantities: {}", crate::syntax::expression::dimension_text(*dimension))
         }
         ValueType::Quantities(dimension, within) => {
-            let one = described(&ValueType::Quantity(*dimension, *within));
+            let one = describe_value(&ValueType::Quantity(*dimension, *within));
             format!("{one}, or a list of them")
         }
         ValueType::Unsupported(why) => format!("nothing: {why}"),
@@ -738,7 +738,7 @@ fn property(key: &Key) -> Value {
     let mut schema = takes_schema(&key.takes);
     let mut doc = key.doc.to_owned();
     if let ValueType::Quantity(..) | ValueType::Frequencies(_) | ValueType::ByName(_) = key.takes {
-        doc = format!("{doc}: {}", described(&key.takes));
+        doc = format!("{doc}: {}", describe_value(&key.takes));
     }
     if let Presence::Default(value) = key.presence {
         doc = format!("{doc}; default: {value}");
@@ -831,7 +831,7 @@ fn takes_schema(takes: &ValueType) -> Value {
         }
         ValueType::Method => {
             let one = |row: &method::MethodInfo| {
-                let takes = crate::syntax::expression::described;
+                let takes = crate::syntax::expression::dimension_text;
                 let options = row.options.iter().map(|o| (o.key, takes(o.dimension), o.doc, false));
                 let mut schema = kind_object(row.name, row.summary, options);
                 for option in row.options.iter().filter(|option| option.count) {

@@ -1,7 +1,7 @@
 //! Suggestions for misspelled words.
 
 /// Returns the candidate that is most similar to `word`, if one is similar enough.
-pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn suggest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // Words from a file can be megabytes long, and the distance costs the product of the
     // lengths. Numbers get no suggestion.
     if word.len() > 64 || word.starts_with(|first: char| first.is_ascii_digit()) {
@@ -28,7 +28,7 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
 }
 
 /// Formats a list as `` `a`, `b` or `c` ``.
-pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
+pub(crate) fn alternatives<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     let words: Vec<String> = words.into_iter().map(|word| format!("`{word}`")).collect();
     match words.split_last() {
         None => "nothing".to_owned(),
@@ -39,7 +39,7 @@ pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
 
 /// Makes a word of the file fit for one line of a message: replaces control characters and cuts
 /// it to 60 characters.
-pub(crate) fn shown(word: &str) -> String {
+pub(crate) fn excerpt(word: &str) -> String {
     const LONGEST: usize = 60;
     let mut text: String =
         word.chars().take(LONGEST).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
@@ -56,13 +56,13 @@ mod tests {
     #[test]
     fn finds_slips_and_abbreviations_but_no_strangers() {
         let keys = ["between", "stiffness", "damping"];
-        assert_eq!(nearest("stifness", keys), Some("stiffness"));
-        assert_eq!(nearest("Damping", keys), Some("damping"));
-        assert_eq!(nearest("damp", keys), Some("damping"));
-        assert_eq!(nearest("colour", keys), None);
-        assert_eq!(nearest("viscous damping", keys), Some("damping"));
-        assert_eq!((nearest("61", ["6", "1"]), nearest("61.x", ["6.x"])), (None, None));
-        assert_eq!(nearest(&"x".repeat(100_000), keys), None);
-        assert_eq!(one_of(keys), "`between`, `stiffness` or `damping`");
+        assert_eq!(suggest("stifness", keys), Some("stiffness"));
+        assert_eq!(suggest("Damping", keys), Some("damping"));
+        assert_eq!(suggest("damp", keys), Some("damping"));
+        assert_eq!(suggest("colour", keys), None);
+        assert_eq!(suggest("viscous damping", keys), Some("damping"));
+        assert_eq!((suggest("61", ["6", "1"]), suggest("61.x", ["6.x"])), (None, None));
+        assert_eq!(suggest(&"x".repeat(100_000), keys), None);
+        assert_eq!(alternatives(keys), "`between`, `stiffness` or `damping`");
     }
 }

@@ -8,7 +8,7 @@
 //! unit follows; `^2`, `^-1` and `²` are powers. `N s/m` is `(N s)/m`. A space after a `/`
 //! (`N/m s`) is refused, because readers disagree on its meaning.
 
-use crate::syntax::suggest::{nearest, shown};
+use crate::syntax::suggest::{excerpt, suggest};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 
@@ -151,7 +151,7 @@ pub(crate) fn parse(text: &str) -> Option<Unit> {
 
 /// Suggests a unit for `name`: one that differs by case or a typing error, or two joined units
 /// (`Nm`).
-pub(crate) fn nearest_unit(name: &str) -> Option<String> {
+pub(crate) fn suggest_unit(name: &str) -> Option<String> {
     let cut = name.char_indices().skip(1).map(|(i, _)| name.split_at(i));
     if let Some((a, b)) = cut.take(8).find(|(a, b)| find(a).is_some() && find(b).is_some()) {
         return Some(format!("{a} {b}"));
@@ -161,7 +161,7 @@ pub(crate) fn nearest_unit(name: &str) -> Option<String> {
         all.extend(["m", "k", "M"].iter().map(|prefix| format!("{prefix}{}", row.name)));
     }
     let same = all.iter().find(|unit| unit.to_lowercase() == name.to_lowercase());
-    same.cloned().or_else(|| nearest(name, all.iter().map(String::as_str)).map(str::to_owned))
+    same.cloned().or_else(|| suggest(name, all.iter().map(String::as_str)).map(str::to_owned))
 }
 
 /// Returns the factor from the unit `from` to the unit `to`. Returns `None` if their dimensions
@@ -171,7 +171,7 @@ pub fn ratio(from: &str, to: &str) -> Option<f64> {
         return Some(1.0);
     }
     let (from, to) = (parse(from)?, parse(to)?);
-    (from.dimension == to.dimension).then(|| from.scale("1") / to.scale("1"))
+    (from.dimension == to.dimension).then(|| from.to_si("1") / to.to_si("1"))
 }
 
 impl Unit {
@@ -202,7 +202,7 @@ impl Unit {
 
     /// Returns the SI value of `literal` (digits, a point, an exponent) in this unit. The
     /// result is rounded once if the unit has no fraction and no π.
-    pub(crate) fn scale(&self, literal: &str) -> f64 {
+    pub(crate) fn to_si(&self, literal: &str) -> f64 {
         let (mantissa, exponent) = literal.split_once(['e', 'E']).unwrap_or((literal, "0"));
         // an exponent out of the range of i32 is far out of the range of f64
         let clamped = if exponent.starts_with('-') { -100_000 } else { 100_000 };
@@ -222,11 +222,11 @@ impl Unit {
 }
 
 impl Unit {
-    /// Like [`Unit::scale`], for a number with an optional minus sign.
-    pub(crate) fn scale_signed(&self, literal: &str) -> f64 {
+    /// Like [`Unit::to_si`], for a number with an optional minus sign.
+    pub(crate) fn signed_to_si(&self, literal: &str) -> f64 {
         match literal.strip_prefix('-') {
-            Some(positive) => -self.scale(positive),
-            None => self.scale(literal),
+            Some(positive) => -self.to_si(positive),
+            None => self.to_si(literal),
         }
     }
 }
@@ -272,7 +272,7 @@ pub(crate) struct ReservedNames<'a> {
 
 /// Returns whether a text that begins with `/` continues with a unit that cannot be a
 /// parameter: `/m`, `/s`.
-pub(crate) fn divides(text: &str, names: &ReservedNames<'_>) -> bool {
+pub(crate) fn starts_with_divisor(text: &str, names: &ReservedNames<'_>) -> bool {
     let Some(after) = text.strip_prefix('/') else { return false };
     let reader = UnitParser { text: after.trim_start(), position: 0, names, depth: 0 };
     reader.unit_here() && !(names.parameter)(reader.word())
@@ -281,7 +281,7 @@ pub(crate) fn divides(text: &str, names: &ReservedNames<'_>) -> bool {
 /// Reads the unit that starts at byte `start` of `text`, and returns it with the byte position
 /// after it.
 ///
-/// The text at `start` must satisfy [`starts_unit`] or [`divides`].
+/// The text at `start` must satisfy [`starts_unit`] or [`starts_with_divisor`].
 pub(crate) fn read(text: &str, start: usize, names: &ReservedNames<'_>) -> Result<(Unit, usize), TextError> {
     let mut reader = UnitParser { text, position: start, names, depth: 0 };
     let unit = reader.product(false)?;
@@ -366,8 +366,8 @@ impl UnitParser<'_> {
                             let help = format!(
                                 "for the unit remove the spaces around `{next}`; for the parameter write \"({}) \
                                  {next} {}\"",
-                                shown(before),
-                                shown(after)
+                                excerpt(before),
+                                excerpt(after)
                             );
                             return Err(TextError::new(span, message).help(help));
                         }
@@ -484,7 +484,7 @@ impl UnitParser<'_> {
             return TextError::new(self.position..self.position, "a unit is missing here");
         }
         let span = self.position..self.position + word.len();
-        let fault = TextError::new(span, format!("there is no unit `{}`", shown(word)));
+        let fault = TextError::new(span, format!("there is no unit `{}`", excerpt(word)));
         if (self.names.parameter)(word) {
             return fault.help(format!("a number is followed by its unit; for the parameter write \"* {word}\""));
         }
@@ -493,7 +493,7 @@ impl UnitParser<'_> {
         {
             return fault.help(*advice);
         }
-        match nearest_unit(word) {
+        match suggest_unit(word) {
             Some(unit) => fault.help(format!("did you mean `{unit}`?")),
             None => fault.help("units are m, kg, s, N, J, Pa, W, Hz, rad, deg, rpm, with prefixes such as m and k"),
         }
@@ -501,7 +501,7 @@ impl UnitParser<'_> {
 }
 
 /// Lists all units for the documentation: (name, whether it takes prefixes).
-pub fn list() -> Vec<(&'static str, bool)> {
+pub fn all_units() -> Vec<(&'static str, bool)> {
     UNITS.iter().map(|row| (row.name, row.prefixes)).collect()
 }
 
@@ -514,7 +514,7 @@ mod tests {
         let cut = text.find(' ').unwrap();
         let (unit, end) = read(text, cut + 1, &names).unwrap();
         assert_eq!((end, unit.dimension), (text.len(), dimension), "{text}");
-        assert_eq!(unit.scale(&text[..cut]), expected, "{text}");
+        assert_eq!(unit.to_si(&text[..cut]), expected, "{text}");
     }
 
     #[test]
@@ -582,7 +582,7 @@ mod tests {
     }
 
     fn quantity_of(unit: &str) -> f64 {
-        read_unit(unit).scale("1")
+        read_unit(unit).to_si("1")
     }
 
     fn read_dimension(unit: &str) -> Dimension {

@@ -41,7 +41,7 @@ pub(crate) const DESIGNS: [(&str, &str, Design); 3] = [
 pub(crate) const MOST_SOBOL: usize = DIRECTIONS.len() + 1;
 
 /// Mixes 64 bits: every bit of the result depends on every bit of `z`.
-fn mixed(z: u64) -> u64 {
+fn mix64(z: u64) -> u64 {
     let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ z >> 31
@@ -52,7 +52,7 @@ const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Returns a hash of several numbers.
 fn hash(numbers: &[u64]) -> u64 {
-    numbers.iter().fold(0, |hash, number| mixed(hash.wrapping_add(STEP) ^ mixed(number.wrapping_add(STEP))))
+    numbers.iter().fold(0, |hash, number| mix64(hash.wrapping_add(STEP) ^ mix64(number.wrapping_add(STEP))))
 }
 
 /// Returns the middle of one of 2⁵³ equal parts of the interval from zero to one, so never an
@@ -69,13 +69,13 @@ impl Design {
         match self {
             Design::Random => unit(hash(&[seed, dimension, index])),
             Design::LatinHypercube => {
-                let part = permuted(index, count as u64, hash(&[seed, dimension, u64::MAX]));
+                let part = feistel_permutation(index, count as u64, hash(&[seed, dimension, u64::MAX]));
                 let value = (part as f64 + unit(hash(&[seed, dimension, index]))) / count as f64;
                 // rounding in the last part could give the end of the interval
                 value.min(1.0 - f64::EPSILON / 2.0)
             }
             Design::Sobol => {
-                let bits = scrambled(sobol(index as u32, dimension as usize), hash(&[seed, dimension]));
+                let bits = owen_scramble(sobol(index as u32, dimension as usize), hash(&[seed, dimension]));
                 (f64::from(bits) + 0.5) / (1u64 << 32) as f64
             }
         }
@@ -86,7 +86,7 @@ impl Design {
 ///
 /// A Feistel network on an even number of bits that hold `count` is applied until the result is
 /// below `count` (cycle walking).
-fn permuted(index: u64, count: u64, key: u64) -> u64 {
+fn feistel_permutation(index: u64, count: u64, key: u64) -> u64 {
     let half = (u64::BITS - count.saturating_sub(1).leading_zeros()).div_ceil(2).max(1);
     let mask = (1u64 << half) - 1;
     let mut at = index;
@@ -133,7 +133,7 @@ fn direction(dimension: usize, k: usize) -> u32 {
 }
 
 /// Scrambles bits: each bit is flipped or not, depending on the bits before it.
-fn scrambled(bits: u32, key: u64) -> u32 {
+fn owen_scramble(bits: u32, key: u64) -> u32 {
     let turned = |level: u32| {
         // the leading one makes prefixes of different length distinct
         let prefix = 1u64 << level | u64::from(bits) >> (32 - level);
@@ -247,7 +247,8 @@ mod tests {
             }
         }
         // the dimensions have different orders
-        let order = |dimension: usize| (0..50).map(move |i| permuted(i, 50, hash(&[1, dimension as u64, u64::MAX])));
+        let order =
+            |dimension: usize| (0..50).map(move |i| feistel_permutation(i, 50, hash(&[1, dimension as u64, u64::MAX])));
         assert!(!order(0).eq(order(1)));
     }
 

@@ -126,11 +126,11 @@ impl Distribution {
         let (a, b) = (self.standard(least), self.standard(most));
         // from the side of the nearer tail, to avoid cancellation
         let value = if a > 0.0 {
-            let (above_a, above_b) = (share_below(-a), share_below(-b));
+            let (above_a, above_b) = (normal_cdf(-a), normal_cdf(-b));
             let above = above_a - (above_a - above_b) * p;
             (above > 0.0 && above_a > above_b).then(|| self.of_standard(-normal_quantile(above)))
         } else {
-            let (below_a, below_b) = (share_below(a), share_below(b));
+            let (below_a, below_b) = (normal_cdf(a), normal_cdf(b));
             let below = below_a + (below_b - below_a) * p;
             (below > 0.0 && below < 1.0 && below_a < below_b).then(|| self.of_standard(normal_quantile(below)))
         };
@@ -171,7 +171,7 @@ fn of_logarithm([mean, deviation]: &[f64; 2]) -> [f64; 2] {
 }
 
 /// Returns the share of a standard normal quantity below `z`.
-fn share_below(z: f64) -> f64 {
+fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
@@ -325,7 +325,7 @@ mod tests {
                     last = value;
                     // the share below the value, relative to the share between the bounds, from
                     // the shares above
-                    let above = |z: f64| share_below(-z);
+                    let above = |z: f64| normal_cdf(-z);
                     let share = (above(a) - above(distribution.standard(value))) / (above(a) - above(b));
                     assert!((share - p).abs() < 1e-9, "{distribution:?} {bounds:?}: {share} {p}");
                 }

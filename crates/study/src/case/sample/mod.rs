@@ -47,7 +47,7 @@ impl DrawnParameter {
     ) -> Result<ExpressionValue, Problem> {
         let mut dimension = dimension;
         let mut number = |quantity: &CompiledQuantity| {
-            let value = quantity.settled(name, dimension, environment)?;
+            let value = quantity.parameter_value(name, dimension, environment)?;
             dimension = dimension.or(value.dimension);
             if value.si.is_finite() { Ok(value.si) } else { Err(quantity.problem(name, "this is not a finite number")) }
         };
@@ -72,6 +72,6 @@ impl DrawnParameter {
                 })?
             }
         };
-        Ok(dimension.map_or_else(|| ExpressionValue::bare(si), |dimension| ExpressionValue::of(si, dimension)))
+        Ok(dimension.map_or_else(|| ExpressionValue::bare(si), |dimension| ExpressionValue::new(si, dimension)))
     }
 }

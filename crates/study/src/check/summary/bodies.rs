@@ -1,6 +1,6 @@
 //! The rigid bodies of a model in words.
 
-use crate::syntax::expression::displayed;
+use crate::syntax::expression::quantity_text;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Body, Model, ROTATIONS};
 
@@ -22,15 +22,15 @@ pub(super) fn described(model: &Model) -> Vec<String> {
 fn line(body: &Body, model: &Model) -> String {
     let turns = |axis: &usize| body.directions.iter().any(|along| along == ROTATIONS[*axis]);
     let moments = (0..ROTATIONS.len()).filter(turns).map(|axis| {
-        format!("{} about {}", displayed(body.inertia[axis][axis], Some(Dimension::INERTIA)), ["x", "y", "z"][axis])
+        format!("{} about {}", quantity_text(body.inertia[axis][axis], Some(Dimension::INERTIA)), ["x", "y", "z"][axis])
     });
     let points = model.places.iter().filter(|place| place.of.as_ref() == Some(&body.name)).count();
     format!(
         "{}: {}, {}; directions {}; {points} place{}",
         body.name,
-        displayed(body.mass, Some(Dimension::MASS)),
+        quantity_text(body.mass, Some(Dimension::MASS)),
         moments.collect::<Vec<_>>().join(", "),
         body.directions.join(", "),
-        crate::syntax::format::plural(points)
+        crate::syntax::format::plural_suffix(points)
     )
 }

@@ -12,7 +12,7 @@ pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 
 use crate::case::study::Study;
 use crate::check::cost::{Cost, CostInputs, StudySize};
-use crate::check::survey::{SurveyedCase, range};
+use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::kinds;
 use crate::run::work::WorkUnits;
 use crate::syntax::error::StudyError;
@@ -136,7 +136,7 @@ const UNLOADED: f64 = 1e6;
 
 /// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
 /// rounding.
-fn load(onset: &Onset) -> f64 {
+fn relative_load(onset: &Onset) -> f64 {
     if onset.largest * UNLOADED < 1.0 { 0.0 } else { onset.largest }
 }
 
@@ -167,7 +167,7 @@ impl ModelSummary {
         let holds = |one: &SurveyedCase| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
         let most = cases.iter().map(holds).max().unwrap_or(0);
         let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
-        let range = range(&shown.case);
+        let range = frequency_range(&shown.case);
         let first = &shown.survey;
         let onsets = range.and_then(|(from, to)| first.onset(from, to));
         let joints = first.first_slip().into_iter().enumerate().map(|(index, slip)| JointSummary {
@@ -180,14 +180,14 @@ impl ModelSummary {
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
-        let kind = kinds::of(study);
+        let kind = kinds::kind_of(study);
         let costings: Vec<CostInputs<'_>> = cases.iter().map(|one| CostInputs::new(study, one)).collect();
         // the time of all cases if they were like this one
         let time = |costing: &CostInputs<'_>| costing.seconds(&(kind.cost)(costing));
         let mean =
             |times: &dyn Fn(&CostInputs<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
-        let (usual_seconds, seconds) = (mean(&|one| time(&one.usual())), mean(&time));
-        let (slow, usual) = (&costings[0], costings[0].usual());
+        let (usual_seconds, seconds) = (mean(&|one| time(&one.typical())), mean(&time));
+        let (slow, usual) = (&costings[0], costings[0].typical());
         let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
         let whole = usual.seconds(&usual_cost);
         let spared = usual_cost.conditional_work.map(|(work, place)| {
@@ -228,16 +228,19 @@ impl ModelSummary {
 
     /// Describes the expected time in words.
     pub(crate) fn time(&self) -> String {
-        let mut usual = format!("{} on one thread", crate::syntax::format::about(self.usual_time_s));
+        let mut usual = format!("{} on one thread", crate::syntax::format::format_estimate(self.usual_time_s));
         if let Some((seconds, place)) = self.time_without
             && self.usual_time_s >= (WIDE * seconds).max(SOON)
         {
-            usual += &format!(", {} {place}", crate::syntax::format::about(seconds));
+            usual += &format!(", {} {place}", crate::syntax::format::format_estimate(seconds));
         }
         if self.longest_time_s < WIDE * self.usual_time_s || self.longest_time_s < SOON {
             return usual;
         }
-        format!("{usual}, up to {} if orbits are hard to find", crate::syntax::format::duration(self.longest_time_s))
+        format!(
+            "{usual}, up to {} if orbits are hard to find",
+            crate::syntax::format::format_duration(self.longest_time_s)
+        )
     }
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.
@@ -258,8 +261,8 @@ impl ModelSummary {
                 "pressed_N": joint.normal_force,
                 "pressed_at_rest_N": joint.normal_force_at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
-                "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / load(onset)).filter(|x| x.is_finite()),
-                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| load(onset) > 0.0).map(|onset| onset.at / TAU),
+                "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / relative_load(onset)).filter(|x| x.is_finite()),
+                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| relative_load(onset) > 0.0).map(|onset| onset.at / TAU),
                 "slips_Hz": joint.onset.as_ref()
                     .map(|onset| onset.slips.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
             })

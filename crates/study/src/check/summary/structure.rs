@@ -2,7 +2,7 @@
 
 use crate::case::study::Study;
 use crate::check::survey::SurveyedCase;
-use crate::syntax::format::{plural, significant};
+use crate::syntax::format::{format_significant, plural_suffix};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::model::{ReductionEvidence, Substructure};
@@ -82,12 +82,13 @@ impl StructureSummary {
             "{rows} rows, {stiffness} entries of stiffness, {mass} of mass, symmetric, mass definite or semidefinite"
         );
         if *left_out > 0 {
-            text += &format!("; {left_out} constrained row{} left out", plural(*left_out));
+            text += &format!("; {left_out} constrained row{} left out", plural_suffix(*left_out));
         }
         let mut lines = vec![("structure", text), ("mass", self.mass_words())];
-        let hertz = |omega: f64| significant(omega / TAU, 6);
-        let within =
-            |error: f64, up_to: f64| format!("error {} % up to {} Hz", significant(100.0 * error, 2), hertz(up_to));
+        let hertz = |omega: f64| format_significant(omega / TAU, 6);
+        let within = |error: f64, up_to: f64| {
+            format!("error {} % up to {} Hz", format_significant(100.0 * error, 2), hertz(up_to))
+        };
         let before = self
             .earlier_reduction
             .map(|earlier| format!("by an earlier reduction, {}", within(earlier.error, earlier.up_to)));
@@ -100,7 +101,7 @@ impl StructureSummary {
         let own = if own.is_empty() { "none computed".to_owned() } else { format!("{} Hz", own.join(", ")) };
         let free = match reduced.rigid_body_modes {
             None | Some(0) => String::new(),
-            Some(free) => format!(", {free} rigid-body motion{}", plural(free)),
+            Some(free) => format!(", {free} rigid-body motion{}", plural_suffix(free)),
         };
         lines.push(("frequencies", own + &free));
         let ReducedSummary { coordinates, kind, error, up_to, .. } = reduced;
@@ -116,7 +117,7 @@ impl StructureSummary {
         let Some(&(_, first)) = known.first() else {
             return "unknown, because no row name has a direction (449.x); `units` cannot be checked".to_owned();
         };
-        let kilograms = |mass: f64| format!("{} kg", significant(mass, 4));
+        let kilograms = |mass: f64| format!("{} kg", format_significant(mass, 4));
         let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= SAME * first.abs());
         let text = if alike {
             let along: Vec<&str> = known.iter().map(|(along, _)| *along).collect();

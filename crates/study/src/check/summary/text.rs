@@ -1,7 +1,7 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary, OrbitCount, UNLOADED, load};
-use crate::syntax::format::{bytes_text, plural, quantity, significant};
+use super::{JointSummary, ModelSummary, OrbitCount, UNLOADED, relative_load};
+use crate::syntax::format::{format_bytes, format_significant, format_with_prefix, plural_suffix};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::fmt;
@@ -37,16 +37,16 @@ impl ModelSummary {
         if count == 0 {
             parts.push("no mode".to_owned());
         } else {
-            let damping: Vec<String> = order.iter().map(|m| significant(100.0 * m.damping, 2)).collect();
+            let damping: Vec<String> = order.iter().map(|m| format_significant(100.0 * m.damping, 2)).collect();
             let damping = match damping.iter().all(|d| *d == damping[0]) {
                 true => damping[0].clone(),
                 false => damping.join(", "),
             };
-            parts.push(format!("{} Hz, damping {damping} %", list(&|m| significant(m.omega / TAU, 5))));
+            parts.push(format!("{} Hz, damping {damping} %", list(&|m| format_significant(m.omega / TAU, 5))));
         }
         let mut text = parts.join(" ");
         if modes.rigid > 0 {
-            text += &format!("; {} rigid-body motion{}", modes.rigid, plural(modes.rigid));
+            text += &format!("; {} rigid-body motion{}", modes.rigid, plural_suffix(modes.rigid));
         }
         if modes.lost > 0 {
             text += &format!("; {} lost in rounding, because other stiffnesses are much higher", modes.lost);
@@ -66,30 +66,31 @@ impl ModelSummary {
         if joint.limit.is_infinite() {
             return "acts as a spring, never slips".to_owned();
         }
-        let (limit, slip) = (quantity(joint.limit, "N"), if joint.micro_slip { "macro-slip" } else { "slip" });
+        let (limit, slip) =
+            (format_with_prefix(joint.limit, "N"), if joint.micro_slip { "macro-slip" } else { "slip" });
         let mut text = match joint.displacement {
             Some(displacement) => {
                 let verb = if joint.micro_slip { "macro-slip at" } else { "slips at" };
                 let before = if joint.micro_slip { ", micro-slip before" } else { "" };
-                format!("{verb} {limit}, {} of relative displacement{before}", quantity(displacement, "m"))
+                format!("{verb} {limit}, {} of relative displacement{before}", format_with_prefix(displacement, "m"))
             }
             None => format!("slips at {limit}, rigid until then"),
         };
         let Some(onset) = &joint.onset else { return text };
         let several = self.range.is_some_and(|(from, to)| from < to);
-        let hertz = |omega: f64| significant(omega / TAU, 7);
+        let hertz = |omega: f64| format_significant(omega / TAU, 7);
         let at = if several { format!(" at {} Hz", hertz(onset.at)) } else { String::new() };
         if !onset.largest.is_finite() {
             return text + "; the imposed motion makes it slip";
         }
-        let factor = significant(1.0 / onset.largest, 3);
+        let factor = format_significant(1.0 / onset.largest, 3);
         let resonant = onset.largest > UNLOADED;
         if onset.largest == 0.0 {
             text += "; the excitation does not reach it";
-        } else if load(onset) == 0.0 {
+        } else if relative_load(onset) == 0.0 {
             text += "; sticks, even under a million times the excitation";
         } else if onset.slips.is_empty() && joint.micro_slip {
-            let share = significant(100.0 * onset.largest, 3);
+            let share = format_significant(100.0 * onset.largest, 3);
             text += &format!("; only micro-slip, up to {share} % of the slip limit{at}");
         } else if onset.slips.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
@@ -120,7 +121,7 @@ fn whole(name: &str) -> &str {
 
 /// Rounds a load to the significant digits, so that joints that are equal by symmetry keep
 /// their order.
-fn equalised(load: f64) -> f64 {
+fn rounded_load(load: f64) -> f64 {
     format!("{load:.4e}").parse().unwrap_or(load)
 }
 
@@ -129,7 +130,7 @@ const GIVEN_WAY: f64 = 1e-3;
 
 /// Describes the normal load at rest that a preload produces.
 fn pressed(preload: f64, at_rest: Option<f64>) -> String {
-    let newtons = |force: f64| quantity(force, "N");
+    let newtons = |force: f64| format_with_prefix(force, "N");
     match at_rest {
         None => {
             format!("pressed with {} if the structure is rigid: it opens and closes", newtons(preload))
@@ -166,7 +167,7 @@ impl fmt::Display for ModelSummary {
             if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
         let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
         let mut line = |name: &str, text: &str| writeln!(f, "  {name:<WIDTH$} {text}");
-        line("model", &format!("{dofs}, {joints} joint{}{shown}", plural(joints)))?;
+        line("model", &format!("{dofs}, {joints} joint{}{shown}", plural_suffix(joints)))?;
         for (name, text) in self.structure.iter().flat_map(|structure| structure.lines()) {
             line(name, &text)?;
         }
@@ -186,9 +187,9 @@ impl fmt::Display for ModelSummary {
         if lines > LISTED {
             let mut loads: BTreeMap<&str, f64> = BTreeMap::new();
             for joint in &self.joints {
-                let load = joint.onset.as_ref().map_or(0.0, load);
+                let load = joint.onset.as_ref().map_or(0.0, relative_load);
                 let most = loads.entry(whole(&joint.name)).or_default();
-                *most = most.max(equalised(load));
+                *most = most.max(rounded_load(load));
             }
             order.sort_by(|a, b| loads[whole(&b.name)].total_cmp(&loads[whole(&a.name)]));
         }
@@ -196,7 +197,7 @@ impl fmt::Display for ModelSummary {
             line(&joint.name, &self.joint(joint))?;
         }
         if let Some(more @ 1..) = lines.checked_sub(LISTED) {
-            line("", &format!("and {more} more joint{}", plural(more)))?;
+            line("", &format!("and {more} more joint{}", plural_suffix(more)))?;
         }
         match &self.orbits {
             Some(OrbitCount::One) => {
@@ -211,9 +212,12 @@ impl fmt::Display for ModelSummary {
         }
         let Self { size, cases, .. } = self;
         let rows = format!("{} row{}", size.rows, if size.rows == 1 { "" } else { "s" });
-        let cases = format!("{cases} case{}", plural(*cases));
-        let results =
-            format!("{cases}, {rows}, {} of numbers, {} of memory", bytes_text(size.results), bytes_text(size.memory));
+        let cases = format!("{cases} case{}", plural_suffix(*cases));
+        let results = format!(
+            "{cases}, {rows}, {} of numbers, {} of memory",
+            format_bytes(size.results),
+            format_bytes(size.memory)
+        );
         line("results", &format!("{results}; {}", self.time()))
     }
 }

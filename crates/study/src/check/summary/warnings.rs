@@ -5,8 +5,8 @@ use crate::case::study::{Study, evaluate};
 use crate::check::survey::SurveyedCase;
 use crate::compile::compiled::{CompiledTable, Environment};
 use crate::results::notes::WARNING;
-use crate::syntax::expression::displayed;
-use crate::syntax::format::significant;
+use crate::syntax::expression::quantity_text;
+use crate::syntax::format::format_significant;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
@@ -20,7 +20,7 @@ const NAMED: usize = 6;
 pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -> Vec<String> {
     let mut warnings = of_kind;
     warnings.extend(loose(cases));
-    warnings.extend(still(&cases[0]));
+    warnings.extend(motionless_joints(&cases[0]));
     warnings.extend(massless(&cases[0]));
     warnings.extend(overstiff(&cases[0]));
     warnings.extend(structure(&cases[0]));
@@ -73,11 +73,11 @@ fn loose(cases: &[SurveyedCase]) -> Vec<String> {
     });
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
     let others = others.filter(|one| !between(one) && !one.held_in_motion);
-    others.take(NAMED).map(one).chain(open).chain(preloaded(cases)).collect()
+    others.take(NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
 }
 
 /// Warns of a preload that no constant force balances, for the first such case.
-fn preloaded(cases: &[SurveyedCase]) -> Option<String> {
+fn unbalanced_preload(cases: &[SurveyedCase]) -> Option<String> {
     let (case, found) = cases.iter().find_map(|case| Some((case, case.survey.unpressed()?)))?;
     let pushed = case.survey.loose().iter().filter(|one| one.contacts.iter().any(|name| found.joints.contains(name)));
     let bodies: Vec<String> = pushed.flat_map(|one| one.masses.clone()).collect();
@@ -85,7 +85,7 @@ fn preloaded(cases: &[SurveyedCase]) -> Option<String> {
         return None;
     }
     let (names, joints) = (listed(&bodies), listed(&found.joints));
-    let preload = displayed(found.preload, Some(Dimension::FORCE));
+    let preload = quantity_text(found.preload, Some(Dimension::FORCE));
     Some(format!(
         "the preload of {joints}, {preload} in total, pushes {names} away: no spring holds {}, and no constant force \
          presses the faces; add a force with `harmonic = 0` that presses them",
@@ -124,8 +124,8 @@ fn overstiff(one: &SurveyedCase) -> Option<String> {
     let stiffness = |slip: &FirstSlip| slip.displacement.map_or(0.0, |u| if u > 0.0 { slip.limit / u } else { 0.0 });
     let joint = slips.iter().filter(|slip| slip.limit.is_finite());
     let joint = joint.max_by(|a, b| stiffness(a).total_cmp(&stiffness(b)));
-    let of = |stiffness: f64| displayed(stiffness, Some(Dimension::STIFFNESS));
-    let hertz = significant(free.max(stuck), 3);
+    let of = |stiffness: f64| quantity_text(stiffness, Some(Dimension::STIFFNESS));
+    let hertz = format_significant(free.max(stuck), 3);
     Some(match (spring, joint) {
         (Some(spring), _) => {
             let [a, b] = &spring.between;
@@ -145,7 +145,7 @@ fn overstiff(one: &SurveyedCase) -> Option<String> {
 }
 
 /// Warns of joints between equal places: both use the same rows, or both are fixed.
-fn still(case: &SurveyedCase) -> Option<String> {
+fn motionless_joints(case: &SurveyedCase) -> Option<String> {
     let moves = |axis: &Axis| {
         let mut weights: HashMap<usize, (f64, f64)> = HashMap::new();
         for (row, weight) in axis.rows() {
@@ -179,17 +179,17 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
     let system = case.survey.system();
     let mut found = system.reduced().map_or_else(Vec::new, coordinates);
     let Some(reduction) = system.reduction_evidence() else { return found };
-    let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+    let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
     if reduction.error > REDUCTION_ERROR {
         let worst = system.reduced().map_or(reduction.up_to, ReducedComponent::worst_at);
         found.push(format!(
             "the reduced model has an error of {} % at {}; use more modes, or `reduce = {{ up_to = … }}`, which \
              chooses the number of modes",
-            significant(100.0 * reduction.error, 3),
+            format_significant(100.0 * reduction.error, 3),
             hertz(worst)
         ));
     }
-    let beyond = crate::check::survey::range(&case.case).filter(|(_, high)| *high > reduction.up_to);
+    let beyond = crate::check::survey::frequency_range(&case.case).filter(|(_, high)| *high > reduction.up_to);
     if let Some((_, high)) = beyond {
         found.push(format!(
             "the excitation frequency reaches {}, but the error of the reduced model is known only up to {}",
@@ -203,7 +203,7 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
 /// Warns of implausible frequencies of a reduced model.
 fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
     let mut found = Vec::new();
-    let hertz = |omega: f64| displayed(omega, Some(Dimension::FREQUENCY));
+    let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
     let lowest = reduced.frequencies().get(reduced.free()).copied();
     match lowest {
         Some(lowest) if lowest / TAU < USUAL.0 || lowest / TAU > USUAL.1 => {
@@ -256,7 +256,7 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
     if let Some(disk) = &lists.disk {
         from(&disk.table);
     }
-    open.extend(lists.disk.iter().flat_map(|disk| disk.mistuned(&study.names)));
+    open.extend(lists.disk.iter().flat_map(|disk| disk.mistuned_parameter(&study.names)));
     let mut used = BTreeSet::new();
     while let Some(index) = open.pop() {
         if used.insert(index) {
@@ -271,7 +271,7 @@ fn used_parameters(study: &Study) -> BTreeSet<usize> {
 /// Warns of a missing reference curve that the figure requests; the first case represents all
 /// cases.
 fn no_references(study: &Study, cases: &[SurveyedCase]) -> Vec<String> {
-    if !study.asks_for_references() {
+    if !study.requests_references() {
         return Vec::new();
     }
     if study.draws().is_some() {
@@ -290,7 +290,7 @@ const LONG: f64 = 0.01;
 /// that unit.
 ///
 /// A number computed with pi is in radians.
-fn easily_meant(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
+fn likely_unit(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
     match dimension? {
         Dimension::ANGLE if si != 0.0 && !with_pi => Some(("rad", "deg", si * 180.0 / PI)),
         Dimension::LENGTH if si.abs() >= LONG => Some(("m", "mm", si * 1e3)),
@@ -319,7 +319,7 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
     let values = &first.values;
     let bare = |index: &usize| values[*index].dimension.is_none() && values[*index].si.abs() > TAU;
     let sentence = |index: usize| {
-        let (name, number) = (&study.names[index], displayed(values[index].si, None));
+        let (name, number) = (&study.names[index], quantity_text(values[index].si, None));
         format!(
             "the parameter `{name}` is the bare number {number} in `sin`, `cos` or `tan`, which means {number} rad; \
              state the unit: \"{number} deg\""
@@ -337,13 +337,13 @@ fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
         for (index, table) in tables.iter().enumerate() {
             table.each_quantity(&mut |key, quantity, dimension| {
                 let Ok(value) = quantity.value(key, first) else { return };
-                let easily = easily_meant(dimension, value.si, value.with_pi);
+                let easily = likely_unit(dimension, value.si, value.with_pi);
                 let Some((unit, other, converted)) = easily.filter(|_| value.dimension.is_none()) else { return };
                 let text = format!("{key} = {}", quantity.text.trim());
                 match found.iter_mut().find(|(known, _, _)| *known == text) {
                     Some((_, _, more)) => *more += 1,
                     None => {
-                        let (number, converted) = (displayed(value.si, None), significant(converted, 4));
+                        let (number, converted) = (quantity_text(value.si, None), format_significant(converted, 4));
                         let sentence = format!(
                             "`{key}` of {list} {} is the bare number {number}, which means {number} {unit} \
                              ({converted} {other}); state the unit: \"{number} {other}\" or \"{number} {unit}\"",

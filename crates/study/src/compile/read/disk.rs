@@ -10,7 +10,7 @@ use crate::compile::source_model::DiskSource;
 use crate::syntax::document::TomlTable;
 use crate::syntax::error::Problem;
 use crate::syntax::key::Key;
-use crate::syntax::suggest::shown;
+use crate::syntax::suggest::excerpt;
 use std::io::Read;
 use stickslip::structure::Node;
 
@@ -52,7 +52,7 @@ impl Reader {
             read.map_err(|(line, message)| {
                 let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name an input \
                     deck with a *NODE block";
-                (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
+                (format!("`{}`, line {line}: {message}", excerpt(name)), Some(help.to_owned()))
             })
         });
         let refuse = |(message, help): MessageAndHelp| Problem::new(&entry.location, "nodes", message).maybe_help(help);
@@ -73,7 +73,7 @@ impl Reader {
             |(message, help): (String, Option<String>)| Problem::new(&entry.location, key, message).maybe_help(help);
         let rows = self.text_of(name).and_then(|text| {
             csv(&text, columns).map_err(|(line, message)| {
-                (format!("`{}`, line {line}: {message}", shown(name)), Some(help.to_owned()))
+                (format!("`{}`, line {line}: {message}", excerpt(name)), Some(help.to_owned()))
             })
         });
         rows.map_err(|problem| self.problems.push(refuse(problem))).ok()
@@ -110,7 +110,7 @@ impl Reader {
 
     fn pattern_of(&self, name: &str) -> Result<Vec<f64>, MessageAndHelp> {
         pattern(&self.text_of(name)?).map_err(|(line, message)| {
-            let message = format!("`{}`, line {line}: {message}", shown(name));
+            let message = format!("`{}`, line {line}: {message}", excerpt(name));
             let help = "write a line `sector,deviation` and below it `0,0.012`, `1,-0.5 %` … for every sector";
             (message, Some(help.to_owned()))
         })
@@ -120,14 +120,14 @@ impl Reader {
     fn text_of(&self, name: &str) -> Result<String, MessageAndHelp> {
         let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
         let failed = |error: std::io::Error| {
-            let message = format!("`{}` cannot be read: {error}", shown(&path.display().to_string()));
+            let message = format!("`{}` cannot be read: {error}", excerpt(&path.display().to_string()));
             (message, Some("the path is relative to the folder of the study file".to_owned()))
         };
         let mut text = String::new();
         let file = std::fs::File::open(&path).map_err(failed)?;
         file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
         if text.len() as u64 > MOST_BYTES {
-            return Err((format!("`{}` is too large: the limit is 64 MiB", shown(name)), None));
+            return Err((format!("`{}` is too large: the limit is 64 MiB", excerpt(name)), None));
         }
         Ok(text)
     }
@@ -156,12 +156,12 @@ fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>,
     let names = fields(head);
     let at = columns.map(|column| names.iter().position(|name| name == column));
     if names.len() != N || at.contains(&None) {
-        return Err((line, format!("expected the columns {}, found `{}`", columns.join(","), shown(head))));
+        return Err((line, format!("expected the columns {}, found `{}`", columns.join(","), excerpt(head))));
     }
     let row = |(line, text): (usize, &str)| {
         let fields = fields(text);
         if fields.len() != N || fields.iter().any(String::is_empty) {
-            return Err((line, format!("expected {}, found `{}`", columns.join(","), shown(text))));
+            return Err((line, format!("expected {}, found `{}`", columns.join(","), excerpt(text))));
         }
         Ok((line, at.map(|at| at.and_then(|at| fields.get(at)).cloned().unwrap_or_default())))
     };
@@ -173,7 +173,8 @@ fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, Strin
     let number = |text: &str| {
         // the exponent letter of Fortran
         let value = text.trim().replace(['d', 'D'], "e").parse::<f64>().ok().filter(|value| value.is_finite());
-        value.ok_or_else(|| (line, format!("`{}` is not a valid coordinate of node `{}`", shown(text), shown(name))))
+        value
+            .ok_or_else(|| (line, format!("`{}` is not a valid coordinate of node `{}`", excerpt(text), excerpt(name))))
     };
     let [x, y, z] = at.map(number);
     Ok((name.to_owned(), [x?, y?, z?]))
@@ -213,14 +214,14 @@ fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
         let wrong = |message: String| Err((line, message));
         let Some(sector) = sector.parse::<usize>().ok().filter(|sector| *sector < crate::syntax::schema::MOST_MASSES)
         else {
-            return wrong(format!("`{}` is not a valid sector number; sectors count from 0", shown(&sector)));
+            return wrong(format!("`{}` is not a valid sector number; sectors count from 0", excerpt(&sector)));
         };
         let (number, unit) = match deviation.strip_suffix('%') {
             Some(percent) => (percent.trim(), 0.01),
             None => (deviation.as_str(), 1.0),
         };
         let Some(deviation) = number.parse::<f64>().ok().map(|n| n * unit).filter(|n| n.is_finite()) else {
-            return wrong(format!("`{}` is not a deviation such as 0.012 or 1.2 %", shown(&deviation)));
+            return wrong(format!("`{}` is not a deviation such as 0.012 or 1.2 %", excerpt(&deviation)));
         };
         if deviations.len() <= sector {
             deviations.resize(sector + 1, None);

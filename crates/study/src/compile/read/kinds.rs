@@ -7,7 +7,7 @@ use crate::kinds::info::KindInfo;
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::schema::{self, Bounds, FILE, Key, Presence, STUDY, ValueType};
-use crate::syntax::suggest::one_of;
+use crate::syntax::suggest::alternatives;
 use stickslip::dimension::Dimension;
 use stickslip::law::{self, LawInfo};
 use stickslip::method;
@@ -16,8 +16,8 @@ use stickslip::method;
 ///
 /// Tables that contain all keys in `own` are left out, because the name was found in such a
 /// table.
-pub(super) fn homes(name: &str, own: &[Key]) -> Vec<String> {
-    let names = |keys: &[Key]| keys.iter().filter(|key| key.is_taken()).map(|key| key.name).collect::<Vec<_>>();
+pub(super) fn tables_with_key(name: &str, own: &[Key]) -> Vec<String> {
+    let names = |keys: &[Key]| keys.iter().filter(|key| key.is_supported()).map(|key| key.name).collect::<Vec<_>>();
     let tables = FILE.iter().filter_map(|table| {
         let (keys, title) = match table.takes {
             ValueType::Table(keys) => (names(keys), format!("[{}]", table.name)),
@@ -49,7 +49,7 @@ impl Reader {
     ) -> Option<&'static T> {
         let words: Vec<&str> = rows.iter().map(name).collect();
         let Some(entry) = table.get("kind") else {
-            let message = format!("`kind` is missing in {what}: one of {}", one_of(words));
+            let message = format!("`kind` is missing in {what}: one of {}", alternatives(words));
             self.problems
                 .push(Problem::new(&table.location, "kind", message).help(format!("add kind = \"{example}\"")));
             return None;
@@ -64,7 +64,7 @@ impl Reader {
                 }
             },
             other => {
-                let message = format!("expected one of {}, found {}", one_of(words), other.described());
+                let message = format!("expected one of {}, found {}", alternatives(words), other.described());
                 self.problems.push(Problem::new(location, "kind", message));
                 None
             }
@@ -76,7 +76,7 @@ impl Reader {
         let mut keys = vec![schema::required("kind", ValueType::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
-            takes: ValueType::Quantity(p.dimension, crate::syntax::key::within(p.range)),
+            takes: ValueType::Quantity(p.dimension, crate::syntax::key::parameter_bounds(p.range)),
             presence: if p.default.is_some() { Presence::Optional } else { Presence::Required },
             doc: p.doc,
             example: example_of(p.dimension),
@@ -86,7 +86,7 @@ impl Reader {
         for problem in
             self.problems[before..].iter_mut().filter(|problem| keys.iter().all(|key| key.name != problem.key))
         {
-            problem.help = of_another_law(row, &problem.key).or(problem.help.take());
+            problem.help = unknown_law_key_help(row, &problem.key).or(problem.help.take());
         }
         Some(CompiledValue::Law(row, stated))
     }
@@ -125,7 +125,7 @@ impl Reader {
         for problem in &mut self.problems[before..] {
             let others = || method::TABLE.iter().filter(|other| other.options.iter().any(|o| o.key == problem.key));
             if keys.iter().all(|key| key.name != problem.key) && others().next().is_some() {
-                let names = one_of(others().map(|other| other.name));
+                let names = alternatives(others().map(|other| other.name));
                 problem.help = Some(format!("`{}` is a key of {names}: set `kind` to that method", problem.key));
             }
         }
@@ -171,9 +171,9 @@ const LOADS: [&str; 8] = ["normal", "n", "n0", "fn", "preload", "normal_load", "
 
 /// Returns the help for an unknown key of a law that belongs to another law or names a friction
 /// coefficient or load.
-fn of_another_law(row: &LawInfo, key: &str) -> Option<String> {
+fn unknown_law_key_help(row: &LawInfo, key: &str) -> Option<String> {
     let word = key.to_lowercase();
-    let own = one_of(row.parameters.iter().map(|parameter| parameter.key)).replace(" or ", " and ");
+    let own = alternatives(row.parameters.iter().map(|parameter| parameter.key)).replace(" or ", " and ");
     let has = |key: &str| row.parameters.iter().any(|parameter| parameter.key == key);
     if COEFFICIENTS.contains(&word.as_str()) || LOADS.contains(&word.as_str()) {
         let limit =
@@ -193,7 +193,8 @@ fn of_another_law(row: &LawInfo, key: &str) -> Option<String> {
     }
     let others = law::TABLE.iter().filter(|other| other.parameters.iter().any(|parameter| parameter.key == key));
     let others: Vec<&str> = others.map(|other| other.name).collect();
-    (!others.is_empty()).then(|| format!("`{}` takes {own}; `{key}` is a parameter of {}", row.name, one_of(others)))
+    (!others.is_empty())
+        .then(|| format!("`{}` takes {own}; `{key}` is a parameter of {}", row.name, alternatives(others)))
 }
 
 /// Returns an example of a quantity for messages.

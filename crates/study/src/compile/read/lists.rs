@@ -10,7 +10,7 @@ use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::is_reserved;
 use crate::syntax::key::RATIO;
 use crate::syntax::schema::{Bounds, FILE, Key, MOST_ELEMENTS, MOST_MASSES, ValueType};
-use crate::syntax::suggest::shown;
+use crate::syntax::suggest::excerpt;
 use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
 
@@ -81,7 +81,7 @@ impl Reader {
                 _ => {}
             }
         }
-        lists.turn();
+        lists.use_rotation_dimensions();
         lists.spring.iter_mut().for_each(percent);
         for spring in &lists.spring {
             if let (Some(_), Some(ratio)) = (spring.entry("damping"), spring.entry(RATIO)) {
@@ -105,7 +105,7 @@ impl Reader {
             self.turn_number = number;
             let before = self.problems.len();
             let mut stated = self.table(table, keys, owner);
-            let turn = self.turn().words();
+            let turn = self.turn().description();
             if !turn.is_empty() {
                 for problem in &mut self.problems[before..] {
                     problem.message = format!("{} ({turn})", problem.message);
@@ -148,7 +148,7 @@ impl Reader {
             if !is_identifier(key) {
                 let message = format!(
                     "`{}` is not a valid index name: use a letter first, then letters, digits and `_`",
-                    shown(key)
+                    excerpt(key)
                 );
                 refuse(key_location, message, None);
             } else if is_reserved(key) {
@@ -199,7 +199,7 @@ impl Reader {
             match indices.iter_mut().find(|index| index.name == *text) {
                 Some(index) => index.wrap = true,
                 None => {
-                    let message = format!("there is no index `{}` in this entry", shown(text));
+                    let message = format!("there is no index `{}` in this entry", excerpt(text));
                     self.problems.push(Problem::new(&node.location, "wrap", message));
                 }
             }

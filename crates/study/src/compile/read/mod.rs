@@ -21,7 +21,7 @@ mod values;
 
 pub use template::TemplateParameter;
 
-use crate::case::study::{Study, stated};
+use crate::case::study::{Study, stated_parameters};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::CompiledValue;
 use crate::compile::source_model::SourceModel;
@@ -29,7 +29,7 @@ use crate::compile::template_errors;
 use crate::syntax::document::{self, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::schema::{self, FILE, MOST_BYTES};
-use crate::syntax::suggest::nearest;
+use crate::syntax::suggest::suggest;
 use reader::Reader;
 use std::io::Read;
 use std::path::Path;
@@ -45,7 +45,7 @@ pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, S
     let name = path.display().to_string();
     let refuse = |message: String, help: Option<String>| StudyError::file(&name, message, help);
     let failed = |error: std::io::Error| match error.kind() {
-        std::io::ErrorKind::NotFound => refuse("there is no such file".to_owned(), sibling(path)),
+        std::io::ErrorKind::NotFound => refuse("there is no such file".to_owned(), suggest_file(path)),
         std::io::ErrorKind::PermissionDenied => refuse("no permission to read the file".to_owned(), None),
         _ => refuse(format!("the file cannot be read: {error}"), None),
     };
@@ -53,7 +53,7 @@ pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, S
         let help = is_results(path).then(|| format!("`stickslip plot {name}` draws the results in this folder"));
         return Err(refuse("this is a folder; a study file (TOML) is needed".to_owned(), help));
     }
-    if let Some((what, help)) = no_study(path) {
+    if let Some((what, help)) = not_a_study(path) {
         return Err(refuse(format!("this is {what}; a study file (TOML) is needed"), Some(help)));
     }
     let mut bytes = Vec::new();
@@ -74,7 +74,7 @@ const RESULTS: [(&str, &str); 7] = [
 ];
 
 /// Returns what a file is if its extension rules out a study, and what to do with it.
-fn no_study(path: &Path) -> Option<(&'static str, String)> {
+fn not_a_study(path: &Path) -> Option<(&'static str, String)> {
     let end = path.extension()?.to_str()?.to_lowercase();
     if let Some((_, what)) = RESULTS.iter().find(|(known, _)| *known == end) {
         let folder = path.parent().filter(|folder| is_results(folder));
@@ -97,7 +97,7 @@ fn is_results(folder: &Path) -> bool {
 }
 
 /// Suggests a file in the same folder with a name similar to that of `path`.
-fn sibling(path: &Path) -> Option<String> {
+fn suggest_file(path: &Path) -> Option<String> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let names: Vec<String> = std::fs::read_dir(folder)
         .ok()?
@@ -105,7 +105,7 @@ fn sibling(path: &Path) -> Option<String> {
         .take(10_000)
         .filter_map(|f| f.file_name().into_string().ok())
         .collect();
-    let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    let near = suggest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(format!("did you mean `{}`?", folder.join(near).display()))
 }
 
@@ -115,7 +115,7 @@ fn sibling(path: &Path) -> Option<String> {
 /// # Errors
 /// [`StudyError`]: the bytes are not UTF-8, or [`read_study`] refuses the text.
 pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> Result<Study, StudyError> {
-    too_big(name, bytes.len())?;
+    check_size(name, bytes.len())?;
     match std::str::from_utf8(bytes) {
         Ok(text) => read_study(name, text, overrides),
         Err(error) => {
@@ -125,12 +125,12 @@ pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> R
             let message = format!("the file is not UTF-8 text: byte {:#04x} is invalid here", bytes[valid]);
             let problem = Problem::new(&Location { source: 0, span }, "", message)
                 .help("save the file as UTF-8; a study file is text, not binary");
-            Err(StudyError::at(&[Arc::new(Source { name: name.to_owned(), text })], problem))
+            Err(StudyError::at_location(&[Arc::new(Source { name: name.to_owned(), text })], problem))
         }
     }
 }
 
-fn too_big(name: &str, bytes: usize) -> Result<(), StudyError> {
+fn check_size(name: &str, bytes: usize) -> Result<(), StudyError> {
     if bytes as u64 <= MOST_BYTES {
         return Ok(());
     }
@@ -169,12 +169,12 @@ pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Res
 ///
 /// # Errors
 /// Those of [`read_study`].
-pub fn read_stored(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
+pub fn read_for_results(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
     read(name, text, overrides, Reader { study_file_only: true, ..Reader::default() })
 }
 
 fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Reader) -> Result<Study, StudyError> {
-    too_big(name, text.len())?;
+    check_size(name, text.len())?;
     reader.folder = Path::new(name).parent().map(Path::to_owned);
     reader.text(name.to_owned(), text.to_owned());
     let study = reader.study(name, text, overrides);
@@ -207,7 +207,7 @@ fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Read
 ///     "study": { "kind": "hysteresis", "frequency": "1 Hz" },
 /// });
 /// let study = read_document("pad", &document, &[("a".into(), "3 mm".into())]).unwrap();
-/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
 /// let loss = dataset.tables[1].numbers("dissipation_J").unwrap()[0];
 /// assert!((loss - 4.0 * 1.0 * (3e-3 - 1e-3)).abs() < 1e-12);   // 4 limit (a - limit/stiffness)
 /// ```
@@ -259,7 +259,7 @@ impl Reader {
             }
             None => {
                 let parameters = self.parameters(&root, Vec::new(), overrides);
-                (parameters, self.own_model(&root, file))
+                (parameters, self.model_from_lists(&root, file))
             }
         };
         let (kind, study, vary) = self.request(&root)?;
@@ -277,8 +277,8 @@ impl Reader {
         let mut structure = structure?;
         if let Some(template) = &mut structure.template {
             let choice = varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
-            let stated = stated(&parameters, &choice);
-            let behind = |index: usize| template_errors::given(template.source, &stated, [index]);
+            let stated = stated_parameters(&parameters, &choice);
+            let behind = |index: usize| template_errors::user_parameters(template.source, &stated, [index]);
             let names = |index: usize| behind(index).into_iter().map(|index| self.names[index].clone()).collect();
             template.given = (0..parameters.len()).map(names).collect();
         }
@@ -307,7 +307,7 @@ impl Reader {
     }
 
     /// Reads the model that the file states itself, without a template.
-    fn own_model(&mut self, root: &TomlTable, file: &str) -> Option<SourceModel> {
+    fn model_from_lists(&mut self, root: &TomlTable, file: &str) -> Option<SourceModel> {
         let lists = self.lists(root)?;
         let matrices = match root.get("structure").map(|entry| &entry.node) {
             Some(TomlNode { value: TomlValue::Table(table), .. }) => Some(self.matrices(table, file)?),

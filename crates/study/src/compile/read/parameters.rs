@@ -4,16 +4,16 @@
 
 use super::reader::Reader;
 use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, DrawnParameter, MOST_SOBOL, SampleSettings, WITHIN};
-use crate::case::study::{Parameter, ParameterValues, ReplacedParameter, VariedParameter, evaluate, stated};
+use crate::case::study::{Parameter, ParameterValues, ReplacedParameter, VariedParameter, evaluate, stated_parameters};
 use crate::case::values::ResolvedValue;
-use crate::compile::bare_numbers::mixed;
+use crate::compile::bare_numbers::bare_number_problem;
 use crate::compile::compiled::{CompiledQuantity, CompiledTable, CompiledValue};
 use crate::compile::template_errors;
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::is_reserved;
 use crate::syntax::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, ValueType};
-use crate::syntax::suggest::{nearest, one_of, shown};
+use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
 
@@ -37,7 +37,7 @@ impl Reader {
                 return None;
             };
             for entry in &table.entries {
-                let problem = |message: String| Problem::new(&entry.key_location, shown(&entry.key), message);
+                let problem = |message: String| Problem::new(&entry.key_location, excerpt(&entry.key), message);
                 if !is_identifier(&entry.key) {
                     let message = "not a valid parameter name: use a letter first, then letters, digits and `_`";
                     self.problems.push(problem(message.to_owned()));
@@ -73,27 +73,27 @@ impl Reader {
         if overrides.is_empty() {
             return Some(());
         }
-        self.settle_dimensions(parameters, &self.index.values().copied().collect::<Vec<_>>())?;
+        self.fix_dimensions(parameters, &self.index.values().copied().collect::<Vec<_>>())?;
         for (name, text) in overrides {
-            let location = self.text(format!("--set {}", shown(name)), text.clone());
+            let location = self.text(format!("--set {}", excerpt(name)), text.clone());
             let Some(&index) = self.index.get(name) else {
-                let message = format!("there is no parameter `{}` to set", shown(name));
-                let help = match nearest(name, self.names.iter().map(String::as_str)) {
+                let message = format!("there is no parameter `{}` to set", excerpt(name));
+                let help = match suggest(name, self.names.iter().map(String::as_str)) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None if self.names.is_empty() => "the file has no [parameters]".to_owned(),
                     None => format!(
                         "the parameters are {}",
-                        one_of(self.names.iter().take(20).map(String::as_str)).replace(" or ", ", ")
+                        alternatives(self.names.iter().take(20).map(String::as_str)).replace(" or ", ", ")
                     ),
                 };
-                self.problems.push(Problem::new(&location, shown(name), message).help(help));
+                self.problems.push(Problem::new(&location, excerpt(name), message).help(help));
                 continue;
             };
             let node = TomlNode { location, value: TomlValue::Text { text: text.clone(), inner: Some(0) } };
             if let Some(quantity) = self.quantity(name, &node) {
                 let own = &parameters[index].quantity;
                 if self.template != Some(own.location.source) {
-                    self.problems.extend(mixed(name, [own, &quantity]));
+                    self.problems.extend(bare_number_problem(name, [own, &quantity]));
                 }
                 parameters[index].quantity = quantity;
             }
@@ -103,13 +103,13 @@ impl Reader {
 
     /// Fixes the dimension of these parameters to the one in the file; other values must have
     /// the same.
-    pub(super) fn settle_dimensions(&mut self, parameters: &mut [Parameter], which: &[usize]) -> Option<()> {
+    pub(super) fn fix_dimensions(&mut self, parameters: &mut [Parameter], which: &[usize]) -> Option<()> {
         let order = self.order(parameters, &[])?;
         let values = match evaluate(&self.names, parameters, &order, &HashMap::new(), &[]) {
             Ok(values) => values,
             Err(problem) => {
-                let stated = stated(parameters, &HashMap::new());
-                let problem = template_errors::blame(problem, self.template, &self.names, &stated);
+                let stated = stated_parameters(parameters, &HashMap::new());
+                let problem = template_errors::locate_at_user_value(problem, self.template, &self.names, &stated);
                 self.problems.push(problem);
                 return None;
             }
@@ -145,7 +145,7 @@ impl Reader {
             let own = &parameters[index].quantity;
             if let Some(points) = points.as_ref().filter(|_| self.template != Some(own.location.source)) {
                 let known = self.problems.len();
-                let beside = mixed(&entry.key, std::iter::once(own).chain(points.quantities()));
+                let beside = bare_number_problem(&entry.key, std::iter::once(own).chain(points.quantities()));
                 self.problems.extend(beside.filter(|_| known == before));
             }
             varied.extend(points.map(|points| VariedParameter {
@@ -156,7 +156,7 @@ impl Reader {
         }
         let which: Vec<usize> = varied.iter().map(|varied| varied.index).collect();
         if self.problems.is_empty() {
-            self.settle_dimensions(parameters, &which)?;
+            self.fix_dimensions(parameters, &which)?;
         }
         Some(varied)
     }
@@ -213,8 +213,8 @@ impl Reader {
             let Some(index) = self.parameter(entry, "draw") else { continue };
             if listed.iter().any(|varied| varied.index == index) {
                 let message =
-                    format!("`{}` is also in `vary`: a parameter is either listed or drawn", shown(&entry.key));
-                self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message));
+                    format!("`{}` is also in `vary`: a parameter is either listed or drawn", excerpt(&entry.key));
+                self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message));
                 continue;
             }
             let Some((distribution, numbers, within)) = self.distribution(entry) else { continue };
@@ -223,7 +223,7 @@ impl Reader {
         }
         let which: Vec<usize> = drawn.iter().map(|drawn| drawn.index).collect();
         if self.problems.is_empty() {
-            self.settle_dimensions(parameters, &which)?;
+            self.fix_dimensions(parameters, &which)?;
         }
         Some((Some(sample), drawn))
     }
@@ -234,14 +234,14 @@ impl Reader {
         let example = "write it as in { normal = [\"2 N\", \"0.2 N\"] }";
         let TomlValue::Table(table) = &entry.node.value else {
             let message = format!("expected a distribution, found {}", entry.node.value.described());
-            self.problems.push(Problem::new(&entry.node.location, shown(&entry.key), message).help(example));
+            self.problems.push(Problem::new(&entry.node.location, excerpt(&entry.key), message).help(example));
             return None;
         };
         let (mut found, mut within) = (None, None);
         for part in &table.entries {
             let TomlValue::List(list) = &part.node.value else {
                 let message = format!("expected a list of quantities, found {}", part.node.value.described());
-                self.problems.push(Problem::new(&part.node.location, shown(&part.key), message).help(example));
+                self.problems.push(Problem::new(&part.node.location, excerpt(&part.key), message).help(example));
                 return None;
             };
             let quantities = self.quantities(&entry.key, list, &part.node.location)?;
@@ -258,7 +258,7 @@ impl Reader {
                 }
                 (Some(_), _) => {
                     let message = "a parameter has one distribution";
-                    self.problems.push(Problem::new(&part.key_location, shown(&part.key), message));
+                    self.problems.push(Problem::new(&part.key_location, excerpt(&part.key), message));
                     return None;
                 }
                 (None, _) => {
@@ -270,8 +270,8 @@ impl Reader {
         match found {
             Some((name, numbers)) => Some((name, numbers, within)),
             None => {
-                let message = format!("a distribution is missing: one of {}", one_of(names()));
-                self.problems.push(Problem::new(&entry.node.location, shown(&entry.key), message).help(example));
+                let message = format!("a distribution is missing: one of {}", alternatives(names()));
+                self.problems.push(Problem::new(&entry.node.location, excerpt(&entry.key), message).help(example));
                 None
             }
         }
@@ -282,12 +282,12 @@ impl Reader {
         if let Some(&index) = self.index.get(&entry.key) {
             return Some(index);
         }
-        let message = format!("there is no parameter `{}` to {what}", shown(&entry.key));
-        let help = match nearest(&entry.key, self.names.iter().map(String::as_str)) {
+        let message = format!("there is no parameter `{}` to {what}", excerpt(&entry.key));
+        let help = match suggest(&entry.key, self.names.iter().map(String::as_str)) {
             Some(near) => format!("did you mean `{near}`?"),
-            None => format!("add it to [parameters] and use it in the model: {} = \"…\"", shown(&entry.key)),
+            None => format!("add it to [parameters] and use it in the model: {} = \"…\"", excerpt(&entry.key)),
         };
-        self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message).help(help));
+        self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message).help(help));
         None
     }
 
@@ -324,7 +324,7 @@ impl Reader {
         for varied in varied {
             needs[varied.index] = varied.points.quantities().flat_map(|q| q.expression.parameters()).collect();
         }
-        match sorted(&needs) {
+        match topological_order(&needs) {
             Ok(order) => Some(order),
             Err(circle) => {
                 let first = circle[0];
@@ -380,7 +380,7 @@ impl Reader {
 /// Returns a topological order of a graph, or a cycle that starts at its lowest index.
 ///
 /// The function is not recursive, because chains can be long.
-fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
+fn topological_order(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
     #[derive(Clone, Copy, PartialEq)]
     enum VisitState {
         New,

@@ -35,7 +35,7 @@ impl Reader {
     /// Returns all problems as one error.
     pub(super) fn error(&mut self, file: &str) -> StudyError {
         self.problems.truncate(MOST_ERRORS);
-        let error = StudyError::all(&self.sources, std::mem::take(&mut self.problems));
+        let error = StudyError::from_problems(&self.sources, std::mem::take(&mut self.problems));
         error.unwrap_or_else(|| StudyError::file(file, "the study could not be read", None))
     }
 
@@ -48,7 +48,7 @@ impl Reader {
 
     /// Returns the current turn of the repetition.
     pub(super) fn turn(&self) -> Iteration<'_> {
-        self.repetition.turn(self.turn_number)
+        self.repetition.iteration(self.turn_number)
     }
 
     /// Compiles an expression over the parameters and the indices of the turn.

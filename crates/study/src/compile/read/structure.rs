@@ -8,7 +8,7 @@ use super::reader::Reader;
 use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
-use crate::compile::source_model::{MatrixSource, exchange, sensible};
+use crate::compile::source_model::{MatrixSource, exchange_advice, plausible_frequencies};
 use crate::syntax::document::TomlTable;
 use crate::syntax::error::Problem;
 use crate::syntax::schema::STRUCTURE;
@@ -61,8 +61,9 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<Stre
         let Some(file) = file(stated, key) else { return Ok(None) };
         let path = folder.join(&file.path);
         let matrix = formats::read(&path, file.format.as_deref(), file.name.as_deref());
-        let matrix =
-            matrix.and_then(|matrix| matrix.must_be_square().map(|()| matrix)).map_err(|error| said(error, &path));
+        let matrix = matrix
+            .and_then(|matrix| matrix.must_be_square().map(|()| matrix))
+            .map_err(|error| message_and_help(error, &path));
         matrix.map(|matrix| Some((key, matrix))).map_err(|(message, help)| problem(key, message).help(help))
     };
     let missing = |key| problem(key, "the file is missing".to_owned());
@@ -70,7 +71,7 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<Stre
     // some programs leave out empty rows; the rows of the stiffness matrix determine the order
     let ordered = |(key, matrix): KeyedMatrix| {
         let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
-        let ordered = formats::aligned(matrix, &stiffness.1).map_err(|error| said(error, &path));
+        let ordered = formats::aligned(matrix, &stiffness.1).map_err(|error| message_and_help(error, &path));
         ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
     let mass = ordered(one("mass")?.ok_or_else(|| missing("mass"))?)?;
@@ -103,7 +104,7 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<Stre
     let left_out = formats::constrained(&all.iter().map(|(_, matrix)| matrix).collect::<Vec<_>>(), rows);
     let kept: Vec<usize> = (0..rows).filter(|row| left_out.binary_search(row).is_err()).collect();
     let free = |(key, matrix): KeyedMatrix| {
-        let free = matrix.without(&left_out).map_err(|error| said(error, Path::new("")));
+        let free = matrix.without(&left_out).map_err(|error| message_and_help(error, Path::new("")));
         free.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
     let all = all.into_iter().map(free).collect::<Result<Vec<KeyedMatrix>, Problem>>()?;
@@ -139,8 +140,8 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<Stre
                 (Ok(mass), Ok(stiffness)) => Component::new(vec![String::new(); kept.len()], mass, None, stiffness).ok(),
                 _ => None,
             };
-            let help = match exchanged.as_ref().and_then(sensible) {
-                Some(frequencies) => exchange(&frequencies),
+            let help = match exchanged.as_ref().and_then(plausible_frequencies) {
+                Some(frequencies) => exchange_advice(&frequencies),
                 None => "a mass matrix has no negative eigenvalue; check whether this file contains the stiffness \
                     matrix or is truncated"
                     .to_owned(),
@@ -159,14 +160,14 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<Stre
         _ => problem("stiffness", error.to_string()),
     })?;
     // the second export is checked at its speed of rotation
-    if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.at(&component, 1.0)) {
+    if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.component_at(&component, 1.0)) {
         return Err(problem("stiffened", error.to_string()));
     }
     Ok((component, stiffened, left_out.len()))
 }
 
 /// Returns message and help for an error of the file formats.
-fn said(error: formats::Error, path: &Path) -> (String, String) {
+fn message_and_help(error: formats::Error, path: &Path) -> (String, String) {
     let mut error = error;
     if !path.as_os_str().is_empty() {
         error.path.get_or_insert_with(|| path.to_owned());
@@ -207,7 +208,7 @@ fn row_names(stated: &CompiledTable, folder: &Path, matrices: [&formats::Matrix;
     };
     let path = folder.join(&file.path);
     names::read(&path, rows).map_err(|error| {
-        let (message, help) = said(error, &path);
+        let (message, help) = message_and_help(error, &path);
         Problem::new(stated.location_of("dofs", None), "dofs", message).help(help)
     })
 }

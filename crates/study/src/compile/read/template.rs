@@ -5,12 +5,12 @@ use super::reader::Reader;
 use crate::case::study::{Parameter, evaluate, model_of};
 use crate::compile::compiled::Environment;
 use crate::compile::source_model::{ModelLists, SourceModel, TemplateSource};
-use crate::compile::templates::{self, Template, comment_behind};
+use crate::compile::templates::{self, Template, trailing_comment};
 use crate::syntax::document::{self, TomlTable, TomlValue};
 use crate::syntax::error::{Problem, Source, StudyError};
 use crate::syntax::expression::ExpressionValue;
 use crate::syntax::schema::{FILE, ValueType};
-use crate::syntax::suggest::nearest;
+use crate::syntax::suggest::suggest;
 use std::collections::HashMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
@@ -46,7 +46,7 @@ impl Reader {
             }
         };
         let mut parameters = self.parameters(&root, Vec::new(), &[])?;
-        self.settle_dimensions(&mut parameters, &(0..self.names.len()).collect::<Vec<_>>())?;
+        self.fix_dimensions(&mut parameters, &(0..self.names.len()).collect::<Vec<_>>())?;
         self.template = Some(source);
         Some(TemplateFile { parameters, lists: self.lists(&root)?, source })
     }
@@ -116,7 +116,7 @@ impl CompiledTemplate {
     /// Evaluates the parameters; `fixed` parameters have the given value, SI.
     fn values(&self, fixed: &[(usize, f64)]) -> Result<Vec<ExpressionValue>, StudyError> {
         let values = evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), fixed);
-        values.map_err(|problem| StudyError::at(&self.sources, problem))
+        values.map_err(|problem| StudyError::at_location(&self.sources, problem))
     }
 
     /// Builds the model; `fixed` parameters have the given value, SI.
@@ -128,7 +128,7 @@ impl CompiledTemplate {
             evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), &fixed)
         };
         let model = model_of(&self.structure, &environment, &again, &mut problems);
-        StudyError::all(&self.sources, problems).map_or(Ok(model), Err)
+        StudyError::from_problems(&self.sources, problems).map_or(Ok(model), Err)
     }
 }
 
@@ -187,7 +187,7 @@ impl Template {
                 dimension: value.dimension.unwrap_or(Dimension::NONE),
                 default: quantity.text.clone(),
                 value: value.si,
-                doc: comment_behind(self.study, quantity.location.span.end).to_owned(),
+                doc: trailing_comment(self.study, quantity.location.span.end).to_owned(),
             });
         }
         parameters
@@ -225,7 +225,7 @@ impl Template {
         let mut fixed = Vec::with_capacity(changes.len());
         for (name, si) in changes {
             let Some(index) = compiled.names.iter().position(|known| known == name) else {
-                let help = nearest(name, compiled.names.iter().map(String::as_str));
+                let help = suggest(name, compiled.names.iter().map(String::as_str));
                 let help = help.map(|near| format!("did you mean `{near}`?"));
                 return Err(StudyError::file(self.name, format!("there is no parameter `{name}`"), help));
             };

@@ -1,16 +1,16 @@
 //! Converts nodes of the document to stated values: unknown and missing keys, types, names,
 //! quantities, ranges.
 
-use super::kinds::homes;
+use super::kinds::tables_with_key;
 use super::reader::Reader;
 use crate::case::values::ResolvedValue;
-use crate::compile::bare_numbers::mixed;
+use crate::compile::bare_numbers::bare_number_problem;
 use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, RangeOrder, Weights};
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
 use crate::syntax::schema::{self, Bounds, Key, MOST_POINTS, Presence, ValueType};
-use crate::syntax::suggest::{nearest, one_of, shown};
+use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
 
@@ -19,25 +19,25 @@ impl Reader {
     pub(super) fn check_keys(&mut self, table: &TomlTable, keys: &[Key], owner: &str) {
         for entry in &table.entries {
             if !keys.iter().any(|key| key.name == entry.key) {
-                let help = match nearest(&entry.key, keys.iter().map(|key| key.name)) {
+                let help = match suggest(&entry.key, keys.iter().map(|key| key.name)) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => {
-                        let taken = keys.iter().filter(|key| key.is_taken()).map(|key| key.name);
-                        let taken = format!("the keys of {owner} are {}", one_of(taken).replace(" or ", ", "));
-                        match homes(&entry.key, keys)[..] {
+                        let taken = keys.iter().filter(|key| key.is_supported()).map(|key| key.name);
+                        let taken = format!("the keys of {owner} are {}", alternatives(taken).replace(" or ", ", "));
+                        match tables_with_key(&entry.key, keys)[..] {
                             [] => taken,
                             ref homes => format!("`{}` is a key of {}; {taken}", entry.key, homes.join(" and of ")),
                         }
                     }
                 };
-                let help = self.by_steps(table, entry, keys).unwrap_or(help);
-                let message = format!("{owner} has no key `{}`", shown(&entry.key));
-                self.problems.push(Problem::new(&entry.key_location, shown(&entry.key), message).help(help));
+                let help = self.step_help(table, entry, keys).unwrap_or(help);
+                let message = format!("{owner} has no key `{}`", excerpt(&entry.key));
+                self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message).help(help));
             }
         }
         for key in keys.iter().filter(|key| key.presence == Presence::Required) {
             if table.get(key.name).is_none() {
-                let message = format!("`{}` is missing in {owner}: {}", key.name, schema::described(&key.takes));
+                let message = format!("`{}` is missing in {owner}: {}", key.name, schema::describe_value(&key.takes));
                 let help = match key.takes {
                     ValueType::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
                     _ => format!("add {} = {}", key.name, key.example),
@@ -49,9 +49,9 @@ impl Reader {
 
     /// Returns the help for a `step` in a range, which has a number of points or a tolerance
     /// instead.
-    fn by_steps(&self, table: &TomlTable, entry: &TomlEntry, keys: &[Key]) -> Option<String> {
+    fn step_help(&self, table: &TomlTable, entry: &TomlEntry, keys: &[Key]) -> Option<String> {
         let is_range = keys.iter().any(|key| key.name == "from") && keys.iter().any(|key| key.name == "to");
-        if !is_range || nearest(&entry.key, ["step", "steps", "increment", "spacing"]).is_none() {
+        if !is_range || suggest(&entry.key, ["step", "steps", "increment", "spacing"]).is_none() {
             return None;
         }
         let number = |key: &str| match &table.get(key)?.node.value {
@@ -83,7 +83,7 @@ impl Reader {
             let (location, value) = match (table.get(key.name), key.presence) {
                 (Some(entry), _) => (entry.node.location.clone(), self.value(key, &entry.node)),
                 (None, Presence::Default(text)) => {
-                    (table.location.clone(), self.standing_for(key, text, &table.location))
+                    (table.location.clone(), self.default_value(key, text, &table.location))
                 }
                 (None, _) => continue,
             };
@@ -93,7 +93,7 @@ impl Reader {
     }
 
     /// Reads the default value of an absent key.
-    fn standing_for(&mut self, key: &Key, text: &str, location: &Location) -> Option<CompiledValue> {
+    fn default_value(&mut self, key: &Key, text: &str, location: &Location) -> Option<CompiledValue> {
         let value = match key.takes {
             ValueType::Count(..) => {
                 let whole = text.parse::<i64>().ok();
@@ -106,7 +106,7 @@ impl Reader {
     }
 
     pub(super) fn wrong_type(&mut self, key: &Key, node: &TomlNode) -> Option<CompiledValue> {
-        let expected = schema::described(&key.takes);
+        let expected = schema::describe_value(&key.takes);
         self.problems.push(
             Problem::new(&node.location, key.name, format!("expected {expected}, found {}", node.value.described()))
                 .help(format!("write it as in {} = {}", key.name, key.example)),
@@ -242,7 +242,7 @@ impl Reader {
         if within.contains(&whole) {
             return Some(CompiledValue::Fixed(ResolvedValue::Count(u64::try_from(whole).unwrap_or(0))));
         }
-        let message = format!("expected {}, found {whole}", schema::described(&key.takes));
+        let message = format!("expected {}, found {whole}", schema::describe_value(&key.takes));
         let problem = Problem::new(location, key.name, message);
         let most = *within.end();
         let limit = key.name == "points" && most == MOST_POINTS as i64 && whole > most;
@@ -255,12 +255,13 @@ impl Reader {
     fn adaptive(&mut self, key: &Key, table: &TomlTable) -> Option<CompiledValue> {
         let before = self.problems.len();
         if let Some(entry) = table.entries.iter().find(|entry| entry.key == "points") {
-            let message = format!("`points` and `tolerance` in the range of `{}` exclude each other", shown(key.name));
+            let message =
+                format!("`points` and `tolerance` in the range of `{}` exclude each other", excerpt(key.name));
             let help = "remove one of them: with `tolerance` the solver chooses the points";
             self.problems.push(Problem::new(&entry.key_location, "points", message).help(help));
             return None;
         }
-        let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", shown(key.name)));
+        let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", excerpt(key.name)));
         let mut take = |key: &str| {
             let at = stated.entries.iter().position(|entry| entry.key == key)?;
             match stated.entries.swap_remove(at).value {
@@ -276,8 +277,8 @@ impl Reader {
     }
 
     pub(super) fn unknown_word(&mut self, key: &str, word: &str, location: &Location, words: Vec<&str>) {
-        let message = format!("unknown value `{}`, expected {}", shown(word), one_of(words.iter().copied()));
-        let help = nearest(word, words).map(|near| format!("did you mean `{near}`?"));
+        let message = format!("unknown value `{}`, expected {}", excerpt(word), alternatives(words.iter().copied()));
+        let help = suggest(word, words).map(|near| format!("did you mean `{near}`?"));
         self.problems.push(Problem::new(location, key, message).maybe_help(help));
     }
 
@@ -292,8 +293,10 @@ impl Reader {
                 return Some(name);
             }
             Ok(name) => {
-                let message =
-                    format!("`{}` is not a valid name: use a letter first, then letters, digits and `_`", shown(&name));
+                let message = format!(
+                    "`{}` is not a valid name: use a letter first, then letters, digits and `_`",
+                    excerpt(&name)
+                );
                 Problem::new(location, key, message)
             }
             Err(fault) if self.repetition.indices.is_empty() => {
@@ -353,8 +356,8 @@ impl Reader {
             let message = "expected one quantity, but this looks like a range";
             let help = format!(
                 "if this key takes a range, write {{ from = \"{}\", to = \"{}\", points = 101 }}",
-                shown(from),
-                shown(to)
+                excerpt(from),
+                excerpt(to)
             );
             self.problems.push(Problem::new(&node.location, key, message).help(help));
         }
@@ -416,7 +419,7 @@ impl Reader {
         }
         let quantities: Vec<CompiledQuantity> =
             list.iter().map(|node| self.quantity(key, node)).collect::<Option<_>>()?;
-        self.problems.extend(mixed(key, &quantities));
+        self.problems.extend(bare_number_problem(key, &quantities));
         Some(quantities)
     }
 
@@ -427,7 +430,7 @@ impl Reader {
         owner: &str,
     ) -> Option<(CompiledQuantity, CompiledQuantity, usize)> {
         let before = self.problems.len();
-        let mut stated = self.table(table, keys, &format!("the range of `{}`", shown(owner)));
+        let mut stated = self.table(table, keys, &format!("the range of `{}`", excerpt(owner)));
         if self.problems.len() > before {
             return None;
         }
@@ -441,7 +444,7 @@ impl Reader {
                 CompiledValue::Quantity { quantity: to, .. },
                 CompiledValue::Fixed(ResolvedValue::Count(points)),
             ) => {
-                self.problems.extend(mixed(owner, [&from, &to]));
+                self.problems.extend(bare_number_problem(owner, [&from, &to]));
                 Some((from, to, usize::try_from(points).ok()?))
             }
             _ => None,

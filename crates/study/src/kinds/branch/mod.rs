@@ -6,11 +6,11 @@ mod prominence;
 use self::prominence::LocalMaximum;
 use super::shared::keys::{HARMONICS, OUTPUT, SERIES_SAMPLES, check_masses, check_output, check_samples};
 use super::shared::orbit_sweep;
-use super::shared::peak_of::{PEAK_OF, check_peak_of, displacements, peak_places, worst};
+use super::shared::peak_of::{PEAK_OF, check_peak_of, displacements, largest_amplitude, peak_places};
 use crate::case::study::{Study, VariedValue, varied_text};
 use crate::case::values::{Frequencies, Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
-use crate::check::warnings::{resonant, undamped};
+use crate::check::warnings::{resonance_warnings, undamped_resonance};
 use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
@@ -77,7 +77,7 @@ pub(super) const KIND: Kind = Kind {
     // the cases of one branch along a parameter differ in the last parameter only
     unit_size: |study| if along_parameter(study) { UnitSize::Curve } else { UnitSize::Case },
     cost,
-    warnings: |cases| resonant(cases).into_iter().chain(undamped(cases)).collect(),
+    warnings: |cases| resonance_warnings(cases).into_iter().chain(undamped_resonance(cases)).collect(),
     compute,
     draw,
 };
@@ -108,7 +108,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows * costing.places,
         unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
         conditional_work: None,
-        work: rows * costing.extra() + steps * FOLLOWED * costing.sector() * costing.series(harmonics),
+        work: rows * costing.extra() + steps * FOLLOWED * costing.solved_share() * costing.series(harmonics),
     }
 }
 
@@ -145,7 +145,7 @@ fn along_parameter(study: &Study) -> bool {
 }
 
 /// Separates the parameters that distinguish branches from the parameter along a branch.
-fn split<'v>(study: &Study, varied: &'v [VariedValue]) -> (&'v [VariedValue], Option<&'v VariedValue>) {
+fn split_varied<'v>(study: &Study, varied: &'v [VariedValue]) -> (&'v [VariedValue], Option<&'v VariedValue>) {
     match varied.split_last() {
         Some((last, outer)) if along_parameter(study) => (outer, Some(last)),
         _ => (varied, None),
@@ -153,13 +153,13 @@ fn split<'v>(study: &Study, varied: &'v [VariedValue]) -> (&'v [VariedValue], Op
 }
 
 /// Returns the column name of the parameter along a branch, and its factor from SI.
-fn axis(along: Option<&VariedValue>) -> (String, f64) {
+fn abscissa_column(along: Option<&VariedValue>) -> (String, f64) {
     along.map_or_else(|| ("frequency_Hz".to_owned(), 1.0 / TAU), |parameter| (parameter.name.clone(), 1.0))
 }
 
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
-    let (outer, along) = split(work.study, &prepared.case.varied);
+    let (outer, along) = split_varied(work.study, &prepared.case.varied);
     let label = || varied_text(outer);
     let mut part = UnitResult::default();
     let range = range(work, along);
@@ -178,7 +178,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         }
     };
     let places = peak_places(prepared);
-    let (name, factor) = axis(along);
+    let (name, factor) = abscissa_column(along);
     let begin = |rows: &mut TableBuilder, value: f64| {
         outer.iter().map(VariedValue::column).for_each(|(name, value)| rows.number(&name, value));
         let (column, value) = match along {
@@ -190,25 +190,25 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let (mut rows, mut peaks, mut turns) = (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
     for point in &branch.points {
         let stable = point.orbit.is_stable();
-        orbit_sweep::count(&mut part, &prepared.case, &point.orbit, (stable, Note::on_branch));
+        orbit_sweep::count(&mut part, &prepared.case, &point.orbit, (stable, Note::for_branch));
         begin(&mut rows, point.value);
-        PointRow::of(prepared, &point.orbit, stable).write(prepared, &mut rows);
-        rows.end();
+        PointRow::with_stability(prepared, &point.orbit, stable).write(prepared, &mut rows);
+        rows.end_row();
     }
     for (value, height) in peaks_of(&branch, &places) {
         begin(&mut peaks, value);
         peaks.number("amplitude_m", height);
-        peaks.reduced(prepared.system.reduction_evidence());
-        peaks.end();
+        peaks.reduction_error(prepared.system.reduction_evidence());
+        peaks.end_row();
     }
     for point in branch.turns.iter().map(|turn| &branch.points[*turn]) {
         begin(&mut turns, point.value);
-        turns.number("amplitude_m", worst(&point.orbit, &places));
-        turns.reduced(prepared.system.reduction_evidence());
-        turns.end();
+        turns.number("amplitude_m", largest_amplitude(&point.orbit, &places));
+        turns.reduction_error(prepared.system.reduction_evidence());
+        turns.end_row();
     }
     let reason = match branch.end {
-        End::Border => missing(&branch, range, (name.as_str(), factor)),
+        End::Border => missing_range_text(&branch, range, (name.as_str(), factor)),
         End::Stalled { at } => {
             Some(format!("the continuation stopped at {name} = {:.9}: no step converges", at * factor))
         }
@@ -231,7 +231,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 
 /// Returns the peaks of a branch whose prominence exceeds the error of its rows.
 fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
-    let heights: Vec<f64> = branch.points.iter().map(|point| worst(&point.orbit, places)).collect();
+    let heights: Vec<f64> = branch.points.iter().map(|point| largest_amplitude(&point.orbit, places)).collect();
     let errors: Vec<f64> =
         branch.points.iter().map(|point| point.orbit.evidence.truncation.unwrap_or(f64::NAN)).collect();
     // a peak lies between the rows before and after its nearest row
@@ -247,7 +247,7 @@ fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
     let Some(tops) = branch.peaks.iter().map(place).collect::<Option<Vec<LocalMaximum>>>() else {
         return branch.peaks.clone();
     };
-    let kept = prominence::out(&tops, &heights, &errors);
+    let kept = prominence::prominent(&tops, &heights, &errors);
     branch.peaks.iter().zip(kept).filter(|(_, kept)| *kept).map(|(peak, _)| *peak).collect()
 }
 
@@ -262,7 +262,7 @@ fn method(values: &Values) -> HarmonicBalance {
 }
 
 /// States which part of the range is missing after the branch left the range, and what to do.
-fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64)) -> Option<String> {
+fn missing_range_text(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64)) -> Option<String> {
     let reached = branch
         .points
         .iter()
@@ -281,7 +281,7 @@ fn missing(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64))
 /// Returns the first and last value along a branch.
 fn range(work: &UnitTask<'_>, along: Option<&VariedValue>) -> (f64, f64) {
     let last = &work.cases[work.cases.len() - 1];
-    match (along, split(work.study, &last.case.varied).1) {
+    match (along, split_varied(work.study, &last.case.varied).1) {
         (Some(first), Some(last)) => (first.si, last.si),
         _ => (work.omega(work.points.start), work.omega(work.points.end - 1)),
     }
@@ -294,7 +294,7 @@ fn follow(work: &UnitTask<'_>, along: Option<&VariedValue>, range: (f64, f64)) -
     }
     let values = &prepared.case.values;
     let system = |value: f64| -> Option<System> {
-        let case = work.study.case_with(prepared.case.index, &along?.name, value).ok()?;
+        let case = work.study.case_with_parameter(prepared.case.index, &along?.name, value).ok()?;
         case.model.assemble().ok()
     };
     // the model has no excitation at an invalid value, so the branch ends before it
@@ -308,7 +308,7 @@ fn follow(work: &UnitTask<'_>, along: Option<&VariedValue>, range: (f64, f64)) -
         method: method(values),
         range,
         step: (range.1 - range.0).abs() / values.count("steps").unwrap_or(100) as f64,
-        quantity: &|orbit| worst(orbit, &places),
+        quantity: &|orbit| largest_amplitude(orbit, &places),
     };
     trace.branch().map_err(BranchFailure::Trace)
 }
@@ -319,13 +319,13 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         return Figure::default();
     };
     let (system, places) = (&prepared.system, peak_places(&prepared));
-    let (outer, along) = split(drawing.study, &prepared.case.varied);
+    let (outer, along) = split_varied(drawing.study, &prepared.case.varied);
     let column = |place: usize| format!("{}_amplitude_m", system.places()[place]);
     let all = displacements(system);
     let (y, factor) = drawing.axis(1, "amplitude", largest(table, all.iter().copied().map(column)), "m");
-    let (name, _) = axis(along);
-    let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.on_axis().1);
-    let stretches = drawing.stretches_of(table, outer.len());
+    let (name, _) = abscissa_column(along);
+    let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.in_axis_unit().1);
+    let stretches = drawing.case_rows_by(table, outer.len());
     let one = stretches.len() == 1;
     let names: Vec<&str> = places.iter().map(|place| system.places()[*place].as_str()).collect();
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };

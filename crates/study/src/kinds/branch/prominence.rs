@@ -16,7 +16,7 @@ pub(super) struct LocalMaximum {
 /// Returns for each top, in row order, whether it is a peak.
 ///
 /// `heights` and relative `errors` belong to the rows; an unknown error is NaN.
-pub(super) fn out(tops: &[LocalMaximum], heights: &[f64], errors: &[f64]) -> Vec<bool> {
+pub(super) fn prominent(tops: &[LocalMaximum], heights: &[f64], errors: &[f64]) -> Vec<bool> {
     let mut ground = heights.to_vec();
     tops.iter().for_each(|top| ground[top.row] = ground[top.row].max(top.height));
     let stands = |top: &LocalMaximum| {
@@ -62,7 +62,7 @@ mod tests {
         let is_top = |row: &usize| heights[*row] >= heights[row - 1] && heights[*row] > heights[row + 1];
         let tops: Vec<LocalMaximum> =
             (1..heights.len() - 1).filter(is_top).map(|row| LocalMaximum { row, height: heights[row] }).collect();
-        let kept = out(&tops, heights, &vec![error; heights.len()]);
+        let kept = prominent(&tops, heights, &vec![error; heights.len()]);
         tops.iter().zip(kept).filter(|(_, kept)| *kept).map(|(top, _)| top.row).collect()
     }
 
@@ -87,6 +87,6 @@ mod tests {
     #[test]
     fn a_refined_top_is_ground_for_others() {
         let tops = [LocalMaximum { row: 1, height: 1.1 }, LocalMaximum { row: 3, height: 1.05 }];
-        assert_eq!(out(&tops, &[0.0, 1.0, 0.99, 1.02, 0.0], &[0.1; 5]), [true, false]);
+        assert_eq!(prominent(&tops, &[0.0, 1.0, 0.99, 1.02, 0.0], &[0.1; 5]), [true, false]);
     }
 }

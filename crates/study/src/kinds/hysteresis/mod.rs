@@ -6,23 +6,23 @@ mod tables;
 pub use tables::{Loop, loops};
 
 use self::tables::{DAMPING, DISPLACEMENT, DISSIPATION, FORCE, JOINT, LOOPS, STIFFNESS, SUMMARY, TIME};
-use super::shared::keys::{FREQUENCY, SAMPLES, anything};
+use super::shared::keys::{FREQUENCY, SAMPLES, no_requirements};
 use super::shared::orbit_sweep;
 use crate::case::names::ModelNames;
 use crate::case::study::varied_text;
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
-use crate::check::warnings::driven;
+use crate::check::warnings::excitation_warnings;
 use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
 use crate::results::dataset::{Figure, Panel, Series};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, join, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, join_title, largest, numbers, words};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::format::shown_hertz;
+use crate::syntax::format::format_hertz;
 use crate::syntax::key::{ValueType, default, optional};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
@@ -57,13 +57,13 @@ pub(super) const KIND: Kind = Kind {
         check,
         axes: [Some(Dimension::LENGTH), Some(Dimension::FORCE)],
         uses_method: true,
-        needs: anything,
+        needs: no_requirements,
         adapts: false,
         tables: &[LOOPS, SUMMARY],
     },
     unit_size: |_| UnitSize::Frequencies,
     cost,
-    warnings: driven,
+    warnings: excitation_warnings,
     compute,
     draw,
 };
@@ -73,10 +73,10 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let loops = match values.names("loop") {
         _ if values.flag("sum") == Some(true) => MOST_DIRECTIONS as f64,
         None if costing.joints == 0.0 => costing.case.model.motions.len() as f64,
-        _ => wanted(values, &costing.case.model).len() as f64,
+        _ => requested_loops(values, &costing.case.model).len() as f64,
     };
     let rows = points * loops * costing.instants();
-    let keys = costing.varied + costing.several();
+    let keys = costing.varied + costing.frequency_columns();
     let read = costing.instants() + loops * (QUADRATURE * FIVE.len()) as f64;
     Cost {
         tables: vec![
@@ -86,20 +86,20 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows,
         unit: costing.kept_orbits() + costing.samples_bytes(),
         conditional_work: None,
-        work: points * (costing.orbit() + costing.reading(read)),
+        work: points * (costing.orbit() + costing.evaluation(read)),
     }
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let known = known(model);
     for name in values.names("loop").unwrap_or_default() {
-        known.all("loop", "joint or moved place", name)?;
+        known.labels("loop", "joint or moved place", name)?;
     }
     if let Some(name) = values.text("against") {
-        ModelNames::of_displacements(model).one("against", "mass", name)?;
+        ModelNames::displacements(model).single_label("against", "mass", name)?;
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
-        let wanted = wanted(values, model);
+        let wanted = requested_loops(values, model);
         let labelled = model.joints.iter().zip(model.joint_labels());
         let summed = labelled.filter(|(_, labels)| labels.iter().any(|label| wanted.contains(label)));
         let mut ends = summed.map(|(joint, _)| &joint.between);
@@ -118,15 +118,15 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
 
 /// Returns the names that can have a loop.
 fn known(model: &Model) -> ModelNames {
-    ModelNames::default().and_joints(model).and_moved(model)
+    ModelNames::default().with_joints(model).with_imposed_motions(model)
 }
 
 /// Returns the names of the requested loops: joints by direction, and moved places; by default
 /// every joint.
-fn wanted(values: &Values, model: &Model) -> Vec<String> {
+fn requested_loops(values: &Values, model: &Model) -> Vec<String> {
     let known = known(model);
     let meant =
-        |name: &String| known.all("loop", "joint or moved place", name).map(<[String]>::to_vec).unwrap_or_default();
+        |name: &String| known.labels("loop", "joint or moved place", name).map(<[String]>::to_vec).unwrap_or_default();
     let every = || model.joint_labels().into_iter().flatten().collect();
     let mut wanted: Vec<String> =
         values.names("loop").map_or_else(every, |names| names.iter().flat_map(meant).collect());
@@ -187,7 +187,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                 table.number(TIME, *time);
                 table.number(DISPLACEMENT, displacement);
                 table.number(FORCE, force);
-                table.end();
+                table.end_row();
             }
             let first = FirstHarmonic::new(&orbit, source);
             summary.varied(&prepared.case);
@@ -200,9 +200,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             summary.number(DAMPING, first.equivalent_damping);
             summary.number(RESIDUAL, orbit.evidence.residual);
             summary.number(ENERGY_GAP, orbit.evidence.energy_gap);
-            summary.reduced(prepared.system.reduction_evidence());
+            summary.reduction_error(prepared.system.reduction_evidence());
             summary.text("status", orbit.evidence.accuracy.status());
-            summary.end();
+            summary.end_row();
         }
     }
     part.tables = vec![table, summary];
@@ -220,7 +220,7 @@ fn sources(prepared: &PreparedCase) -> Vec<(String, LoopSource)> {
         .enumerate()
         .flat_map(|(j, joint)| joint.labels().enumerate().map(move |(axis, label)| (label, (j, axis))))
         .collect();
-    let mut names = wanted(values, &prepared.case.model);
+    let mut names = requested_loops(values, &prepared.case.model);
     if names.is_empty() {
         let moved = system.moved().iter().filter(|place| !prepared.case.model.is_rotation(&place.name));
         names = moved.map(|place| place.name.clone()).collect();
@@ -344,9 +344,9 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
             for rows in tables::single(table, stretch.rows.clone()) {
                 let from = rows.start;
                 let joint = Some(joints[from].clone()).filter(|_| several);
-                let title = join([outer.clone()].into_iter().chain(joint));
-                let frequency = frequencies.map(|frequencies| shown_hertz(frequencies[from]));
-                let label = join([inner.clone()].into_iter().chain(frequency));
+                let title = join_title([outer.clone()].into_iter().chain(joint));
+                let frequency = frequencies.map(|frequencies| format_hertz(frequencies[from]));
+                let label = join_title([inner.clone()].into_iter().chain(frequency));
                 let label = if label.is_empty() { joints[from].clone() } else { label };
                 let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
                     let (x, y) = (x_axis.clone(), y_axis.clone());
@@ -361,7 +361,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         }
         panels
     };
-    let stretches = drawing.stretches(table);
+    let stretches = drawing.case_rows(table);
     if drawing.study.draws().is_some() {
         let of_draw = |stretch: &CaseRows, title: String| {
             panels_of(std::slice::from_ref(stretch), &|_| (title.clone(), String::new()))

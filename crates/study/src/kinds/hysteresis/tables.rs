@@ -85,11 +85,11 @@ pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
 /// use stickslip_study::{kinds::hysteresis, read_study, run::{Context, run}};
 /// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
-/// let loops = hysteresis::loops(&study, &run(&study, &Context::unwatched(1)).unwrap()).unwrap();
+/// let loops = hysteresis::loops(&study, &run(&study, &Context::without_progress(1)).unwrap()).unwrap();
 /// assert!((loops[1].dissipation - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
 /// ```
 pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError> {
-    let results = Results::of(NAME, study, dataset)?;
+    let results = Results::new(NAME, study, dataset)?;
     let (Some(points), Some(summary)) = (results.table(LOOPS)?, results.table(SUMMARY)?) else {
         return Ok(Vec::new());
     };
@@ -98,18 +98,18 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
     let (named, dissipation) = (summary.texts(JOINT)?, summary.numbers(DISSIPATION)?);
     let (stiffness, damping) = (summary.numbers(STIFFNESS)?, summary.numbers(DAMPING)?);
     let mut loops = Vec::new();
-    for stretch in results.stretches(&points, study.varied().len())? {
+    for stretch in results.case_rows(&points, study.varied().len())? {
         // a study of one frequency has no frequency column
         let only = || study.case(stretch.case).ok()?.frequencies?.get(0).map(hertz);
         for rows in single(points.table, stretch.rows) {
             let row = loops.len();
             if named.get(row) != Some(&joint[rows.start]) {
-                return Err(summary.other_rows());
+                return Err(summary.foreign_rows());
             }
             let listed = points.table.numbers(FREQUENCY).map(|frequency| frequency[rows.start]);
             loops.push(Loop {
                 varied: stretch.varied.clone(),
-                frequency: listed.or_else(only).ok_or_else(|| points.other_rows())?,
+                frequency: listed.or_else(only).ok_or_else(|| points.foreign_rows())?,
                 joint: named[row].clone(),
                 time: time[rows.clone()].to_vec(),
                 displacement: displacement[rows.clone()].to_vec(),
@@ -120,7 +120,7 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
             });
         }
     }
-    if loops.len() == named.len() { Ok(loops) } else { Err(summary.other_rows()) }
+    if loops.len() == named.len() { Ok(loops) } else { Err(summary.foreign_rows()) }
 }
 
 #[cfg(test)]

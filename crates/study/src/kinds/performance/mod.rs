@@ -4,12 +4,12 @@ mod tables;
 
 pub use tables::{Optimum, PeakCurve, PerformancePoint, curves};
 
-use super::shared::keys::{FREQUENCY, anything, check_masses};
+use super::shared::keys::{FREQUENCY, check_masses, no_requirements};
 use super::shared::peak_of::{PEAK_OF, check_peak_of, peak_places};
 use crate::case::study::{VariedValue, varied_text};
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
-use crate::check::warnings::sampled;
+use crate::check::warnings::sampling_warnings;
 use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
@@ -37,13 +37,13 @@ pub(super) const KIND: Kind = Kind {
         check,
         axes: [None, Some(Dimension::LENGTH)],
         uses_method: true,
-        needs: anything,
+        needs: no_requirements,
         adapts: false,
         tables: &[tables::PERFORMANCE, tables::OPTIMUM],
     },
     unit_size: |_| UnitSize::Curve,
     cost,
-    warnings: sampled,
+    warnings: sampling_warnings,
     compute,
     draw,
 };
@@ -55,8 +55,9 @@ const OPTIMUM: f64 = 35.0;
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
     let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
-    let peak = costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.between();
-    let tried = if costing.study.last_varied() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
+    let peak =
+        costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.unchecked_orbit();
+    let tried = if costing.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
         tables: vec![
             TableShape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
@@ -112,7 +113,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                  of the method; examine one of them with kind = \"response\".",
                 row.inaccurate
             );
-            Note::of_case(&prepared.case.label(), text).join(&mut part.notes);
+            Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
         }
         rows.varied(&prepared.case);
         rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
@@ -122,9 +123,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.flag(WAY_BACK, row.peak.map(|_| row.way_back));
         }
         rows.integer(tables::FAILED, row.failed as u64);
-        rows.reduced(prepared.system.reduction_evidence());
+        rows.reduction_error(prepared.system.reduction_evidence());
         rows.text("status", status);
-        rows.end();
+        rows.end_row();
     }
     if let Some((outer, inner)) = split(work.case()) {
         let best = curve.optimum;
@@ -134,12 +135,12 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         optima.number(&inner.column().0, at_best.map_or(f64::NAN, |value| value.column().1));
         optima.number(DRIVE, peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         optima.number(AMPLITUDE, peak.map_or(f64::NAN, |peak| peak.value));
-        optima.reduced(work.case().system.reduction_evidence());
+        optima.reduction_error(work.case().system.reduction_evidence());
         optima.text("status", best.as_ref().map_or("none", status));
-        optima.end();
+        optima.end_row();
         if best.is_none() {
             let why = no_optimum(work, &curve, (&inner.name, &order));
-            Note::of_case(&varied_text(outer), format!("{WARNING}{why}")).join(&mut part.notes);
+            Note::for_case(&varied_text(outer), format!("{WARNING}{why}")).merge_into(&mut part.notes);
         }
     }
     part.tables = vec![rows, optima];
@@ -192,7 +193,7 @@ fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, Method
     let parameter = split(first).map(|(_, inner)| inner.name.clone());
     let build = |value: f64| {
         let Some(name) = &parameter else { return Ok(first.system.clone()) };
-        let case = work.study.case_with(first.case.index, name, value).map_err(|error| error.to_string())?;
+        let case = work.study.case_with_parameter(first.case.index, name, value).map_err(|error| error.to_string())?;
         case.model.assemble().map_err(|error| error.to_string())
     };
     let performance = Performance {
@@ -224,7 +225,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     else {
         return Figure::default();
     };
-    let stretches = drawing.stretches_of(table, outer);
+    let stretches = drawing.case_rows_by(table, outer);
     let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
     let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, [AMPLITUDE.to_owned()]), "m");
     let column = inner.column().0;
@@ -234,24 +235,25 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let varied = if outer == 1 { drawing.varied_axis(&stretches, 0) } else { None };
     let value = |curve: usize| {
         let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
-        parameter.map(|parameter| parameter.as_written().0)
+        parameter.map(|parameter| parameter.in_file_unit().0)
     };
     let panel = |title: String, series| Panel {
         title,
-        x: Axis::new(&inner.name, inner.on_axis().1),
+        x: Axis::new(&inner.name, inner.in_axis_unit().1),
         y: y_axis.clone(),
         series,
         ..Panel::default()
     };
     if drawing.study.draws().is_some() {
         // the stretches hold all parameters but the last; the first case represents a stretch
-        let groups = drawing.by_listed(&stretches);
+        let groups = drawing.group_draws(&stretches);
         let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let bands = groups.iter().take(MOST_BANDS).enumerate().flat_map(|(colour, (_, group))| {
             let curve =
                 |stretch: &&CaseRows| (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
-            let outer =
-                group.first().map_or(&[][..], |stretch| &stretch.varied[drawing.study.drawn().min(outer)..outer]);
+            let outer = group
+                .first()
+                .map_or(&[][..], |stretch| &stretch.varied[drawing.study.drawn_parameter_count().min(outer)..outer]);
             percentiles(&group.iter().map(curve).collect::<Vec<_>>(), &varied_text(outer), colour)
         });
         return Figure { panels: vec![panel(draws, bands.collect())], ..Figure::default() };

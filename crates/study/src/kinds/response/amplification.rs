@@ -7,7 +7,7 @@ use crate::case::study::varied_text;
 use crate::case::values::{Frequencies, Values, hertz};
 use crate::check::survey::SurveyedCase;
 use crate::kinds::info::KeyError;
-use crate::kinds::shared::peak_of::{displacements, named_places, worst};
+use crate::kinds::shared::peak_of::{displacements, largest_amplitude, named_places};
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
 use crate::results::dataset::{Axis, Panel};
 use crate::results::drawing::{CaseRows, FigureInput, numbers};
@@ -50,7 +50,7 @@ pub(super) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
 }
 
 /// Warns if no blade differs in any case, so that every amplification is one.
-pub(super) fn none(cases: &[SurveyedCase]) -> Option<String> {
+pub(super) fn tuned_warning(cases: &[SurveyedCase]) -> Option<String> {
     let asked = cases.iter().any(|one| one.case.values.flag(KEY.name) == Some(true));
     let tuned = cases.iter().all(|one| one.case.model.ring.is_some_and(|ring| ring.equal));
     (asked && tuned).then(|| {
@@ -71,21 +71,21 @@ pub(super) fn row(work: &UnitTask<'_>, found: &[FoundPeak], rows: &mut TableBuil
     rows.number(tables::TUNED_AMPLITUDE, tuned.value);
     rows.number(tables::RATIO, highest.peak.value / tuned.value);
     rows.flag(AT_RANGE_END, Some(highest.peak.at_end || tuned.at_end));
-    rows.reduced(prepared.system.reduction_evidence());
-    rows.end();
+    rows.reduction_error(prepared.system.reduction_evidence());
+    rows.end_row();
     Ok(())
 }
 
 /// Returns the highest peak of the case without mistuning, at the same frequencies.
 fn tuned(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
     let prepared = work.case();
-    let case = work.study.tuned().case(prepared.case.index).map_err(|error| error.to_string())?;
+    let case = work.study.without_mistuning().case(prepared.case.index).map_err(|error| error.to_string())?;
     let system = case.model.assemble().map_err(|error| error.to_string())?;
     let mut places = named_places(prepared);
     if places.is_empty() {
         places = displacements(&system);
     }
-    let quantities = |orbit: &Orbit| vec![worst(orbit, &places)];
+    let quantities = |orbit: &Orbit| vec![largest_amplitude(orbit, &places)];
     let method = &*prepared.method;
     let points: Vec<Point> = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
@@ -120,10 +120,10 @@ fn tuned(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
 /// Draws, or the values of the last parameter of `vary`, form one histogram.
 pub(super) fn panels(drawing: &FigureInput<'_>) -> Vec<Panel> {
     let Some(table) = drawing.table(tables::AMPLIFICATION) else { return Vec::new() };
-    let stretches = drawing.stretches(table);
+    let stretches = drawing.case_rows(table);
     let outer = |stretch: &CaseRows| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
     let groups: Vec<(String, Vec<&CaseRows>)> = match drawing.study.draws() {
-        Some(_) => drawing.by_listed(&stretches),
+        Some(_) => drawing.group_draws(&stretches),
         None => {
             stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|all| (outer(&all[0]), all.iter().collect())).collect()
         }

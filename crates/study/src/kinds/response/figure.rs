@@ -5,9 +5,9 @@ use super::{amplification, tables};
 use crate::kinds::shared::contact_states;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
 use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, PanelLayout, join, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, PanelLayout, join_title, largest, numbers, words};
 use crate::results::histogram;
-use crate::syntax::format::display_unit;
+use crate::syntax::format::prefixed_unit;
 
 pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
@@ -29,16 +29,16 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let tables = [Some(curve), drawing.table(tables::WAY_BACK)];
     let highest = tables.into_iter().flatten().map(|table| largest(table, columns())).fold(0.0, f64::max);
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
-    let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
-    let stretches = drawing.stretches(curve);
+    let (unit, force_factor) = prefixed_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
+    let stretches = drawing.case_rows(curve);
     let mut drawn = FigureData {
         drawing,
         curve,
         index: curve.index(),
-        reverse_sweep: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.stretches(table))),
+        reverse_sweep: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.case_rows(table))),
         references: drawing.table(tables::REFERENCES).map(|table| (table, references_by_case(drawing, table))),
         peaks: peaks_by_case(drawing),
-        shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.stretches(table))),
+        shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.case_rows(table))),
         factor: (x_factor, y_factor),
         force_factor,
         axes: (x, y),
@@ -49,7 +49,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         joints,
         contact_joints: faces,
         failed: 0,
-        case_count_text: drawing.left_out(stretches.len()),
+        case_count_text: drawing.shown_cases_text(stretches.len()),
     };
     drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
     let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
@@ -76,7 +76,7 @@ fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
     let (Some(table), Some(_)) = (drawn.drawing.table(tables::PEAKS), drawn.drawing.study.draws()) else {
         return Vec::new();
     };
-    let stretches = drawn.drawing.stretches(table);
+    let stretches = drawn.drawing.case_rows(table);
     let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &drawn.axes.1.unit) };
     let of_group = |(words, group): (String, Vec<&CaseRows>)| {
         let highest = |stretch: &&CaseRows| {
@@ -84,9 +84,9 @@ fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
             heights.into_iter().fold(f64::NAN, f64::max) * drawn.factor.1
         };
         let heights: Vec<f64> = group.iter().map(highest).collect();
-        histogram::panel(&heights, &x, &join([words, "largest peak".to_owned()]), "draws")
+        histogram::panel(&heights, &x, &join_title([words, "largest peak".to_owned()]), "draws")
     };
-    drawn.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
+    drawn.drawing.group_draws(&stretches).into_iter().filter_map(of_group).collect()
 }
 
 /// Returns the rows of the linear references case by case.
@@ -97,7 +97,7 @@ fn references_by_case(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows>
     if table.columns.first().is_some_and(|column| column.name == DRIVE) {
         return vec![CaseRows { case: 0, varied, rows: 0..table.rows() }];
     }
-    drawing.stretches(table)
+    drawing.case_rows(table)
 }
 
 /// Returns the peaks inside the frequency range.
@@ -111,7 +111,7 @@ fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
         return Vec::new();
     }
     let mut peaks = Vec::new();
-    for stretch in drawing.stretches(table) {
+    for stretch in drawing.case_rows(table) {
         let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
         for (i, row) in stretch.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {

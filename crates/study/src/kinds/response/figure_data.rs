@@ -4,7 +4,7 @@ use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::kinds::shared::disk_shape::{self, of_sector};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
-use crate::results::drawing::{CaseRows, FigureInput, join, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, join_title, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
@@ -163,7 +163,7 @@ impl FigureData<'_> {
     /// (degrees) of every shown place there.
     ///
     /// The maximum is a refined peak, or a point of the curve without a higher peak.
-    pub(super) fn at_the_highest(&self, stretch: &CaseRows) -> Option<(f64, DeflectionShape<'_>)> {
+    pub(super) fn shape_at_maximum(&self, stretch: &CaseRows) -> Option<(f64, DeflectionShape<'_>)> {
         let peaks = self.shapes.as_ref().and_then(|(table, stretches)| {
             Some((*table, stretches.iter().find(|of| of.case == stretch.case)?.rows.clone()))
         });
@@ -243,18 +243,18 @@ impl FigureData<'_> {
                 }
                 let whose = if thinned { stretch.label() } else { "for each case".to_owned() };
                 let (label, value) =
-                    (format!("{}, {whose}", line.label), stretch.varied.last().map(|v| v.as_written().0));
-                lines.push(Series { label, value, colour, ..line.reference_of_its_own() });
+                    (format!("{}, {whose}", line.label), stretch.varied.last().map(|v| v.in_file_unit().0));
+                lines.push(Series { label, value, colour, ..line.case_reference() });
             }
         }
         lines
     }
 
     /// Returns crosses at the points of a case without an orbit, in this row from below.
-    pub(super) fn missing(&self, stretch: &CaseRows, row: usize, colour: usize) -> Option<Series> {
+    pub(super) fn failed_points(&self, stretch: &CaseRows, row: usize, colour: usize) -> Option<Series> {
         let x = self.without_orbit(stretch);
         let count = self.failed;
-        let label = format!("{count} point{} without an orbit", crate::syntax::format::plural(count));
+        let label = format!("{count} point{} without an orbit", crate::syntax::format::plural_suffix(count));
         (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
     }
 
@@ -299,7 +299,7 @@ impl FigureData<'_> {
     ) -> Panel {
         let words = state.words();
         let title = if joints.len() == 1 { format!("{name} {words}") } else { format!("{name}, {words}") };
-        Panel { y: contact_states::axis("share of the period"), ..self.panel(join([title, more])) }
+        Panel { y: contact_states::axis("share of the period"), ..self.panel(join_title([title, more])) }
     }
 
     /// Returns the share of the period of one state, for example slip, as the mean of the
@@ -328,7 +328,7 @@ impl FigureData<'_> {
     ///
     /// Each of a few joints is one group. Of many joints, those with the same name in every
     /// sector form a group.
-    pub(super) fn pulling(&self) -> Vec<(String, Vec<String>)> {
+    pub(super) fn force_groups(&self) -> Vec<(String, Vec<String>)> {
         if self.joints.len() <= SINGLE {
             return self.joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect();
         }
@@ -357,23 +357,23 @@ impl FigureData<'_> {
     /// Returns the first colours for places in a sector, joint forces and contact states, so
     /// that no colour is used twice.
     pub(super) fn colours(&self) -> [usize; 3] {
-        let places = match self.single() {
+        let places = match self.draws_each_place() {
             true => self.shown.len().max(self.system.places().len().min(SINGLE)),
             false => MANY,
         };
         let in_sector: BTreeSet<String> =
-            self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.ring()).collect();
+            self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.is_disk()).collect();
         let joints = places + in_sector.len().min(disk_shape::MOST);
-        [places, joints, joints + if self.joints.is_empty() { 0 } else { self.pulling().len() }]
+        [places, joints, joints + if self.joints.is_empty() { 0 } else { self.force_groups().len() }]
     }
 
     /// Returns true if the model is a disk, whose sectors are compared in a panel.
-    pub(super) fn ring(&self) -> bool {
+    pub(super) fn is_disk(&self) -> bool {
         self.drawing.study.case(0).is_ok_and(|case| case.model.ring.is_some())
     }
 
     /// Returns true if the places are drawn one by one.
-    pub(super) fn single(&self) -> bool {
+    pub(super) fn draws_each_place(&self) -> bool {
         self.shown.len() <= SINGLE
     }
 

@@ -11,20 +11,20 @@ mod tables;
 
 pub use tables::{MassCurve, ResponseCurve, curves};
 
-use super::shared::keys::{FREQUENCY, OUTPUT, anything, check_output};
+use super::shared::keys::{FREQUENCY, OUTPUT, check_output, no_requirements};
 use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of};
 use crate::case::values::{Frequencies, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
 use crate::check::survey::SurveyedCase;
-use crate::check::warnings::{sampled, undamped};
+use crate::check::warnings::{sampling_warnings, undamped_resonance};
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_in, phase_of};
 use crate::results::drawing::{MOST_CURVES, MOST_PANELS};
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
-use crate::run::point_row::{PointRow, location_of};
+use crate::run::point_row::{PointRow, describe_location};
 use crate::run::work::{Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{Key, ValueType, default};
 use figure_data::SINGLE;
@@ -66,7 +66,7 @@ pub(super) const KIND: Kind = Kind {
         },
         axes: [Some(Dimension::FREQUENCY), Some(Dimension::LENGTH)],
         uses_method: true,
-        needs: anything,
+        needs: no_requirements,
         adapts: true,
         tables: &[
             tables::CURVE,
@@ -78,17 +78,17 @@ pub(super) const KIND: Kind = Kind {
         ],
     },
     // an amplification needs the whole curve
-    unit_size: |study| match study.is_adaptive() || study.wants(amplification::KEY.name) {
+    unit_size: |study| match study.is_adaptive() || study.has_flag(amplification::KEY.name) {
         true => UnitSize::Case,
         false => orbit_sweep::grain(study),
     },
     cost,
     warnings: |cases| {
-        sampled(cases)
+        sampling_warnings(cases)
             .into_iter()
-            .chain(undamped(cases))
-            .chain(amplification::none(cases))
-            .chain(many_peaks(cases))
+            .chain(undamped_resonance(cases))
+            .chain(amplification::tuned_warning(cases))
+            .chain(many_peaks_warning(cases))
             .collect()
     },
     compute,
@@ -120,7 +120,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         (None, _) => peaks,
     };
     // cases that differ only in their limits share the references
-    let others = references::others(costing.study);
+    let others = references::distinct_cases(costing.study);
     let linear = (costing.frequencies * REFERENCE_POINTS as f64 * others).floor();
     // a tuned disk takes the time of one sector, at the frequencies of the mistuned disk
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
@@ -145,13 +145,13 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         conditional_work: None,
         work: points * costing.extra()
             + (points + OTHERS * back + tuned * costing.frequencies) * costing.orbit()
-            + (back + REFINING * refined) * costing.between()
+            + (back + REFINING * refined) * costing.unchecked_orbit()
             + 2.0 * linear * costing.reference(),
     }
 }
 
 /// Warns of the cost of refining the peaks of thousands of places, and states the alternatives.
-fn many_peaks(cases: &[SurveyedCase]) -> Option<String> {
+fn many_peaks_warning(cases: &[SurveyedCase]) -> Option<String> {
     let one = cases.first()?;
     let (values, places) = (&one.case.values, one.survey.system().places().len());
     let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
@@ -174,9 +174,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let found = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
             let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
-            adaptively(work, adaptive, &mut stretch)
+            sweep_adaptive(work, adaptive, &mut stretch)
         }
-        _ => evenly(work, &mut stretch),
+        _ => sweep_given(work, &mut stretch),
     };
     let (points, others) = found.map_err(|error| (case.index, error))?;
     let mut part = stretch.part;
@@ -190,7 +190,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         for found in &all {
             if let Some(why) = found.peak.unsettled {
                 let at = || {
-                    format!("peak of {}, {}", prepared.system.places()[found.mass], location_of(case, found.peak.omega))
+                    format!(
+                        "peak of {}, {}",
+                        prepared.system.places()[found.mass],
+                        describe_location(case, found.peak.omega)
+                    )
                 };
                 part.count(at, "peak-unsettled", Some(why.to_string()));
             }
@@ -202,20 +206,20 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             if both_ways::is_followed(&prepared.system) {
                 peaks.flag(WAY_BACK, Some(found.reverse_sweep));
             }
-            peaks.reduced(prepared.system.reduction_evidence());
-            peaks.end();
+            peaks.reduction_error(prepared.system.reduction_evidence());
+            peaks.end_row();
         }
         part.tables.push(peaks);
         all.iter().filter(|found| found.leads(&prepared.system)).for_each(|found| shape(prepared, found, &mut shapes));
-        if work.study.wants(amplification::KEY.name)
+        if work.study.has_flag(amplification::KEY.name)
             && let Err(why) = amplification::row(work, &all, &mut amplified)
         {
-            part.notes.push(Note::of_case(&case.label(), format!("{WARNING}no amplification: {why}.")));
+            part.notes.push(Note::for_case(&case.label(), format!("{WARNING}no amplification: {why}.")));
         }
     } else {
         part.tables.push(TableBuilder::default());
     }
-    if work.study.wants_references() && !references::are_known(work.study, case) {
+    if work.study.wants_references() && !references::equal_previous(work.study, case) {
         let (rows, absent) = references(work, &stretch.omegas);
         part.tables.push(rows);
         part.notes.extend(absent.into_iter().map(Note::Sentence));
@@ -231,7 +235,7 @@ fn orbit_row(prepared: &PreparedCase, omega: f64, summary: &PointRow, rows: &mut
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(omega));
     summary.write(prepared, rows);
-    rows.end();
+    rows.end_row();
 }
 
 /// Writes the row of a peak of a disk, with every place.
@@ -243,8 +247,8 @@ fn shape(prepared: &PreparedCase, found: &FoundPeak, rows: &mut TableBuilder) {
         rows.number(&amplitude_in(place, along.unit()), of[0]);
         rows.number(&phase_of(place), of[1]);
     }
-    rows.reduced(prepared.system.reduction_evidence());
-    rows.end();
+    rows.reduction_error(prepared.system.reduction_evidence());
+    rows.end_row();
 }
 
 /// The state of a range of points during its computation.
@@ -274,11 +278,11 @@ impl<'a> ResponseBuilder<'a> {
     fn add(&mut self, omega: f64, point: Option<(PointRow, Vec<Note>)>) {
         let case = &self.prepared.case;
         let Some((summary, notes)) = point else {
-            return self.part.count(|| location_of(case, omega), NOT_REACHED, None);
+            return self.part.count(|| describe_location(case, omega), NOT_REACHED, None);
         };
-        self.part.count(|| location_of(case, omega), &summary.status, summary.failure.clone());
+        self.part.count(|| describe_location(case, omega), &summary.status, summary.failure.clone());
         self.stuck += usize::from(summary.stuck);
-        notes.into_iter().for_each(|note| note.join(&mut self.part.notes));
+        notes.into_iter().for_each(|note| note.merge_into(&mut self.part.notes));
         self.omegas.push(omega);
         orbit_row(self.prepared, omega, &summary, &mut self.rows);
     }
@@ -291,7 +295,7 @@ impl<'a> ResponseBuilder<'a> {
         let others = ways.others(&*prepared.method, &prepared.system, &work.context.stop)?;
         let points = others.iter().map(|Other { orbit, ratio }| {
             let note = Note::OtherOrbit { points: 1, from: orbit.omega, to: orbit.omega, ratios: [*ratio; 2] };
-            note.join(&mut self.part.notes);
+            note.merge_into(&mut self.part.notes);
             orbit_row(prepared, orbit.omega, &PointRow::new(prepared, Ok(orbit)), &mut self.reverse_sweep);
             Point::new(orbit, &|orbit| sought.quantities(orbit))
         });
@@ -300,10 +304,10 @@ impl<'a> ResponseBuilder<'a> {
 }
 
 /// Returns the row and the notes of a point.
-fn kept(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitError>) -> (PointRow, Vec<Note>) {
+fn summary_and_notes(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitError>) -> (PointRow, Vec<Note>) {
     let summary = PointRow::new(prepared, outcome);
     let notes =
-        outcome.map_or_else(|_| Vec::new(), |orbit| Note::of_orbit(&prepared.case.model, orbit, summary.stable));
+        outcome.map_or_else(|_| Vec::new(), |orbit| Note::for_orbit(&prepared.case.model, orbit, summary.stable));
     (summary, notes)
 }
 
@@ -311,7 +315,7 @@ fn kept(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitError>) -> (Point
 type SweepPoints = (Vec<Point>, Vec<Point>);
 
 /// Computes the points at the frequencies of the unit.
-fn evenly(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result<SweepPoints, MethodError> {
+fn sweep_given(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
     let sought = PeakQuantities::new(prepared);
@@ -319,7 +323,7 @@ fn evenly(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result<Swee
     let mut points = Vec::new();
     let mut ways = BothWays::of(&prepared.system);
     orbit_sweep::sweep(work, &mut |omega, outcome| {
-        stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
+        stretch.add(omega, outcome.map(|outcome| summary_and_notes(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {
             points.push(outcome.map_or_else(|_| Point::failed(omega), point));
@@ -349,7 +353,7 @@ fn evenly(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result<Swee
 }
 
 /// Computes the points of a curve with adaptive frequencies.
-fn adaptively(
+fn sweep_adaptive(
     work: &UnitTask<'_>,
     adaptive: Adaptive,
     stretch: &mut ResponseBuilder<'_>,
@@ -360,7 +364,7 @@ fn adaptively(
     let quantities = |orbit: &Orbit| sought.amplitudes(orbit);
     let keep = |outcome: Result<&Orbit, &OrbitError>| {
         (work.context.finished)();
-        (kept(prepared, outcome), outcome.map_or_else(|_| Vec::new(), |orbit| sought.shape(orbit)))
+        (summary_and_notes(prepared, outcome), outcome.map_or_else(|_| Vec::new(), |orbit| sought.shape(orbit)))
     };
     let stop = || work.context.stopped();
     let curve = adaptive.curve(&*prepared.method, &prepared.system, &quantities, &keep, &stop)?;

@@ -6,8 +6,8 @@ use crate::kinds::shared::contact_states;
 use crate::kinds::shared::disk_shape::{self, PlaceInSectors};
 use crate::results::columns::FREQUENCY as DRIVE;
 use crate::results::dataset::{Axis, Panel, Series, Style};
-use crate::results::drawing::{CaseRows, MOST_PANELS, join, numbers};
-use crate::syntax::format::significant;
+use crate::results::drawing::{CaseRows, MOST_PANELS, join_title, numbers};
+use crate::syntax::format::format_significant;
 
 /// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
 /// paper.
@@ -43,7 +43,7 @@ impl FigureData<'_> {
             }
             if !self.joints.is_empty() {
                 let mut panel = self.force_panel(stretch.label());
-                for (i, (name, joints)) in self.pulling().into_iter().enumerate() {
+                for (i, (name, joints)) in self.force_groups().into_iter().enumerate() {
                     let (x, y) = self.force_line(stretch, &joints);
                     panel.series.push(Series::line(name, x, y, of_forces + i));
                 }
@@ -63,7 +63,7 @@ impl FigureData<'_> {
         }
         if let Some(first) = panels.first_mut().filter(|_| room < stretches.len()) {
             let some = format!("the first {room} of {} cases", stretches.len());
-            first.title = join([std::mem::take(&mut first.title), some]);
+            first.title = join_title([std::mem::take(&mut first.title), some]);
         }
         panels
     }
@@ -74,7 +74,10 @@ impl FigureData<'_> {
     pub(super) fn panels_of_a_case(&self) -> usize {
         let shares =
             if self.contact_joints.is_empty() { 0 } else { contact_states::count(self.curve, &self.contact_joints) };
-        usize::from(!self.shown.is_empty()) + usize::from(self.ring()) + usize::from(!self.joints.is_empty()) + shares
+        usize::from(!self.shown.is_empty())
+            + usize::from(self.is_disk())
+            + usize::from(!self.joints.is_empty())
+            + shares
     }
 
     /// Draws the places of one case: each of them, or the largest amplitude in front of all
@@ -82,8 +85,8 @@ impl FigureData<'_> {
     fn masses_of(&self, stretch: &CaseRows) -> Panel {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names, &[(0, stretch)]));
-        panel.series.extend(self.missing(stretch, 1, MISSING));
-        if self.single() {
+        panel.series.extend(self.failed_points(stretch, 1, MISSING));
+        if self.draws_each_place() {
             // the mass is known only for a place that is one row of the structure
             let mass = |place: usize| match self.system.seen()[place].rows() {
                 [(row, _)] => self.system.structure().own_mass(*row),
@@ -115,7 +118,7 @@ impl FigureData<'_> {
             panel.series.push(Series::line(label.clone(), x, y, 1).pale());
         }
         let (x, y, worst) = self.envelope(stretch);
-        panel.title = join([panel.title, worst]);
+        panel.title = join_title([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} places", names.len()), x, y, 0));
         panel.series.extend(self.way_back(stretch, &names, 0));
         panel
@@ -140,29 +143,29 @@ impl FigureData<'_> {
     /// `first`.
     fn sectors_of(&self, stretch: &CaseRows, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
-        let (frequency, shape) = self.at_the_highest(stretch)?;
+        let (frequency, shape) = self.shape_at_maximum(stretch)?;
         let all = PlaceInSectors::of_ring(shape)?;
         let places = all.len();
         let shape: Vec<PlaceInSectors> =
-            disk_shape::leaders(&all, disk_shape::MOST).into_iter().map(|place| all[place].clone()).collect();
+            disk_shape::largest_places(&all, disk_shape::MOST).into_iter().map(|place| all[place].clone()).collect();
         let bars = |colour: usize| {
             let around = &shape[colour];
             let (x, y) = around.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&around.place, x, y, first + colour)
         };
         let fit = (BARS / ring.sectors.max(1)).clamp(1, disk_shape::MOST);
-        let series: Vec<Series> = disk_shape::leaders(&shape, fit).into_iter().map(bars).collect();
+        let series: Vec<Series> = disk_shape::largest_places(&shape, fit).into_iter().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
         // bars of equal height, as for a tuned disk, are left out
         let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > ALIKE * bars.y[0].abs());
         let differ = series.iter().any(differ);
-        let title = join([stretch.label(), format!("at {} Hz", significant(frequency, 6))]);
+        let title = join_title([stretch.label(), format!("at {} Hz", format_significant(frequency, 6))]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
         let of = disk_shape::left_out(shape.len(), places);
-        let wheel = disk_shape::panel(&shape, ring.sectors, join(["shape".to_owned(), title.clone(), of]), first);
-        let title = join([title, disk_shape::left_out(series.len(), places)]);
+        let wheel = disk_shape::panel(&shape, ring.sectors, join_title(["shape".to_owned(), title.clone(), of]), first);
+        let title = join_title([title, disk_shape::left_out(series.len(), places)]);
         Some([differ.then(|| Panel { title, x, y, series, ..Panel::default() }), wheel])
     }
 }

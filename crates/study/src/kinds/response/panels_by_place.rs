@@ -6,7 +6,7 @@ use crate::case::study::varied_text;
 use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of};
 use crate::results::dataset::{Panel, Series};
-use crate::results::drawing::{CaseRows, MOST_CURVES, MOST_PANELS, join, numbers, thinned};
+use crate::results::drawing::{CaseRows, MOST_CURVES, MOST_PANELS, evenly_chosen, join_title, numbers};
 use crate::results::percentiles::percentiles;
 
 /// Returns x and y of one draw.
@@ -26,13 +26,13 @@ impl FigureData<'_> {
         let groups: Vec<(&[CaseRows], String)> =
             stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
         let masses: Vec<Option<&str>> =
-            if self.single() { self.names().into_iter().map(Some).collect() } else { vec![None] };
+            if self.draws_each_place() { self.names().into_iter().map(Some).collect() } else { vec![None] };
         let of_masses = groups.iter().flat_map(|(group, outer)| {
             masses.iter().map(|mass| self.cases_of_mass(*mass, group, outer, masses.len())).collect::<Vec<_>>()
         });
         let [_, of_forces, of_shares] = self.colours();
         let of_joints = groups.iter().flat_map(|(group, outer)| {
-            let joints = self.pulling().into_iter().zip(of_forces..);
+            let joints = self.force_groups().into_iter().zip(of_forces..);
             joints.map(move |(joint, alone)| self.cases_of_joint(&joint, group, outer, alone))
         });
         let of_faces = groups.iter().flat_map(|(group, outer)| {
@@ -44,11 +44,11 @@ impl FigureData<'_> {
 
     /// Returns the same panels with percentiles of the draws for each combination of `vary`.
     fn by_percentiles(&self, stretches: &[CaseRows]) -> Vec<Panel> {
-        let groups = self.drawing.by_listed(stretches);
+        let groups = self.drawing.group_draws(stretches);
         let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let some = (groups.len() > SINGLE).then(|| format!("the first {SINGLE} of {} cases", groups.len()));
         let panel = |mut panel: Panel, name: &str, curve: CurveFn<'_>| {
-            panel.title = join([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
+            panel.title = join_title([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
             for (colour, (words, group)) in groups.iter().take(SINGLE).enumerate() {
                 let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();
                 panel.series.extend(percentiles(&curves, words, colour));
@@ -62,7 +62,7 @@ impl FigureData<'_> {
             (of(DRIVE, self.factor.0), of(column, self.factor.1))
         };
         let mut panels = Vec::new();
-        if self.single() {
+        if self.draws_each_place() {
             for (name, _) in &self.shown {
                 panels.push(panel(self.panel(String::new()), name, &|stretch| of(stretch, &amplitude_of(name))));
             }
@@ -71,7 +71,7 @@ impl FigureData<'_> {
             // without peaks: their frequencies differ between draws
             panels.push(panel(self.panel(String::new()), &name, &|stretch| self.largest(stretch)));
         }
-        for (name, joints) in self.pulling() {
+        for (name, joints) in self.force_groups() {
             panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
         }
         for named in contact_states::groups(&self.contact_joints) {
@@ -92,20 +92,20 @@ impl FigureData<'_> {
             true => Some(format!("{MOST_CURVES} of {} cases", group.len())),
             false => self.case_count_text.clone(),
         };
-        let mut panel = self.panel(join(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
+        let mut panel = self.panel(join_title(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
         if mass.is_none() {
             panel.y.quantity = format!("largest amplitude of {} places", self.shown.len());
         } else if panels == 1 && self.system.places().len() > 1 {
             panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
         }
-        let cases: Vec<(usize, &CaseRows)> = thinned(group, MOST_CURVES).into_iter().enumerate().collect();
+        let cases: Vec<(usize, &CaseRows)> = evenly_chosen(group, MOST_CURVES).into_iter().enumerate().collect();
         panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass]), &cases));
         // each case has its row of crosses if few cases have failures
         let failing = cases.iter().filter(|(_, stretch)| !self.without_orbit(stretch).is_empty()).count();
         let mut row = 0;
         for (colour, stretch) in cases {
-            if let Some(crosses) = self.missing(stretch, row + 1, colour) {
-                let value = stretch.varied.last().map(|varied| varied.as_written().0);
+            if let Some(crosses) = self.failed_points(stretch, row + 1, colour) {
+                let value = stretch.varied.last().map(|varied| varied.in_file_unit().0);
                 panel.series.push(Series { value, ..crosses });
                 row += usize::from(failing <= SINGLE);
             }
@@ -138,8 +138,8 @@ impl FigureData<'_> {
         alone: usize,
     ) -> Panel {
         let named = Some(joint.clone()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
-        let mut panel = self.force_panel(join(named.into_iter().chain([outer.to_owned()])));
-        for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+        let mut panel = self.force_panel(join_title(named.into_iter().chain([outer.to_owned()])));
+        for (colour, stretch) in evenly_chosen(group, MOST_CURVES).into_iter().enumerate() {
             let (x, y) = self.force_line(stretch, all);
             let colour = if stretch.varied.is_empty() { alone } else { colour };
             panel.series.push(of_case(stretch, joint, x, y, colour));
@@ -161,7 +161,7 @@ impl FigureData<'_> {
         let (name, joints) = named;
         let panel = |state: ContactState| {
             let mut panel = self.share_panel(named, state, outer.to_owned());
-            for (colour, stretch) in thinned(group, MOST_CURVES).into_iter().enumerate() {
+            for (colour, stretch) in evenly_chosen(group, MOST_CURVES).into_iter().enumerate() {
                 let (x, y) = self.share_line(stretch, joints, state);
                 let colour = if stretch.varied.is_empty() { alone } else { colour };
                 panel.series.push(of_case(stretch, name, x, y, colour));
@@ -184,5 +184,5 @@ impl FigureData<'_> {
 fn of_case(stretch: &CaseRows, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
     let last = stretch.varied.last();
     let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
-    Series { value: last.map(|varied| varied.as_written().0), ..Series::line(label, x, y, colour) }
+    Series { value: last.map(|varied| varied.in_file_unit().0), ..Series::line(label, x, y, colour) }
 }

@@ -1,6 +1,6 @@
 //! The peaks of a range of a response curve.
 
-use crate::kinds::shared::peak_of::{named_places, worst};
+use crate::kinds::shared::peak_of::{largest_amplitude, named_places};
 use crate::run::work::{PreparedCase, UnitTask};
 use stickslip::curve::both_ways::stretches;
 use stickslip::curve::peak::{self, Peak, Point, held};
@@ -49,7 +49,9 @@ impl PeakQuantities {
             let height = |place: &PlaceMotion| if place.radius.is_some() { 0.0 } else { place.amplitude() };
             return orbit.places.iter().map(height).collect();
         }
-        std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
+        std::iter::once(largest_amplitude(orbit, named))
+            .chain(named.iter().map(|place| orbit.places[*place].amplitude()))
+            .collect()
     }
 
     /// Returns amplitude and phase (degrees) of every place; empty if no shape is kept.
@@ -113,12 +115,12 @@ pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> 
         of_others.extend(found.map(|found| FoundPeak { reverse_sweep: true, ..found }));
     }
     let sought = PeakQuantities::new(work.case());
-    of_others.retain(|found| !is_of_the_way_there(found, &points, others, &sought));
+    of_others.retain(|found| !is_jump_to_forward(found, &points, others, &sought));
     let omegas: Vec<f64> = points.iter().map(|point| point.omega).collect();
     let mut all = peaks_of(work, points)?;
-    all.retain(|found| !is_edge(found, &omegas, others, &sought));
+    all.retain(|found| !is_jump_to_branch(found, &omegas, others, &sought));
     for found in of_others {
-        match all.iter_mut().find(|other| is_same(other, &found, &omegas)) {
+        match all.iter_mut().find(|other| is_same_peak(other, &found, &omegas)) {
             Some(same) if found.peak.value > same.peak.value => *same = FoundPeak { reverse_sweep: false, ..found },
             Some(_) => {}
             None => all.push(found),
@@ -129,7 +131,7 @@ pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> 
 }
 
 /// Returns true if a peak of the forward sweep and a peak of the reverse sweep are the same.
-fn is_same(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
+fn is_same_peak(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
     let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
     let (a, b) = (&there.peak, &back.peak);
     !there.reverse_sweep
@@ -143,7 +145,7 @@ fn is_same(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
 ///
 /// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
 /// than to that of the reverse sweep, and not higher.
-fn is_of_the_way_there(found: &FoundPeak, points: &[Point], others: &[Point], sought: &PeakQuantities) -> bool {
+fn is_jump_to_forward(found: &FoundPeak, points: &[Point], others: &[Point], sought: &PeakQuantities) -> bool {
     let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
     let there = points.iter().find(|point| point.omega == own.omega);
@@ -154,7 +156,7 @@ fn is_of_the_way_there(found: &FoundPeak, points: &[Point], others: &[Point], so
 
 /// Returns true if a peak is only the jump of the forward sweep to a branch on which the
 /// reverse sweep reaches a higher amplitude.
-fn is_edge(found: &FoundPeak, omegas: &[f64], others: &[Point], sought: &PeakQuantities) -> bool {
+fn is_jump_to_branch(found: &FoundPeak, omegas: &[f64], others: &[Point], sought: &PeakQuantities) -> bool {
     let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
     let next = omegas.iter().find(|omega| **omega > other.omega);

@@ -18,7 +18,7 @@ pub(super) const REFERENCE_POINTS: usize = 4;
 
 /// Returns true if the previous case has the same references: linear structures, excitation and
 /// frequencies are equal.
-pub(super) fn are_known(study: &Study, case: &Case) -> bool {
+pub(super) fn equal_previous(study: &Study, case: &Case) -> bool {
     let before = case.index.checked_sub(1).and_then(|index| study.case(index).ok());
     before.is_some_and(|before| {
         let alike = |reference: LinearReference| match (reference.model(&before.model), reference.model(&case.model)) {
@@ -34,13 +34,13 @@ const LOOKED_AT: usize = 9;
 
 /// Estimates the number of cases with different references, from some of the cases; zero if
 /// none are requested.
-pub(super) fn others(study: &Study) -> f64 {
+pub(super) fn distinct_cases(study: &Study) -> f64 {
     if !study.wants_references() {
         return 0.0;
     }
     let (cases, looked) = (study.cases(), study.cases().min(LOOKED_AT));
     let looked_at = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
-    let own = looked_at.filter(|case| !are_known(study, case)).count();
+    let own = looked_at.filter(|case| !equal_previous(study, case)).count();
     own as f64 * cases as f64 / looked as f64
 }
 
@@ -74,10 +74,10 @@ pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, 
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
             Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok().map(amplitudes)).collect())
         });
-        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
+        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.no_reference(&why)))).ok()
     };
     let curves = LinearReference::ALL.map(|reference| (reference.name(), follow(reference)));
-    let mut rows = TableBuilder::linear();
+    let mut rows = TableBuilder::for_linear_motions();
     for (i, omega) in omegas.iter().enumerate() {
         rows.varied(&prepared.case);
         rows.number(DRIVE, hertz(*omega));
@@ -88,8 +88,8 @@ pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, 
                 rows.number(&amplitude_in(&format!("{name}_{what}"), along.unit()), amplitude);
             }
         }
-        rows.reduced(prepared.system.reduction_evidence());
-        rows.end();
+        rows.reduction_error(prepared.system.reduction_evidence());
+        rows.end_row();
     }
     (rows, absent)
 }

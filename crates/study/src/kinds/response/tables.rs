@@ -88,22 +88,22 @@ impl MassCurve {
 /// frequency = { from = "0.5 rad/s", to = "1.5 rad/s", points = 3 }
 /// "#;
 /// let study = read_study("oscillator.toml", text, &[]).unwrap();
-/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
 /// let curves = response::curves(&study, &dataset).unwrap();
 /// assert!((curves[0].masses[0].amplitude[1] - 1.0).abs() < 1e-12);   // F/(c ω) at ω = √(k/m)
 /// ```
 pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, ResultsError> {
-    let results = Results::of(NAME, study, dataset)?;
+    let results = Results::new(NAME, study, dataset)?;
     let Some(curve) = results.table(CURVE)? else { return Ok(Vec::new()) };
     let keys = study.varied().len();
     let frequency = curve.numbers(FREQUENCY)?;
     let system = study.case(0).ok().and_then(|case| case.model.assemble().ok());
-    let system = system.ok_or_else(|| curve.other_rows())?;
+    let system = system.ok_or_else(|| curve.foreign_rows())?;
     let displacements = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
     let places: Vec<String> = displacements.map(|(place, _)| place.clone()).collect();
     let amplitudes =
         places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;
-    let stretches = results.stretches(&curve, keys)?;
+    let stretches = results.case_rows(&curve, keys)?;
     let mut curves: Vec<ResponseCurve> = stretches
         .iter()
         .map(|stretch| ResponseCurve {
@@ -123,12 +123,12 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, Re
     let Some(peaks) = results.table(PEAKS)? else { return Ok(curves) };
     let (masses, frequency) = (peaks.texts(MASS)?, peaks.numbers(FREQUENCY)?);
     let (amplitude, at_range_end) = (peaks.numbers(AMPLITUDE)?, peaks.flags(AT_RANGE_END)?);
-    for stretch in results.stretches(&peaks, keys)? {
+    for stretch in results.case_rows(&peaks, keys)? {
         let case = stretches.iter().position(|of_curve| of_curve.case == stretch.case);
         for row in stretch.rows {
             let mass = places.iter().position(|place| *place == masses[row]);
             let (Some(case), Some(mass), Some(at_range_end)) = (case, mass, at_range_end[row]) else {
-                return Err(peaks.other_rows());
+                return Err(peaks.foreign_rows());
             };
             let peak = Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
             curves[case].masses[mass].peaks.push(peak);

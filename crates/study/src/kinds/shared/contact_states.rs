@@ -41,13 +41,14 @@ impl ContactState {
 
 /// Returns true if a table has the shares of a joint.
 pub(in crate::kinds) fn has(table: &Table, joint: &str) -> bool {
-    table.numbers(&columns::sticks(joint)).is_some_and(|shares| shares.iter().any(|share| share.is_finite()))
+    table.numbers(&columns::stick_fraction(joint)).is_some_and(|shares| shares.iter().any(|share| share.is_finite()))
 }
 
 /// Returns the shares in percent of the period, in the order of [`ContactState::ALL`], row by row.
 fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
-    let [stick, slip, open] = [columns::sticks(joint), columns::slips(joint), columns::open(joint)]
-        .map(|column| numbers(table, &column, rows.clone()));
+    let [stick, slip, open] =
+        [columns::stick_fraction(joint), columns::slip_fraction(joint), columns::open_fraction(joint)]
+            .map(|column| numbers(table, &column, rows.clone()));
     // the remainder is contact of a stop
     let touch = (0..stick.len()).map(|i| 1.0 - stick[i] - slip[i] - open[i]);
     let touch = touch.map(|share| if share.abs() < NOTHING { 0.0 } else { share }).collect();
@@ -71,7 +72,7 @@ pub(in crate::kinds) fn occurs_in(table: &Table, joints: &[String], state: Conta
 }
 
 /// Returns the states with a map. Stick has no map, because it is the remainder.
-fn mapped(table: &Table, joints: &[String]) -> Vec<ContactState> {
+fn map_states(table: &Table, joints: &[String]) -> Vec<ContactState> {
     let drawn = |state: &ContactState| match state {
         ContactState::Stick => false,
         ContactState::Slip => true,
@@ -82,7 +83,7 @@ fn mapped(table: &Table, joints: &[String]) -> Vec<ContactState> {
 
 /// Returns the number of panels that [`panels`] returns.
 pub(in crate::kinds) fn count(table: &Table, joints: &[String]) -> usize {
-    if joints.len() <= FEW { joints.len() } else { mapped(table, joints).len() }
+    if joints.len() <= FEW { joints.len() } else { map_states(table, joints).len() }
 }
 
 /// Groups joints for panels of one quantity: each of a few joints, or all together.
@@ -130,7 +131,7 @@ pub(in crate::kinds) fn panels(
             .collect(),
         ..Panel::default()
     };
-    mapped(table, joints).into_iter().map(map).collect()
+    map_states(table, joints).into_iter().map(map).collect()
 }
 
 fn occurs(shares: &[f64]) -> bool {

@@ -4,7 +4,7 @@
 //! nodal diameters and the participating blades.
 
 use crate::results::dataset::{Axis, Panel, Series};
-use crate::results::drawing::join;
+use crate::results::drawing::join_title;
 use std::f64::consts::TAU;
 use stickslip_numerics::leading::leading;
 
@@ -71,7 +71,7 @@ const CIRCLE: usize = 180;
 pub(in crate::kinds) const MOST: usize = 4;
 
 /// Returns the indices of at most `most` places that move most, in ascending order.
-pub(in crate::kinds) fn leaders(places: &[PlaceInSectors], most: usize) -> Vec<usize> {
+pub(in crate::kinds) fn largest_places(places: &[PlaceInSectors], most: usize) -> Vec<usize> {
     let mut leaders: Vec<usize> = (0..places.len()).collect();
     leaders.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
     leaders.truncate(most);
@@ -99,7 +99,7 @@ pub(in crate::kinds) fn panel(
     if sectors < LEAST || places.iter().all(|around| around.sectors.len() < LEAST) {
         return None;
     }
-    let shown = leaders(places, MOST);
+    let shown = largest_places(places, MOST);
     let left_out = left_out(shown.len(), places.len());
     let at = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
     let rest = (0..=CIRCLE).map(|i| at(i as f64 / CIRCLE as f64, 1.0)).unzip();
@@ -125,7 +125,7 @@ pub(in crate::kinds) fn panel(
     }
     let first = series.iter().rev().find_map(|line| Some((*line.x.first()?, *line.y.first()?)))?;
     series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
-    let title = join([title, left_out]);
+    let title = join_title([title, left_out]);
     let axis = || Axis::default().between(-ROOM, ROOM);
     Some(Panel { title, x: axis(), y: axis(), series, equal_axes: true })
 }

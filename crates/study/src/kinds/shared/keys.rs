@@ -29,7 +29,7 @@ pub(in crate::kinds) fn check_masses(model: &Model) -> Result<(), KeyError> {
 }
 
 /// Accepts every system, for kinds without requirements beyond those of the method.
-pub(in crate::kinds) fn anything(_: &Values, _: &Options, _: &System) -> Result<(), MethodError> {
+pub(in crate::kinds) fn no_requirements(_: &Values, _: &Options, _: &System) -> Result<(), MethodError> {
     Ok(())
 }
 
@@ -71,7 +71,7 @@ pub(in crate::kinds) const OUTPUT: Key = optional(
 pub(in crate::kinds) fn check_output(values: &Values) -> Result<(), KeyError> {
     let known: Vec<&str> = output_columns::TABLE.iter().map(|extra| extra.name).collect();
     match values.names("output").unwrap_or_default().iter().find(|name| !known.contains(&name.as_str())) {
-        Some(name) => Err(KeyError::unknown("output", "output", name, &known)),
+        Some(name) => Err(KeyError::unknown_name("output", "output", name, &known)),
         None => Ok(()),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::case::study::{Case, Study};
 use crate::results::notes::Note;
-use crate::run::point_row::location_of;
+use crate::run::point_row::describe_location;
 use crate::run::work::{NOT_REACHED, UnitResult, UnitSize, UnitTask};
 use stickslip::curve::sweep::{See, Watch, solver, stretch};
 use stickslip::method::{MethodError, OrbitError};
@@ -72,15 +72,18 @@ pub(in crate::kinds) fn count(
     orbit: &Orbit,
     (stable, words): (Option<bool>, fn(Note) -> Note),
 ) {
-    part.count(|| location_of(case, orbit.omega), orbit.evidence.accuracy.status(), None);
-    Note::of_orbit(&case.model, orbit, stable).into_iter().map(words).for_each(|note| note.join(&mut part.notes));
+    part.count(|| describe_location(case, orbit.omega), orbit.evidence.accuracy.status(), None);
+    Note::for_orbit(&case.model, orbit, stable)
+        .into_iter()
+        .map(words)
+        .for_each(|note| note.merge_into(&mut part.notes));
 }
 
 /// Counts a point without an orbit.
 fn count_missing(part: &mut UnitResult, case: &Case, omega: f64, point: Option<&Result<Orbit, OrbitError>>) {
     match point {
-        Some(Err(error)) => part.count(|| location_of(case, omega), error.status(), Some(error.to_string())),
-        _ => part.count(|| location_of(case, omega), NOT_REACHED, None),
+        Some(Err(error)) => part.count(|| describe_location(case, omega), error.status(), Some(error.to_string())),
+        _ => part.count(|| describe_location(case, omega), NOT_REACHED, None),
     }
 }
 

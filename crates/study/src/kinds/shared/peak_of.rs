@@ -24,9 +24,9 @@ pub(in crate::kinds) const PEAK_OF: Key = optional(
 
 /// Checks that the key names masses of the model.
 pub(in crate::kinds) fn check_peak_of(values: &Values, model: &Model) -> Result<(), KeyError> {
-    let masses = ModelNames::of_displacements(model);
+    let masses = ModelNames::displacements(model);
     let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
-    named.try_for_each(|name| masses.all(PEAK_OF.name, "mass", name).map(drop))
+    named.try_for_each(|name| masses.labels(PEAK_OF.name, "mass", name).map(drop))
 }
 
 /// Returns the places that the key names; empty if the key is absent.
@@ -36,8 +36,8 @@ pub(in crate::kinds) fn named_places(prepared: &PreparedCase) -> Vec<usize> {
     if names.iter().any(|name| name == ALL) && !places.iter().any(|place| place == ALL) {
         return displacements(&prepared.system);
     }
-    let masses = ModelNames::of_displacements(&prepared.case.model);
-    let meant = names.iter().filter_map(|name| masses.all(PEAK_OF.name, "mass", name).ok()).flatten();
+    let masses = ModelNames::displacements(&prepared.case.model);
+    let meant = names.iter().filter_map(|name| masses.labels(PEAK_OF.name, "mass", name).ok()).flatten();
     let mut found: Vec<usize> = Vec::new();
     for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {
         // the list may contain a place and its node
@@ -67,6 +67,6 @@ pub(in crate::kinds) fn displacements(system: &System) -> Vec<usize> {
 }
 
 /// Returns the largest amplitude of some places, m.
-pub(in crate::kinds) fn worst(orbit: &Orbit, places: &[usize]) -> f64 {
+pub(in crate::kinds) fn largest_amplitude(orbit: &Orbit, places: &[usize]) -> f64 {
     places.iter().map(|place| orbit.places[*place].amplitude()).fold(0.0, f64::max)
 }

@@ -33,7 +33,7 @@ use parser::Parser;
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 pub use value::ExpressionValue;
-pub(crate) use value::{described, displayed};
+pub(crate) use value::{dimension_text, quantity_text};
 
 /// A compiled expression: steps of a stack machine.
 ///
@@ -59,8 +59,8 @@ impl Expression {
     /// use stickslip::dimension::Dimension;
     /// use stickslip_study::expression::{Expression, ExpressionValue};
     /// let e = Expression::compile("m - m1/2", &["m", "m1"]).unwrap();
-    /// let value = e.evaluate(&[ExpressionValue::of(0.182, Dimension::MASS), ExpressionValue::bare(0.002)]).unwrap();
-    /// assert_eq!(value.to(Dimension::MASS), Ok(0.181));
+    /// let value = e.evaluate(&[ExpressionValue::new(0.182, Dimension::MASS), ExpressionValue::bare(0.002)]).unwrap();
+    /// assert_eq!(value.si_in(Dimension::MASS), Ok(0.181));
     /// ```
     pub fn compile<S: AsRef<str>>(text: &str, parameters: &[S]) -> Result<Self, TextError> {
         let index = |name: &str| parameters.iter().position(|p| p.as_ref() == name);
@@ -144,7 +144,7 @@ impl Expression {
                 Operation::Add | Operation::Subtract => {
                     let (b, a) = (pop(), pop());
                     let (verb, sign) = if *operation == Operation::Add { ("add", 1.0) } else { ("subtract", -1.0) };
-                    let (x, y, value) = unify(a, b).map_err(|e| e.into_fault(span, verb))?;
+                    let (x, y, value) = common_dimension(a, b).map_err(|e| e.into_fault(span, verb))?;
                     ExpressionValue { si: x + sign * y, ..value }
                 }
                 Operation::Multiply | Operation::Divide => {
@@ -168,13 +168,13 @@ impl Expression {
                 Operation::Power => {
                     let (b, a) = (pop(), pop());
                     if b.dimension.is_some_and(|d| d != Dimension::NONE) {
-                        let found = described(b.dimension.unwrap_or(Dimension::NONE));
+                        let found = dimension_text(b.dimension.unwrap_or(Dimension::NONE));
                         return Err(fault(format!("an exponent must be a pure number, found {found}")));
                     }
                     let dimension = match a.dimension {
                         None => None,
                         Some(d) => Some(power(d, b.si).ok_or_else(|| {
-                            fault(format!("{} cannot be raised to the power {}", described(d), b.si))
+                            fault(format!("{} cannot be raised to the power {}", dimension_text(d), b.si))
                         })?),
                     };
                     ExpressionValue { si: a.si.powf(b.si), dimension, with_pi: a.with_pi || b.with_pi }
@@ -182,7 +182,7 @@ impl Expression {
                 Operation::Call { function: function @ ("min" | "max"), arguments } => {
                     let mut best = pop();
                     for _ in 1..arguments {
-                        let (x, y, value) = unify(best, pop()).map_err(|e| e.into_fault(span, "compare"))?;
+                        let (x, y, value) = common_dimension(best, pop()).map_err(|e| e.into_fault(span, "compare"))?;
                         best = ExpressionValue { si: if function == "min" { x.min(y) } else { x.max(y) }, ..value };
                     }
                     best
@@ -208,16 +208,17 @@ impl DimensionMismatch {
     fn into_fault(self, span: &Range<usize>, verb: &str) -> TextError {
         match self.other {
             Some((message, help)) => TextError { span: span.clone(), message, help },
-            None => {
-                TextError::new(span.clone(), format!("cannot {verb} {} and {}", described(self.a), described(self.b)))
-            }
+            None => TextError::new(
+                span.clone(),
+                format!("cannot {verb} {} and {}", dimension_text(self.a), dimension_text(self.b)),
+            ),
         }
     }
 }
 
 /// Brings two values to one dimension: both numbers, and a value with the dimension of the
 /// result.
-fn unify(a: ExpressionValue, b: ExpressionValue) -> Result<(f64, f64, ExpressionValue), DimensionMismatch> {
+fn common_dimension(a: ExpressionValue, b: ExpressionValue) -> Result<(f64, f64, ExpressionValue), DimensionMismatch> {
     let none = Dimension::NONE;
     let unit = |value: ExpressionValue, d| {
         value.in_si_unit_of(d).map_err(|e| DimensionMismatch { a: none, b: none, other: Some(e) })
@@ -234,8 +235,8 @@ fn unify(a: ExpressionValue, b: ExpressionValue) -> Result<(f64, f64, Expression
 fn call(function: &str, a: ExpressionValue) -> Result<ExpressionValue, String> {
     let pure = |allowed: &[Dimension], value: f64| match a.dimension {
         None => Ok(ExpressionValue { si: value, ..a }),
-        Some(d) if allowed.contains(&d) => Ok(ExpressionValue::of(value, Dimension::NONE)),
-        Some(d) => Err(format!("`{function}` takes {}, found {}", described(allowed[0]), described(d))),
+        Some(d) if allowed.contains(&d) => Ok(ExpressionValue::new(value, Dimension::NONE)),
+        Some(d) => Err(format!("`{function}` takes {}, found {}", dimension_text(allowed[0]), dimension_text(d))),
     };
     let angle = &[Dimension::ANGLE, Dimension::NONE];
     match function {
@@ -248,7 +249,7 @@ fn call(function: &str, a: ExpressionValue) -> Result<ExpressionValue, String> {
         _ => {
             let dimension = match a.dimension {
                 None => None,
-                Some(d) => Some(power(d, 0.5).ok_or_else(|| format!("{} has no square root", described(d)))?),
+                Some(d) => Some(power(d, 0.5).ok_or_else(|| format!("{} has no square root", dimension_text(d)))?),
             };
             if a.si < 0.0 {
                 return Err(format!("the square root of a negative number ({})", a.si));
@@ -284,18 +285,18 @@ mod tests {
 
     fn values() -> [ExpressionValue; 6] {
         [
-            ExpressionValue::of(0.182, Dimension::MASS),
+            ExpressionValue::new(0.182, Dimension::MASS),
             ExpressionValue::bare(0.002),
-            ExpressionValue::of(105_103.0, Dimension::STIFFNESS),
+            ExpressionValue::new(105_103.0, Dimension::STIFFNESS),
             ExpressionValue::bare(121.0),
-            ExpressionValue::of(2.0, Dimension::FORCE),
-            ExpressionValue::of(760.0, Dimension::FREQUENCY),
+            ExpressionValue::new(2.0, Dimension::FORCE),
+            ExpressionValue::new(760.0, Dimension::FREQUENCY),
         ]
     }
 
     fn evaluate(text: &str, dimension: Dimension) -> Result<f64, TextError> {
         let value = Expression::compile(text, &PARAMETERS)?.evaluate(&values())?;
-        value.to(dimension).map_err(|(message, help)| TextError { span: 0..text.len(), message, help })
+        value.si_in(dimension).map_err(|(message, help)| TextError { span: 0..text.len(), message, help })
     }
 
     fn check(text: &str, dimension: Dimension, expected: f64) {
@@ -397,8 +398,8 @@ mod tests {
 
     #[test]
     fn values_are_shown_as_a_reader_would_write_them() {
-        assert_eq!(displayed(0.1 + 0.2, Some(Dimension::FORCE)), "0.3 N");
-        assert_eq!(displayed(121.0 * TAU, Some(Dimension::FREQUENCY)), "121 Hz");
-        assert_eq!(displayed(2.0, None), "2");
+        assert_eq!(quantity_text(0.1 + 0.2, Some(Dimension::FORCE)), "0.3 N");
+        assert_eq!(quantity_text(121.0 * TAU, Some(Dimension::FREQUENCY)), "121 Hz");
+        assert_eq!(quantity_text(2.0, None), "2");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::ExpressionValue;
 use super::operation::{FUNCTIONS, Operation, is_not_finite};
-use crate::syntax::suggest::{nearest, shown};
+use crate::syntax::suggest::{excerpt, suggest};
 use crate::syntax::units::{self, ReservedNames, TextError};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
@@ -50,7 +50,7 @@ impl Parser<'_> {
         self.steps.push((operation, start..end));
     }
 
-    fn deeper(&mut self) -> Result<(), TextError> {
+    fn check_depth(&mut self) -> Result<(), TextError> {
         self.depth += 1;
         if self.depth > DEEPEST {
             let message = format!("more than {DEEPEST} nested parentheses or powers");
@@ -105,7 +105,7 @@ impl Parser<'_> {
         self.atom()?;
         if self.peek() == Some('^') {
             self.next('^');
-            self.deeper()?;
+            self.check_depth()?;
             self.signed()?;
             self.depth -= 1;
             self.push(Operation::Power, start);
@@ -119,7 +119,7 @@ impl Parser<'_> {
             None => Err(TextError::new(start..start, "the expression ends too early: a value is missing here")),
             Some('(') => {
                 self.next('(');
-                self.deeper()?;
+                self.check_depth()?;
                 self.sum()?;
                 self.close(start)?;
                 self.depth -= 1;
@@ -179,19 +179,19 @@ impl Parser<'_> {
         let function = |name: &str| FUNCTIONS.contains(&name);
         let names = ReservedNames { parameter: &parameter, function: &function };
         // `5000 1/m` means `5000 /m`; two numbers in a row have no other meaning
-        if self.rest().strip_prefix('1').is_some_and(|rest| units::divides(rest, &names)) {
+        if self.rest().strip_prefix('1').is_some_and(|rest| units::starts_with_divisor(rest, &names)) {
             self.position += 1;
         }
         let value = match self.peek() {
-            Some(c) if units::starts_unit(c) || units::divides(self.rest(), &names) => {
+            Some(c) if units::starts_unit(c) || units::starts_with_divisor(self.rest(), &names) => {
                 let (unit, end) = units::read(self.text, self.position, &names)?;
                 self.position = end;
-                ExpressionValue::of(unit.scale(literal), unit.dimension)
+                ExpressionValue::new(unit.to_si(literal), unit.dimension)
             }
             Some('/') => match self.inverse_unit() {
                 Some((unit, inverse, end)) => {
                     self.position = end;
-                    ExpressionValue::of(literal.parse().unwrap_or(f64::NAN) / unit.scale("1"), inverse)
+                    ExpressionValue::new(literal.parse().unwrap_or(f64::NAN) / unit.to_si("1"), inverse)
                 }
                 None => ExpressionValue::bare(literal.parse().unwrap_or(f64::NAN)),
             },
@@ -256,7 +256,7 @@ impl Parser<'_> {
         if FUNCTIONS.contains(&name) {
             return Err(TextError::new(start..end, format!("the function `{name}` needs its argument in parentheses")));
         }
-        let fault = TextError::new(start..end, format!("there is no parameter `{}`", shown(name)));
+        let fault = TextError::new(start..end, format!("there is no parameter `{}`", excerpt(name)));
         Err(if units::find(name).is_some() {
             let help = if self.steps.is_empty() {
                 format!("a unit needs a number before it, as in \"1 {name}\"")
@@ -264,28 +264,28 @@ impl Parser<'_> {
                 format!("a unit must follow a number, as in \"1 {name}\" or \"1 {name}^-1\"")
             };
             fault.help(help)
-        } else if let Some(near) = nearest(name, self.names.iter().copied()) {
+        } else if let Some(near) = suggest(name, self.names.iter().copied()) {
             fault.help(format!("did you mean `{near}`?"))
         } else if OF_THE_DRIVE.contains(&name.to_lowercase().as_str()) {
             fault.help(OF_PARAMETERS)
-        } else if let Some(unit) = units::nearest_unit(name).filter(|_| !self.steps.is_empty()) {
+        } else if let Some(unit) = units::suggest_unit(name).filter(|_| !self.steps.is_empty()) {
             fault.help(format!("did you mean the unit `{unit}`?"))
         } else {
-            fault.help(format!("add it to [parameters]: {} = \"…\"", shown(name)))
+            fault.help(format!("add it to [parameters]: {} = \"…\"", excerpt(name)))
         })
     }
 
     fn call(&mut self, name: &str, span: Range<usize>) -> Result<(), TextError> {
         let Some(&function) = FUNCTIONS.iter().find(|f| **f == name) else {
-            let fault = TextError::new(span, format!("there is no function `{}`", shown(name)));
-            return Err(match nearest(name, FUNCTIONS.iter().copied()) {
+            let fault = TextError::new(span, format!("there is no function `{}`", excerpt(name)));
+            return Err(match suggest(name, FUNCTIONS.iter().copied()) {
                 Some(near) => fault.help(format!("did you mean `{near}`?")),
                 None => fault.help(format!("the functions are {}; write a product with `*`", FUNCTIONS.join(", "))),
             });
         };
         let open = self.position;
         self.next('(');
-        self.deeper()?;
+        self.check_depth()?;
         let mut arguments = 1;
         self.sum()?;
         while self.peek() == Some(',') {
@@ -317,7 +317,7 @@ impl Parser<'_> {
             c if c.is_alphanumeric() => {
                 TextError::new(span, "an operator is missing here").help("write a product with `*`")
             }
-            c => TextError::new(span, format!("unexpected `{}`", shown(&c.to_string()))),
+            c => TextError::new(span, format!("unexpected `{}`", excerpt(&c.to_string()))),
         }
     }
 }

@@ -22,7 +22,7 @@ impl ExpressionValue {
     }
 
     /// Returns a number in SI with a dimension.
-    pub fn of(si: f64, dimension: Dimension) -> Self {
+    pub fn new(si: f64, dimension: Dimension) -> Self {
         ExpressionValue { si, dimension: Some(dimension), with_pi: false }
     }
 
@@ -30,11 +30,11 @@ impl ExpressionValue {
     ///
     /// # Errors
     /// Returns message and help if the value has another dimension.
-    pub fn to(self, expected: Dimension) -> Result<f64, (String, Option<String>)> {
+    pub fn si_in(self, expected: Dimension) -> Result<f64, (String, Option<String>)> {
         self.written_as("", expected)
     }
 
-    /// Does the same as [`ExpressionValue::to`]; errors quote `text`, which the user wrote.
+    /// Does the same as [`ExpressionValue::si_in`]; errors quote `text`, which the user wrote.
     pub(crate) fn written_as(self, text: &str, expected: Dimension) -> Result<f64, (String, Option<String>)> {
         let Some(found) = self.dimension else {
             return self.in_si_unit_of(expected);
@@ -51,9 +51,9 @@ impl ExpressionValue {
             ),
             (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
             (true, std::cmp::Ordering::Less) => Some("there is one radian too many: divide by `1 rad`".to_owned()),
-            _ => dimension_advice::advice(expected, found, text),
+            _ => dimension_advice::dimension_advice(expected, found, text),
         };
-        Err((format!("expected {}, found {}", described(expected), described(found)), help))
+        Err((format!("expected {}, found {}", dimension_text(expected), dimension_text(found)), help))
     }
 
     pub(super) fn in_si_unit_of(self, dimension: Dimension) -> Result<f64, (String, Option<String>)> {
@@ -69,7 +69,7 @@ impl ExpressionValue {
 }
 
 /// Returns the dimension as error texts name it: `stiffness (N/m)`, `a pure number`.
-pub(crate) fn described(dimension: Dimension) -> String {
+pub(crate) fn dimension_text(dimension: Dimension) -> String {
     match dimension {
         Dimension::NONE => "a pure number".to_owned(),
         other if other.name_and_unit().is_none() => format!("a quantity in {other}"),
@@ -79,7 +79,7 @@ pub(crate) fn described(dimension: Dimension) -> String {
 
 /// Formats a number in the main unit of its dimension, with up to nine digits: `2.5 N`,
 /// `121 Hz`.
-pub(crate) fn displayed(si: f64, dimension: Option<Dimension>) -> String {
+pub(crate) fn quantity_text(si: f64, dimension: Option<Dimension>) -> String {
     let (value, unit) = match dimension {
         None | Some(Dimension::NONE) => (si, String::new()),
         Some(Dimension::FREQUENCY) => (si / TAU, "Hz".to_owned()),
