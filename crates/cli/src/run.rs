@@ -17,9 +17,9 @@ use stickslip_report::journal::{Journal, JournalError};
 use stickslip_report::stream::{self, Shard, Start, StreamError};
 use stickslip_report::{Outputs, check_writable, json::write_dataset_json, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
-use stickslip_study::decimation::MOST_ROWS;
+use stickslip_study::decimation::MAX_ROWS;
 use stickslip_study::run::{CONVERGED, CheckedStudy, Context, check as check_study};
-use stickslip_study::schema::MOST_BYTES;
+use stickslip_study::schema::MAX_FILE_BYTES;
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
@@ -75,7 +75,7 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
     }
     let mut bytes = Vec::new();
     // A partly read study is not valid.
-    match std::io::stdin().lock().take(MOST_BYTES + 1).read_to_end(&mut bytes) {
+    match std::io::stdin().lock().take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes) {
         Ok(_) => read_bytes("stdin", &bytes, set),
         Err(_) => read_bytes("stdin", &[], set),
     }
@@ -383,7 +383,7 @@ pub(crate) fn told(assembled: &Assembled, known: &[String], (json, open): (bool,
     }
     let ending = if json && !is_whole {
         Ending::Failed(format!(
-            "--json prints tables of up to {MOST_ROWS} rows; the results are in {}",
+            "--json prints tables of up to {MAX_ROWS} rows; the results are in {}",
             files.first().map_or(String::new(), |file| file.with_file_name("").display().to_string())
         ))
     } else if json {

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Around, Disk, Mistuned, Model, ModelError, Ring, normal_pattern, too_far};
-use stickslip_study::schema::MOST_MASSES;
+use stickslip_study::schema::MAX_MASSES;
 
 /// Returns the distribution of a force or an imposed motion around a disk, if one is given.
 pub fn around(
@@ -103,9 +103,9 @@ pub fn ring(
         let message = "a sector by its matrices needs the node pairs of its two sides: state it with [structure] and [disk], in a file or for Study.from_dict";
         return Err(error::model(py, message));
     }
-    let most = MOST_MASSES / sector.masses.len().max(1);
+    let most = MAX_MASSES / sector.masses.len().max(1);
     if disk.sectors > most {
-        let message = format!("{} sectors of {} masses; the limit is {MOST_MASSES}", disk.sectors, sector.masses.len());
+        let message = format!("{} sectors of {} masses; the limit is {MAX_MASSES}", disk.sectors, sector.masses.len());
         return Err(error::model(py, message));
     }
     let mistuned = given.map(|given| mistuning(given, sector, disk.sectors)).transpose()?;

@@ -74,7 +74,7 @@ vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
 /// A slider with a limit above the force keeps the mass at rest. Then no limit is the best, and
 /// if only some limits do so, none of these is.
 #[test]
-fn no_value_is_the_best_where_nothing_moves() {
+fn no_optimum_without_motion() {
     let found = |limits: &str| {
         let study = format!(
             "kind = \"performance\"\nfrequency = {{ from = \"0.1 Hz\", to = \"0.2 Hz\", points = 5 }}\nvary = {{ Fc = {limits} }}"
@@ -136,7 +136,7 @@ fn modes_are_summarised() {
 
 /// If two modes nearly merge, the run reports that amplitude and does not look like a success.
 #[test]
-fn merging_modes_are_told() {
+fn merging_modes_are_reported() {
     let study = |points: u32| {
         dataset(&format!(
             r#"
@@ -165,7 +165,7 @@ amplitude = {{ from = "0.01 mm", to = "100 mm", points = {points} }}
 
 /// A range of amplitudes without slip gives a linear mode, and a note says it.
 #[test]
-fn a_mode_that_never_slips_is_told() {
+fn a_mode_without_slip_is_reported() {
     let law = r#"{ kind = "jenkins", stiffness = "0.2 N/m", limit = "1 N" }"#;
     let study = |to: &str| format!("kind = \"modes\"\namplitude = {{ from = \"0.1 m\", to = \"{to} m\", points = 5 }}");
     let told =
@@ -176,7 +176,7 @@ fn a_mode_that_never_slips_is_told() {
 /// A branch along a force with two folds: two turns in its table, and an unstable part in its
 /// figure.
 #[test]
-fn a_branch_turns() {
+fn a_branch_has_two_folds() {
     let study = r#"kind = "branch"
 frequency = "1.04880885 rad/s"
 vary = { F0 = ["2 N", "0.5 N"] }
@@ -309,7 +309,7 @@ fn a_branch_that_begins_between_folds_has_the_peak_of_its_range() {
 
 /// A branch without a range is refused with the reason.
 #[test]
-fn a_branch_without_a_range_fails_with_words() {
+fn a_branch_without_a_range_is_refused() {
     let law = r#"{ kind = "coulomb", limit = "1 N" }"#;
     let refused = |frequency: &str| {
         let study = format!("kind = \"branch\"\nfrequency = {frequency}");
@@ -405,7 +405,7 @@ fn performance_takes_values_in_any_order() {
 /// Curves of a performance study carry the value of their outer parameter, so that a figure of
 /// many curves has a colour bar.
 #[test]
-fn performance_curves_tell_their_parameter() {
+fn performance_curves_carry_their_parameter() {
     let law = r#"{ kind = "coulomb", limit = "Ft" }"#;
     let study = r#"kind = "performance"
 frequency = { from = "0.6 rad/s", to = "1.4 rad/s", points = 9 }
@@ -491,7 +491,7 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
 /// the deflection of the dynamic limit, initially with the velocity of the belt. The belt is a
 /// slow and long imposed motion, as the book advises.
 #[test]
-fn a_long_motion_is_a_belt() {
+fn a_slow_motion_models_a_belt() {
     let book = include_str!("../../../docs/src/laws.md");
     let from = book.find("schema = 1\n[parameters]\nv =").unwrap();
     let text = &book[from..from + book[from..].find("```").unwrap()];

@@ -355,7 +355,7 @@ fn samples_of_a_disk_by_its_matrices() {
 /// in a travelling wave. The ring is solved without its symmetry, with elastic, rigid and
 /// smooth friction.
 #[test]
-fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
+fn a_matrix_sector_with_a_joint_equals_its_ring() {
     let laws = [
         "kind = \"jenkins\", stiffness = \"2e3 N/m\", limit = \"0.2 N\"",
         "kind = \"coulomb\", limit = \"0.2 N\"",
@@ -539,7 +539,7 @@ fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
 
 /// Coordinates determine the matching nodes of both sides, and verify the stated pairs.
 #[test]
-fn coordinates_tell_a_wrong_sector() {
+fn coordinates_detect_a_wrong_sector() {
     let study = "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n";
     let frequencies = |disk: &str| {
         let data = run(&in_space(disk, study).unwrap(), &Context::without_progress(1)).unwrap();
@@ -637,7 +637,7 @@ fn shapes_of_a_sector_are_those_of_the_ring() {
 
 /// The shapes that the figure of kind `nodal-diameter` shows, and those that it omits.
 #[test]
-fn the_shapes_that_are_drawn() {
+fn drawn_mode_shapes() {
     let titles = |keys: &str| -> Vec<String> {
         let study = read("", "", &format!("[study]\nkind = \"nodal-diameter\"\nmodes = 2\n{keys}\n")).unwrap();
         let panels = run(&study, &Context::without_progress(1)).unwrap().figure.panels;

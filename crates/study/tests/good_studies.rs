@@ -133,7 +133,7 @@ fn set_replaces_a_parameter_and_everything_that_follows_from_it() {
 }
 
 #[test]
-fn transient_keys_arrive() {
+fn transient_keys_are_read() {
     let study_table = "[study]\nkind = \"transient\"\nrun_up = { from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }\n\
                        start = { blade1 = \"1 mm\" }\n";
     let text = format!("{}{study_table}", &EXAMPLE[..EXAMPLE.find("[study]").unwrap()]);
@@ -352,7 +352,7 @@ fn joint_law(directions: usize, law: &str) -> Result<law::SharedLaw, String> {
 }
 
 #[test]
-fn dimensions_are_raised_to_the_exponent_of_the_law() {
+fn dimensions_depend_on_exponents() {
     let with = |beta: &str, exponent: &str| {
         let law =
             format!("kind = \"bouc-wen\", stiffness = \"1 N/mm\", gamma = 0, beta = {beta}, exponent = {exponent}");

@@ -268,7 +268,7 @@ fn watched(text: &str) -> Result<Ending, String> {
 }
 
 #[test]
-fn studies_with_absent_parts_end_whole_or_are_refused() {
+fn incomplete_studies_run_or_are_refused() {
     let count = number("STICKSLIP_ABSENT_PARTS").unwrap_or(STUDIES);
     let first = number("STICKSLIP_RANDOM_SEED").unwrap_or(SEED);
     let mut endings = BTreeMap::<Ending, u64>::new();
@@ -290,7 +290,7 @@ fn studies_with_absent_parts_end_whole_or_are_refused() {
 /// A contact with a preload whose two directions are imposed, so that nothing can move freely,
 /// has its loop.
 #[test]
-fn a_contact_that_is_moved_alone_has_its_loop() {
+fn an_imposed_contact_has_its_loop() {
     let text = r#"
 schema = 1
 [[motion]]

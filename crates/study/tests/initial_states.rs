@@ -33,7 +33,7 @@ fn lowest(motion: &[f64]) -> f64 {
 /// A stuck joint is a spring relaxed at zero, so the motion is symmetric. A joint relaxed at
 /// the place of release, 0.2 mm, gives a motion about `kt u/(k + kt)`.
 #[test]
-fn a_joint_that_sticks_swings_about_zero() {
+fn a_stuck_joint_gives_a_symmetric_motion() {
     let law = "{ kind = \"jenkins\", stiffness = \"10 N/um\", limit = \"10 kN\" }";
     let low = lowest(&pulled(law, ""));
     assert!((low / -0.2e-3 - 1.0).abs() < 1e-4, "{low}");
@@ -44,7 +44,7 @@ fn a_joint_that_sticks_swings_about_zero() {
 /// A joint that slipped during the displacement carries its limit:
 /// `k (a₀ - a₁)/2 (a₀ + a₁) = W`, with the loss of half a loop.
 #[test]
-fn a_joint_that_slips_on_the_way_carries_its_limit() {
+fn a_joint_that_slipped_carries_its_limit() {
     let (k, kt, limit, a) = (20e6, 10e6, 200.0, 0.2e-3);
     let low = lowest(&pulled("{ kind = \"jenkins\", stiffness = \"10 N/um\", limit = \"200 N\" }", ""));
     // from +limit through the elastic range to -limit, then slip until the kinetic energy is
@@ -65,7 +65,7 @@ fn a_joint_that_slips_on_the_way_carries_its_limit() {
 /// Places that `start` does not name are in equilibrium: the second of two masses in series
 /// follows the first one.
 #[test]
-fn what_is_not_pulled_is_in_equilibrium() {
+fn other_places_are_in_equilibrium() {
     let study = |begin: &str| {
         format!(
             "schema = 1\n[[mass]]\nname = \"a\"\nmass = \"1 kg\"\n[[mass]]\nname = \"b\"\nmass = \"1 kg\"\n\

@@ -220,7 +220,7 @@ fn a_turned_face_is_the_same_contact() {
 }
 
 #[test]
-fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
+fn invalid_rotated_faces_are_refused() {
     let error = |place: &str, directions: &str| {
         let text = format!(
             "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n{directions}\n[[place]]\nname = \"face\"\n{place}\n\
@@ -246,7 +246,7 @@ fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
 /// The normal direction does not depend on the order in which nodes are named: nodes of
 /// different orders are refused. An excitation amplitude whose square underflows is refused, too.
 #[test]
-fn normals_and_sizes_that_mislead_are_refused() {
+fn inconsistent_normals_are_refused() {
     let study = "[study]\nkind = \"orbit\"\nfrequency = \"1 Hz\"\n";
     let good = text(study)
         + "[[mass]]\nname = \"other\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n\

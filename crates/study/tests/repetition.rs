@@ -66,7 +66,7 @@ fn written_out() -> String {
 }
 
 #[test]
-fn a_ring_in_thirty_lines_is_the_ring_written_out() {
+fn a_repeated_ring_equals_the_written_one() {
     let ring = RING.to_owned() + STUDY;
     assert!(ring.lines().count() <= 30, "{}", ring.lines().count());
     let model = model(&ring);

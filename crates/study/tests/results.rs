@@ -254,7 +254,7 @@ fn an_interrupted_run_has_what_was_finished() {
 }
 
 #[test]
-fn what_is_not_the_result_of_the_study_is_refused() {
+fn foreign_results_are_refused() {
     let (study, dataset) = oscillators(SWEEP);
     let wrong_kind = hysteresis::loops(&study, &dataset).unwrap_err();
     assert!(wrong_kind.to_string().contains("`study` is of kind `response`"), "{wrong_kind}");
@@ -297,7 +297,7 @@ fn the_worst_evidence_is_the_largest() {
 /// Rigid joints in a triangle become indistinguishable within the first period, and the transient
 /// breaks down. The rows until then exist, and their summary covers them.
 #[test]
-fn a_transient_that_breaks_down_keeps_what_it_has() {
+fn an_aborted_transient_keeps_its_rows() {
     let text = r#"
 schema = 1
 [[mass]]
@@ -358,7 +358,7 @@ cycles = 20
 /// A note reports a stuck joint in a model with a stop: the position at which it sticks
 /// determines when the stop closes. Without the stop, or if the joint slips, there is no note.
 #[test]
-fn a_stuck_joint_beside_a_stop_is_told() {
+fn a_stuck_joint_with_a_stop_is_reported() {
     let stop = "[[joint]]\nname = \"stop\"\nbetween = [\"b\", \"ground\"]\nlaw = { kind = \"gap\", gap = \"0.05 mm\", stiffness = \"30 N/mm\" }\n";
     let (rigid, spring) = (r#"kind = "coulomb""#, r#"kind = "jenkins", stiffness = "20 N/mm""#);
     for (limit, law, stop, told) in [
@@ -418,7 +418,7 @@ kind = "event-driven"
 /// the return map is then that of slip: 1.41 for a stable orbit, without the contact that stays
 /// open. Such an orbit is one of a continuum, and its stability is unknown.
 #[test]
-fn what_sticks_up_to_its_limit_is_not_called_unstable() {
+fn sticking_up_to_the_limit_has_unknown_stability() {
     let text = r#"
 schema = 1
 [[mass]]

@@ -36,7 +36,7 @@ fn silent(text: &str) {
 }
 
 #[test]
-fn starting_studies_have_nothing_to_warn_of() {
+fn templates_have_no_warnings() {
     for row in templates::TABLE {
         let mut warnings = summary(row.study).warnings;
         // only friction keeps a friction ring in place
@@ -46,7 +46,7 @@ fn starting_studies_have_nothing_to_warn_of() {
 }
 
 #[test]
-fn the_couple_says_its_modes_and_where_it_slips() {
+fn summary_of_the_couple() {
     let text = summary(templates::find("blade-couple").unwrap().study).to_string();
     // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589
     // Hz (6.8): 2 N are 10.1 % of it
@@ -66,7 +66,7 @@ fn the_couple_says_its_modes_and_where_it_slips() {
 }
 
 #[test]
-fn a_model_that_nothing_drives() {
+fn a_model_without_excitation() {
     warns(&template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\"")]), &["all forces and motions are zero"]);
     warns(
         &template("blade-couple", &[("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 0")]),
@@ -95,7 +95,7 @@ fn a_model_that_nothing_drives() {
 }
 
 #[test]
-fn masses_that_nothing_holds() {
+fn unconstrained_masses() {
     let edits = [("[[joint]]", "[[mass]]\nname = \"lost\"\nmass = \"1 g\"\n\n[[joint]]")];
     warns(&template("blade-couple", &edits), &["`lost` can move freely"]);
     let ground = [
@@ -108,7 +108,7 @@ fn masses_that_nothing_holds() {
 /// A block on a contact whose preload pushes it away: there is no warning if a force pushes it
 /// back.
 #[test]
-fn a_preload_that_nothing_balances() {
+fn an_unbalanced_preload() {
     let block = |press: &str| {
         format!(
             "schema = 1\n[[mass]]\nname = \"block\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[joint]]\nname = \"foot\"\n\
@@ -122,7 +122,7 @@ fn a_preload_that_nothing_balances() {
 }
 
 #[test]
-fn parameters_that_nothing_uses() {
+fn unused_parameters() {
     let edits = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"\nother = \"2 * spare\"")];
     warns(&template("blade-couple", &edits), &["uses the parameter `spare`, `other`"]);
     let varied = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\""), ("vary = { Ft =", "vary = { spare =")];
@@ -263,7 +263,7 @@ fn warnings_stand_in_the_record() {
 }
 
 #[test]
-fn an_optimum_at_the_edge_is_warned_of() {
+fn an_optimum_at_the_boundary_gives_a_warning() {
     let text = template(
         "blade-couple",
         &[
@@ -409,7 +409,7 @@ fn the_time_is_estimated_within_bounds() {
 /// Measured: ten million orbits of the couple take 282 s of processor time. The summary also
 /// states the longest time.
 #[test]
-fn the_usual_time_is_told_beside_the_longest() {
+fn usual_and_longest_time_are_stated() {
     let text = template(
         "blade-couple",
         &[
@@ -478,7 +478,7 @@ harmonics = 15
 /// - 36 mistuned sectors of two masses, event-driven, at nine distant frequencies;
 /// - a ring of 300 rigid joints with five harmonics, without a warm start.
 #[test]
-fn the_usual_time_is_that_which_was_measured() {
+fn usual_time_agrees_with_measurements() {
     let contacts = r#"
 schema = 1
 [parameters]
@@ -614,7 +614,7 @@ fn peaks_are_refined_where_resonances_are() {
 /// blades, one preload, on one thread, and of 12 mistuned blades. The three points of the last
 /// study are distant, and every orbit of its peak has no warm start. It was stopped after 36 s.
 #[test]
-fn the_usual_time_of_wedges_is_that_which_was_measured() {
+fn usual_time_of_wedges_agrees_with_measurements() {
     let vary = r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#;
     let mistuned = "sectors = \"N\"\nmistuning = { of = \"kx\", deviation = \"2 %\", seed = 7 }";
     let tuned = "sectors = \"N\"";
@@ -775,7 +775,7 @@ fn references_of_draws_are_missed_before_the_run() {
 }
 
 #[test]
-fn a_long_run_says_so_at_its_start() {
+fn a_long_run_is_announced() {
     let points = |law: &str, count: &str| summary(&stop(law, "").replace("points = 11", count)).long_run();
     let smooth = "kind = \"bouc-wen\", stiffness = \"100 N/mm\", beta = \"500 1/m\", gamma = \"500 1/m\", exponent = 1";
     assert_eq!(points(smooth, "points = 11"), None);
@@ -826,7 +826,7 @@ output = "joint_mean"
 /// The spring of the structure takes the fraction `k/(k + kn)` of the preload, and the constant
 /// force is shared likewise. The mean of a small vibration is the same.
 #[test]
-fn what_the_structure_takes_of_a_preload() {
+fn preload_at_rest() {
     for (preload, constant, left) in [(40.0, 0.0, 10.0), (40.0, 40.0, 40.0), (40.0, 80.0, 70.0), (40.0, -40.0, -20.0)] {
         let text = pressed(&format!("{preload} N"), &format!("{constant} N"));
         let found = summary(&text);
@@ -858,7 +858,7 @@ fn what_the_structure_takes_of_a_preload() {
 /// Contacts that are open at rest count as closed in the modes with all joints stuck, as in the
 /// reference curve of a figure.
 #[test]
-fn stuck_is_closed() {
+fn stuck_contacts_count_as_closed() {
     let hertz = |k: f64| (k / 2.0).sqrt() / std::f64::consts::TAU;
     for preload in ["0 N", "40 N"] {
         let found = summary(&pressed(preload, "0 N"));
@@ -875,7 +875,7 @@ fn stuck_is_closed() {
 /// A wedge without a load lies loose between its faces: one warning for all wedges says what is
 /// missing.
 #[test]
-fn wedges_that_nothing_presses() {
+fn wedges_without_load() {
     let edit = ("speed = \"2600 rpm\"", "speed = \"0 rpm\"");
     let alone = ("vary = { speed = [\"2000 rpm\", \"2600 rpm\", \"4000 rpm\", \"8000 rpm\"] }\n", "");
     let words = [
@@ -910,7 +910,7 @@ fn a_tuned_disk_is_warned_of_the_nodal_diameters_that_its_excitation_meets() {
 }
 
 #[test]
-fn what_only_rounding_loads_does_not_slip() {
+fn rounding_does_not_cause_slip() {
     let first = |amplitude: &str| {
         let text = format!(
             "schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[parameters]\nEO = 0\nF0 = \"{amplitude}\"\n[study]\nkind = \"response\"\n\
@@ -981,7 +981,7 @@ fn models_without_mass() {
 }
 
 #[test]
-fn stiffnesses_that_no_structure_has() {
+fn implausible_stiffness() {
     let stiff = JENKINS.replace("2 N/mm", "2e9 N/mm");
     warns(&rubbing(&stiff, &[]), &["225", "stiffness of `foot`, 2e12 N/m", "`coulomb`"]);
     let spring = rubbing(
@@ -1014,7 +1014,7 @@ fn stuck_bristles_damp() {
 /// An Iwan joint of 4 N slips completely at FS (1 + beta)/(KT (beta + (chi+1)/(chi+2))) = 4.105
 /// mm, and partly before.
 #[test]
-fn an_iwan_joint_says_its_macro_slip() {
+fn summary_states_macro_slip_of_iwan() {
     let law = "kind = \"iwan\", stiffness = \"2 N/mm\", limit = \"4 N\", chi = -0.5, beta = 0.3";
     let found = summary(&rubbing(law, &[]));
     let text = found.to_string();

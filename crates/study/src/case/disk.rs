@@ -6,7 +6,7 @@ use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
 use crate::compile::source_model::{DiskSource, SourceModel, model_problem};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::ExpressionValue;
-use crate::syntax::key::MOST_MASSES;
+use crate::syntax::key::MAX_MASSES;
 use crate::syntax::suggest::{excerpt, suggest};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -22,11 +22,11 @@ enum MistunedQuantity {
 }
 
 /// Quantities of a blade given by matrices that may deviate.
-const OF_BLADE: [(&str, Mistuned); 2] =
+const BLADE_QUANTITIES: [(&str, Mistuned); 2] =
     [("blade.stiffness", Mistuned::BladeStiffness), ("blade.frequency", Mistuned::BladeFrequency)];
 
 /// Limit on the rows of all sectors of a disk without reduction: matrices of several GB.
-const MOST_ROWS: usize = 1_000_000;
+const MAX_ROWS: usize = 1_000_000;
 
 /// Evaluates the parameters with some of them changed: (index, value in SI).
 pub(crate) type Reevaluate<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<ExpressionValue>, Problem>;
@@ -53,15 +53,15 @@ pub(crate) fn ring_of(
             None => Vec::new(),
             Some(deviations) => mistuned(structure, disk, environment, again, (&first, deviations))?,
         };
-        let most = MOST_MASSES / (first.masses.len() + first.bodies.len()).max(1);
+        let most = MAX_MASSES / (first.masses.len() + first.bodies.len()).max(1);
         if sectors > most {
-            let message = format!("{sectors} sectors of {} masses; the limit is {MOST_MASSES}", first.masses.len());
+            let message = format!("{sectors} sectors of {} masses; the limit is {MAX_MASSES}", first.masses.len());
             return Err(vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]);
         }
         let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None { .. }));
         let rows = rows.map_or(0, |own| own.component.dofs());
-        if rows * sectors > MOST_ROWS {
-            let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MOST_ROWS}");
+        if rows * sectors > MAX_ROWS {
+            let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MAX_ROWS}");
             let problem = Problem::new(disk.table.location_of("sectors", None), "sectors", message);
             return Err(vec![
                 problem.help("remove `reduce = false` from [structure]: all sectors then share one reduced model"),
@@ -283,7 +283,7 @@ fn mistuned_quantity(
     let place = table.location_of("of", None);
     match &names[..] {
         [name] => {
-            if let Some((_, part)) = OF_BLADE.into_iter().find(|(known, _)| known == name) {
+            if let Some((_, part)) = BLADE_QUANTITIES.into_iter().find(|(known, _)| known == name) {
                 if disk.table.entry("blade").is_some() {
                     return Ok(MistunedQuantity::Part(part));
                 }

@@ -6,7 +6,7 @@ use crate::case::values::{ResolvedValue, Values};
 use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
 use crate::compile::source_model::{ModelLists, SourceModel};
 use crate::syntax::error::Problem;
-use crate::syntax::key::RATIO;
+use crate::syntax::key::DAMPING_RATIO;
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::model::{
@@ -103,7 +103,7 @@ pub(crate) fn build_model(
             stiffness: number(&values, "stiffness"),
             damping: number(&values, "damping"),
         };
-        if let Some(ratio) = values.quantity(RATIO) {
+        if let Some(ratio) = values.quantity(DAMPING_RATIO) {
             match critical_damping(&spring, lists, &model.masses) {
                 Ok(critical) => spring.damping = ratio * critical,
                 Err(why) => wrong.push(damping_ratio_problem(table, &why)),
@@ -202,7 +202,7 @@ fn critical_damping(spring: &Spring, lists: &ModelLists, masses: &[Mass]) -> Res
 /// Returns the problem that a damping ratio has no meaning at this spring.
 fn damping_ratio_problem(table: &CompiledTable, why: &str) -> Problem {
     let message = format!("a damping ratio needs a stiffness and a mass, but {why}");
-    Problem::new(table.location_of(RATIO, None), RATIO, table.with_repetition(&message)).help(
+    Problem::new(table.location_of(DAMPING_RATIO, None), DAMPING_RATIO, table.with_repetition(&message)).help(
         "write damping = \"2*zeta*sqrt(k*m)\" with the parameters zeta, k and the moving mass m; for a structure \
          given by matrices use `modal_damping` in [structure]",
     )
@@ -264,12 +264,12 @@ pub(crate) fn refuse_without_disk(table: &CompiledTable, problems: &mut Vec<Prob
 }
 
 /// Largest absolute value that is accepted as a whole number.
-const MOST: f64 = 1e9;
+const MAX_WHOLE_NUMBER: f64 = 1e9;
 
 /// Returns the value of a key, which must be a whole number; `None` if the key is absent.
 pub(crate) fn whole_number(table: &CompiledTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
     let Some(value) = values.quantity(key) else { return Ok(None) };
-    if value.fract() == 0.0 && value.abs() <= MOST {
+    if value.fract() == 0.0 && value.abs() <= MAX_WHOLE_NUMBER {
         return Ok(Some(value as i64));
     }
     let message = format!("must be a whole number, found {value}");

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use stickslip::model::Model;
 
 /// Largest number of names that a message lists.
-const LISTED: usize = 12;
+const MAX_LISTED: usize = 12;
 
 /// The names that a key may take, each with the labels that it stands for.
 #[derive(Debug, Default)]
@@ -121,7 +121,7 @@ impl ModelNames {
                 None => match suggest(name, words()) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None if self.is_empty() => format!("the model has no {what}"),
-                    None => format!("choose {}", alternatives(words().take(LISTED))),
+                    None => format!("choose {}", alternatives(words().take(MAX_LISTED))),
                 },
             };
             KeyError { name: Some(name.to_owned()), ..KeyError::new(key, self.unknown_name(what, name), help) }
@@ -140,7 +140,7 @@ impl ModelNames {
                     // on a disk: the places with this name in every sector
                     false => format!("`{name}` stands for {} places; this key needs one of them", several.len()),
                 };
-                let help = format!("write {}", alternatives(several.iter().take(LISTED).map(String::as_str)));
+                let help = format!("write {}", alternatives(several.iter().take(MAX_LISTED).map(String::as_str)));
                 Err(KeyError { name: Some(name.to_owned()), ..KeyError::new(key, message, help) })
             }
         }

@@ -11,7 +11,7 @@ use stickslip_numerics::sparse::{Matrix, MatrixError};
 
 /// Number of components that are kept, one per speed. Reductions belong to a component, and
 /// cases at the same speed share it.
-const KEPT: usize = 16;
+const CACHE_SIZE: usize = 16;
 
 /// Both exports of a study's structure.
 #[derive(Debug, Clone)]
@@ -59,7 +59,7 @@ impl StressStiffening {
         // both matrices have the same size, so only a factor that is not finite can fail here
         let stiffness = Matrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
         let found = Component::new(component.rows().to_vec(), mass.clone(), damping.cloned(), stiffness)?;
-        if kept.len() == KEPT {
+        if kept.len() == CACHE_SIZE {
             kept.remove(0);
         }
         kept.push((bits, found.clone()));

@@ -134,7 +134,7 @@ pub struct VariedValue {
 }
 
 /// Names of table columns, without units, that a parameter could also have.
-const OF_TABLES: [&str; 12] = [
+const RESERVED_COLUMNS: [&str; 12] = [
     "amplitude",
     "frequency",
     "drive_frequency",
@@ -157,7 +157,7 @@ impl VariedValue {
     /// its bare name.
     pub fn column(&self) -> (String, f64) {
         // tables already have columns of these names
-        let prefix = if OF_TABLES.contains(&self.name.as_str()) { "parameter_" } else { "" };
+        let prefix = if RESERVED_COLUMNS.contains(&self.name.as_str()) { "parameter_" } else { "" };
         match self.dimension.and_then(|dimension| Some((table_unit(dimension)?, dimension))) {
             Some(((unit, _), dimension)) => {
                 (format!("{prefix}{}_{unit}", self.name), in_table_unit(self.si, dimension))
@@ -220,10 +220,10 @@ pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
 
 /// Largest number of cases that [`Study::to_record`] lists. A run can be repeated from the text
 /// alone.
-const MOST_RESOLVED: usize = 1_000;
+const MAX_RESOLVED_CASES: usize = 1_000;
 
 /// Help for a draw with values that no model can have.
-const IMPOSSIBLE: &str = "[sample] draws invalid values such as this one: bound the distribution with \
+const INVALID_DRAW_HELP: &str = "[sample] draws invalid values such as this one: bound the distribution with \
     `within = [least, most]`, or use a distribution without such values, such as `lognormal`";
 
 impl Study {
@@ -305,7 +305,7 @@ impl Study {
     }
 
     /// Returns the memory limit of a run, bytes: the limit that was set, or
-    /// [`MEMORY_LIMIT`](memory_limit::MEMORY_LIMIT), or the machine's free memory if that is less.
+    /// [`DEFAULT_MEMORY_LIMIT`](memory_limit::DEFAULT_MEMORY_LIMIT), or the machine's free memory if that is less.
     pub fn memory_limit(&self) -> u64 {
         self.memory.unwrap_or_else(memory_limit::default_limit)
     }
@@ -509,7 +509,7 @@ impl Study {
     /// the file's text is included.
     pub fn to_record(&self) -> Json {
         let mut cases = Vec::new();
-        for index in 0..self.cases().min(MOST_RESOLVED) {
+        for index in 0..self.cases().min(MAX_RESOLVED_CASES) {
             if let Ok(case) = self.case(index) {
                 let quantities = case.parameters.iter().map(|(name, (si, d))| (name.clone(), quantity_json(*si, *d)));
                 cases.push(json!({
@@ -590,7 +590,7 @@ impl Study {
             for problem in problems.iter_mut().filter(|problem| !others.contains(problem)) {
                 problem.message = format!("{} ({})", problem.message, self.case_words(index));
                 if problem.help.is_none() && self.sample.is_some() {
-                    problem.help = Some(IMPOSSIBLE.to_owned());
+                    problem.help = Some(INVALID_DRAW_HELP.to_owned());
                 }
             }
         }
@@ -837,13 +837,13 @@ pub(crate) fn stated_parameters<'a>(
     parameters: &'a [Parameter],
     choice: &HashMap<usize, (&'a VariedParameter, usize)>,
 ) -> Vec<template_errors::StatedValue<'a>> {
-    let of = |quantity: &'a CompiledQuantity| {
+    let from_quantity = |quantity: &'a CompiledQuantity| {
         let CompiledQuantity { text, location, expression, .. } = quantity;
         template_errors::StatedValue { text, location, expression: Some(expression) }
     };
     let one = |(index, parameter): (usize, &'a Parameter)| match choice.get(&index) {
-        None => of(&parameter.quantity),
-        Some((VariedParameter { points: ParameterValues::List(list), .. }, point)) => of(&list[*point]),
+        None => from_quantity(&parameter.quantity),
+        Some((VariedParameter { points: ParameterValues::List(list), .. }, point)) => from_quantity(&list[*point]),
         Some((varied, _)) => {
             template_errors::StatedValue { text: "one of its values", location: &varied.location, expression: None }
         }

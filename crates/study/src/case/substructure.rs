@@ -12,16 +12,16 @@ use stickslip::structure::{Component, Reduction, ReductionKind};
 
 /// Default frequency range of a reduced model without joints, in multiples of the highest
 /// excitation frequency. The forces need one multiple; the rest is a margin.
-const HARMONICS: u32 = 5;
+const RANGE_WITHOUT_JOINTS: u32 = 5;
 /// Default range with joints, in the same multiples. The harmonics of friction fall with the
 /// square of their order. A mode near one of them amplifies it again.
 ///
 /// Measured on a chain of 60 masses, where a mode meets harmonic 7: ranges of 5, 9, 15 and 31
 /// harmonics left errors of 9e-3, 1e-3, 5e-5 and 5e-6.
-const HARMONICS_OF_JOINTS: u32 = 15;
+const RANGE_WITH_JOINTS: u32 = 15;
 /// Largest number of modes when the range is extended for joints. More modes make time
 /// integration slow, and the mesh rarely resolves the highest ones.
-const MODES_OF_HARMONICS: usize = 60;
+const MAX_MODES_WITH_JOINTS: usize = 60;
 /// Largest structure, in rows, that is not reduced by default if it has joints.
 ///
 /// A reduced model lacks modes that harmonics of friction meet: a chain of 80 masses with a
@@ -34,11 +34,11 @@ const MODES_OF_HARMONICS: usize = 60;
 /// - all rows, event-driven: 0.19, 0.26, 0.26, 3.2, 4.2 with one joint; 0.02, 0.05, 0.1, 12 and
 ///   more with ten;
 /// - all rows, `auto`: 0.02 to 0.1.
-const KEPT: usize = 100;
+const MAX_UNREDUCED_ROWS: usize = 100;
 /// Critical damping ratio: from here on a mode does not oscillate.
-const CRITICAL: f64 = 1.0;
+const CRITICAL_DAMPING_RATIO: f64 = 1.0;
 /// Names of the directions of a node with a normal.
-const IN_FRAME: [&str; 3] = ["t1", "t2", "n"];
+const FRAME_DIRECTIONS: [&str; 3] = ["t1", "t2", "n"];
 /// Names of the rows of a node with a normal.
 const CARTESIAN: [&str; 3] = ["x", "y", "z"];
 
@@ -59,7 +59,7 @@ pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
 ];
 
 /// No reduction; [`set_frequency_range`] sets the frequency up to which modes are damped.
-const WHOLE: Reduction = Reduction::None { up_to: 0.0 };
+const UNREDUCED: Reduction = Reduction::None { up_to: 0.0 };
 
 /// Builds the structure of `[structure]`. If the file does not state a reduction, [`set_frequency_range`]
 /// decides later.
@@ -77,7 +77,7 @@ pub(crate) fn structure_from_table(
         problems.push(Problem::new(table.location_of("stiffened", None), "stiffened", error.to_string()));
         component.clone()
     });
-    if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= CRITICAL) {
+    if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= CRITICAL_DAMPING_RATIO) {
         let message = format!("a damping ratio of {ratio}: from 1 on a mode does not oscillate");
         let problem = Problem::new(table.location_of("modal_damping", None), "modal_damping", message);
         problems.push(problem.help("write it in percent, as in modal_damping = \"0.1 %\""));
@@ -93,9 +93,9 @@ pub(crate) fn structure_from_table(
     let reduction = match (values.table("reduce"), values.flag("reduce")) {
         (Some(reduce), _) => stated_reduction(reduce).unwrap_or_else(|(key, message, help)| {
             problems.push(Problem::new(table.location_of("reduce", None), key, message).help(help));
-            WHOLE
+            UNREDUCED
         }),
-        (None, Some(false)) => WHOLE,
+        (None, Some(false)) => UNREDUCED,
         _ => Reduction::up_to(0.0),
     };
     let earlier = values.table("reduced").and_then(|reduced| {
@@ -163,11 +163,15 @@ pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &V
     let exact = method.quantity(WIDTH).is_none() && model.joints.iter().all(|joint| joint.law.pieces().is_some());
     let Some(Substructure { component, reduction, disk, .. }) = model.substructure.as_mut() else { return };
     if joints && exact && disk.is_none() && *reduction == Reduction::up_to(0.0) && is_unreduced(component) {
-        *reduction = WHOLE;
+        *reduction = UNREDUCED;
     }
     match reduction {
         Reduction::UpTo { up_to, .. } | Reduction::None { up_to } if *up_to <= 0.0 => {
-            *up_to = if joints { joint_frequency_range(component, excited) } else { f64::from(HARMONICS) * excited };
+            *up_to = if joints {
+                joint_frequency_range(component, excited)
+            } else {
+                f64::from(RANGE_WITHOUT_JOINTS) * excited
+            };
         }
         Reduction::Modes { up_to, .. } => *up_to = excited,
         _ => {}
@@ -177,16 +181,16 @@ pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &V
 /// Returns whether the structure is small and has a definite mass matrix, so that every method
 /// accepts all its rows.
 fn is_unreduced(component: &Component) -> bool {
-    component.dofs() <= KEPT && component.has_definite_mass()
+    component.dofs() <= MAX_UNREDUCED_ROWS && component.has_definite_mass()
 }
 
 /// Returns the upper end of the frequency range with joints, rad/s: the highest odd harmonic of
 /// `excited` (rad/s) up to which the number of modes stays within its limit.
 fn joint_frequency_range(component: &Component, excited: f64) -> f64 {
-    let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= MODES_OF_HARMONICS);
+    let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= MAX_MODES_WITH_JOINTS);
     let mut beyond =
-        (HARMONICS + 1..=HARMONICS_OF_JOINTS).rev().step_by(2).map(|harmonic| f64::from(harmonic) * excited);
-    beyond.find(few).unwrap_or(f64::from(HARMONICS) * excited)
+        (RANGE_WITHOUT_JOINTS + 1..=RANGE_WITH_JOINTS).rev().step_by(2).map(|harmonic| f64::from(harmonic) * excited);
+    beyond.find(few).unwrap_or(f64::from(RANGE_WITHOUT_JOINTS) * excited)
 }
 
 /// Builds a `[[place]]` of the structure; errors go to `problems`.
@@ -212,7 +216,7 @@ pub(crate) fn place(
 }
 
 /// Names of the directions of a rotated face of a plane node.
-const IN_PLANE: [&str; 2] = ["t", "n"];
+const PLANE_FRAME_DIRECTIONS: [&str; 2] = ["t", "n"];
 
 /// The element of which a `[[place]]` with `of` is a point or a face.
 enum ViewedElement<'a> {
@@ -317,8 +321,8 @@ pub(crate) fn place_on_element(table: &CompiledTable, values: &Values, model: &M
     let row = |along: &[f64; 3]| viewed.row(&axes, offset.unwrap_or_default(), along);
     let [first, second, normal] = frame.axes();
     let (rows, names) = match missing {
-        None => (vec![row(first), row(second), row(normal)], &IN_FRAME[..]),
-        Some(_) => (vec![row(first), row(normal)], &IN_PLANE[..]),
+        None => (vec![row(first), row(second), row(normal)], &FRAME_DIRECTIONS[..]),
+        Some(_) => (vec![row(first), row(normal)], &PLANE_FRAME_DIRECTIONS[..]),
     };
     let directions = values
         .names("directions")
@@ -382,7 +386,7 @@ fn directions(table: &CompiledTable, values: &Values) -> Result<(Vec<String>, Ve
     }
     let names = match (framed, &stated, values.names("dofs")) {
         (false, _, _) if values.names("dof").is_some() => stated.unwrap_or_default(),
-        (true, None, _) => owned(&IN_FRAME),
+        (true, None, _) => owned(&FRAME_DIRECTIONS),
         (_, Some(names), _) => names.clone(),
         // the ends of the names of rows, if they are distinct
         (false, None, Some(rows)) => {
@@ -526,9 +530,9 @@ fn node_row(component: &Component, table: &CompiledTable, node: &str, along: &st
 }
 
 /// Largest number of rows that a message lists.
-const LISTED: usize = 4;
+const MAX_LISTED_ROWS: usize = 4;
 /// Number of rows that are searched for a similar name; each takes a microsecond.
-const LOOKED_AT: usize = 200_000;
+const MAX_SEARCHED_ROWS: usize = 200_000;
 
 /// Returns the help for an unknown row: the rows of the same node, a similar name, or the first
 /// rows.
@@ -539,7 +543,7 @@ fn row_help(component: &Component, name: &str) -> String {
         .iter()
         .map(String::as_str)
         .filter(|row| row.rsplit_once('.').is_some_and(|(of, _)| of == node))
-        .take(2 * LISTED)
+        .take(2 * MAX_LISTED_ROWS)
         .collect();
     if !same.is_empty() {
         return format!(
@@ -547,12 +551,14 @@ fn row_help(component: &Component, name: &str) -> String {
             alternatives(same).replace(" or ", ", ")
         );
     }
-    match suggest(name, rows.iter().take(LOOKED_AT).map(String::as_str)) {
+    match suggest(name, rows.iter().take(MAX_SEARCHED_ROWS).map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`?"),
         None => {
-            let first = rows.iter().take(LISTED).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
+            let first = rows.iter().take(MAX_LISTED_ROWS).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
             match rows.last() {
-                Some(last) if rows.len() > LISTED => format!("its {} rows are {first}, … `{last}`", rows.len()),
+                Some(last) if rows.len() > MAX_LISTED_ROWS => {
+                    format!("its {} rows are {first}, … `{last}`", rows.len())
+                }
                 _ => format!("its rows are {first}"),
             }
         }

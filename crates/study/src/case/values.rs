@@ -215,7 +215,7 @@ pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, inde
         return if cycles { radians(value) } else { value };
     }
     let decimal = match usize::try_from(digits) {
-        Ok(digits @ ..=MOST_DECIMALS) => format!("{value:.digits$}"),
+        Ok(digits @ ..=MAX_DECIMALS) => format!("{value:.digits$}"),
         _ => format!("{value:e}"),
     };
     let unit = if dimension == Dimension::ANGLE { "deg" } else { "Hz" };
@@ -227,7 +227,7 @@ pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, inde
 
 /// Largest number of decimals. A value that needs more is far below 1 in its unit and stays as
 /// computed.
-const MOST_DECIMALS: usize = 300;
+const MAX_DECIMALS: usize = 300;
 
 /// One resolved value.
 #[derive(Debug, Clone, PartialEq)]
@@ -410,7 +410,7 @@ mod tests {
 
     /// Queries on a range do not visit its points: for this range, that would take hours.
     #[test]
-    fn ends_order_and_places_of_a_range_take_no_time() {
+    fn range_queries_do_not_visit_points() {
         let most = 1_000_000_000_000;
         let range = Frequencies::Range { from: TAU, to: 101.0 * TAU, points: most + 1 };
         assert_eq!((range.lowest(), range.highest(), range.is_rising()), (Some(TAU), Some(101.0 * TAU), true));

@@ -5,10 +5,10 @@
 
 use crate::case::study::{Case, Study};
 use crate::check::survey::{SurveyedCase, frequency_range};
-use crate::results::decimation::MOST_ROWS;
+use crate::results::decimation::MAX_ROWS;
 use crate::run::basis_check;
 use crate::run::output_columns;
-use crate::run::work::AHEAD;
+use crate::run::work::UNITS_AHEAD;
 use crate::syntax::error::{Problem, StudyError};
 use crate::syntax::format::format_bytes;
 use std::collections::BTreeSet;
@@ -36,10 +36,10 @@ const NUMBER: f64 = 8.0;
 /// Bytes of a word in a table: its handle and its heap allocation.
 const WORD: f64 = 56.0;
 /// Bytes of a cell as text in a CSV file. Measured: 85 for three numbers and a word.
-const WRITTEN: f64 = 20.0;
+const CSV_CELL_BYTES: f64 = 20.0;
 /// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in
 /// HTML.
-const DRAWN: f64 = 240.0;
+const FIGURE_POINT_BYTES: f64 = 240.0;
 /// Bytes of an orbit: of exact laws per entry of its state and per switch, of smooth laws per
 /// entry.
 ///
@@ -70,7 +70,7 @@ const SAMPLED: f64 = 1024.0;
 ///
 /// These are three matrices of the structure, the inverse mass, and the return map with its
 /// products, which has twice the rows.
-const IN_TIME: f64 = 16.0;
+const TIME_METHOD_MATRICES: f64 = 16.0;
 /// Bytes of the motion at one instant, per mass and joint.
 const SAMPLE: f64 = 64.0;
 /// Points per case of a curve with adaptive frequencies. Measured: 100 to 600 at tolerances of
@@ -318,7 +318,7 @@ impl<'a> CostInputs<'a> {
             let harmonics = self.case.method.options.get("harmonics").copied().unwrap_or(SERIES_HARMONICS);
             return self.series_bytes(harmonics) + SERIES_SAMPLES * self.joints;
         }
-        let matrices = IN_TIME * NUMBER * self.dofs * self.dofs;
+        let matrices = TIME_METHOD_MATRICES * NUMBER * self.dofs * self.dofs;
         matrices + if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + SWITCHES * self.joints) }
     }
 
@@ -350,7 +350,7 @@ impl Cost {
 
     /// Returns the cells of at most as many rows as a figure shows.
     fn figure_cells(&self, number: f64, word: f64) -> f64 {
-        let rows = |table: &TableShape| table.rows.min(MOST_ROWS as f64);
+        let rows = |table: &TableShape| table.rows.min(MAX_ROWS as f64);
         self.tables.iter().map(|table| rows(table) * (number * table.numbers + word * table.words)).sum()
     }
 }
@@ -359,12 +359,12 @@ impl CostInputs<'_> {
     /// Returns the size of a study of this cost, divided into `units` units of work.
     pub(crate) fn size(&self, cost: &Cost, units: usize) -> StudySize {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let tables = cost.cells(NUMBER + WRITTEN, WORD + WRITTEN);
+        let tables = cost.cells(NUMBER + CSV_CELL_BYTES, WORD + CSV_CELL_BYTES);
         // finished units wait until they are in order; a figure reads back at most
-        // [`MOST_ROWS`] rows of a table
-        let waiting = tables * ((AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
-        let shown = cost.figure_cells(NUMBER + WRITTEN, WORD + WRITTEN);
-        let drawn = DRAWN * cost.drawn.min(MOST_ROWS as f64 * (self.places + self.joints));
+        // [`MAX_ROWS`] rows of a table
+        let waiting = tables * ((UNITS_AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
+        let shown = cost.figure_cells(NUMBER + CSV_CELL_BYTES, WORD + CSV_CELL_BYTES);
+        let drawn = FIGURE_POINT_BYTES * cost.drawn.min(MAX_ROWS as f64 * (self.places + self.joints));
         let factor = self.factor_bytes;
         let factors = factor + (KEPT_FACTORS.0 * factor).min(KEPT_FACTORS.1);
         let working = units.min(threads) as f64 * (cost.unit + factors);
@@ -386,7 +386,7 @@ impl CostInputs<'_> {
         let preparing = self.cases * (PREPARING + modes + ASSEMBLING * elements);
         let writing = CELL * cost.cells(1.0, 1.0);
         OVERHEAD
-            + GENEROUS
+            + SAFETY_FACTOR
                 * (cost.work
                     + self.reduction_seconds()
                     + self.basis_check_seconds()
@@ -400,7 +400,7 @@ impl CostInputs<'_> {
     fn reduction_seconds(&self) -> f64 {
         let reduced = self.system().reduced().and(self.case.model.substructure.as_ref());
         let rows = reduced.map_or(0.0, |substructure| substructure.component.dofs() as f64);
-        MATRICES.0 * rows.powf(MATRICES.1) + SEEN * rows * self.places
+        MATRICES.0 * rows.powf(MATRICES.1) + PLACE_PER_ROW * rows * self.places
     }
 
     /// Returns the time of the basis check, s: points with slip are solved again in a larger
@@ -411,11 +411,11 @@ impl CostInputs<'_> {
         let harmonics = self.case.method.options.get("harmonics").filter(|_| self.is_series());
         let highest = harmonics.zip(self.range()).map(|(harmonics, (_, drive))| harmonics * drive);
         let within = highest.is_some_and(|highest| highest <= reduced.up_to());
-        if self.joints == 0.0 || within || rows > basis_check::ROWS || !self.study.kind().uses_method {
+        if self.joints == 0.0 || within || rows > basis_check::MAX_ROWS || !self.study.kind().uses_method {
             return 0.0;
         }
-        AGAIN.0 * self.reduction_seconds()
-            + AGAIN.1 * basis_check::checked_points(self.points(), self.cases) * self.orbit()
+        BASIS_CHECK.0 * self.reduction_seconds()
+            + BASIS_CHECK.1 * basis_check::checked_points(self.points(), self.cases) * self.orbit()
     }
 }
 
@@ -454,7 +454,7 @@ impl StudySize {
 // time
 
 /// Safety factor on times measured on one core of 2020: estimates are high rather than low.
-const GENEROUS: f64 = 2.0;
+const SAFETY_FACTOR: f64 = 2.0;
 /// Time for reading, drawing and writing, s.
 const OVERHEAD: f64 = 0.2;
 /// Time for one cell of a table and its text, s. Measured: 0.4 s for 200,000 rows of ten.
@@ -465,7 +465,7 @@ const POINT: f64 = 3e-6;
 /// frequency. Measured: 19 to 49 µs for the couple.
 const EVENT_DRIVEN: (f64, f64) = (3e-5, 2e-4);
 /// Factor on the time of an orbit that Newton's method finds only after waiting.
-const EVENTS_WAITED: f64 = 3.0;
+const WAITING_FACTOR: f64 = 3.0;
 /// Tolerance of harmonic balance at which its time was measured.
 const SERIES_TOLERANCE: f64 = 1e-3;
 /// Harmonic balance: time per mass and joint at 15 harmonics, s, in the hard case.
@@ -517,11 +517,11 @@ const RIGID_ORDER: f64 = 2.0 / 3.0;
 ///
 /// Such friction needs hundreds of harmonics and tens of thousands of samples. Typical: few are
 /// enough. Measured: 0.3 to 14.5 s per point with four to eight pairs.
-const BESIDE_RIGID: (f64, f64) = (0.0, 1.5);
+const MEMORY_LAWS_WITH_RIGID: (f64, f64) = (0.0, 1.5);
 /// Upper bound of that time per point, s.
 const BESIDE_RIGID_MOST: f64 = 15.0;
 /// Largest number of harmonics in harmonic balance.
-const MOST_HARMONICS: f64 = 511.0;
+const MAX_HARMONICS: f64 = 511.0;
 /// Order of the truncation error in the number of harmonics for forces with corners, and
 /// exponent of the time in the number of harmonics.
 ///
@@ -551,10 +551,10 @@ const COUPLED: f64 = 4e-8;
 /// Factors on the time of an orbit if only contacts hold some bodies of a structure that is not
 /// solved by one sector.
 ///
-/// With a warm start, and without one: no neighbouring frequency is within [`FAR`] widths of a
+/// With a warm start, and without one: no neighbouring frequency is within [`NEAR_WIDTHS`] widths of a
 /// resonance. Measured: 0.4 s and 4 s for 12 mistuned blades with wedges.
-const UNHELD: (f64, f64) = (14.0, 200.0);
-const FAR: f64 = 10.0;
+const CONTACT_HELD: (f64, f64) = (14.0, 200.0);
+const NEAR_WIDTHS: f64 = 10.0;
 /// Number of harmonics for which [`SERIES`] holds.
 const SERIES_HARMONICS: f64 = 15.0;
 /// Shooting: time per square of masses and joints, s, without and with internal states of the
@@ -608,12 +608,12 @@ const PATTERN: f64 = 6e-8;
 const PATTERNS: f64 = 2.0;
 /// Number of digits to which an undamped fast oscillation shortens the integration steps: the
 /// digits of the step tolerance.
-const RINGING: f64 = 9.0;
+const STEP_DIGITS: f64 = 9.0;
 /// Excitation periods whose integration takes as long as one oscillation of the fastest mode; a
 /// lower bound.
 ///
 /// Measured: 0.8 s for four masses, 1000 oscillations at 18 kHz in 8 periods at 151 Hz.
-const RUNG: f64 = 0.2;
+const FAST_OSCILLATION: f64 = 0.2;
 /// Equal steps per period, typical and hard, including the solutions with two and four times
 /// the steps.
 ///
@@ -631,7 +631,7 @@ const STEP: (f64, f64, f64) = (7.5e-7, 5e-8, 4e-9);
 ///
 /// Measured for returns of 4096 steps: 6 ms for two masses and a contact of two directions,
 /// 37 ms for 13 coordinates and a contact of three.
-const JUDGED: f64 = 4e-8;
+const STEP_DERIVATIVES: f64 = 4e-8;
 /// Time to resolve and assemble a case, s.
 const PREPARING: f64 = 2e-4;
 /// Time of the modes of a case, s, per cube of its masses. Measured: 0.35 s for 500.
@@ -642,13 +642,13 @@ const MODES: f64 = 2.8e-9;
 /// Measured: 0.2 s for 3,200 rows, 3 to 5 s for 28,000, 10 to 15 s for 70,000; 900 places of
 /// 31,500 rows take 7.
 const MATRICES: (f64, f64) = (2.4e-6, 1.4);
-const SEEN: f64 = 2e-7;
+const PLACE_PER_ROW: f64 = 2e-7;
 /// Basis check: time of the larger reduction in multiples of the first one, and time of a cold
 /// orbit in it in multiples of an orbit.
 ///
 /// Measured: twice as long for 3,200 rows; 57 instead of 10 coordinates of a chain of 300
 /// masses, 0.3 s instead of 0.03.
-const AGAIN: (f64, f64) = (2.0, 10.0);
+const BASIS_CHECK: (f64, f64) = (2.0, 10.0);
 /// Time to read, check and assemble, s, per mass and joint.
 const ASSEMBLING: f64 = 5e-5;
 /// Time to evaluate the motion at one instant, per mass and joint, s.
@@ -688,8 +688,8 @@ impl CostInputs<'_> {
     fn events(&self) -> f64 {
         let counted = ELIMINATED * event_driven::orbit_work(self.system()).unwrap_or(0.0);
         let far = event_driven::ALONE * counted;
-        let usual = if self.is_dense(FAR) { counted } else { far };
-        self.pace.select(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + EVENTS_WAITED * far)
+        let usual = if self.is_dense(NEAR_WIDTHS) { counted } else { far };
+        self.pace.select(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + WAITING_FACTOR * far)
     }
 
     /// Returns true if there are several frequencies, spaced by at most `widths` widths of a
@@ -715,7 +715,7 @@ impl CostInputs<'_> {
         if !contacts || survey.free().rigid == 0 || survey.system().cyclic().is_some() {
             return 1.0;
         }
-        self.pace.select(if self.is_dense(FAR) { UNHELD.0 } else { UNHELD.1 }, 1.0)
+        self.pace.select(if self.is_dense(NEAR_WIDTHS) { CONTACT_HELD.0 } else { CONTACT_HELD.1 }, 1.0)
     }
 
     /// Returns the number of steps along a curve: `usual` in the typical case, otherwise
@@ -740,13 +740,13 @@ impl CostInputs<'_> {
             (false, false, _) => 1.0,
             (_, _, None) => HARD,
             (true, _, Some(_)) => HARD_SMOOTH,
-            (false, true, Some(_)) if self.is_dense(FAR) => HARD_RIGID.0,
+            (false, true, Some(_)) if self.is_dense(NEAR_WIDTHS) => HARD_RIGID.0,
             (false, true, Some(_)) => self.pace.select(HARD_RIGID.1, HARD_RIGID.0),
         };
         let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
         let length = match harmonics {
             Some(harmonics) => harmonics / SERIES_HARMONICS,
-            None => (SERIES_TOLERANCE / asked).powf(SERIES_ORDER.recip()).min(MOST_HARMONICS / SERIES_HARMONICS),
+            None => (SERIES_TOLERANCE / asked).powf(SERIES_ORDER.recip()).min(MAX_HARMONICS / SERIES_HARMONICS),
         };
         // friction that falls with velocity is hard to solve in the typical case too
         let usual = if self.falling_friction { SERIES } else { SERIES_USUAL };
@@ -782,7 +782,7 @@ impl CostInputs<'_> {
         let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
         let longest =
             self.pace.select(RIGID_HARMONICS.0, RIGID_HARMONICS.1) * (SERIES_TOLERANCE / asked).powf(RIGID_ORDER);
-        let longest = longest.min(MOST_HARMONICS);
+        let longest = longest.min(MAX_HARMONICS);
         let each = self.pace.select(RIGID_EACH.0, RIGID_EACH.1);
         let sought = each * harmonic_balance::doubling_work(system, longest);
         ELIMINATED * sought.min(harmonic_balance::most_work(system))
@@ -800,7 +800,7 @@ impl CostInputs<'_> {
         }
         let remembers = |law: &&SharedLaw| law.step().is_some() || law.rate().is_some_and(|rate| rate.states() > 0);
         let pairs: usize = laws().filter(remembers).map(|law| law.directions().pow(2)).sum();
-        (self.pace.select(BESIDE_RIGID.0, BESIDE_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
+        (self.pace.select(MEMORY_LAWS_WITH_RIGID.0, MEMORY_LAWS_WITH_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
     }
 
     /// Returns the time to factor the dynamic stiffness for one orbit, s; zero if no factor is
@@ -838,7 +838,7 @@ impl CostInputs<'_> {
     /// Returns zero if the check takes no time compared with the orbit.
     fn return_check(&self) -> f64 {
         let Some((steps, with_derivatives)) = evidence_steps(self.system()) else { return 0.0 };
-        let derivatives = if with_derivatives { JUDGED * self.dofs.powi(2) } else { 0.0 };
+        let derivatives = if with_derivatives { STEP_DERIVATIVES * self.dofs.powi(2) } else { 0.0 };
         steps as f64 * (self.step() + derivatives)
     }
 
@@ -868,8 +868,8 @@ impl CostInputs<'_> {
     fn fast_mode_factor(&self) -> f64 {
         let drive = self.range().map_or(self.slowest_mode(), |(lowest, _)| lowest);
         let modes = &self.surveyed.survey.stuck().elastic;
-        let rings = modes.iter().filter(|mode| TAU * mode.damping * mode.omega < RINGING * LN_10 * drive);
-        (RUNG * rings.map(|mode| mode.omega).fold(drive, f64::max) / drive.max(f64::MIN_POSITIVE)).max(1.0)
+        let rings = modes.iter().filter(|mode| TAU * mode.damping * mode.omega < STEP_DIGITS * LN_10 * drive);
+        (FAST_OSCILLATION * rings.map(|mode| mode.omega).fold(drive, f64::max) / drive.max(f64::MIN_POSITIVE)).max(1.0)
     }
 
     /// Returns the smallest modal damping ratio with all joints free.

@@ -2,11 +2,11 @@
 
 /// Default memory limit of a run, bytes. The limit is lower if the machine has less free
 /// memory.
-pub const MEMORY_LIMIT: u64 = 2_000_000_000;
+pub const DEFAULT_MEMORY_LIMIT: u64 = 2_000_000_000;
 
-/// Returns the default limit: [`MEMORY_LIMIT`], or the machine's free memory if that is less.
+/// Returns the default limit: [`DEFAULT_MEMORY_LIMIT`], or the machine's free memory if that is less.
 pub(crate) fn default_limit() -> u64 {
-    MEMORY_LIMIT.min(available_memory().unwrap_or(MEMORY_LIMIT))
+    DEFAULT_MEMORY_LIMIT.min(available_memory().unwrap_or(DEFAULT_MEMORY_LIMIT))
 }
 
 /// Returns the available memory of the machine, bytes; `None` if the system is not Linux.

@@ -67,15 +67,16 @@ pub(crate) fn overstiff_element(model: &Model, omega: f64) -> Option<ModelError>
 }
 
 /// Share of a motion that rounding may reach because of a mode far below the excitation.
-const LOST: f64 = 1e-6;
+const ROUNDING_SHARE: f64 = 1e-6;
 
 /// Returns the error of a spring whose stiffness is lost in the rounding of the inertia at
 /// `omega`, rad/s.
 ///
-/// The condition is `ε √(m Ω²/k) >` [`LOST`] for the stiffest element of a mass. Returns `None`
+/// The condition is `ε √(m Ω²/k) >` [`ROUNDING_SHARE`] for the stiffest element of a mass. Returns `None`
 /// without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
-    let lost = |held: &AttachedMass<'_>| f64::EPSILON * omega > LOST * (held.stiffness / held.mass.mass).sqrt();
+    let lost =
+        |held: &AttachedMass<'_>| f64::EPSILON * omega > ROUNDING_SHARE * (held.stiffness / held.mass.mass).sqrt();
     let AttachedMass { mass, stiffness, element: by } = attached_masses(model).find(lost)?;
     let message = format!(
         "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
@@ -96,7 +97,7 @@ fn element_error(by: Element, message: String) -> ModelError {
 
 /// Factor of inertia over rounding at the suggested frequency; the motion is still quasi-static
 /// there.
-const SEEN: f64 = 100.0;
+const INERTIA_MARGIN: f64 = 100.0;
 
 /// Returns the error of an excitation frequency `omega`, rad/s, that is too slow for every
 /// mass.
@@ -115,7 +116,7 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
     }
     let (own, name) = softest?;
     let shown = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
-    let enough = TAU * 10f64.powf((SEEN.sqrt() * slowest / TAU).log10().ceil());
+    let enough = TAU * 10f64.powf((INERTIA_MARGIN.sqrt() * slowest / TAU).log10().ceil());
     let message = format!(
         "at {} inertia has no effect, because it is lost in rounding; the lowest natural frequency of a single mass is \
          {}, that of `{name}`",

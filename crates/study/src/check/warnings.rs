@@ -3,7 +3,7 @@
 use crate::case::values::{Frequencies, Values};
 use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::syntax::format::{format_significant, format_with_prefix};
-use crate::syntax::key::MOST_POINTS;
+use crate::syntax::key::MAX_POINTS;
 use std::f64::consts::TAU;
 use stickslip::curve::modes::unit;
 use stickslip::model::{Cyclic, LinearMode, Modes};
@@ -147,7 +147,7 @@ fn coarse_frequencies(cases: &[SurveyedCase]) -> Option<String> {
     let (from, to) = frequency_range(&cases[0].case)?;
     let hertz = |omega: f64, digits: i32| format_significant(omega / TAU, digits);
     let step = (to - from) / (points - 1) as f64;
-    let several = if enough <= MOST_POINTS as f64 {
+    let several = if enough <= MAX_POINTS as f64 {
         format!("{enough} points are enough")
     } else {
         "use a narrower range".to_owned()
@@ -190,8 +190,8 @@ fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
         let turns = Cyclic { sectors, order }.diameter(harmonic as usize);
         waves.iter().find(|wave| wave.diameter == turns.min(sectors - turns))
     };
-    let of = |harmonic: u32| met(harmonic).map(|wave| resonances(&wave.free, &wave.stuck, harmonic));
-    narrowest_of(harmonics.iter().filter_map(|harmonic| of(*harmonic)).flatten(), (from, to, points))
+    let resonances_of = |harmonic: u32| met(harmonic).map(|wave| resonances(&wave.free, &wave.stuck, harmonic));
+    narrowest_of(harmonics.iter().filter_map(|harmonic| resonances_of(*harmonic)).flatten(), (from, to, points))
 }
 
 /// Returns the excitation frequencies at which a harmonic meets each mode: the lower and the
@@ -225,12 +225,12 @@ fn narrowest_of(
 }
 
 /// Fraction of the first slip below which a range of amplitudes shows a linear mode only.
-const STICKS: f64 = 0.99;
+const NO_SLIP_FRACTION: f64 = 0.99;
 
 /// Multiple of the largest requested amplitude above which the first slip is due to rounding. A
 /// mode of a symmetric structure that does not move its joints still loads them by the rounding
 /// errors of its shape.
-const UNLOADED: f64 = 1e6;
+const ROUNDING_SLIP_FACTOR: f64 = 1e6;
 
 /// Warnings of a nonlinear mode: its amplitudes end before any joint slips, or a constant force
 /// acts on the structure.
@@ -257,14 +257,14 @@ fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {
         let to = values.table("amplitude")?.quantity("to")?;
         // the range is that of the place with the largest motion in the mode without joints
         let slip = one.survey.slip_amplitude(number)? / unit(one.survey.system(), number).ok()??;
-        if slip * STICKS <= to {
+        if slip * NO_SLIP_FRACTION <= to {
             return None;
         }
         if slip < needed {
             (needed, asked) = (slip, to);
         }
     }
-    if needed > UNLOADED * asked {
+    if needed > ROUNDING_SLIP_FACTOR * asked {
         return Some("no joint slips in this mode at any amplitude: its motion does not load the joints".to_owned());
     }
     Some(format!(

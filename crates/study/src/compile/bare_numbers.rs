@@ -21,9 +21,9 @@ pub(crate) fn bare_number_problem<'a>(
     let all: Vec<&CompiledQuantity> = all.into_iter().collect();
     // a bare frequency is in Hz
     let bare = |dimension| if matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE) { TAU } else { 1.0 };
-    let counts_so = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= ROUNDING;
+    let is_bare_unit = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= ROUNDING;
     // no problem if one of the quantities has the unit in which a bare number counts
-    if all.iter().filter_map(|q| literal_unit(q)).any(|(_, factor, dimension)| counts_so(factor, dimension)) {
+    if all.iter().filter_map(|q| literal_unit(q)).any(|(_, factor, dimension)| is_bare_unit(factor, dimension)) {
         return None;
     }
     let (unit, _, dimension) = all.iter().find_map(|quantity| literal_unit(quantity))?;

@@ -275,8 +275,10 @@ impl CompiledValue {
                 check_range(start, end, to, Some(Dimension::FREQUENCY))?;
                 let share =
                     tolerance.number("tolerance", (Dimension::NONE, Bounds::Positive), "\"1 %\"", environment)?;
-                if !(FINEST..=COARSEST).contains(&share) {
-                    let message = format!("must lie between {FINEST} and {COARSEST}, found {share}");
+                if !(MIN_ADAPTIVE_TOLERANCE..=MAX_ADAPTIVE_TOLERANCE).contains(&share) {
+                    let message = format!(
+                        "must lie between {MIN_ADAPTIVE_TOLERANCE} and {MAX_ADAPTIVE_TOLERANCE}, found {share}"
+                    );
                     return Err(tolerance.problem("tolerance", message).help("1 % makes a smooth figure"));
                 }
                 ResolvedValue::Frequencies(Frequencies::Adaptive { from: start, to: end, tolerance: share })
@@ -360,8 +362,8 @@ fn law(
 
 /// Bounds of the tolerance of adaptive frequencies. A finer tolerance costs too many points, a
 /// coarser one hides the shape of the curve.
-const FINEST: f64 = 1e-5;
-const COARSEST: f64 = 0.5;
+const MIN_ADAPTIVE_TOLERANCE: f64 = 1e-5;
+const MAX_ADAPTIVE_TOLERANCE: f64 = 0.5;
 
 /// Refuses a range whose end is not above its start.
 pub(crate) fn check_range(

@@ -74,23 +74,23 @@ impl Iteration<'_> {
     /// [`TextError`] with the byte range of `text` that is wrong.
     pub fn name(&self, text: &str) -> Result<String, TextError> {
         let mut name = String::new();
-        let mut at = 0;
-        while let Some(open) = text[at..].find('{').map(|i| at + i) {
+        let mut position = 0;
+        while let Some(open) = text[position..].find('{').map(|i| position + i) {
             let Some(close) = text[open..].find('}').map(|i| open + i) else {
                 return Err(
                     TextError::new(open..text.len(), "this brace is not closed").help("write it as in \"blade{i}\"")
                 );
             };
-            name.push_str(&text[at..open]);
+            name.push_str(&text[position..open]);
             let inner = &text[open + 1..close];
             let value = self.whole_number(inner).map_err(|mut fault| {
                 fault.span = open + 1 + fault.span.start..open + 1 + fault.span.end;
                 fault
             })?;
             name.push_str(&value.to_string());
-            at = close + 1;
+            position = close + 1;
         }
-        name.push_str(&text[at..]);
+        name.push_str(&text[position..]);
         Ok(name)
     }
 

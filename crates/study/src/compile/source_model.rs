@@ -154,7 +154,7 @@ impl ModelLists {
             });
             for entry in table.entries.iter_mut().filter(|_| turned) {
                 if let CompiledValue::Quantity { dimension, example, .. } = &mut entry.value
-                    && let Some(of_rotation) = OF_ROTATIONS.iter().find(|row| row.displacement == *dimension)
+                    && let Some(of_rotation) = ROTATION_DIMENSIONS.iter().find(|row| row.displacement == *dimension)
                 {
                     (*dimension, *example) = (of_rotation.rotation, of_rotation.example);
                 }
@@ -184,7 +184,7 @@ struct RotationDimension {
 }
 
 /// The pairs of dimensions.
-const OF_ROTATIONS: [RotationDimension; 4] = [
+const ROTATION_DIMENSIONS: [RotationDimension; 4] = [
     RotationDimension { displacement: Dimension::LENGTH, rotation: Dimension::ANGLE, example: "\"0.1 deg\"" },
     RotationDimension { displacement: Dimension::FORCE, rotation: Dimension::ENERGY, example: "\"2 N m\"" },
     RotationDimension {
@@ -279,7 +279,7 @@ pub(crate) fn model_problem(structure: &SourceModel, error: &ModelError, model: 
 }
 
 /// Number of lowest frequencies that a message shows if a structure cannot be reduced.
-const LOWEST: usize = 3;
+const SHOWN_FREQUENCIES: usize = 3;
 
 /// Returns the message and the help for a structure without any frequency that limits its
 /// reduction.
@@ -311,9 +311,9 @@ fn reduction_advice(model: &Model) -> Option<String> {
         );
     }
     let component = &substructure.component;
-    let lowest = component.frequencies(LOWEST).ok()?;
+    let lowest = component.frequencies(SHOWN_FREQUENCIES).ok()?;
     let listed: Vec<String> = lowest.iter().map(|omega| quantity_text(*omega, Some(Dimension::FREQUENCY))).collect();
-    let absurd = lowest.iter().all(|omega| *omega < SLOWEST);
+    let absurd = lowest.iter().all(|omega| *omega < MIN_PLAUSIBLE_FREQUENCY);
     let (mass, _, stiffness) = component.matrices();
     let exchanged = || Component::new(component.rows().to_vec(), stiffness.clone(), None, mass.clone()).ok();
     let advice = match absurd.then(exchanged).flatten().as_ref().and_then(plausible_frequencies) {
@@ -326,15 +326,16 @@ fn reduction_advice(model: &Model) -> Option<String> {
 }
 
 /// Limits of plausible frequencies of a structure, rad/s.
-const SLOWEST: f64 = 1e-3 * std::f64::consts::TAU;
-const FASTEST: f64 = 1e8 * std::f64::consts::TAU;
+const MIN_PLAUSIBLE_FREQUENCY: f64 = 1e-3 * std::f64::consts::TAU;
+const MAX_PLAUSIBLE_FREQUENCY: f64 = 1e8 * std::f64::consts::TAU;
 
 /// Returns the lowest frequencies of a component (rad/s) if they are plausible: one within the
 /// limits, none above.
 pub(crate) fn plausible_frequencies(component: &Component) -> Option<Vec<f64>> {
-    let lowest = component.frequencies(LOWEST.min(component.dofs())).ok()?;
-    let elastic = |omega: &&f64| (SLOWEST..=FASTEST).contains(*omega);
-    (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= FASTEST)).then_some(lowest)
+    let lowest = component.frequencies(SHOWN_FREQUENCIES.min(component.dofs())).ok()?;
+    let elastic = |omega: &&f64| (MIN_PLAUSIBLE_FREQUENCY..=MAX_PLAUSIBLE_FREQUENCY).contains(*omega);
+    (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= MAX_PLAUSIBLE_FREQUENCY))
+        .then_some(lowest)
 }
 
 /// Returns the advice to exchange the files of stiffness and mass, with the frequencies that

@@ -18,7 +18,7 @@ use crate::results::drawing::{CaseRows, FigureInput, largest, numbers, words};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::key::SPEEDS;
+use crate::syntax::key::SPEED_RANGE;
 use crate::syntax::key::{ValueType, default, required};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -42,7 +42,7 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             required(
                 "speed",
-                ValueType::Frequencies(SPEEDS),
+                ValueType::Frequencies(SPEED_RANGE),
                 "speeds of rotation as frequencies; zero is allowed",
                 "{ from = \"10 Hz\", to = \"120 Hz\", points = 56 }",
             ),
@@ -181,10 +181,10 @@ fn excited_modes(
 /// Typical number of evaluations per crossing.
 const REFINED: f64 = 4.0;
 /// Largest number of evaluations per crossing.
-const MOST_REFINED: usize = 60;
+const MAX_REFINED: usize = 60;
 /// Relative change of the speed at which the search for a crossing stops: a hundred times the
 /// observed rounding of the frequencies.
-const FOUND: f64 = 1e-11;
+const CROSSING_TOLERANCE: f64 = 1e-11;
 
 /// The evaluation of one case over its speeds.
 struct CampbellDiagram<'a> {
@@ -225,15 +225,15 @@ impl CampbellDiagram<'_> {
         let excess = |speed: f64, mode: &NaturalFrequency| (mode.omega - order * speed) * (mode.omega + order * speed);
         let (mut at_a, mut at_b) = (excess(a, one), excess(b, other));
         let (mut last, mut slow) = (f64::NAN, 0);
-        for _ in 0..MOST_REFINED {
+        for _ in 0..MAX_REFINED {
             if at_a == 0.0 {
                 return Ok(a);
             }
             let secant = (a * a - at_a * (b * b - a * a) / (at_b - at_a)).sqrt();
             let next = if slow < 2 { secant.clamp(a.min(b), a.max(b)) } else { 0.5 * (a + b) };
             // at an end of the interval only rounding remains
-            let near = [a, b, last].into_iter().any(|known| (next - known).abs() <= FOUND * next.abs());
-            if near || (b - a).abs() <= FOUND * b.abs() {
+            let near = [a, b, last].into_iter().any(|known| (next - known).abs() <= CROSSING_TOLERANCE * next.abs());
+            if near || (b - a).abs() <= CROSSING_TOLERANCE * b.abs() {
                 return Ok(next);
             }
             last = next;
@@ -349,7 +349,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let speeds = numbers(table, SPEED, stretch.rows.clone());
         let (low, high) = speeds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
         let highest = series.iter().flat_map(|line| &line.y).copied().fold(0.0, f64::max);
-        let top = ROOM * highest;
+        let top = PANEL_TOP * highest;
         for order in 1..=orders {
             // the line ends at the highest speed or at the top of the panel
             let end = (high * x_factor).min(top * x_factor / (order as f64 * y_factor));
@@ -375,7 +375,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
 }
 
 /// Top of the panel as a multiple of the highest frequency.
-const ROOM: f64 = 1.1;
+const PANEL_TOP: f64 = 1.1;
 
 fn frequencies(
     table: &Table,

@@ -11,7 +11,7 @@ use crate::kinds::kind::Kind;
 use crate::results::columns::{amplitude_in, amplitude_of, first_harmonic_in, first_harmonic_of, phase_of};
 use crate::results::dataset::{Axis, CellValues, Figure, Panel, Series, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join_title, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, join_title, largest, numbers};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
@@ -25,12 +25,12 @@ use stickslip::model::Model;
 const LENGTH: ValueType = ValueType::Quantity(Dimension::LENGTH, Bounds::Positive);
 
 /// Largest number of points of one mode.
-const MOST_POINTS: i64 = 10_000;
+const MAX_POINTS: i64 = 10_000;
 
 const AMPLITUDE: &[Key] = &[
     required("from", LENGTH, "smallest amplitude", "\"1 um\""),
     required("to", LENGTH, "largest amplitude", "\"10 mm\""),
-    default("points", ValueType::Count(2, MOST_POINTS), "61", "points, evenly spaced in the logarithm", "61"),
+    default("points", ValueType::Count(2, MAX_POINTS), "61", "points, evenly spaced in the logarithm", "61"),
 ];
 
 pub(super) const KIND: Kind = Kind {
@@ -66,7 +66,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// Solutions of the full equations per point. Measured: 0.3 s per point for a disk of 24
 /// sectors.
-const FOLLOWED: f64 = 8.0;
+const SOLUTIONS_PER_POINT: f64 = 8.0;
 /// Steps of the curve from its large end, independent of the request: typical, and with close
 /// modes.
 const STEPS: (f64, f64) = (100.0, 200.0);
@@ -86,7 +86,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
         conditional_work: None,
-        work: (rows * FOLLOWED + costing.cases * costing.steps(STEPS))
+        work: (rows * SOLUTIONS_PER_POINT + costing.cases * costing.steps(STEPS))
             * (costing.series(Some(harmonics)) + elimination),
     }
 }
@@ -115,7 +115,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let unit = unit(&prepared.system, number(prepared)).map_err(|error| (prepared.case.index, error))?;
     let Some(unit) = unit else {
         (work.context.finished)();
-        part.count(|| location_of(prepared), "failed", Some(UNSEEN.to_owned()));
+        part.count(|| location_of(prepared), "failed", Some(NO_SUCH_MODE.to_owned()));
         part.tables = vec![TableBuilder::default(), TableBuilder::default()];
         return Ok(part);
     };
@@ -167,7 +167,7 @@ fn number(prepared: &PreparedCase) -> usize {
 }
 
 /// Error text for a mode without a displacement at any place.
-const UNSEEN: &str = "the structure has no such mode, or no place moves in it; choose another mode, or add a \
+const NO_SUCH_MODE: &str = "the structure has no such mode, or no place moves in it; choose another mode, or add a \
     [[place]] that moves in this mode";
 
 /// Computes the mode.
@@ -230,7 +230,7 @@ fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
 
 /// Damping ratio of the joints, absolute, below which no joint slips. Solutions are accurate to
 /// 1e-11.
-const SLIPS: f64 = 1e-9;
+const NO_SLIP_DAMPING: f64 = 1e-9;
 
 /// Returns the notes about a computed mode.
 fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
@@ -253,7 +253,7 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
         remarks.push(text.to_owned());
     }
     let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
-    if !mode.points.is_empty() && joints.fold(0.0, f64::max) < SLIPS {
+    if !mode.points.is_empty() && joints.fold(0.0, f64::max) < NO_SLIP_DAMPING {
         remarks.push("no joint slips in this amplitude range, so the joints add no damping.".to_owned());
     }
     remarks
@@ -321,7 +321,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
     }
     let mut panels = both(&stretches, "");
-    if panels.len() + 2 * stretches.len() <= MOST_PANELS {
+    if panels.len() + 2 * stretches.len() <= MAX_PANELS {
         panels.extend(
             stretches
                 .iter()

@@ -10,7 +10,7 @@ use crate::kinds::kind::Kind;
 use crate::results::columns::{FREQUENCY, phase_of, shape_of};
 use crate::results::dataset::{Axis, Figure, Panel, Series, Style, Table};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join_title, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, join_title, largest, numbers, words};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::format_significant;
@@ -26,7 +26,7 @@ const JOINTS: &str = "joints";
 /// Both states of the joints, as written in the column `joints`.
 pub(super) const STATES: [&str; 2] = ["free", "stuck"];
 /// Largest number of shapes drawn per case.
-const WHEELS: usize = 4;
+const MAX_SHAPES: usize = 4;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -121,7 +121,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows,
         unit: if each > SPARSE { FACTOR * each } else { 8.0 * each * each },
         conditional_work: None,
-        work: costing.cases * waves * if each > SPARSE { LOWEST * each.powf(1.5) } else { EIGEN * each.powi(3) },
+        work: costing.cases * waves * if each > SPARSE { LOWEST_MODES * each.powf(1.5) } else { EIGEN * each.powi(3) },
     }
 }
 
@@ -131,7 +131,7 @@ const SPARSE: f64 = 700.0;
 const EIGEN: f64 = 1e-8;
 /// Time of the lowest modes of a wave, free and stuck, per size to the power of 1.5, s.
 /// Measured: 8 s for a sector of 1935 rows in seven waves.
-const LOWEST: f64 = 4.6e-6;
+const LOWEST_MODES: f64 = 4.6e-6;
 /// Bytes of matrices and factors per row. Measured: 0.7 GB for 61,000 rows.
 const FACTOR: f64 = 12e3;
 
@@ -222,7 +222,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         ..Panel::default()
     };
     let stretches = drawing.case_rows(table);
-    let room = stretches.len() * (1 + WHEELS) <= MOST_PANELS;
+    let room = stretches.len() * (1 + MAX_SHAPES) <= MAX_PANELS;
     let of_case = |stretch: &CaseRows, title: String| {
         let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
         std::iter::once(panel(stretch, title)).chain(shapes).collect::<Vec<_>>()
@@ -270,7 +270,7 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, stretch: &CaseRows) -> Vec<P
             [stretch.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
         disk_shape::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join_title(title), STATES.len())
     };
-    stretch.rows.clone().filter(wanted).take(WHEELS).filter_map(wheel).collect()
+    stretch.rows.clone().filter(wanted).take(MAX_SHAPES).filter_map(wheel).collect()
 }
 
 fn lines(table: &Table, stretch: &CaseRows, factor: f64) -> Vec<Series> {

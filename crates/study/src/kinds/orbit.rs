@@ -9,7 +9,7 @@ use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::draw_panels;
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, join_title, largest, numbers};
+use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, join_title, largest, numbers};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::{PointRow, describe_location};
@@ -23,7 +23,7 @@ use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 /// Length of the state, with the states of joints, up to which the return of an orbit is
 /// checked for every method. Measured: 12 s for a mistuned ring of 48 blades and joints, whose
 /// state has length 144.
-const FOLLOWED: usize = 200;
+const MAX_CHECKED_STATES: usize = 200;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -89,7 +89,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
         let mut row = PointRow::with_stability(prepared, &orbit, stable);
-        if orbit.start.len() <= FOLLOWED {
+        if orbit.start.len() <= MAX_CHECKED_STATES {
             row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
         }
         row.write(prepared, &mut summary);
@@ -213,7 +213,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     };
     let of_case = |stretch: &CaseRows, title: String| -> Vec<Panel> {
         let mut from = stretch.rows.start;
-        let runs = frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b).take(MOST_PANELS);
+        let runs = frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b).take(MAX_PANELS);
         let of_run = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
@@ -222,6 +222,6 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         runs.flat_map(of_run).collect()
     };
     let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);
-    panels.truncate(MOST_PANELS);
+    panels.truncate(MAX_PANELS);
     Figure { panels, ..Figure::default() }
 }

@@ -2,7 +2,7 @@
 //! switched-on excitation, or run-up.
 
 use super::orbit::write_sample;
-use super::shared::keys::MOST_SAMPLES;
+use super::shared::keys::MAX_SAMPLES;
 use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, begin_values, held_equilibrium, state_vector};
 use crate::case::names::ModelNames;
 use crate::case::values::{Values, hertz};
@@ -15,14 +15,14 @@ use crate::results::dataset::{Axis, Figure, Panel, Series, Table};
 use crate::results::decay::{Decay, PlaceMotionFn};
 use crate::results::draw_panels;
 use crate::results::drawing::{
-    CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, evenly_chosen, join_title, largest, numbers, words,
+    CaseRows, FigureInput, MAX_CURVES, MAX_PANELS, evenly_chosen, join_title, largest, numbers, words,
 };
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::describe_location;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::{format_hertz, prefixed_unit};
-use crate::syntax::key::RANGE;
+use crate::syntax::key::FREQUENCY_RANGE;
 use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -36,7 +36,7 @@ const FREQUENCY: ValueType = ValueType::Quantity(Dimension::FREQUENCY, Bounds::P
 const DURATION: ValueType = ValueType::Quantity(Dimension::TIME, Bounds::Positive);
 
 /// Largest number of samples of one transient.
-const MOST_STEPS: f64 = 1e7;
+const MAX_STEPS: f64 = 1e7;
 
 const RUN_UP: &[Key] = &[
     required("from", FREQUENCY, "excitation frequency at the start", "\"110 Hz\""),
@@ -51,7 +51,7 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             optional(
                 "frequency",
-                ValueType::Frequencies(RANGE),
+                ValueType::Frequencies(FREQUENCY_RANGE),
                 "excitation frequency; without it and without `run_up` the motion is a free decay",
                 "\"121 Hz\"",
             ),
@@ -85,7 +85,7 @@ pub(super) const KIND: Kind = Kind {
             ),
             default(
                 "samples_per_cycle",
-                ValueType::Count(8, MOST_SAMPLES),
+                ValueType::Count(8, MAX_SAMPLES),
                 "64",
                 "points of the table per excitation period (for a run-up: of its highest frequency)",
                 "64",
@@ -142,7 +142,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
             TableShape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
             TableShape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
         ],
-        drawn: points.min(MOST_PANELS as f64) * samples * costing.places,
+        drawn: points.min(MAX_PANELS as f64) * samples * costing.places,
         unit: 0.0,
         conditional_work: None,
         work: points * (periods * costing.period() + costing.patterns(periods) + costing.evaluation(samples)),
@@ -193,8 +193,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
         let help = "add `time_step`, for example \"0.1 ms\"";
         return Err(KeyError::new("time_step", "a free decay has no period to divide into samples", help));
     };
-    if time / step > MOST_STEPS {
-        let message = format!("the study needs {:.3e} samples; the limit is {MOST_STEPS:e}", time / step);
+    if time / step > MAX_STEPS {
+        let message = format!("the study needs {:.3e} samples; the limit is {MAX_STEPS:e}", time / step);
         return Err(KeyError::new("duration", message, "shorten `duration` or use fewer samples"));
     }
     Ok(())
@@ -388,7 +388,7 @@ fn damping(drawing: &FigureInput<'_>, table: &Table, places: &[String]) -> Panel
         title: "damping of each cycle".to_owned(),
         x: Axis::new("amplitude", unit).log(),
         y: Axis::new("equivalent damping ratio", "%"),
-        series: evenly_chosen(&stretches, MOST_CURVES).iter().enumerate().map(line).collect(),
+        series: evenly_chosen(&stretches, MAX_CURVES).iter().enumerate().map(line).collect(),
         ..Panel::default()
     }
 }
@@ -424,12 +424,11 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
             panel(join_title([title.clone(), format!("frequency = {}", format_hertz(run[0]))]), rows)
         };
         let runs = drives[stretch.rows.clone()].chunk_by(|a, b| a == b);
-        runs.take(MOST_PANELS).map(of_drive).collect()
+        runs.take(MAX_PANELS).map(of_drive).collect()
     };
     let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);
-    panels.truncate(MOST_PANELS);
-    if let Some(decay) =
-        drawing.table("decay").filter(|_| drawing.study.draws().is_none() && panels.len() < MOST_PANELS)
+    panels.truncate(MAX_PANELS);
+    if let Some(decay) = drawing.table("decay").filter(|_| drawing.study.draws().is_none() && panels.len() < MAX_PANELS)
     {
         panels.push(damping(drawing, decay, system.places()));
     }

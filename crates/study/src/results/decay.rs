@@ -14,7 +14,7 @@
 use std::f64::consts::TAU;
 
 /// Swings below this share of the largest swing count as rest.
-const REST: f64 = 1e-9;
+const SMALLEST_SWING: f64 = 1e-9;
 
 /// One cycle of a decay.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +74,7 @@ impl Decay {
 
     /// Returns the consecutive cycles until the motion rests.
     pub fn cycles(&self) -> Vec<Cycle> {
-        let least = REST * self.largest();
+        let least = SMALLEST_SWING * self.largest();
         let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
         let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
         let (swings, turns) = (&swings[..moves], &self.turns);
@@ -127,7 +127,7 @@ fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64
 /// The motion has velocity `v0` at the first time; the search ends where the velocity in the
 /// direction of `v0` vanishes.
 fn turning_point(motion: &PlaceMotionFn<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
         if motion(middle)[1] * v0 > 0.0 { low = middle } else { high = middle }
     }
@@ -136,7 +136,7 @@ fn turning_point(motion: &PlaceMotionFn<'_>, [mut low, mut high]: [f64; 2], v0: 
 }
 
 /// Number of bisections of the time between two samples: all bits of a double.
-const HALVINGS: usize = 53;
+const BISECTIONS: usize = 53;
 
 #[cfg(test)]
 mod tests {
@@ -174,7 +174,7 @@ mod tests {
     /// The mean drifts by more than the decay of the amplitude: linearly, and with a mean that
     /// comes to rest.
     #[test]
-    fn a_mean_that_creeps_is_no_growth() {
+    fn a_drifting_mean_does_not_change_the_damping() {
         let (zeta, omega) = (0.002f64, TAU * 10.0);
         let damped = omega * (1.0 - zeta * zeta).sqrt();
         for creep in [-0.3, 0.3] {

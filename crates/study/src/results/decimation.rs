@@ -1,6 +1,6 @@
 //! Decimation of long tables for their figure, in bounded memory.
 //!
-//! Tables of up to [`MOST_ROWS`] rows are kept whole. A longer table first loses cases. A study
+//! Tables of up to [`MAX_ROWS`] rows are kept whole. A longer table first loses cases. A study
 //! with draws keeps the first cases, which are a sample themselves; other studies keep every
 //! n-th case. Figures state how many cases they show.
 //!
@@ -10,10 +10,10 @@
 
 use crate::case::study::Study;
 use crate::results::dataset::{CellValues, Column, Table};
-use crate::results::drawing::MOST_CURVES;
+use crate::results::drawing::MAX_CURVES;
 
 /// Largest number of rows of a table that are held in memory for its figure.
-pub const MOST_ROWS: usize = 500_000;
+pub const MAX_ROWS: usize = 500_000;
 
 /// Takes tables block by block and keeps the rows that their figure needs.
 ///
@@ -38,7 +38,7 @@ impl Decimation {
     /// For tables of a study with these names and numbers of rows.
     pub fn new(study: &Study, tables: &[(&str, usize)]) -> Decimation {
         Decimation {
-            tables: tables.iter().map(|(name, rows)| DecimatedTable::new(study, name, *rows, MOST_ROWS)).collect(),
+            tables: tables.iter().map(|(name, rows)| DecimatedTable::new(study, name, *rows, MAX_ROWS)).collect(),
         }
     }
 
@@ -96,12 +96,12 @@ impl DecimatedTable {
                 cases = CaseSelection::First(first);
                 first
             } else {
-                let each = study.cases().div_ceil(MOST_CURVES);
+                let each = study.cases().div_ceil(MAX_CURVES);
                 cases = CaseSelection::EveryNth(each);
                 study.cases().div_ceil(each)
             };
             // a bin keeps at most two rows for every column: a few dozen
-            bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * EXTREMES);
+            bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * ROWS_PER_BIN);
         }
         DecimatedTable { rows: empty.clone(), cases, bin, key_columns: keys, current_case: None, open_bin: empty }
     }
@@ -152,10 +152,12 @@ impl DecimatedTable {
         let mut kept = vec![0, open.rows() - 1];
         for column in &open.columns {
             if let CellValues::Number(values) = &column.values {
-                let by = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
+                let compare = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
                 // a gap in a curve stays a gap
                 let (there, gaps): (Vec<usize>, Vec<usize>) = (0..values.len()).partition(|row| !values[*row].is_nan());
-                kept.extend(there.iter().min_by(by).into_iter().chain(there.iter().max_by(by)).chain(gaps.first()));
+                kept.extend(
+                    there.iter().min_by(compare).into_iter().chain(there.iter().max_by(compare)).chain(gaps.first()),
+                );
             }
         }
         kept.sort_unstable();
@@ -171,7 +173,7 @@ impl DecimatedTable {
 
 /// Approximate number of rows that a bin keeps: a table has about a dozen columns with extremes
 /// at different rows.
-const EXTREMES: usize = 24;
+const ROWS_PER_BIN: usize = 24;
 
 fn key(table: &Table, row: usize, keys: usize) -> Vec<u64> {
     let columns = table.columns.iter().take(keys);
@@ -261,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_cases_some_are_kept_whole() {
+    fn kept_cases_are_complete() {
         let listed = study("vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 1000 } }");
         let table = table(1000, 20);
         let kept = fed(DecimatedTable::new(&listed, "curve", table.rows(), 10_000), &table, 33);

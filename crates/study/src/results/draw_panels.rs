@@ -8,7 +8,7 @@
 //! have them.
 
 use crate::results::dataset::{Emphasis, Panel, Series, Style};
-use crate::results::drawing::{CaseRows, FigureInput, MOST_CURVES, MOST_PANELS, evenly_chosen, join_title};
+use crate::results::drawing::{CaseRows, FigureInput, MAX_CURVES, MAX_PANELS, evenly_chosen, join_title};
 use crate::results::percentiles::percentiles;
 
 /// Returns the panels of all cases, as `of_case` draws them under a title.
@@ -20,7 +20,7 @@ pub(crate) fn panels(
     of_case: &dyn Fn(&CaseRows, String) -> Vec<Panel>,
 ) -> Vec<Panel> {
     if drawing.study.draws().is_none() {
-        let cases = stretches.iter().take(MOST_PANELS);
+        let cases = stretches.iter().take(MAX_PANELS);
         return cases.flat_map(|stretch| of_case(stretch, stretch.label())).collect();
     }
     let of_group = |(words, group): (String, Vec<&CaseRows>)| -> Vec<Panel> {
@@ -30,7 +30,7 @@ pub(crate) fn panels(
         let same = |at: usize| cases.iter().filter_map(|case| case.get(at)).collect::<Vec<_>>();
         (0..most).filter_map(|at| combine_draws(&same(at))).collect()
     };
-    drawing.group_draws(stretches).into_iter().take(MOST_PANELS).flat_map(of_group).take(MOST_PANELS).collect()
+    drawing.group_draws(stretches).into_iter().take(MAX_PANELS).flat_map(of_group).take(MAX_PANELS).collect()
 }
 
 /// Combines the panels of all draws into one; returns `None` for pictures.
@@ -55,7 +55,7 @@ fn combine_draws(draws: &[&Panel]) -> Option<Panel> {
         series.extend(pairs.iter().flat_map(|pair| pair.get(1)).cloned());
         series.extend(of_points(draws));
     } else {
-        let shown = evenly_chosen(&lines, MOST_CURVES);
+        let shown = evenly_chosen(&lines, MAX_CURVES);
         series.extend(shown.into_iter().flatten().map(|line| (*line).clone().pale()));
     }
     let ends = draws.iter().map(|panel| panel.y.range).reduce(|a, b| {
@@ -70,7 +70,7 @@ fn combine_draws(draws: &[&Panel]) -> Option<Panel> {
 /// Largest number of points of a curve between two adjacent abscissae of a common grid.
 ///
 /// Two evenly spaced grids satisfy this.
-const BETWEEN: usize = 2;
+const MAX_POINTS_PER_CELL: usize = 2;
 
 /// Returns true if `grid` is as fine as the points `x`, so that a curve over `grid` loses no
 /// detail.
@@ -78,7 +78,7 @@ const BETWEEN: usize = 2;
 /// Adaptive steps fail this test: they put many points where other curves have few.
 fn is_as_fine_as(grid: &[f64], x: &[f64]) -> bool {
     let mut cells = x.chunk_by(|a, b| grid.partition_point(|at| at < a) == grid.partition_point(|at| at < b));
-    cells.all(|cell| cell.len() <= BETWEEN)
+    cells.all(|cell| cell.len() <= MAX_POINTS_PER_CELL)
 }
 
 fn is_line(style: Style) -> bool {
@@ -168,7 +168,7 @@ mod tests {
     /// Every draw has its curve in each of these cases: the curve turns back, labels differ,
     /// the steps are adaptive, or the abscissae do not overlap.
     #[test]
-    fn what_has_no_band_is_drawn_draw_by_draw() {
+    fn curves_without_a_band_are_drawn_one_by_one() {
         let around = |y: f64| panel(vec![Series::line("joint", vec![0.0, 1.0, 0.5], vec![y, 1.0, 2.0], 0)]);
         let straight = |label: &str| panel(vec![Series::line(label, vec![0.0, 1.0], vec![1.0, 2.0], 0)]);
         // several points between two abscissae of the other curve

@@ -39,7 +39,7 @@ impl CaseRows {
 
 /// Largest number of curves in a panel. Further curves are left out evenly, and the panel
 /// states this.
-pub(crate) const MOST_CURVES: usize = 400;
+pub(crate) const MAX_CURVES: usize = 400;
 
 /// The assignment of curves to panels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,8 +87,8 @@ impl<'a> FigureInput<'a> {
         match self.options().flag("overlay") {
             Some(true) => PanelLayout::Masses,
             Some(false) => PanelLayout::Cases,
-            None if cases > 1 && cases * panels > MOST_PANELS => PanelLayout::Masses,
-            None if masses > 1 && cases <= MOST_CASES => PanelLayout::Cases,
+            None if cases > 1 && cases * panels > MAX_PANELS => PanelLayout::Masses,
+            None if masses > 1 && cases <= MAX_CASES => PanelLayout::Cases,
             None => PanelLayout::Masses,
         }
     }
@@ -215,10 +215,10 @@ impl<'a> FigureInput<'a> {
 }
 
 /// Largest number of panels in a figure; the tables hold all cases.
-pub(crate) const MOST_PANELS: usize = 12;
+pub(crate) const MAX_PANELS: usize = 12;
 /// Up to this number of cases each case has a panel with all masses; beyond it each mass has a
 /// panel with all cases.
-const MOST_CASES: usize = 6;
+const MAX_CASES: usize = 6;
 /// Ratio of largest to smallest parameter value above which a logarithmic scale is considered.
 const DECADES: f64 = 10.0;
 

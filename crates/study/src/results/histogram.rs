@@ -4,13 +4,13 @@ use crate::results::dataset::{Axis, Panel, Series, Style};
 use crate::results::weibull::WeibullMaxima;
 
 /// Smallest number of values for a histogram.
-pub(crate) const LEAST: usize = 20;
+pub(crate) const MIN_VALUES: usize = 20;
 /// Smallest and largest number of bars.
 const BARS: (f64, f64) = (6.0, 60.0);
 /// Number of first values used for the fit; more values give the percentiles without a fit.
-const MOST_FITTED: usize = 20_000;
+const MAX_FITTED: usize = 20_000;
 /// Percentiles used in design.
-const HIGH: [(f64, &str); 2] = [(0.99, "99 %"), (0.999, "99.9 %")];
+const DESIGN_PERCENTILES: [(f64, &str); 2] = [(0.99, "99 %"), (0.999, "99.9 %")];
 /// Number of points of the fitted curve, and the probabilities between which it is drawn. The
 /// curve begins at the first bar at the latest.
 const CURVE: (usize, [f64; 2]) = (120, [0.0005, 0.9995]);
@@ -21,7 +21,7 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let [low, .., high] = sorted[..] else { return None };
-    if sorted.len() < LEAST {
+    if sorted.len() < MIN_VALUES {
         return None;
     }
     let width = freedman_diaconis_width(&sorted);
@@ -57,7 +57,7 @@ fn freedman_diaconis_width(sorted: &[f64]) -> f64 {
 /// The title states the high percentiles if the distribution fits.
 pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
     let mut panel = panel(values, x, title, each)?;
-    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MOST_FITTED).collect();
+    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MAX_FITTED).collect();
     let Some(fit) = WeibullMaxima::fit(&finite) else { return Some(panel) };
     let bars = &panel.series[0];
     let top = bars.y.iter().copied().fold(0.0, f64::max);
@@ -71,7 +71,7 @@ pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str)
         panel.title += "; no Weibull distribution fits (peaks of several resonances?)";
         return Some(panel);
     }
-    for ((share, words), style) in HIGH.into_iter().zip([Style::Dashed, Style::Dotted]) {
+    for ((share, words), style) in DESIGN_PERCENTILES.into_iter().zip([Style::Dashed, Style::Dotted]) {
         let (at, (from, to)) = (fit.quantile(share), fit.confidence_interval(share));
         let line = Series::line(words, vec![at; 2], vec![0.0, top], 1);
         panel.series.push(Series { style, ..line });

@@ -17,20 +17,20 @@ pub(crate) const WARNING: &str = "warning: ";
 
 /// Largest number of cases that a note names. If it applies to more cases, it gives their
 /// number.
-const MOST_NAMED: usize = 3;
+const MAX_NAMED_CASES: usize = 3;
 
 /// Largest number of cases with a permanently stuck joint that are named one by one. The points
 /// of all other such cases are counted together.
-const MOST_STUCK: usize = 4;
+const MAX_STUCK_CASES: usize = 4;
 
 /// Says which orbit of a continuum is reported.
-const SHOWN: &str = "Reported: the orbit that begins at static equilibrium under the constant loads, applied as one \
+const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibrium under the constant loads, applied as one \
     ramp. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
     orbit that its run reached.";
 
 /// Relative change of the amplitudes with the history above which it is reported: the tolerance
 /// of harmonic balance.
-const SPREAD: f64 = 1e-3;
+const HISTORY_TOLERANCE: f64 = 1e-3;
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,7 +43,7 @@ pub enum Note {
     Cases {
         /// Number of cases.
         cases: usize,
-        /// The first cases, at most [`MOST_NAMED`].
+        /// The first cases, at most [`MAX_NAMED_CASES`].
         named: Vec<String>,
         /// The sentence. It begins with [`WARNING`] if it is a warning.
         text: String,
@@ -119,7 +119,7 @@ pub enum Note {
         #[serde(rename = "of")]
         total: usize,
     },
-    /// Number of points with a stuck joint in the cases beyond [`MOST_STUCK`].
+    /// Number of points with a stuck joint in the cases beyond [`MAX_STUCK_CASES`].
     #[serde(rename = "StuckElsewhere")]
     StuckInOtherCases(usize),
 }
@@ -150,7 +150,7 @@ impl Note {
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
         let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::UnknownStability(1));
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
-        let spread = orbit.evidence.history_spread.filter(|spread| *spread > SPREAD);
+        let spread = orbit.evidence.history_spread.filter(|spread| *spread > HISTORY_TOLERANCE);
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
         said.chain(Note::stuck_offset_note(model, orbit))
             .chain(range)
@@ -222,7 +222,7 @@ impl Note {
             }
         }
         let named = notes.iter().filter(|note| matches!(note, Note::Stuck { points: 1.., .. })).count();
-        match (named < MOST_STUCK, points) {
+        match (named < MAX_STUCK_CASES, points) {
             (true, _) => Some(Note::Stuck { case, points, total: of }),
             (false, 0) => None,
             (false, _) => Some(Note::StuckInOtherCases(points)),
@@ -237,7 +237,7 @@ impl Note {
                     if text == same =>
                 {
                     *cases += more;
-                    let room = MOST_NAMED.saturating_sub(named.len());
+                    let room = MAX_NAMED_CASES.saturating_sub(named.len());
                     named.extend(others.iter().take(room).cloned());
                     return;
                 }
@@ -349,12 +349,12 @@ impl Note {
             }
             Note::StuckOffset(count) => Some(format!(
                 "At {} a joint, or a part of it, sticks permanently in a motion without half-period symmetry: its \
-                 position and the mean values depend on the history. {SHOWN}",
+                 position and the mean values depend on the history. {REPORTED_ORBIT}",
                 points(*count)
             )),
             Note::SeveralOrbits { points: count, stuck, position_dependent: knows } => Some(format!(
                 "warning: at {} several orbits are possible: `{stuck}`, or a part of it, sticks permanently. Its \
-                 position depends on the history, and so do the force of `{knows}` and the amplitudes. {SHOWN} \
+                 position depends on the history, and so do the force of `{knows}` and the amplitudes. {REPORTED_ORBIT} \
                  kind = \"transient\" follows the motion from a given start.",
                 points(*count)
             )),
@@ -428,7 +428,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn notes_of_one_sort_become_one() {
+    fn notes_of_one_kind_are_merged() {
         let stuck = |case: &str, points| Note::Stuck { case: case.to_owned(), points, total: 10 };
         let instead = |chosen: &str| Note::OtherMethod {
             points: 1,
@@ -482,7 +482,7 @@ mod tests {
     /// A note that is true of many cases is one line: a warning of 16 draws once appeared 16
     /// times.
     #[test]
-    fn what_is_said_of_many_cases_is_said_once() {
+    fn a_note_of_many_cases_is_one_line() {
         let texts = |cases: usize| {
             let mut notes = Vec::new();
             for case in 1..=cases {
@@ -504,7 +504,7 @@ mod tests {
 
     /// A branch takes no other method, so its note names only its own keys.
     #[test]
-    fn what_helps_a_branch_is_said_of_a_branch() {
+    fn branch_notes_name_branch_keys() {
         let mut notes = Vec::new();
         for note in [Note::Truncated(1, 1e-2), Note::Truncated(2, 3e-2), Note::StuckOffset(1)] {
             note.for_branch().merge_into(&mut notes);
@@ -520,10 +520,10 @@ mod tests {
     }
 
     #[test]
-    fn however_notes_are_joined_first_the_whole_is_the_same() {
+    fn merging_notes_is_independent_of_grouping() {
         // blocks of three units per case; a joint sticks in most cases, in some of them not at
         // first
-        let all: Vec<Note> = (0..3 * MOST_STUCK)
+        let all: Vec<Note> = (0..3 * MAX_STUCK_CASES)
             .flat_map(|unit| {
                 let (case, points) = (format!("case {}", unit / 3), if unit % 7 < 2 { 0 } else { unit % 5 });
                 let of_case = Note::for_case(&case, format!("It is so in {} ways.", unit % 3));
@@ -546,7 +546,7 @@ mod tests {
             whole.iter().filter_map(Note::text).collect::<Vec<_>>()
         };
         let one_by_one = joined(1);
-        assert!(one_by_one.len() <= MOST_STUCK + 7, "{}", one_by_one.len());
+        assert!(one_by_one.len() <= MAX_STUCK_CASES + 7, "{}", one_by_one.len());
         assert!(one_by_one.iter().any(|text| text.starts_with("In other cases")), "{one_by_one:?}");
         for stretch in [2, 3, 7, 50, 1000, all.len()] {
             assert_eq!(joined(stretch), one_by_one, "{stretch}");

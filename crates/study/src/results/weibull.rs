@@ -30,34 +30,34 @@ pub(crate) struct WeibullMaxima {
 }
 
 /// Minimum number of values for a fit of three parameters.
-const LEAST: usize = 20;
+const MIN_VALUES: usize = 20;
 /// Lower end of the search for the bound: its distance above the largest value, relative to the
 /// range of the values.
-const NEAR: f64 = 1e-4;
+const MIN_BOUND_DISTANCE: f64 = 1e-4;
 /// Upper end of the search for the bound. From here on the distribution equals that of Gumbel,
 /// which has no bound, to a thousandth of its shape.
-const FAR: f64 = 1e3;
+const MAX_BOUND_DISTANCE: f64 = 1e3;
 /// Number of steps of the search for the bound, in equal ratios.
-const STEPS: usize = 48;
+const SEARCH_STEPS: usize = 48;
 /// Relative tolerance of the bound's distance.
-const LOCATED: f64 = 1e-10;
+const BOUND_TOLERANCE: f64 = 1e-10;
 /// Maximum number of iterations for the shape. Newton's method takes about six; bisection keeps
 /// it within its bounds.
-const ITERATIONS: usize = 80;
+const MAX_ITERATIONS: usize = 80;
 /// Relative change of the shape at which the iteration ends.
-const FOUND: f64 = 1e-13;
+const SHAPE_TOLERANCE: f64 = 1e-13;
 /// Below this shape the density has a peak or a step at the bound, and the likeliest bound is
 /// the largest value itself.
-const PEAKED: f64 = 1.0;
+const MIN_SHAPE: f64 = 1.0;
 /// Above this shape the likelihood is regular in the bound, too (Smith 1985).
-const REGULAR: f64 = 2.0;
+const MIN_REGULAR_SHAPE: f64 = 2.0;
 /// Kolmogorov-Smirnov distance times the square root of the number of values above which the
 /// fit is rejected. One in a hundred samples exceeds it if the parameters are known, fewer if
 /// they are fitted (Kolmogorov 1933).
-const STRANGE: f64 = 1.63;
+const KOLMOGOROV_LIMIT: f64 = 1.63;
 /// Half width, in standard deviations, of the interval that contains 95 % of a normal
 /// distribution.
-const TWO_SIDED: f64 = 1.959_963_984_540_054;
+const NORMAL_QUANTILE_975: f64 = 1.959_963_984_540_054;
 
 /// Scale, shape and log-likelihood of the best distribution with a given bound.
 struct ProfileLikelihood {
@@ -74,23 +74,23 @@ impl WeibullMaxima {
     pub fn fit(values: &[f64]) -> Option<WeibullMaxima> {
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let range = high - low;
-        if values.len() < LEAST || !(range > 0.0 && range.is_finite()) {
+        if values.len() < MIN_VALUES || !(range > 0.0 && range.is_finite()) {
             return None;
         }
         let bound = |s: f64| high + range * libm::exp(s);
-        let profile = |s: f64| ProfileLikelihood::fit(values, bound(s)).filter(|profile| profile.shape > PEAKED);
+        let profile = |s: f64| ProfileLikelihood::fit(values, bound(s)).filter(|profile| profile.shape > MIN_SHAPE);
         let height = |s: f64| profile(s).map_or(f64::NEG_INFINITY, |profile| profile.likelihood);
-        let (from, to) = (libm::log(NEAR), libm::log(FAR));
-        let step = (to - from) / STEPS as f64;
+        let (from, to) = (libm::log(MIN_BOUND_DISTANCE), libm::log(MAX_BOUND_DISTANCE));
+        let step = (to - from) / SEARCH_STEPS as f64;
         let at = |i: usize| from + step * i as f64;
-        let heights: Vec<f64> = (0..=STEPS).map(|i| height(at(i))).collect();
-        let best = (0..=STEPS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
-        let ends = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
-        let Ok((s, _)) = maximum(ends, |a, b| b - a < LOCATED, |s| Ok::<_, Infallible>(height(s)));
+        let heights: Vec<f64> = (0..=SEARCH_STEPS).map(|i| height(at(i))).collect();
+        let best = (0..=SEARCH_STEPS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
+        let ends = (at(best.saturating_sub(1)), at((best + 1).min(SEARCH_STEPS)));
+        let Ok((s, _)) = maximum(ends, |a, b| b - a < BOUND_TOLERANCE, |s| Ok::<_, Infallible>(height(s)));
         let ProfileLikelihood { scale, shape, .. } = profile(s)?;
         let found = WeibullMaxima { upper_bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
         // the bound counts as known at the far end, and if the likelihood is not regular in it
-        let known = best == STEPS || shape <= REGULAR;
+        let known = best == SEARCH_STEPS || shape <= MIN_REGULAR_SHAPE;
         Some(WeibullMaxima { covariance: found.covariance(values, known)?, ..found })
     }
 
@@ -110,7 +110,7 @@ impl WeibullMaxima {
             let share = self.cumulative_probability(*value);
             (share - below as f64 / count).max((below + 1) as f64 / count - share)
         });
-        apart.fold(0.0, f64::max) * count.sqrt() <= STRANGE
+        apart.fold(0.0, f64::max) * count.sqrt() <= KOLMOGOROV_LIMIT
     }
 
     /// Returns the value that is not exceeded with the probability `share`.
@@ -126,7 +126,7 @@ impl WeibullMaxima {
         let slopes = [self.scale * power * libm::log(depth) / (self.shape * self.shape), -power, 1.0];
         let variance: f64 =
             (0..3).map(|a| (0..3).map(|b| slopes[a] * self.covariance[a][b] * slopes[b]).sum::<f64>()).sum();
-        let (middle, reach) = (self.quantile(share), TWO_SIDED * variance.max(0.0).sqrt());
+        let (middle, reach) = (self.quantile(share), NORMAL_QUANTILE_975 * variance.max(0.0).sqrt());
         (middle - reach, middle + reach)
     }
 
@@ -222,7 +222,7 @@ impl ProfileLikelihood {
         // 1.28 is the standard deviation of ln y times the shape, π/√6
         let mut shape = 1.28 / spread;
         let (mut below, mut above) = (0.0, f64::INFINITY);
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let [sum, first, second] = sums(shape);
             let (slope, weighted) = (second / sum - (first / sum).powi(2), first / sum);
             let value = weighted - 1.0 / shape - mean;
@@ -236,7 +236,7 @@ impl ProfileLikelihood {
             let next = if newton > below && newton < above { newton } else { halved };
             let change = (next - shape).abs();
             shape = next;
-            if change <= FOUND * shape {
+            if change <= SHAPE_TOLERANCE * shape {
                 break;
             }
         }
@@ -267,7 +267,7 @@ mod tests {
     /// `minimize(…, method="Nelder-Mead")` to 1e-14. The deviations of the quantiles come from
     /// differences of that likelihood.
     #[test]
-    fn the_fit_is_that_of_scipy() {
+    fn fit_agrees_with_scipy() {
         let fit = WeibullMaxima::fit(&values()).unwrap();
         let near = |what: &str, found: f64, expected: f64, within: f64| {
             assert!((found / expected - 1.0).abs() < within, "{what}: {found} {expected}");
@@ -279,7 +279,7 @@ mod tests {
         near("99.9 %", fit.quantile(0.999), 1.856823367544346, 1e-7);
         for (share, deviation) in [(0.99, 0.03267047916133568), (0.999, 0.046330211794089214)] {
             let (low, high) = fit.confidence_interval(share);
-            near("interval", (high - low) / (2.0 * TWO_SIDED), deviation, 1e-4);
+            near("interval", (high - low) / (2.0 * NORMAL_QUANTILE_975), deviation, 1e-4);
         }
         // the density is the derivative of the distribution
         near(
@@ -295,7 +295,7 @@ mod tests {
     /// A mixture of two families of peaks is rejected; draws from one distribution are accepted
     /// in nearly all sets.
     #[test]
-    fn a_mixture_is_told_from_a_distribution() {
+    fn mixtures_are_rejected() {
         let draw =
             |set: u64, i: u64| 1.5 - 0.4 * (-stickslip_numerics::random::Stream::new(set).uniform(i).ln()).powf(0.4);
         let of_one = (0..40).filter(|set| {
@@ -310,7 +310,7 @@ mod tests {
     /// The 99th percentile lies in its interval about as often as stated, over many sets of 100
     /// draws.
     #[test]
-    fn intervals_hold_what_they_say() {
+    fn confidence_intervals_have_their_coverage() {
         let (bound, scale, shape) = (2.0, 0.6, 3.0);
         let truth = bound - scale * (-0.99f64.ln()).powf(1.0 / shape);
         let sets = 100;
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_such_distribution_has_no_fit() {
+    fn unsuitable_values_have_no_fit() {
         assert_eq!(WeibullMaxima::fit(&values()[..19]), None);
         assert_eq!(WeibullMaxima::fit(&[1.5; 40]), None);
         // the values of a Gumbel distribution, for which the best bound is very large

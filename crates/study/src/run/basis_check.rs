@@ -16,12 +16,12 @@ use stickslip::orbit::Orbit;
 use stickslip_numerics::leading::leading;
 
 /// Factors on the frequency limit of the basis. The check uses the first factor whose number of
-/// modes is at most [`MODES`].
+/// modes is at most [`MAX_MODES`].
 ///
 /// Measured on chains of 80 and 300 masses, compared with all rows. The driven end has a slider
 /// of 2 N/um or a rigid one. A basis up to fifteen harmonics had errors of 3 to 8 %; twice that
 /// limit gave 2 %, four times 0.3 to 0.8 %, eight times 0.02 to 0.3 %.
-const TIMES: [f64; 2] = [8.0, 4.0];
+const BASIS_FACTORS: [f64; 2] = [8.0, 4.0];
 /// Number of points per unit of work that are solved again: the largest, and others over the
 /// whole range.
 ///
@@ -32,15 +32,15 @@ const POINTS: usize = 4;
 ///
 /// Cases with different slip limits have different harmonics. Measured: one of three cases had
 /// an error of 0.6 %, the others 2.6 %.
-const FIRST: usize = 16;
+const CHECKED_FIRST_UNITS: usize = 16;
 /// Largest number of modes in the larger basis; methods that integrate in time are slow with
 /// more.
-const MODES: usize = 60;
+const MAX_MODES: usize = 60;
 /// Largest number of rows for the check; reducing this size takes ten seconds.
-pub(crate) const ROWS: usize = 30_000;
+pub(crate) const MAX_ROWS: usize = 30_000;
 /// Difference relative to the largest amplitude above which the note becomes a warning with
 /// advice.
-const SHOWS: f64 = 0.01;
+const WARNING_DIFFERENCE: f64 = 0.01;
 
 /// Points with slip on a reduced structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -84,12 +84,12 @@ pub struct BasisDifference {
 /// About [`POINTS`] of every [`BLOCK`] points are solved again, and [`POINTS`] of each of the
 /// first units.
 pub(crate) fn is_checked(unit: usize, points: usize) -> bool {
-    unit < FIRST || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
+    unit < CHECKED_FIRST_UNITS || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
 }
 
 /// Returns the number of points solved again if joints slip at all points.
 pub(crate) fn checked_points(points: f64, cases: f64) -> f64 {
-    (POINTS as f64 * (points / BLOCK as f64).ceil().max(cases.min(FIRST as f64))).min(points)
+    (POINTS as f64 * (points / BLOCK as f64).ceil().max(cases.min(CHECKED_FIRST_UNITS as f64))).min(points)
 }
 
 impl SlipReductionCheck {
@@ -171,7 +171,7 @@ impl SlipReductionCheck {
                      more",
                     hertz(*up_to)
                 );
-                match *error > SHOWS {
+                match *error > WARNING_DIFFERENCE {
                     true => format!(
                         "{warning}{slips}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
                         hertz(*up_to)
@@ -199,11 +199,11 @@ fn chosen(points: &[CurvePoint]) -> BTreeSet<usize> {
 /// Assembles the same model with a larger reduction basis, if it has few enough modes.
 fn larger_basis_system(model: &Model, system: &System) -> Option<System> {
     let (own, few) = (model.substructure.as_ref()?, system.reduced()?);
-    if own.component.dofs() > ROWS {
+    if own.component.dofs() > MAX_ROWS {
         return None;
     }
-    let counted = |times: &f64| own.component.modes_below(times * few.serves()).is_some_and(|count| count <= MODES);
-    let times = TIMES.into_iter().find(counted)?;
+    let counted = |times: &f64| own.component.modes_below(times * few.serves()).is_some_and(|count| count <= MAX_MODES);
+    let times = BASIS_FACTORS.into_iter().find(counted)?;
     let model = Model { substructure: Some(own.farther(few, times)), ..model.clone() };
     model.assemble().ok()
 }

@@ -14,7 +14,7 @@ use std::ops::Range;
 /// Number of failures stored with their reasons; further failures are only counted.
 ///
 /// The tables hold the status of every point.
-pub const MOST_FAILURES: usize = 10_000;
+pub const MAX_FAILURES: usize = 10_000;
 
 /// The results of a range of units.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +31,7 @@ pub struct Block {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     notes: Vec<Note>,
-    /// Points without a result, at most [`MOST_FAILURES`].
+    /// Points without a result, at most [`MAX_FAILURES`].
     failures: Vec<Failure>,
     /// Number of further points without a result.
     more_failures: u64,
@@ -78,7 +78,7 @@ impl Tally {
     pub fn append(&mut self, next: Tally) {
         next.notes.into_iter().for_each(|note| note.merge_into(&mut self.notes));
         self.interrupted |= next.interrupted;
-        let room = MOST_FAILURES - self.failures.len();
+        let room = MAX_FAILURES - self.failures.len();
         self.more_failures += next.more_failures + next.failures.len().saturating_sub(room) as u64;
         self.failures.extend(next.failures.into_iter().take(room));
         for (status, count) in next.points {
@@ -91,7 +91,7 @@ impl Tally {
         &self.points
     }
 
-    /// Returns the points without a result: where and why, at most [`MOST_FAILURES`].
+    /// Returns the points without a result: where and why, at most [`MAX_FAILURES`].
     pub fn failures(&self) -> &[Failure] {
         &self.failures
     }

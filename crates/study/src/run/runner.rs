@@ -14,7 +14,7 @@ use crate::results::notes::Note;
 use crate::run::basis_check::is_checked;
 use crate::run::point_row::describe_location;
 use crate::run::result_block::{Block, Tally};
-use crate::run::work::{AHEAD, UnitResult, UnitTask, WorkUnits, refusal_at_location};
+use crate::run::work::{UNITS_AHEAD, UnitResult, UnitTask, WorkUnits, refusal_at_location};
 use crate::syntax::error::StudyError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -271,10 +271,10 @@ fn divide(study: &Study) -> WorkUnits {
 }
 
 /// Interval at which a run checks for a stop request.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time that an interrupted run waits for the units in progress. Each of them ends after its
 /// current orbit. Users accept a wait of less than a second.
-const GRACE: Duration = Duration::from_millis(500);
+const STOP_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Computes the units of a range and passes their parts on in order.
 ///
@@ -295,9 +295,9 @@ fn compute_parts<E: From<StudyError>>(
     let mut deadline: Option<Instant> = None;
     while joined < range.end {
         if deadline.is_none() && context.stopped() {
-            deadline = Some(Instant::now() + GRACE);
+            deadline = Some(Instant::now() + STOP_TIMEOUT);
         }
-        while begun < range.end && begun < joined + AHEAD * context.threads.max(1) && deadline.is_none() {
+        while begun < range.end && begun < joined + UNITS_AHEAD * context.threads.max(1) && deadline.is_none() {
             let (study, first, context) = (shared.clone(), first.clone(), context.clone());
             let (send, index) = (send.clone(), begun);
             rayon::spawn_fifo(move || {
@@ -336,13 +336,13 @@ type Finished = (usize, std::thread::Result<Result<UnitResult, StudyError>>);
 /// tasks meanwhile, because it must not wait for itself.
 fn next_finished(receive: &mpsc::Receiver<Finished>) -> Option<Finished> {
     if rayon::current_thread_index().is_none() {
-        return receive.recv_timeout(LOOK).ok();
+        return receive.recv_timeout(POLL_INTERVAL).ok();
     }
     if let Ok(finished) = receive.try_recv() {
         return Some(finished);
     }
     if rayon::yield_now() != Some(rayon::Yield::Executed) {
-        std::thread::sleep(LOOK / 20);
+        std::thread::sleep(POLL_INTERVAL / 20);
     }
     None
 }
@@ -390,8 +390,8 @@ fn check_reduction(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
     let Some(slipping) = slipping else { return };
     let PreparedCase { case, system, method } = prepared;
     let turn = study.kind().uses_method && is_checked(index, points);
-    let at = |omega: f64| describe_location(case, omega);
-    if let Some(error) = slipping.solve_again(turn, (&case.model, system, &**method), &at) {
+    let describe = |omega: f64| describe_location(case, omega);
+    if let Some(error) = slipping.solve_again(turn, (&case.model, system, &**method), &describe) {
         part.tables.iter_mut().for_each(|rows| rows.raise_reduction_error(error));
     }
 }

@@ -22,7 +22,7 @@ use stickslip::model::System;
 
 /// Units per thread that may be in progress or wait to be joined. The number keeps all threads
 /// busy behind a slow unit and bounds the memory.
-pub(crate) const AHEAD: usize = 8;
+pub(crate) const UNITS_AHEAD: usize = 8;
 
 /// Settings of one run.
 #[derive(Clone)]
@@ -77,11 +77,11 @@ impl PreparedCase {
         let method = (row.build)(&case.method.options).map_err(|error| refusal_at_location(study, &case, &error))?;
         let system =
             case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-        let told = |error: MethodError| refusal_at_location(study, &case, &error.with(method::ways(&system)));
+        let refuse = |error: MethodError| refusal_at_location(study, &case, &error.with(method::ways(&system)));
         if study.kind().uses_method {
-            method.solver(&system).map_err(told)?;
+            method.solver(&system).map_err(refuse)?;
         }
-        (study.kind().needs)(&case.values, &case.method.options, &system).map_err(told)?;
+        (study.kind().needs)(&case.values, &case.method.options, &system).map_err(refuse)?;
         Ok(PreparedCase { case, system, method })
     }
 }
@@ -119,7 +119,7 @@ pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodErro
 }
 
 /// Velocity, m/s, over which laws are smoothed to test whether smoothing would help.
-const ANY_WIDTH: f64 = 1e-3;
+const TRIAL_WIDTH: f64 = 1e-3;
 
 /// Returns the advice for a refused model. A kind that uses no method cannot take another one.
 fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
@@ -127,14 +127,14 @@ fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
     if kind.uses_method || !ways.any() {
         return ways.to_string();
     }
-    let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
+    let smoothed = Options::from([(WIDTH.to_owned(), TRIAL_WIDTH)]);
     let helps = case.model.assemble().is_ok_and(|system| (kind.needs)(&case.values, &smoothed, &system).is_ok());
     let smoothing = method::TABLE.iter().find(|row| row.options.iter().any(|option| option.key == WIDTH));
     match smoothing.filter(|_| helps) {
         Some(row) => format!(
             "give a velocity over which friction changes its sign: [method] with kind = \"{}\" and {WIDTH} = \"{}\"",
             row.name,
-            quantity_text(ANY_WIDTH, Some(Dimension::VELOCITY))
+            quantity_text(TRIAL_WIDTH, Some(Dimension::VELOCITY))
         ),
         None => format!(
             "a study of kind `{}` uses its own method, which does not accept this model; for kinds with a choice of \

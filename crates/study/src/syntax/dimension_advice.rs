@@ -11,7 +11,7 @@ const PRESSURE: Dimension = dimension(1, -1, -2, 0);
 const ACCELERATION: Dimension = dimension(0, 1, -2, 0);
 
 /// Pairs of the expected dimension and the dimension that a model of rotation has there.
-const OF_ROTATION: [(Dimension, Dimension); 9] = [
+const ROTATION_PAIRS: [(Dimension, Dimension); 9] = [
     (Dimension::MASS, dimension(1, 2, 0, 0)),
     (Dimension::STIFFNESS, dimension(1, 2, -2, -1)),
     (Dimension::STIFFNESS, Dimension::ENERGY),
@@ -31,7 +31,7 @@ const TORSION: &str = "this quantity belongs to a rotation, but places move in m
 /// the user's text.
 pub(crate) fn dimension_advice(expected: Dimension, found: Dimension, text: &str) -> Option<String> {
     let said = match (expected, found) {
-        _ if OF_ROTATION.contains(&(expected, found)) => TORSION,
+        _ if ROTATION_PAIRS.contains(&(expected, found)) => TORSION,
         (Dimension::STIFFNESS, PRESSURE) => {
             "this is a pressure; write a stiffness as a force over a length, such as \"10 N/mm\", or as a pressure \
              times an area over a length: \"210 GPa * 3 mm^2/(40 mm)\""
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_meant_is_said() {
+    fn advice_names_the_intended_quantity() {
         for (text, expected, words) in [
             ("10 N/mm^2", Dimension::STIFFNESS, "this is a pressure"),
             ("1 MPa", Dimension::FORCE, "10 N/mm^2 * 25 mm^2"),

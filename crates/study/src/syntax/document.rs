@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everything_has_its_place() {
+    fn every_node_has_its_location() {
         let text = "a = \"2 mm\"\n[[mass]]\nname = 'x'\nmass = 0x10\n";
         let tree = parse(text, 0).unwrap();
         let a = tree.get("a").unwrap();

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_as_many_digits_as_they_are_worth() {
+    fn numbers_have_significant_digits() {
         assert_eq!(
             [format_significant(121.2503, 5), format_significant(0.072_31, 2), format_significant(2.0, 4)],
             ["121.25", "0.072", "2"]

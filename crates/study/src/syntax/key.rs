@@ -9,14 +9,14 @@ pub const VERSION: i64 = 1;
 
 /// Largest number of masses, repetitions included. Measured: a ring of 20,000 masses and joints
 /// is read and checked in 1.2 s of processor time. The time grows with their number.
-pub const MOST_MASSES: usize = 20_000;
+pub const MAX_MASSES: usize = 20_000;
 
 /// Largest number of points of a study: cases times frequencies.
-pub const MOST_POINTS: usize = 100_000_000;
+pub const MAX_POINTS: usize = 100_000_000;
 
 /// Largest number of cases of a study. Each case is resolved and assembled once before anything
 /// is computed.
-pub const MOST_CASES: usize = 1_000_000;
+pub const MAX_CASES: usize = 1_000_000;
 
 /// One key of a table.
 #[derive(Debug, Clone, Copy)]
@@ -156,7 +156,7 @@ impl Key {
 }
 
 /// The key of a damping ratio, relative to critical damping.
-pub(crate) const RATIO: &str = "damping_ratio";
+pub(crate) const DAMPING_RATIO: &str = "damping_ratio";
 
 /// A key that users look for but that does not exist, with the reason and the alternative.
 pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {
@@ -188,25 +188,25 @@ const FROM: Key =
     required("from", ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive), "first value", "\"119 Hz\"");
 const TO: Key = required("to", ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive), "last value", "\"123 Hz\"");
 const POINTS: Key =
-    required("points", ValueType::Count(2, MOST_POINTS as i64), "number of values, both ends included", "241");
+    required("points", ValueType::Count(2, MAX_POINTS as i64), "number of values, both ends included", "241");
 
 /// Keys of a range of frequencies.
-pub const RANGE: &[Key] = &[FROM, TO, POINTS];
+pub const FREQUENCY_RANGE: &[Key] = &[FROM, TO, POINTS];
 
 /// Keys of a range of speeds, which may begin at zero.
-pub const SPEEDS: &[Key] = &[
+pub const SPEED_RANGE: &[Key] = &[
     required("from", ValueType::Quantity(Dimension::FREQUENCY, Bounds::AtLeastZero), "first value", "\"0 rpm\""),
     TO,
     POINTS,
 ];
 
 /// Keys of a range of frequencies of which only the two ends matter.
-pub const ENDS: &[Key] = &[
+pub const END_POINTS_RANGE: &[Key] = &[
     FROM,
     TO,
     default(
         "points",
-        ValueType::Count(2, MOST_POINTS as i64),
+        ValueType::Count(2, MAX_POINTS as i64),
         "2",
         "number of values of a range; only the two ends of the range matter",
         "2",
@@ -214,7 +214,7 @@ pub const ENDS: &[Key] = &[
 ];
 
 /// Keys of a range of frequencies whose points are placed by the curvature of the response.
-pub const ADAPTIVE: &[Key] = &[
+pub const ADAPTIVE_RANGE: &[Key] = &[
     FROM,
     TO,
     required(

@@ -9,21 +9,21 @@ use crate::case::substructure::REDUCTIONS;
 use crate::compile::templates;
 use crate::kinds;
 use crate::kinds::kind::Kind;
-use crate::syntax::key::RATIO;
+use crate::syntax::key::DAMPING_RATIO;
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
 pub use crate::syntax::key::{
-    ADAPTIVE, Bounds, ENDS, Key, MOST_CASES, MOST_MASSES, MOST_POINTS, Presence, RANGE, VERSION, ValueType, default,
-    optional, refused, required,
+    ADAPTIVE_RANGE, Bounds, END_POINTS_RANGE, FREQUENCY_RANGE, Key, MAX_CASES, MAX_MASSES, MAX_POINTS, Presence,
+    VERSION, ValueType, default, optional, refused, required,
 };
 
 /// Largest number of elements in one list (`[[spring]]`, …), repetitions included.
-pub const MOST_ELEMENTS: usize = 40_000;
+pub const MAX_ELEMENTS: usize = 40_000;
 
 /// Largest size of a study file, bytes.
-pub const MOST_BYTES: u64 = 4 * 1024 * 1024;
+pub const MAX_FILE_BYTES: u64 = 4 * 1024 * 1024;
 
 /// The top-level keys of the file.
 pub const FILE: &[Key] = &[
@@ -219,10 +219,16 @@ fn format_names() -> Vec<(&'static str, &'static str)> {
 }
 
 /// 1/s, the dimension of a decay rate, which is not a frequency.
-const RATE: Dimension = Dimension { kg: 0, m: 0, s: -1, rad: 0 };
+const DECAY_RATE: Dimension = Dimension { kg: 0, m: 0, s: -1, rad: 0 };
 
 const RAYLEIGH: &[Key] = &[
-    default("mass", ValueType::Quantity(RATE, Bounds::AtLeastZero), "0 /s", "factor of the mass matrix", "\"1 /s\""),
+    default(
+        "mass",
+        ValueType::Quantity(DECAY_RATE, Bounds::AtLeastZero),
+        "0 /s",
+        "factor of the mass matrix",
+        "\"1 /s\"",
+    ),
     default(
         "stiffness",
         ValueType::Quantity(Dimension::TIME, Bounds::AtLeastZero),
@@ -413,7 +419,7 @@ const SPRING: &[Key] = &[
         "\"0.2 kg/s\"",
     ),
     optional(
-        RATIO,
+        DAMPING_RATIO,
         ValueType::Quantity(Dimension::NONE, Bounds::AtLeastZero),
         "instead of `damping`: damping ratio zeta of this spring with the mass at its end, c = 2 zeta sqrt(k m); \
          between two masses m is m1 m2/(m1 + m2)",
@@ -533,7 +539,7 @@ const ONE_SECTOR: Key = optional(
     "0",
 );
 
-const MOST_HARMONIC: i64 = 1_000;
+const MAX_HARMONIC: i64 = 1_000;
 
 const FORCE: &[Key] = &[
     required("on", ValueType::Name, "the place on which it acts", "\"blade1\""),
@@ -546,7 +552,7 @@ const FORCE: &[Key] = &[
     default("phase", ValueType::Quantity(Dimension::ANGLE, Bounds::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default(
         "harmonic",
-        ValueType::Count(0, MOST_HARMONIC),
+        ValueType::Count(0, MAX_HARMONIC),
         "1",
         "multiple of the excitation frequency; 0 is constant",
         "3",
@@ -568,7 +574,7 @@ const MOTION: &[Key] = &[
     default("phase", ValueType::Quantity(Dimension::ANGLE, Bounds::Finite), "0 deg", "phase lead", "\"90 deg\""),
     default(
         "harmonic",
-        ValueType::Count(0, MOST_HARMONIC),
+        ValueType::Count(0, MAX_HARMONIC),
         "1",
         "multiple of the excitation frequency; 0 is constant",
         "3",
@@ -599,7 +605,7 @@ pub const STUDY: &[Key] = &[
 
 /// The keys of `[sample]`.
 pub const SAMPLE: &[Key] = &[
-    required("count", ValueType::Count(1, MOST_CASES as i64), "number of values that are drawn", "1000"),
+    required("count", ValueType::Count(1, MAX_CASES as i64), "number of values that are drawn", "1000"),
     default(
         "seed",
         ValueType::Count(0, i64::MAX),
@@ -763,7 +769,7 @@ fn takes_schema(takes: &ValueType) -> Value {
         ValueType::Count(from, to) => json!({ "type": "integer", "minimum": from, "maximum": to }),
         ValueType::Flag => json!({ "type": "boolean" }),
         ValueType::Frequencies(keys) => {
-            json!({ "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(keys), object(ADAPTIVE)] })
+            json!({ "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(keys), object(ADAPTIVE_RANGE)] })
         }
         ValueType::ByName(_) | ValueType::Parameters => json!({
             "type": "object", "additionalProperties": quantity(), "propertyNames": { "pattern": NAME_PATTERN },
@@ -782,7 +788,7 @@ fn takes_schema(takes: &ValueType) -> Value {
         }
         ValueType::Vector(_) => json!({ "type": "array", "items": quantity(), "minItems": 3, "maxItems": 3 }),
         ValueType::Table(keys) => object(keys),
-        ValueType::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MOST_ELEMENTS }),
+        ValueType::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MAX_ELEMENTS }),
         ValueType::Repeat => json!({
             "type": "object",
             "properties": { "wrap": {
@@ -791,7 +797,7 @@ fn takes_schema(takes: &ValueType) -> Value {
                 "anyOf": [{ "type": "boolean" }, { "type": "string" }, { "type": "array", "items": { "type": "string" } }],
             } },
             "additionalProperties": { "anyOf": [
-                { "type": "integer", "minimum": 1, "maximum": MOST_ELEMENTS },
+                { "type": "integer", "minimum": 1, "maximum": MAX_ELEMENTS },
                 { "type": "array", "items": { "type": "integer" }, "minItems": 2, "maxItems": 2 },
             ] },
         }),
@@ -809,7 +815,7 @@ fn takes_schema(takes: &ValueType) -> Value {
         ValueType::Vary => json!({
             "type": "object",
             "additionalProperties": {
-                "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(RANGE)],
+                "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(FREQUENCY_RANGE)],
             },
         }),
         ValueType::Sample => object(SAMPLE),

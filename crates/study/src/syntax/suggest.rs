@@ -16,12 +16,12 @@ pub(crate) fn suggest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
             let length = lower.chars().count().max(other.chars().count());
             // one typing error in a short word, a third of the letters in a long one; or an
             // abbreviation such as `freq`
-            let near = distance <= (length / 3).max(usize::from(length > 1));
+            let is_similar = distance <= (length / 3).max(usize::from(length > 1));
             let abbreviation = lower.chars().count() >= 3 && other.starts_with(&lower);
             // one word of several, as in `frequency response` or `nonlinear modes`
             let parts = || lower.split(|c: char| !c.is_alphanumeric());
             let within = other.chars().count() >= 3 && parts().any(|part| part == other);
-            (near || abbreviation || within).then_some((distance, candidate))
+            (is_similar || abbreviation || within).then_some((distance, candidate))
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn finds_slips_and_abbreviations_but_no_strangers() {
+    fn suggests_misspellings_and_abbreviations() {
         let keys = ["between", "stiffness", "damping"];
         assert_eq!(suggest("stifness", keys), Some("stiffness"));
         assert_eq!(suggest("Damping", keys), Some("damping"));

@@ -92,7 +92,7 @@ const UNITS: &[NamedUnit] = &[
 
 /// Common spellings of units that have another name here, in lower case, and what to write
 /// instead.
-const SPELT_OTHERWISE: &[(&[&str], &str)] = &[
+const OTHER_SPELLINGS: &[(&[&str], &str)] = &[
     (&["lbs", "pound", "pounds", "lbm"], "write `lb` for a mass, `lbf` for a force"),
     (&["kgf", "kp"], "a kilogram-force is 9.80665 N"),
     (&["kip", "kips"], "write 1000 lbf"),
@@ -296,9 +296,9 @@ struct UnitParser<'a> {
 }
 
 /// Maximum depth of parentheses in a unit.
-const DEEPEST: usize = 8;
+const MAX_DEPTH: usize = 8;
 /// Maximum power of a unit.
-const HIGHEST_POWER: i32 = 9;
+const MAX_POWER: i32 = 9;
 
 impl UnitParser<'_> {
     fn rest(&self) -> &str {
@@ -408,7 +408,7 @@ impl UnitParser<'_> {
         let start = self.position;
         let unit = if self.peek() == Some('(') {
             self.depth += 1;
-            if self.depth > DEEPEST {
+            if self.depth > MAX_DEPTH {
                 return Err(TextError::new(start..start + 1, "too many parentheses in a unit"));
             }
             self.position += 1;
@@ -465,10 +465,10 @@ impl UnitParser<'_> {
             raised.chars().map(plain).collect()
         };
         match digits.parse::<i32>() {
-            Ok(exponent) if exponent.abs() <= HIGHEST_POWER => Ok(Some(exponent)),
+            Ok(exponent) if exponent.abs() <= MAX_POWER => Ok(Some(exponent)),
             _ => Err(TextError::new(
                 start..self.position,
-                format!("the power of a unit must be a whole number from -{HIGHEST_POWER} to {HIGHEST_POWER}"),
+                format!("the power of a unit must be a whole number from -{MAX_POWER} to {MAX_POWER}"),
             )
             .help("to raise a quantity to another power, put it in parentheses: \"(2 m)^0.5\"")),
         }
@@ -489,7 +489,7 @@ impl UnitParser<'_> {
             return fault.help(format!("a number is followed by its unit; for the parameter write \"* {word}\""));
         }
         if let Some((_, advice)) =
-            SPELT_OTHERWISE.iter().find(|(words, _)| words.contains(&word.to_lowercase().as_str()))
+            OTHER_SPELLINGS.iter().find(|(words, _)| words.contains(&word.to_lowercase().as_str()))
         {
             return fault.help(*advice);
         }
@@ -566,8 +566,8 @@ mod tests {
 
     /// No explained spelling is a unit, and every proposed unit exists.
     #[test]
-    fn other_spellings_lead_to_units() {
-        for (words, advice) in SPELT_OTHERWISE {
+    fn other_spellings_name_known_units() {
+        for (words, advice) in OTHER_SPELLINGS {
             assert!(words.iter().all(|word| find(word).is_none()), "{words:?}");
             let proposed = advice.split('`').skip(1).step_by(2);
             for unit in proposed {

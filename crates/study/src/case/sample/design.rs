@@ -38,7 +38,7 @@ pub(crate) const DESIGNS: [(&str, &str, Design); 3] = [
 ];
 
 /// Largest number of dimensions of the Sobol sequence.
-pub(crate) const MOST_SOBOL: usize = DIRECTIONS.len() + 1;
+pub(crate) const MAX_SOBOL: usize = DIRECTIONS.len() + 1;
 
 /// Mixes 64 bits: every bit of the result depends on every bit of `z`.
 fn mix64(z: u64) -> u64 {
@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn scrambling_keeps_the_net() {
         for seed in [1, 2, 77] {
-            for dimension in 0..MOST_SOBOL {
+            for dimension in 0..MAX_SOBOL {
                 let parts: BTreeSet<u64> =
                     (0..256).map(|i| (Design::Sobol.coordinate(seed, i, 256, dimension) * 256.0) as u64).collect();
                 assert_eq!(parts.len(), 256, "dimension {dimension}");

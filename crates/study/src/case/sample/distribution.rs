@@ -176,8 +176,8 @@ fn normal_cdf(z: f64) -> f64 {
 }
 
 /// Limits of the central part in `p - 0.5`, and of the near tail in `√(-ln p)`.
-const MIDDLE: f64 = 0.425;
-const NEAR: f64 = 5.0;
+const CENTRE_LIMIT: f64 = 0.425;
+const NEAR_TAIL_LIMIT: f64 = 5.0;
 /// Numerators and denominators of the three parts, lowest power first.
 const CENTRE: [[f64; 8]; 2] = [
     [
@@ -253,11 +253,12 @@ fn normal_quantile(p: f64) -> f64 {
         power(above) / power(below)
     };
     let q = p - 0.5;
-    if q.abs() <= MIDDLE {
-        return q * rational(&CENTRE, MIDDLE * MIDDLE - q * q);
+    if q.abs() <= CENTRE_LIMIT {
+        return q * rational(&CENTRE, CENTRE_LIMIT * CENTRE_LIMIT - q * q);
     }
     let r = (-libm::log(p.min(1.0 - p))).sqrt();
-    let size = if r <= NEAR { rational(&NEAR_TAIL, r - 1.6) } else { rational(&FAR_TAIL, r - NEAR) };
+    let size =
+        if r <= NEAR_TAIL_LIMIT { rational(&NEAR_TAIL, r - 1.6) } else { rational(&FAR_TAIL, r - NEAR_TAIL_LIMIT) };
     if q < 0.0 { -size } else { size }
 }
 

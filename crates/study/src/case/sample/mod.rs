@@ -3,7 +3,7 @@
 mod design;
 mod distribution;
 
-pub(crate) use design::{DESIGNS, Design, MOST_SOBOL};
+pub(crate) use design::{DESIGNS, Design, MAX_SOBOL};
 pub(crate) use distribution::{DISTRIBUTIONS, Distribution, WITHIN};
 
 use crate::compile::compiled::{CompiledQuantity, Environment};

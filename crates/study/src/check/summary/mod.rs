@@ -74,9 +74,9 @@ pub enum OrbitCount {
 impl OrbitCount {
     fn new(system: &System) -> Option<OrbitCount> {
         let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
-        let mut of: Vec<String> =
+        let mut reasons: Vec<String> =
             separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
-        if of.is_empty() {
+        if reasons.is_empty() {
             // on a large structure the answer takes three factorizations
             return match system.structure().is_sparse() {
                 true => None,
@@ -84,16 +84,16 @@ impl OrbitCount {
                 false => Some(OrbitCount::Several("the structure feeds energy into some motion".to_owned())),
             };
         }
-        if let Some(more @ 1..) = of.len().checked_sub(NAMED) {
-            of.truncate(NAMED);
-            of.push(format!("{more} more"));
+        if let Some(more @ 1..) = reasons.len().checked_sub(MAX_NAMED_JOINTS) {
+            reasons.truncate(MAX_NAMED_JOINTS);
+            reasons.push(format!("{more} more"));
         }
-        Some(OrbitCount::Several(of.join(", ")))
+        Some(OrbitCount::Several(reasons.join(", ")))
     }
 }
 
 /// Number of joints that are named as the reason for several orbits.
-const NAMED: usize = 2;
+const MAX_NAMED_JOINTS: usize = 2;
 
 /// State of a joint at rest, and its first slip.
 #[derive(Debug, Clone)]
@@ -118,26 +118,26 @@ pub struct JointSummary {
 
 /// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
 /// the model is true for all of them.
-const LOOKED_AT: usize = 9;
-/// The summary states the longest time if it exceeds the usual time by the factor [`WIDE`] and
-/// exceeds [`SOON`], s.
-const WIDE: f64 = 3.0;
-const SOON: f64 = 5.0;
+const MAX_CHECKED_CASES: usize = 9;
+/// The summary states the longest time if it exceeds the usual time by the factor [`LONG_TIME_FACTOR`] and
+/// exceeds [`SHORT_TIME`], s.
+const LONG_TIME_FACTOR: f64 = 3.0;
+const SHORT_TIME: f64 = 5.0;
 /// Duration above which a run announces its expected time at the start, s.
 const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom above which only the first case is checked, so that a summary takes at
 /// most a second.
-const LARGE: usize = 60;
+const MAX_DOFS_ALL_CASES: usize = 60;
 
 /// Factor on the excitation above which the first slip is due to rounding. Symmetry keeps the
 /// load from some joints, but rounding errors of the other loads remain. A load above this
 /// multiple of the slip limit comes from an undamped resonance, which has no bound.
-const UNLOADED: f64 = 1e6;
+const ROUNDING_SLIP_FACTOR: f64 = 1e6;
 
 /// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
 /// rounding.
 fn relative_load(onset: &Onset) -> f64 {
-    if onset.largest * UNLOADED < 1.0 { 0.0 } else { onset.largest }
+    if onset.largest * ROUNDING_SLIP_FACTOR < 1.0 { 0.0 } else { onset.largest }
 }
 
 impl ModelSummary {
@@ -158,7 +158,7 @@ impl ModelSummary {
     pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
         let mut cases = vec![SurveyedCase::new(study, 0)?];
         let last = study.cases().saturating_sub(1);
-        let others = if cases[0].survey.dofs() > LARGE { 0 } else { last.min(LOOKED_AT - 1) };
+        let others = if cases[0].survey.dofs() > MAX_DOFS_ALL_CASES { 0 } else { last.min(MAX_CHECKED_CASES - 1) };
         for i in 1..=others {
             cases.push(SurveyedCase::new(study, last * i / others)?);
         }
@@ -230,11 +230,11 @@ impl ModelSummary {
     pub(crate) fn time(&self) -> String {
         let mut usual = format!("{} on one thread", crate::syntax::format::format_estimate(self.usual_time_s));
         if let Some((seconds, place)) = self.time_without
-            && self.usual_time_s >= (WIDE * seconds).max(SOON)
+            && self.usual_time_s >= (LONG_TIME_FACTOR * seconds).max(SHORT_TIME)
         {
             usual += &format!(", {} {place}", crate::syntax::format::format_estimate(seconds));
         }
-        if self.longest_time_s < WIDE * self.usual_time_s || self.longest_time_s < SOON {
+        if self.longest_time_s < LONG_TIME_FACTOR * self.usual_time_s || self.longest_time_s < SHORT_TIME {
             return usual;
         }
         format!(

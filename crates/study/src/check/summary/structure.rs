@@ -15,7 +15,7 @@ const LISTED: usize = 6;
 pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 /// Masses along several directions that differ by less than this share are stated once. The
 /// constrained rows of a structure cause small differences.
-const SAME: f64 = 1e-3;
+const EQUAL_MASS: f64 = 1e-3;
 
 /// A structure given by matrices.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +118,7 @@ impl StructureSummary {
             return "unknown, because no row name has a direction (449.x); `units` cannot be checked".to_owned();
         };
         let kilograms = |mass: f64| format!("{} kg", format_significant(mass, 4));
-        let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= SAME * first.abs());
+        let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= EQUAL_MASS * first.abs());
         let text = if alike {
             let along: Vec<&str> = known.iter().map(|(along, _)| *along).collect();
             format!("{} along {}", kilograms(first), along.join(", "))

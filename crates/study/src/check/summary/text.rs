@@ -1,6 +1,6 @@
 //! The summary in words, for a terminal.
 
-use super::{JointSummary, ModelSummary, OrbitCount, UNLOADED, relative_load};
+use super::{JointSummary, ModelSummary, OrbitCount, ROUNDING_SLIP_FACTOR, relative_load};
 use crate::syntax::format::{format_bytes, format_significant, format_with_prefix, plural_suffix};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -10,7 +10,7 @@ use stickslip::model::{LinearMode, Modes};
 /// Largest number of listed modes and joints.
 const LISTED: usize = 10;
 /// Largest number of listed frequency ranges with slip per joint.
-const STRETCHES: usize = 3;
+const MAX_SLIP_RANGES: usize = 3;
 /// Width of the first column.
 const WIDTH: usize = 14;
 
@@ -84,7 +84,7 @@ impl ModelSummary {
             return text + "; the imposed motion makes it slip";
         }
         let factor = format_significant(1.0 / onset.largest, 3);
-        let resonant = onset.largest > UNLOADED;
+        let resonant = onset.largest > ROUNDING_SLIP_FACTOR;
         if onset.largest == 0.0 {
             text += "; the excitation does not reach it";
         } else if relative_load(onset) == 0.0 {
@@ -95,9 +95,13 @@ impl ModelSummary {
         } else if onset.slips.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
         } else if several {
-            let mut stretches: Vec<String> =
-                onset.slips.iter().take(STRETCHES).map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b))).collect();
-            if let Some(more @ 1..) = onset.slips.len().checked_sub(STRETCHES) {
+            let mut stretches: Vec<String> = onset
+                .slips
+                .iter()
+                .take(MAX_SLIP_RANGES)
+                .map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b)))
+                .collect();
+            if let Some(more @ 1..) = onset.slips.len().checked_sub(MAX_SLIP_RANGES) {
                 stretches.push(format!("{more} more"));
             }
             let stretches = stretches.join(", ");
@@ -126,7 +130,7 @@ fn rounded_load(load: f64) -> f64 {
 }
 
 /// Relative change of a preload by the structure below which it is ignored.
-const GIVEN_WAY: f64 = 1e-3;
+const PRELOAD_CHANGE: f64 = 1e-3;
 
 /// Describes the normal load at rest that a preload produces.
 fn pressed(preload: f64, at_rest: Option<f64>) -> String {
@@ -135,7 +139,7 @@ fn pressed(preload: f64, at_rest: Option<f64>) -> String {
         None => {
             format!("pressed with {} if the structure is rigid: it opens and closes", newtons(preload))
         }
-        Some(force) if (force - preload).abs() <= GIVEN_WAY * preload => {
+        Some(force) if (force - preload).abs() <= PRELOAD_CHANGE * preload => {
             format!("pressed with {} in static equilibrium: it opens and closes", newtons(force))
         }
         Some(force) if force > preload => format!(

@@ -116,10 +116,14 @@ fn overstiff(one: &SurveyedCase) -> Option<String> {
     }
     let highest = |modes: &Modes| modes.elastic.last().map_or(0.0, |mode| mode.omega) / TAU;
     let (free, stuck) = (highest(survey.free()), highest(survey.stuck()));
-    if free.max(stuck) <= USUAL.1 {
+    if free.max(stuck) <= PLAUSIBLE_FREQUENCIES.1 {
         return None;
     }
-    let spring = model.springs.iter().max_by(|a, b| a.stiffness.total_cmp(&b.stiffness)).filter(|_| free > USUAL.1);
+    let spring = model
+        .springs
+        .iter()
+        .max_by(|a, b| a.stiffness.total_cmp(&b.stiffness))
+        .filter(|_| free > PLAUSIBLE_FREQUENCIES.1);
     let slips = survey.first_slip();
     let stiffness = |slip: &FirstSlip| slip.displacement.map_or(0.0, |u| if u > 0.0 { slip.limit / u } else { 0.0 });
     let joint = slips.iter().filter(|slip| slip.limit.is_finite());
@@ -152,7 +156,7 @@ fn motionless_joints(case: &SurveyedCase) -> Option<String> {
             let (sum, size) = weights.entry(*row).or_default();
             (*sum, *size) = (*sum + weight, *size + weight.abs());
         }
-        !axis.imposed().is_empty() || weights.values().any(|(sum, size)| sum.abs() > SAME * size)
+        !axis.imposed().is_empty() || weights.values().any(|(sum, size)| sum.abs() > WEIGHT_ROUNDING * size)
     };
     let joints = case.survey.system().joints().iter();
     let names: Vec<String> =
@@ -166,11 +170,11 @@ fn motionless_joints(case: &SurveyedCase) -> Option<String> {
 }
 
 /// Relative rounding below which the weights of a row cancel.
-const SAME: f64 = 1e-12;
+const WEIGHT_ROUNDING: f64 = 1e-12;
 
 /// Plausible frequencies of a structure of machine size, Hz. Mistaken units shift frequencies
 /// by powers of ten, beyond these limits.
-const USUAL: (f64, f64) = (0.1, 2e5);
+const PLAUSIBLE_FREQUENCIES: (f64, f64) = (0.1, 2e5);
 /// Error of a reduction above which it is visible in a response.
 const REDUCTION_ERROR: f64 = 1e-3;
 
@@ -206,7 +210,7 @@ fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
     let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
     let lowest = reduced.frequencies().get(reduced.free()).copied();
     match lowest {
-        Some(lowest) if lowest / TAU < USUAL.0 || lowest / TAU > USUAL.1 => {
+        Some(lowest) if lowest / TAU < PLAUSIBLE_FREQUENCIES.0 || lowest / TAU > PLAUSIBLE_FREQUENCIES.1 => {
             found.push(format!("the lowest natural frequency of the structure is {}; check `units`", hertz(lowest)));
         }
         None => found.push(format!(
@@ -284,7 +288,7 @@ fn no_references(study: &Study, cases: &[SurveyedCase]) -> Vec<String> {
 
 /// A bare length from this value on, m, was probably meant in millimetres: gaps and imposed
 /// motions of machines are tenths of a millimetre.
-const LONG: f64 = 0.01;
+const SUSPICIOUS_LENGTH: f64 = 0.01;
 
 /// Returns the assumed unit of an easily mistaken bare number, another unit, and the value in
 /// that unit.
@@ -293,7 +297,7 @@ const LONG: f64 = 0.01;
 fn likely_unit(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
     match dimension? {
         Dimension::ANGLE if si != 0.0 && !with_pi => Some(("rad", "deg", si * 180.0 / PI)),
-        Dimension::LENGTH if si.abs() >= LONG => Some(("m", "mm", si * 1e3)),
+        Dimension::LENGTH if si.abs() >= SUSPICIOUS_LENGTH => Some(("m", "mm", si * 1e3)),
         _ => None,
     }
 }

@@ -15,7 +15,7 @@ use std::io::Read;
 use stickslip::structure::Node;
 
 /// Largest size of a file in bytes: lines for a million nodes.
-const MOST_BYTES: u64 = 1 << 26;
+const MAX_BYTES: u64 = 1 << 26;
 
 impl Reader {
     pub(super) fn disk(&mut self, table: &TomlTable, keys: &[Key]) -> Option<DiskSource> {
@@ -125,8 +125,8 @@ impl Reader {
         };
         let mut text = String::new();
         let file = std::fs::File::open(&path).map_err(failed)?;
-        file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
-        if text.len() as u64 > MOST_BYTES {
+        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
+        if text.len() as u64 > MAX_BYTES {
             return Err((format!("`{}` is too large: the limit is 64 MiB", excerpt(name)), None));
         }
         Ok(text)
@@ -212,7 +212,7 @@ fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
     let mut deviations: Vec<Option<f64>> = Vec::new();
     for (line, [sector, deviation]) in csv(text, ["sector", "deviation"])? {
         let wrong = |message: String| Err((line, message));
-        let Some(sector) = sector.parse::<usize>().ok().filter(|sector| *sector < crate::syntax::schema::MOST_MASSES)
+        let Some(sector) = sector.parse::<usize>().ok().filter(|sector| *sector < crate::syntax::schema::MAX_MASSES)
         else {
             return wrong(format!("`{}` is not a valid sector number; sectors count from 0", excerpt(&sector)));
         };

@@ -8,8 +8,8 @@ use crate::compile::source_model::ModelLists;
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::is_reserved;
-use crate::syntax::key::RATIO;
-use crate::syntax::schema::{Bounds, FILE, Key, MOST_ELEMENTS, MOST_MASSES, ValueType};
+use crate::syntax::key::DAMPING_RATIO;
+use crate::syntax::schema::{Bounds, FILE, Key, MAX_ELEMENTS, MAX_MASSES, ValueType};
 use crate::syntax::suggest::excerpt;
 use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
@@ -23,7 +23,8 @@ fn percent(spring: &mut CompiledTable) {
         if let CompiledValue::Quantity { quantity, dimension, within, example } = &mut entry.value
             && quantity.text.trim_end().ends_with('%')
         {
-            (entry.key, *dimension, *within, *example) = (RATIO, Dimension::NONE, Bounds::AtLeastZero, "\"2 %\"");
+            (entry.key, *dimension, *within, *example) =
+                (DAMPING_RATIO, Dimension::NONE, Bounds::AtLeastZero, "\"2 %\"");
         }
     }
 }
@@ -49,7 +50,7 @@ impl Reader {
                     self.wrong_type(key, node);
                 }
                 (ValueType::List(keys), TomlValue::List(list)) => {
-                    let most = if matches!(name, "mass" | "body") { MOST_MASSES } else { MOST_ELEMENTS };
+                    let most = if matches!(name, "mass" | "body") { MAX_MASSES } else { MAX_ELEMENTS };
                     let mut elements = 0;
                     for (i, node) in list.iter().enumerate() {
                         match &node.value {
@@ -84,9 +85,9 @@ impl Reader {
         lists.use_rotation_dimensions();
         lists.spring.iter_mut().for_each(percent);
         for spring in &lists.spring {
-            if let (Some(_), Some(ratio)) = (spring.entry("damping"), spring.entry(RATIO)) {
-                let message = format!("`damping` and `{RATIO}` exclude each other");
-                self.problems.push(Problem::new(&ratio.location, RATIO, message).help("remove one of them"));
+            if let (Some(_), Some(ratio)) = (spring.entry("damping"), spring.entry(DAMPING_RATIO)) {
+                let message = format!("`damping` and `{DAMPING_RATIO}` exclude each other");
+                self.problems.push(Problem::new(&ratio.location, DAMPING_RATIO, message).help("remove one of them"));
             }
             if spring.entry("stiffness").is_none() && spring.entry("damping").is_none() && self.problems.is_empty() {
                 let message = "a spring needs a stiffness, a damping, or both";

@@ -28,7 +28,7 @@ use crate::compile::source_model::SourceModel;
 use crate::compile::template_errors;
 use crate::syntax::document::{self, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
-use crate::syntax::schema::{self, FILE, MOST_BYTES};
+use crate::syntax::schema::{self, FILE, MAX_FILE_BYTES};
 use crate::syntax::suggest::suggest;
 use reader::Reader;
 use std::io::Read;
@@ -58,12 +58,12 @@ pub fn read_file(path: &Path, overrides: &[(String, String)]) -> Result<Study, S
     }
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(failed)?;
-    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     read_bytes(&name, &bytes, overrides)
 }
 
 /// File name extensions of results, with a description of such a file.
-const RESULTS: [(&str, &str); 7] = [
+const RESULT_EXTENSIONS: [(&str, &str); 7] = [
     ("csv", "a table of numbers"),
     ("parquet", "a table of numbers"),
     ("json", "a record of results"),
@@ -76,7 +76,7 @@ const RESULTS: [(&str, &str); 7] = [
 /// Returns what a file is if its extension rules out a study, and what to do with it.
 fn not_a_study(path: &Path) -> Option<(&'static str, String)> {
     let end = path.extension()?.to_str()?.to_lowercase();
-    if let Some((_, what)) = RESULTS.iter().find(|(known, _)| *known == end) {
+    if let Some((_, what)) = RESULT_EXTENSIONS.iter().find(|(known, _)| *known == end) {
         let folder = path.parent().filter(|folder| is_results(folder));
         let help = match folder {
             Some(folder) => format!("`stickslip plot {}` draws the results in its folder", folder.display()),
@@ -131,10 +131,10 @@ pub fn read_bytes(name: &str, bytes: &[u8], overrides: &[(String, String)]) -> R
 }
 
 fn check_size(name: &str, bytes: usize) -> Result<(), StudyError> {
-    if bytes as u64 <= MOST_BYTES {
+    if bytes as u64 <= MAX_FILE_BYTES {
         return Ok(());
     }
-    let message = format!("the file is too large for a study: the limit is {} MiB", MOST_BYTES / (1024 * 1024));
+    let message = format!("the file is too large for a study: the limit is {} MiB", MAX_FILE_BYTES / (1024 * 1024));
     Err(StudyError::file(name, message, None))
 }
 

@@ -3,7 +3,7 @@
 //! It determines the parameters, the order of their evaluation, and the number of cases.
 
 use super::reader::Reader;
-use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, DrawnParameter, MOST_SOBOL, SampleSettings, WITHIN};
+use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, DrawnParameter, MAX_SOBOL, SampleSettings, WITHIN};
 use crate::case::study::{Parameter, ParameterValues, ReplacedParameter, VariedParameter, evaluate, stated_parameters};
 use crate::case::values::ResolvedValue;
 use crate::compile::bare_numbers::bare_number_problem;
@@ -12,7 +12,7 @@ use crate::compile::template_errors;
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::is_reserved;
-use crate::syntax::schema::{self, Key, MOST_CASES, MOST_POINTS, SAMPLE, ValueType};
+use crate::syntax::schema::{self, Key, MAX_CASES, MAX_POINTS, SAMPLE, ValueType};
 use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use std::collections::HashMap;
 use stickslip::model::is_identifier;
@@ -136,7 +136,7 @@ impl Reader {
                     self.quantities(&entry.key, list, &entry.node.location).map(ParameterValues::List)
                 }
                 TomlValue::Table(table) => self
-                    .range(table, schema::RANGE, &entry.key)
+                    .range(table, schema::FREQUENCY_RANGE, &entry.key)
                     .map(|(from, to, points)| ParameterValues::Range { from, to, points }),
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| ParameterValues::List(vec![quantity])),
             };
@@ -202,9 +202,8 @@ impl Reader {
             let message = "no parameter is drawn: name at least one";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message));
         }
-        if sample.design == Design::Sobol && of.entries.len() > MOST_SOBOL {
-            let message =
-                format!("the Sobol design supports up to {MOST_SOBOL} parameters, found {}", of.entries.len());
+        if sample.design == Design::Sobol && of.entries.len() > MAX_SOBOL {
+            let message = format!("the Sobol design supports up to {MAX_SOBOL} parameters, found {}", of.entries.len());
             let help = "use design = \"latin-hypercube\"";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "design", message).help(help));
         }
@@ -360,7 +359,7 @@ impl Reader {
             Some(CompiledValue::Range { points, .. }) => *points,
             _ => 1,
         };
-        if cases <= MOST_CASES && cases.saturating_mul(frequencies) <= MOST_POINTS {
+        if cases <= MAX_CASES && cases.saturating_mul(frequencies) <= MAX_POINTS {
             return Some(());
         }
         let (location, key) = match (frequency, varied.first()) {
@@ -369,7 +368,7 @@ impl Reader {
             _ => (&study.location, "frequency"),
         };
         let message = format!(
-            "{cases} cases times {frequencies} frequencies exceed the limit of {MOST_CASES} cases and {MOST_POINTS} \
+            "{cases} cases times {frequencies} frequencies exceed the limit of {MAX_CASES} cases and {MAX_POINTS} \
              points"
         );
         self.problems.push(Problem::new(location, key, message).help("split the study, or use fewer points"));

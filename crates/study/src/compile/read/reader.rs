@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Largest number of errors reported at once.
-const MOST_ERRORS: usize = 20;
+const MAX_ERRORS: usize = 20;
 
 /// Reads one file and the template that it names.
 #[derive(Default)]
@@ -34,7 +34,7 @@ pub(super) struct Reader {
 impl Reader {
     /// Returns all problems as one error.
     pub(super) fn error(&mut self, file: &str) -> StudyError {
-        self.problems.truncate(MOST_ERRORS);
+        self.problems.truncate(MAX_ERRORS);
         let error = StudyError::from_problems(&self.sources, std::mem::take(&mut self.problems));
         error.unwrap_or_else(|| StudyError::file(file, "the study could not be read", None))
     }

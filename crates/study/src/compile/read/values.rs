@@ -9,7 +9,7 @@ use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, C
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
-use crate::syntax::schema::{self, Bounds, Key, MOST_POINTS, Presence, ValueType};
+use crate::syntax::schema::{self, Bounds, Key, MAX_POINTS, Presence, ValueType};
 use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
@@ -245,8 +245,8 @@ impl Reader {
         let message = format!("expected {}, found {whole}", schema::describe_value(&key.takes));
         let problem = Problem::new(location, key.name, message);
         let most = *within.end();
-        let limit = key.name == "points" && most == MOST_POINTS as i64 && whole > most;
-        let help = limit.then(|| format!("the limit of a study is {MOST_POINTS} points"));
+        let limit = key.name == "points" && most == MAX_POINTS as i64 && whole > most;
+        let help = limit.then(|| format!("the limit of a study is {MAX_POINTS} points"));
         self.problems.push(problem.maybe_help(help));
         None
     }
@@ -261,7 +261,7 @@ impl Reader {
             self.problems.push(Problem::new(&entry.key_location, "points", message).help(help));
             return None;
         }
-        let mut stated = self.table(table, schema::ADAPTIVE, &format!("the range of `{}`", excerpt(key.name)));
+        let mut stated = self.table(table, schema::ADAPTIVE_RANGE, &format!("the range of `{}`", excerpt(key.name)));
         let mut take = |key: &str| {
             let at = stated.entries.iter().position(|entry| entry.key == key)?;
             match stated.entries.swap_remove(at).value {

@@ -21,7 +21,7 @@ use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::PointRow;
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::key::ENDS;
+use crate::syntax::key::END_POINTS_RANGE;
 use crate::syntax::key::{Bounds, ValueType, default, required};
 use std::f64::consts::TAU;
 use stickslip::curve::trace::{Branch, End, Trace, TraceError};
@@ -38,7 +38,7 @@ pub(super) const KIND: Kind = Kind {
         keys: &[
             required(
                 "frequency",
-                ValueType::Frequencies(ENDS),
+                ValueType::Frequencies(END_POINTS_RANGE),
                 "excitation frequency: a range with its ends in either order (`steps` sets the spacing), or one \
                  value for a branch along a parameter",
                 "{ from = \"119 Hz\", to = \"123 Hz\" }",
@@ -88,7 +88,7 @@ pub(super) const KIND: Kind = Kind {
 /// Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border of stick.
 const POINTS: f64 = 5.0;
 /// Solutions of the full equations per requested step.
-const FOLLOWED: f64 = 15.0;
+const SOLUTIONS_PER_STEP: f64 = 15.0;
 /// Peaks and turning points per branch.
 const MARKS: f64 = 2.0;
 
@@ -108,7 +108,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows * costing.places,
         unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
         conditional_work: None,
-        work: rows * costing.extra() + steps * FOLLOWED * costing.solved_share() * costing.series(harmonics),
+        work: rows * costing.extra() + steps * SOLUTIONS_PER_STEP * costing.solved_share() * costing.series(harmonics),
     }
 }
 

@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ripple_below_the_error_is_no_peak() {
+    fn a_ripple_below_the_error_is_not_a_peak() {
         // two resonances, the second with a ripple of 2e-3 on its top, and a low one with
         // enough prominence
         let heights = [0.1, 0.5, 0.2, 0.99, 0.998, 1.0, 0.3, 0.301, 0.1];
@@ -85,7 +85,7 @@ mod tests {
 
     /// A refined top between two rows counts with its refined height.
     #[test]
-    fn a_refined_top_is_ground_for_others() {
+    fn a_refined_top_counts_with_its_height() {
         let tops = [LocalMaximum { row: 1, height: 1.1 }, LocalMaximum { row: 3, height: 1.05 }];
         assert_eq!(prominent(&tops, &[0.0, 1.0, 0.99, 1.02, 0.0], &[0.1; 5]), [true, false]);
     }

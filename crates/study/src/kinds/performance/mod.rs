@@ -13,7 +13,7 @@ use crate::check::warnings::sampling_warnings;
 use crate::kinds::info::KeyError;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
-use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP};
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
 use crate::results::notes::Note;
@@ -120,7 +120,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
         if both_ways::is_followed(&prepared.system) {
-            rows.flag(WAY_BACK, row.peak.map(|_| row.way_back));
+            rows.flag(REVERSE_SWEEP, row.peak.map(|_| row.way_back));
         }
         rows.integer(tables::FAILED, row.failed as u64);
         rows.reduction_error(prepared.system.reduction_evidence());
@@ -218,7 +218,7 @@ fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, Method
 }
 
 /// Largest number of bands in the panel; more bands hide each other.
-const MOST_BANDS: usize = 7;
+const MAX_BANDS: usize = 7;
 
 fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(table), outer) = (drawing.table(tables::PERFORMANCE), drawing.study.varied().len().saturating_sub(1))
@@ -248,7 +248,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         // the stretches hold all parameters but the last; the first case represents a stretch
         let groups = drawing.group_draws(&stretches);
         let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
-        let bands = groups.iter().take(MOST_BANDS).enumerate().flat_map(|(colour, (_, group))| {
+        let bands = groups.iter().take(MAX_BANDS).enumerate().flat_map(|(colour, (_, group))| {
             let curve =
                 |stretch: &&CaseRows| (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
             let outer = group

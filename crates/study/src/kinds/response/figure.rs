@@ -3,9 +3,9 @@
 use super::figure_data::{CasePeak, FigureData, force};
 use super::{amplification, tables};
 use crate::kinds::shared::contact_states;
-use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP, amplitude_of};
 use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
-use crate::results::drawing::{CaseRows, FigureInput, MOST_PANELS, PanelLayout, join_title, largest, numbers, words};
+use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, PanelLayout, join_title, largest, numbers, words};
 use crate::results::histogram;
 use crate::syntax::format::prefixed_unit;
 
@@ -67,7 +67,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     };
     let amplified = amplification::panels(drawing);
     figure.panels.extend(if amplified.is_empty() { heights(&drawn) } else { amplified });
-    figure.panels.truncate(MOST_PANELS);
+    figure.panels.truncate(MAX_PANELS);
     figure
 }
 
@@ -104,7 +104,7 @@ fn references_by_case(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows>
 fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
-    let way_back = table.flags(WAY_BACK).unwrap_or_default();
+    let way_back = table.flags(REVERSE_SWEEP).unwrap_or_default();
     let masses = words(table, tables::MASS);
     // a table from another source may lack columns
     if masses.len() != table.rows() {

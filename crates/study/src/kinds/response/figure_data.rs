@@ -363,7 +363,7 @@ impl FigureData<'_> {
         };
         let in_sector: BTreeSet<String> =
             self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.is_disk()).collect();
-        let joints = places + in_sector.len().min(disk_shape::MOST);
+        let joints = places + in_sector.len().min(disk_shape::MAX_PLACES);
         [places, joints, joints + if self.joints.is_empty() { 0 } else { self.force_groups().len() }]
     }
 

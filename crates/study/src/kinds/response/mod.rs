@@ -20,8 +20,8 @@ use crate::check::survey::SurveyedCase;
 use crate::check::warnings::{sampling_warnings, undamped_resonance};
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::Kind;
-use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_in, phase_of};
-use crate::results::drawing::{MOST_CURVES, MOST_PANELS};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP, amplitude_in, phase_of};
+use crate::results::drawing::{MAX_CURVES, MAX_PANELS};
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::{PointRow, describe_location};
@@ -100,9 +100,9 @@ pub(super) const KIND: Kind = Kind {
 const PEAKS: f64 = 1.3;
 const REFINING: f64 = 6.0;
 /// Peaks of the largest amplitude of a disk: about three for twelve blades that differ by 2 %.
-const LEADING: f64 = 3.0;
+const DISK_PEAKS: f64 = 3.0;
 /// Share of the points of a curve at which the reverse sweep has another orbit.
-const OTHERS: f64 = 0.2;
+const REVERSE_SHARE: f64 = 0.2;
 
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let (points, values) = (costing.points(), &costing.case.values);
@@ -125,12 +125,12 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     // a tuned disk takes the time of one sector, at the frequencies of the mistuned disk
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
     let shapes = match costing.case.model.ring {
-        Some(_) if values.names("peak_of").is_none() => peaks.min(LEADING * costing.cases),
+        Some(_) if values.names("peak_of").is_none() => peaks.min(DISK_PEAKS * costing.cases),
         Some(_) => peaks,
         None => 0.0,
     };
     let back = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
-    let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
+    let curves = costing.cases.min(MAX_CURVES as f64) * costing.places.min(MAX_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
             costing.orbits(points),
@@ -138,13 +138,13 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
             TableShape { rows: linear, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
             TableShape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
             TableShape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
-            costing.orbits((OTHERS * back).floor()),
+            costing.orbits((REVERSE_SHARE * back).floor()),
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         conditional_work: None,
         work: points * costing.extra()
-            + (points + OTHERS * back + tuned * costing.frequencies) * costing.orbit()
+            + (points + REVERSE_SHARE * back + tuned * costing.frequencies) * costing.orbit()
             + (back + REFINING * refined) * costing.unchecked_orbit()
             + 2.0 * linear * costing.reference(),
     }
@@ -204,7 +204,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
             if both_ways::is_followed(&prepared.system) {
-                peaks.flag(WAY_BACK, Some(found.reverse_sweep));
+                peaks.flag(REVERSE_SWEEP, Some(found.reverse_sweep));
             }
             peaks.reduction_error(prepared.system.reduction_evidence());
             peaks.end_row();

@@ -6,7 +6,7 @@ use crate::kinds::shared::contact_states;
 use crate::kinds::shared::disk_shape::{self, PlaceInSectors};
 use crate::results::columns::FREQUENCY as DRIVE;
 use crate::results::dataset::{Axis, Panel, Series, Style};
-use crate::results::drawing::{CaseRows, MOST_PANELS, join_title, numbers};
+use crate::results::drawing::{CaseRows, MAX_PANELS, join_title, numbers};
 use crate::syntax::format::format_significant;
 
 /// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
@@ -17,10 +17,10 @@ const MISSING: usize = 6;
 /// Largest number of bars that remain distinct in a panel: two for each of 60 blades.
 const BARS: usize = 120;
 /// Bars whose heights differ by at most this share belong to equal sectors.
-const ALIKE: f64 = 1e-5;
+const EQUAL_BARS: f64 = 1e-5;
 /// Largest number of places drawn behind the curve of the largest amplitude; thousands of
 /// curves would form one grey area of several megabytes.
-const BEHIND: usize = 100;
+const MAX_BACKGROUND: usize = 100;
 
 impl FigureData<'_> {
     /// Returns the panels of each case.
@@ -30,8 +30,8 @@ impl FigureData<'_> {
     /// this.
     pub(super) fn by_case(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         let each = self.panels_of_a_case().max(1);
-        let room = (MOST_PANELS / each).clamp(1, stretches.len().max(1));
-        let wheels = room * (each + 1) <= MOST_PANELS;
+        let room = (MAX_PANELS / each).clamp(1, stretches.len().max(1));
+        let wheels = room * (each + 1) <= MAX_PANELS;
         let [of_sectors, of_forces, of_shares] = self.colours();
         let mut panels = Vec::new();
         for stretch in stretches.iter().take(room) {
@@ -108,7 +108,7 @@ impl FigureData<'_> {
             }
             return panel;
         }
-        let behind = self.highest(stretch, BEHIND);
+        let behind = self.highest(stretch, MAX_BACKGROUND);
         let label = match behind.len() < names.len() {
             true => format!("the {} highest of {} places", behind.len(), names.len()),
             false => format!("each of {} places", names.len()),
@@ -146,20 +146,22 @@ impl FigureData<'_> {
         let (frequency, shape) = self.shape_at_maximum(stretch)?;
         let all = PlaceInSectors::of_ring(shape)?;
         let places = all.len();
-        let shape: Vec<PlaceInSectors> =
-            disk_shape::largest_places(&all, disk_shape::MOST).into_iter().map(|place| all[place].clone()).collect();
+        let shape: Vec<PlaceInSectors> = disk_shape::largest_places(&all, disk_shape::MAX_PLACES)
+            .into_iter()
+            .map(|place| all[place].clone())
+            .collect();
         let bars = |colour: usize| {
             let around = &shape[colour];
             let (x, y) = around.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&around.place, x, y, first + colour)
         };
-        let fit = (BARS / ring.sectors.max(1)).clamp(1, disk_shape::MOST);
+        let fit = (BARS / ring.sectors.max(1)).clamp(1, disk_shape::MAX_PLACES);
         let series: Vec<Series> = disk_shape::largest_places(&shape, fit).into_iter().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
         // bars of equal height, as for a tuned disk, are left out
-        let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > ALIKE * bars.y[0].abs());
+        let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > EQUAL_BARS * bars.y[0].abs());
         let differ = series.iter().any(differ);
         let title = join_title([stretch.label(), format!("at {} Hz", format_significant(frequency, 6))]);
         let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));

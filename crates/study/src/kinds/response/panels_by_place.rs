@@ -6,7 +6,7 @@ use crate::case::study::varied_text;
 use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of};
 use crate::results::dataset::{Panel, Series};
-use crate::results::drawing::{CaseRows, MOST_CURVES, MOST_PANELS, evenly_chosen, join_title, numbers};
+use crate::results::drawing::{CaseRows, MAX_CURVES, MAX_PANELS, evenly_chosen, join_title, numbers};
 use crate::results::percentiles::percentiles;
 
 /// Returns x and y of one draw.
@@ -39,7 +39,7 @@ impl FigureData<'_> {
             let groups = contact_states::groups(&self.contact_joints).into_iter().zip(of_shares..);
             groups.flat_map(move |(joints, alone)| self.shares_in_cases(&joints, group, outer, alone))
         });
-        of_masses.chain(of_joints).chain(of_faces).take(MOST_PANELS).collect()
+        of_masses.chain(of_joints).chain(of_faces).take(MAX_PANELS).collect()
     }
 
     /// Returns the same panels with percentiles of the draws for each combination of `vary`.
@@ -80,7 +80,7 @@ impl FigureData<'_> {
             let title = shares.title.clone();
             panels.push(panel(shares, &title, &of_case));
         }
-        panels.truncate(MOST_PANELS);
+        panels.truncate(MAX_PANELS);
         panels
     }
 
@@ -88,8 +88,8 @@ impl FigureData<'_> {
     /// figure has `panels` such panels.
     fn cases_of_mass(&self, mass: Option<&str>, group: &[CaseRows], outer: &str, panels: usize) -> Panel {
         let named = mass.filter(|_| panels > 1).map(str::to_owned);
-        let thinned_out = match group.len() > MOST_CURVES {
-            true => Some(format!("{MOST_CURVES} of {} cases", group.len())),
+        let thinned_out = match group.len() > MAX_CURVES {
+            true => Some(format!("{MAX_CURVES} of {} cases", group.len())),
             false => self.case_count_text.clone(),
         };
         let mut panel = self.panel(join_title(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
@@ -98,7 +98,7 @@ impl FigureData<'_> {
         } else if panels == 1 && self.system.places().len() > 1 {
             panel.y.quantity = format!("amplitude of {}", self.shown[0].0);
         }
-        let cases: Vec<(usize, &CaseRows)> = evenly_chosen(group, MOST_CURVES).into_iter().enumerate().collect();
+        let cases: Vec<(usize, &CaseRows)> = evenly_chosen(group, MAX_CURVES).into_iter().enumerate().collect();
         panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass]), &cases));
         // each case has its row of crosses if few cases have failures
         let failing = cases.iter().filter(|(_, stretch)| !self.without_orbit(stretch).is_empty()).count();
@@ -139,7 +139,7 @@ impl FigureData<'_> {
     ) -> Panel {
         let named = Some(joint.clone()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
         let mut panel = self.force_panel(join_title(named.into_iter().chain([outer.to_owned()])));
-        for (colour, stretch) in evenly_chosen(group, MOST_CURVES).into_iter().enumerate() {
+        for (colour, stretch) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
             let (x, y) = self.force_line(stretch, all);
             let colour = if stretch.varied.is_empty() { alone } else { colour };
             panel.series.push(of_case(stretch, joint, x, y, colour));
@@ -161,7 +161,7 @@ impl FigureData<'_> {
         let (name, joints) = named;
         let panel = |state: ContactState| {
             let mut panel = self.share_panel(named, state, outer.to_owned());
-            for (colour, stretch) in evenly_chosen(group, MOST_CURVES).into_iter().enumerate() {
+            for (colour, stretch) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
                 let (x, y) = self.share_line(stretch, joints, state);
                 let colour = if stretch.varied.is_empty() { alone } else { colour };
                 panel.series.push(of_case(stretch, name, x, y, colour));

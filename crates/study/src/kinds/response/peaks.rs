@@ -21,7 +21,7 @@ const LEVEL: f64 = 1e-8;
 /// count as one.
 ///
 /// Searches on a level top end at points that depend on the warm start.
-const SAME: f64 = 1e-2;
+const SAME_PEAK: f64 = 1e-2;
 
 /// The quantities of an orbit for the peak search.
 pub(super) struct PeakQuantities {
@@ -137,7 +137,7 @@ fn is_same_peak(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
     !there.reverse_sweep
         && there.mass == back.mass
         && below(a) == below(b)
-        && (a.value - b.value).abs() <= SAME * a.value
+        && (a.value - b.value).abs() <= SAME_PEAK * a.value
 }
 
 /// Returns true if a peak of the reverse sweep is only its jump to the orbits of the forward

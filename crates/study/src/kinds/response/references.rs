@@ -30,7 +30,7 @@ pub(super) fn equal_previous(study: &Study, case: &Case) -> bool {
 }
 
 /// Number of cases examined to estimate the number of references.
-const LOOKED_AT: usize = 9;
+const SAMPLED_CASES: usize = 9;
 
 /// Estimates the number of cases with different references, from some of the cases; zero if
 /// none are requested.
@@ -38,7 +38,7 @@ pub(super) fn distinct_cases(study: &Study) -> f64 {
     if !study.wants_references() {
         return 0.0;
     }
-    let (cases, looked) = (study.cases(), study.cases().min(LOOKED_AT));
+    let (cases, looked) = (study.cases(), study.cases().min(SAMPLED_CASES));
     let looked_at = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
     let own = looked_at.filter(|case| !equal_previous(study, case)).count();
     own as f64 * cases as f64 / looked as f64

@@ -9,9 +9,9 @@ use crate::results::drawing::numbers;
 use std::ops::Range;
 
 /// Up to this number of joints, each joint has one panel.
-const FEW: usize = 3;
+const MAX_SINGLE: usize = 3;
 /// Shares below this are rounding.
-const NOTHING: f64 = 1e-9;
+const ROUNDING: f64 = 1e-9;
 /// Factor from shares to percent.
 const PERCENT: f64 = 100.0;
 
@@ -51,7 +51,7 @@ fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
             .map(|column| numbers(table, &column, rows.clone()));
     // the remainder is contact of a stop
     let touch = (0..stick.len()).map(|i| 1.0 - stick[i] - slip[i] - open[i]);
-    let touch = touch.map(|share| if share.abs() < NOTHING { 0.0 } else { share }).collect();
+    let touch = touch.map(|share| if share.abs() < ROUNDING { 0.0 } else { share }).collect();
     [stick, slip, touch, open].map(|shares: Vec<f64>| shares.into_iter().map(|share| share * PERCENT).collect())
 }
 
@@ -83,13 +83,13 @@ fn map_states(table: &Table, joints: &[String]) -> Vec<ContactState> {
 
 /// Returns the number of panels that [`panels`] returns.
 pub(in crate::kinds) fn count(table: &Table, joints: &[String]) -> usize {
-    if joints.len() <= FEW { joints.len() } else { map_states(table, joints).len() }
+    if joints.len() <= MAX_SINGLE { joints.len() } else { map_states(table, joints).len() }
 }
 
 /// Groups joints for panels of one quantity: each of a few joints, or all together.
 pub(in crate::kinds) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> {
     match joints.len() {
-        0..=FEW => joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect(),
+        0..=MAX_SINGLE => joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect(),
         many => vec![(format!("mean of {many} joints"), joints.to_vec())],
     }
 }
@@ -107,7 +107,7 @@ pub(in crate::kinds) fn panels(
 ) -> Vec<Panel> {
     let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| of_joint(table, joint, rows)).collect();
     let titled = |words: &str| if title.is_empty() { words.to_owned() } else { format!("{words}, {title}") };
-    if joints.len() <= FEW {
+    if joints.len() <= MAX_SINGLE {
         let occurring: Vec<ContactState> =
             ContactState::ALL.into_iter().filter(|state| occurs_in(table, joints, *state)).collect();
         let of_joint = |(joint, shares): (&String, &[Vec<f64>; 4])| Panel {

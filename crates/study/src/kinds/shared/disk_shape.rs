@@ -62,13 +62,13 @@ pub(in crate::kinds) fn of_sector(name: &str) -> Option<(String, usize)> {
 /// Length of the largest displacement as a share of the radius of the circle.
 const LARGEST: f64 = 0.35;
 /// Half the width of the picture in radii of the circle; all pictures have the same size.
-const ROOM: f64 = 1.0 + LARGEST + 0.05;
+const HALF_WIDTH: f64 = 1.0 + LARGEST + 0.05;
 /// Smallest number of sectors for a picture.
-const LEAST: usize = 3;
+const MIN_SECTORS: usize = 3;
 /// Number of points of the circle at rest.
 const CIRCLE: usize = 180;
 /// Largest number of places in a picture: those that move most. More places hide each other.
-pub(in crate::kinds) const MOST: usize = 4;
+pub(in crate::kinds) const MAX_PLACES: usize = 4;
 
 /// Returns the indices of at most `most` places that move most, in ascending order.
 pub(in crate::kinds) fn largest_places(places: &[PlaceInSectors], most: usize) -> Vec<usize> {
@@ -96,10 +96,10 @@ pub(in crate::kinds) fn panel(
     let all = places.iter().flat_map(|around| &around.sectors);
     // the first of equal displacements determines the instant
     let (_, _, now) = *all.clone().nth(leading(all.map(|(_, size, _)| *size))?)?;
-    if sectors < LEAST || places.iter().all(|around| around.sectors.len() < LEAST) {
+    if sectors < MIN_SECTORS || places.iter().all(|around| around.sectors.len() < MIN_SECTORS) {
         return None;
     }
-    let shown = largest_places(places, MOST);
+    let shown = largest_places(places, MAX_PLACES);
     let left_out = left_out(shown.len(), places.len());
     let at = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
     let rest = (0..=CIRCLE).map(|i| at(i as f64 / CIRCLE as f64, 1.0)).unzip();
@@ -126,7 +126,7 @@ pub(in crate::kinds) fn panel(
     let first = series.iter().rev().find_map(|line| Some((*line.x.first()?, *line.y.first()?)))?;
     series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
     let title = join_title([title, left_out]);
-    let axis = || Axis::default().between(-ROOM, ROOM);
+    let axis = || Axis::default().between(-HALF_WIDTH, HALF_WIDTH);
     Some(Panel { title, x: axis(), y: axis(), series, equal_axes: true })
 }
 

@@ -3,7 +3,7 @@
 use crate::case::values::Values;
 use crate::kinds::info::KeyError;
 use crate::run::output_columns;
-use crate::syntax::key::RANGE;
+use crate::syntax::key::FREQUENCY_RANGE;
 use crate::syntax::key::{Key, ValueType, default, optional, required};
 use std::collections::BTreeSet;
 use stickslip::method::{MethodError, Options};
@@ -34,7 +34,7 @@ pub(in crate::kinds) fn no_requirements(_: &Values, _: &Options, _: &System) -> 
 }
 
 /// Largest number of samples per period.
-pub(in crate::kinds) const MOST_SAMPLES: i64 = 100_000;
+pub(in crate::kinds) const MAX_SAMPLES: i64 = 100_000;
 
 /// Default harmonics and samples of the kinds that always use harmonic balance.
 pub(in crate::kinds) const HARMONICS: u64 = 15;
@@ -54,7 +54,7 @@ pub(in crate::kinds) fn check_samples(values: &Values) -> Result<(), KeyError> {
 /// The key `frequency` of the kinds that need an excitation frequency.
 pub(in crate::kinds) const FREQUENCY: Key = required(
     "frequency",
-    ValueType::Frequencies(RANGE),
+    ValueType::Frequencies(FREQUENCY_RANGE),
     "excitation frequency: one value, a list, or a range that includes both ends",
     "{ from = \"119 Hz\", to = \"123 Hz\", points = 241 }",
 );
@@ -78,4 +78,4 @@ pub(in crate::kinds) fn check_output(values: &Values) -> Result<(), KeyError> {
 
 /// The key `samples` of the kinds that show the motion over one period.
 pub(in crate::kinds) const SAMPLES: Key =
-    default("samples", ValueType::Count(8, MOST_SAMPLES), "720", "points per period", "720");
+    default("samples", ValueType::Count(8, MAX_SAMPLES), "720", "points per period", "720");
