@@ -62,7 +62,7 @@ pub(crate) fn ring() -> Dataset {
         x: Axis::new("frequency", "Hz"),
         y: Axis {
             names: (0..12).map(|j| format!("shroud_{j}")).collect(),
-            ..Axis::new("joint", "").between(-0.5, 11.5)
+            ..Axis::new("joint", "").with_range(-0.5, 11.5)
         },
         series: (0..12).map(stripe).collect(),
         ..Panel::default()
@@ -80,7 +80,7 @@ pub(crate) fn ring() -> Dataset {
         ..Panel::default()
     };
     let mut dataset = bare("ring", "A ring of twelve", vec![map, wheel]);
-    dataset.figure.varied = Some(Axis::new("share of the period", "%").between(0.0, 100.0));
+    dataset.figure.varied = Some(Axis::new("share of the period", "%").with_range(0.0, 100.0));
     dataset
 }
 
@@ -393,8 +393,8 @@ pub(crate) fn envelope() -> Dataset {
     list.push(Series::line("largest (blade 17)", f.clone(), largest.clone(), 1));
     let first = Panel {
         title: "48 blades".into(),
-        x: axis("frequency", "Hz").between(110.0, 140.0),
-        y: axis("amplitude", "mm").log().between(0.1, 10.0),
+        x: axis("frequency", "Hz").with_range(110.0, 140.0),
+        y: axis("amplitude", "mm").log().with_range(0.1, 10.0),
         series: list,
         ..Panel::default()
     };

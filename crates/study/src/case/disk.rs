@@ -51,7 +51,7 @@ pub(crate) fn ring_of(
         let deviations = deviations(disk, &values, sectors)?;
         let all = match &deviations {
             None => Vec::new(),
-            Some(deviations) => mistuned(structure, disk, environment, again, (&first, deviations))?,
+            Some(deviations) => mistuned_sectors(structure, disk, environment, again, (&first, deviations))?,
         };
         let most = MAX_MASSES / (first.masses.len() + first.bodies.len()).max(1);
         if sectors > most {
@@ -218,7 +218,7 @@ fn mistuning<'a>(disk: &'a DiskSource, values: &'a Values) -> Option<(&'a Compil
 }
 
 /// Returns the sectors, each with its deviation.
-fn mistuned(
+fn mistuned_sectors(
     structure: &SourceModel,
     disk: &DiskSource,
     environment: &Environment<'_>,

@@ -707,7 +707,7 @@ impl Study {
             let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
             evaluate(&self.names, &self.parameters, &self.order, &choice, &fixed)
         };
-        let mut model = model_of(&self.structure, &environment, &again, problems);
+        let mut model = case_model(&self.structure, &environment, &again, problems);
         let values = self.study.values(&environment, problems);
         let method = self.method.values(&environment, problems);
         substructure::set_frequency_range(&mut model, &values, &method);
@@ -722,7 +722,7 @@ impl Study {
         }
         let lowest = values.frequencies("frequency").and_then(Frequencies::lowest);
         if let Some(complaint) = lowest.and_then(|omega| too_slow(&model, omega)) {
-            problems.push(self.complaint(complaint));
+            problems.push(self.key_problem(complaint));
             return None;
         }
         let highest = values.frequencies("frequency").and_then(Frequencies::highest);
@@ -732,7 +732,7 @@ impl Study {
             return None;
         }
         if let Err(complaint) = (self.kind.check)(&values, &model, self.values_per_curve()) {
-            problems.push(self.complaint(complaint));
+            problems.push(self.key_problem(complaint));
             return None;
         }
         if first_look && let Err(complaint) = figure::check(&self.figure_values(), self.kind, &model) {
@@ -774,7 +774,7 @@ impl Study {
         }
     }
 
-    fn complaint(&self, complaint: KeyError) -> Problem {
+    fn key_problem(&self, complaint: KeyError) -> Problem {
         let location = self.study.location_of(complaint.key, complaint.name.as_deref());
         Problem::new(location, complaint.key, complaint.message).maybe_help(complaint.help)
     }
@@ -853,7 +853,7 @@ pub(crate) fn stated_parameters<'a>(
 
 /// Builds the model that the lists state, or the ring of the sector that they state. `again`
 /// evaluates the parameters with some of them changed.
-pub(crate) fn model_of(
+pub(crate) fn case_model(
     structure: &SourceModel,
     environment: &Environment<'_>,
     again: Reevaluate<'_>,

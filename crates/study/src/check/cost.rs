@@ -63,9 +63,9 @@ const SERIES_SAMPLES: f64 = 40.0 * 1024.0;
 const COEFFICIENT: f64 = 16.0;
 const DIRECTIONS: f64 = 3.0;
 /// Bytes of the measured quantities of a place, including its name.
-const MEASURED: f64 = 100.0;
+const PLACE_BYTES: f64 = 100.0;
 /// Samples per period at which [`SERIES_SAMPLES`] was measured.
-const SAMPLED: f64 = 1024.0;
+const REFERENCE_SAMPLES: f64 = 1024.0;
 /// Numbers per entry of a full matrix for a method that integrates in time.
 ///
 /// These are three matrices of the structure, the inverse mass, and the return map with its
@@ -296,7 +296,8 @@ impl<'a> CostInputs<'a> {
         let orbits = self.frequencies.min(BLOCK as f64);
         if self.is_series() {
             let option = |name: &str, default: f64| self.case.method.options.get(name).copied().unwrap_or(default);
-            let kept = self.kept_series_bytes(option("harmonics", SERIES_HARMONICS), option("samples", SAMPLED));
+            let kept =
+                self.kept_series_bytes(option("harmonics", SERIES_HARMONICS), option("samples", REFERENCE_SAMPLES));
             return orbits * kept + self.orbit_bytes();
         }
         orbits * self.orbit_bytes()
@@ -308,7 +309,9 @@ impl<'a> CostInputs<'a> {
     /// directions, at 15 harmonics.
     pub fn kept_series_bytes(&self, harmonics: f64, samples: f64) -> f64 {
         let coefficients = (harmonics + 2.0) * (self.dofs + DIRECTIONS * self.joints);
-        COEFFICIENT * coefficients + MEASURED * self.places + SERIES_SAMPLES * samples / SAMPLED * self.joints
+        COEFFICIENT * coefficients
+            + PLACE_BYTES * self.places
+            + SERIES_SAMPLES * samples / REFERENCE_SAMPLES * self.joints
     }
 
     /// Returns the bytes of an orbit in memory while it is computed.
@@ -366,7 +369,7 @@ impl CostInputs<'_> {
         let shown = cost.figure_cells(NUMBER + CSV_CELL_BYTES, WORD + CSV_CELL_BYTES);
         let drawn = FIGURE_POINT_BYTES * cost.drawn.min(MAX_ROWS as f64 * (self.places + self.joints));
         let factor = self.factor_bytes;
-        let factors = factor + (KEPT_FACTORS.0 * factor).min(KEPT_FACTORS.1);
+        let factors = factor + (STORED_FACTORS.0 * factor).min(STORED_FACTORS.1);
         let working = units.min(threads) as f64 * (cost.unit + factors);
         // a float above the largest value of the type becomes that value
         let whole = |value: f64| value as u64;
@@ -383,8 +386,8 @@ impl CostInputs<'_> {
         let elements = self.dofs + self.joints;
         // the modes of large models are not computed
         let modes = if self.surveyed.survey.is_too_large() { 0.0 } else { MODES * self.dofs.powi(3) };
-        let preparing = self.cases * (PREPARING + modes + ASSEMBLING * elements);
-        let writing = CELL * cost.cells(1.0, 1.0);
+        let preparing = self.cases * (CASE_SECONDS + modes + ELEMENT_SECONDS * elements);
+        let writing = CELL_SECONDS * cost.cells(1.0, 1.0);
         OVERHEAD
             + SAFETY_FACTOR
                 * (cost.work
@@ -392,7 +395,7 @@ impl CostInputs<'_> {
                     + self.basis_check_seconds()
                     + preparing
                     + writing
-                    + POINT * cost.drawn)
+                    + FIGURE_POINT_SECONDS * cost.drawn)
     }
 
     /// Returns the time to read and reduce a structure given by matrices, s; all cases share
@@ -458,9 +461,9 @@ const SAFETY_FACTOR: f64 = 2.0;
 /// Time for reading, drawing and writing, s.
 const OVERHEAD: f64 = 0.2;
 /// Time for one cell of a table and its text, s. Measured: 0.4 s for 200,000 rows of ten.
-const CELL: f64 = 3e-7;
+const CELL_SECONDS: f64 = 3e-7;
 /// Time for one point of a figure, s. Measured: 1 s for 800,000 in HTML, the same for SVG.
-const POINT: f64 = 3e-6;
+const FIGURE_POINT_SECONDS: f64 = 3e-6;
 /// Event-driven: time for the closed forms of an orbit, s, with and without an orbit at a near
 /// frequency. Measured: 19 to 49 µs for the couple.
 const EVENT_DRIVEN: (f64, f64) = (3e-5, 2e-4);
@@ -475,13 +478,13 @@ const SERIES_TOLERANCE: f64 = 1e-3;
 /// not found take the rest.
 const SERIES: f64 = 5e-4;
 /// Time of [`SERIES`] in the typical case, in which orbits are found.
-const SERIES_USUAL: f64 = 1.5e-5;
+const SERIES_TYPICAL: f64 = 1.5e-5;
 /// Factors for rigid sliders and smooth laws, which need more harmonics and more Newton steps.
 ///
 /// Measured: 20 ms at 4 blades, 0.9 s at 32. With given harmonics they need only more Newton
 /// steps, with a warm start and without one. Measured with five harmonics: 0.8 and 2.1 s for
 /// rings of 100 and 300.
-const HARD: f64 = 40.0;
+const RIGID_FACTOR: f64 = 40.0;
 const HARD_RIGID: (f64, f64) = (3.0, 80.0);
 const HARD_SMOOTH: f64 = 10.0;
 /// Factors for friction that falls with velocity, which needs the most harmonics and Newton
@@ -494,17 +497,17 @@ const HARD_FALLING: (f64, f64) = (120.0, 500.0);
 ///
 /// Measured: 2.8e-10 in bands, for Newton steps of a ring of 96 blades with 96 rigid joints and
 /// 15 harmonics; 1e-10 in blocks.
-const ELIMINATED: f64 = 2e-10;
+const MULTIPLICATION_SECONDS: f64 = 2e-10;
 /// Newton steps of rigid friction with given harmonics, and with the harmonics of the error
 /// estimate.
 ///
 /// Typical: from a warm start. Hard: Newton's method alone does not converge. Measured: 3 to 5
 /// for rings of 12 and 24 blades, 30 to 55 for 48 to 192; 4 to 8 for an estimate.
-const RIGID_STEPS_USUAL: (f64, f64) = (8.0, 4.0);
+const RIGID_STEPS_TYPICAL: (f64, f64) = (8.0, 4.0);
 const RIGID_STEPS: (f64, f64) = (60.0, 8.0);
 /// Newton steps of rigid friction per number of harmonics if the method chooses the harmonics;
 /// typical and hard.
-const RIGID_EACH: (f64, f64) = (3.0, 8.0);
+const RIGID_STEPS_PER_HARMONIC: (f64, f64) = (3.0, 8.0);
 /// Harmonics that rigid friction needs for [`SERIES_TOLERANCE`], typical and hard, and the
 /// exponent of their growth with one over the tolerance.
 ///
@@ -519,7 +522,7 @@ const RIGID_ORDER: f64 = 2.0 / 3.0;
 /// enough. Measured: 0.3 to 14.5 s per point with four to eight pairs.
 const MEMORY_LAWS_WITH_RIGID: (f64, f64) = (0.0, 1.5);
 /// Upper bound of that time per point, s.
-const BESIDE_RIGID_MOST: f64 = 15.0;
+const MAX_MEMORY_LAWS_WITH_RIGID: f64 = 15.0;
 /// Largest number of harmonics in harmonic balance.
 const MAX_HARMONICS: f64 = 511.0;
 /// Order of the truncation error in the number of harmonics for forces with corners, and
@@ -541,13 +544,13 @@ const FACTORS: (f64, f64) = (2.0, 6.0);
 const FACTOR: (f64, f64) = (2.1e-9, 1.17);
 /// Memory of stored factors and motions: number of factors, and bytes at most. The factor that
 /// is being computed comes in addition.
-const KEPT_FACTORS: (f64, f64) = (2.0, 3e9);
+const STORED_FACTORS: (f64, f64) = (2.0, 3e9);
 /// Time for contacts that a reduced structure couples all with all, per square of their
 /// directions, s, as for a smooth law.
 ///
 /// Measured with five harmonics on a block in which many contacts slip: 0.05, 0.29 and 1.1 s
 /// for 10, 100 and 300 nodes of three directions; a fifth of that if they stick.
-const COUPLED: f64 = 4e-8;
+const COUPLED_CONTACTS: f64 = 4e-8;
 /// Factors on the time of an orbit if only contacts hold some bodies of a structure that is not
 /// solved by one sector.
 ///
@@ -566,12 +569,12 @@ const SHOOTING: (f64, f64) = (1e-3, 1.5e-2);
 ///
 /// Measured for two masses and a joint: 0.7 ms with `coulomb-arctan` and `cubic`, 1.5 to 3.5 ms
 /// with laws that have states.
-const SHOOTING_USUAL: (f64, f64) = (5e-5, 3e-4);
+const SHOOTING_TYPICAL: (f64, f64) = (5e-5, 3e-4);
 /// Shooting with equal steps: the periods of transient motion that take the time of one orbit.
 ///
 /// Measured: 0.29 s per point for a body on a contact of two directions, 0.33 s for three
 /// bodies with two such contacts.
-const STEPPED: f64 = 40.0;
+const EQUAL_STEP_PERIODS: f64 = 40.0;
 /// Method `transient`: periods in which the mode with the least damping loses one digit, at
 /// least and at most.
 ///
@@ -580,7 +583,7 @@ const STEPPED: f64 = 40.0;
 /// of two decays take 16.
 const SETTLING_PERIODS: (f64, f64) = (30.0, 50_000.0);
 /// The excitation moves modes up to this multiple of its highest frequency.
-const DRIVEN: f64 = 2.0;
+const EXCITED_FREQUENCY_FACTOR: f64 = 2.0;
 /// Periods after which method `transient` gives up if the motion does not settle.
 ///
 /// A law with unbounded force (a gap, a cubic spring) can cause this at some points. The factor
@@ -590,7 +593,7 @@ const UNSETTLED_PERIODS: f64 = 2.0 * 4096.0;
 ///
 /// Measured: one in five of two masses on a hard cubic spring with little damping, none with
 /// more.
-const UNSETTLED: f64 = 0.05;
+const UNSETTLED_SHARE: f64 = 0.05;
 /// Time of a period of integration, per square of masses and joints, s, without and with
 /// internal states.
 const PERIOD: (f64, f64) = (2.5e-4, 1.3e-3);
@@ -619,7 +622,7 @@ const FAST_OSCILLATION: f64 = 0.2;
 ///
 /// Measured: 0.7 to 2 ms per period for a body on a joint with little slip, 10 to 24 ms with
 /// much slip.
-const STEPS: (f64, f64) = (2500.0, 25_000.0);
+const STEPS_PER_PERIOD: (f64, f64) = (2500.0, 25_000.0);
 /// Time of one equal step, s: per direction of a joint, per pair of directions, and per pair of
 /// masses.
 ///
@@ -633,7 +636,7 @@ const STEP: (f64, f64, f64) = (7.5e-7, 5e-8, 4e-9);
 /// 37 ms for 13 coordinates and a contact of three.
 const STEP_DERIVATIVES: f64 = 4e-8;
 /// Time to resolve and assemble a case, s.
-const PREPARING: f64 = 2e-4;
+const CASE_SECONDS: f64 = 2e-4;
 /// Time of the modes of a case, s, per cube of its masses. Measured: 0.35 s for 500.
 const MODES: f64 = 2.8e-9;
 /// Time to read a structure given by matrices, with its factors, modes and samples of the
@@ -650,16 +653,16 @@ const PLACE_PER_ROW: f64 = 2e-7;
 /// masses, 0.3 s instead of 0.03.
 const BASIS_CHECK: (f64, f64) = (2.0, 10.0);
 /// Time to read, check and assemble, s, per mass and joint.
-const ASSEMBLING: f64 = 5e-5;
+const ELEMENT_SECONDS: f64 = 5e-5;
 /// Time to evaluate the motion at one instant, per mass and joint, s.
-const INSTANT: f64 = 5e-7;
+const INSTANT_SECONDS: f64 = 5e-7;
 
 impl CostInputs<'_> {
     /// Returns the time of one orbit by the method of the study, s.
     pub fn orbit(&self) -> f64 {
         let case = self.case;
         let size = self.dofs + self.joints;
-        let shooting = self.pace.select(SHOOTING_USUAL, SHOOTING);
+        let shooting = self.pace.select(SHOOTING_TYPICAL, SHOOTING);
         let shooting = size * size * self.fast_mode_factor() * if self.has_states { shooting.1 } else { shooting.0 };
         let series = self.series(case.method.options.get("harmonics").copied());
         match case.method.name.as_str() {
@@ -668,17 +671,17 @@ impl CostInputs<'_> {
                 let given = case.method.options.get("harmonics").copied();
                 whole.max(self.rigid_series(given))
                     + self.memory_laws_with_rigid(given)
-                    + self.factored(given)
+                    + self.factorization_seconds(given)
                     + self.return_check()
             }
             "transient" => {
                 let digit = LN_10 / (TAU * self.least_damping());
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
-                let share = self.pace.select(0.0, UNSETTLED);
+                let share = self.pace.select(0.0, UNSETTLED_SHARE);
                 let restless = if self.unbounded_force { share * UNSETTLED_PERIODS } else { 0.0 };
                 (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
             }
-            "shooting" if self.equal_steps => STEPPED * self.period(),
+            "shooting" if self.equal_steps => EQUAL_STEP_PERIODS * self.period(),
             _ if self.smooth => shooting,
             _ => self.events(),
         }
@@ -686,7 +689,7 @@ impl CostInputs<'_> {
 
     /// Returns the time of one event-driven orbit, s.
     fn events(&self) -> f64 {
-        let counted = ELIMINATED * event_driven::orbit_work(self.system()).unwrap_or(0.0);
+        let counted = MULTIPLICATION_SECONDS * event_driven::orbit_work(self.system()).unwrap_or(0.0);
         let far = event_driven::ALONE * counted;
         let usual = if self.is_dense(NEAR_WIDTHS) { counted } else { far };
         self.pace.select(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + WAITING_FACTOR * far)
@@ -738,7 +741,7 @@ impl CostInputs<'_> {
         let factor = match (self.smooth, self.is_rigid(), harmonics) {
             (_, _, None) if self.falling_friction => self.pace.select(HARD_FALLING.0, HARD_FALLING.1),
             (false, false, _) => 1.0,
-            (_, _, None) => HARD,
+            (_, _, None) => RIGID_FACTOR,
             (true, _, Some(_)) => HARD_SMOOTH,
             (false, true, Some(_)) if self.is_dense(NEAR_WIDTHS) => HARD_RIGID.0,
             (false, true, Some(_)) => self.pace.select(HARD_RIGID.1, HARD_RIGID.0),
@@ -749,14 +752,14 @@ impl CostInputs<'_> {
             None => (SERIES_TOLERANCE / asked).powf(SERIES_ORDER.recip()).min(MAX_HARMONICS / SERIES_HARMONICS),
         };
         // friction that falls with velocity is hard to solve in the typical case too
-        let usual = if self.falling_friction { SERIES } else { SERIES_USUAL };
+        let usual = if self.falling_friction { SERIES } else { SERIES_TYPICAL };
         let each = self.pace.select(usual, SERIES) * (self.dofs + self.joints).max(1.0);
         (each + self.coupled_contacts()) * factor * length.max(1.0).powf(SERIES_LENGTH)
     }
 
     /// Returns the time to eliminate `unknowns` unknowns, s.
-    pub fn eliminated(&self, unknowns: f64) -> f64 {
-        ELIMINATED * unknowns.powi(3) / 3.0
+    pub fn elimination_seconds(&self, unknowns: f64) -> f64 {
+        MULTIPLICATION_SECONDS * unknowns.powi(3) / 3.0
     }
 
     /// Returns the time that contacts add if a reduced structure couples all of them, s.
@@ -764,7 +767,7 @@ impl CostInputs<'_> {
         let system = self.system();
         let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
         let all = system.reduced().is_some() && system.cyclic().is_none();
-        if all { COUPLED * (directions as f64).powi(2) } else { 0.0 }
+        if all { COUPLED_CONTACTS * (directions as f64).powi(2) } else { 0.0 }
     }
 
     /// Returns the elimination time of harmonic balance with rigid friction, s; zero without
@@ -774,18 +777,18 @@ impl CostInputs<'_> {
         if self.smooth || !self.is_rigid() {
             return 0.0;
         }
-        let step = |harmonics: f64| ELIMINATED * harmonic_balance::step_work(system, harmonics as usize);
+        let step = |harmonics: f64| MULTIPLICATION_SECONDS * harmonic_balance::step_work(system, harmonics as usize);
         if let Some(given) = harmonics {
-            let (own, estimate) = self.pace.select(RIGID_STEPS_USUAL, RIGID_STEPS);
+            let (own, estimate) = self.pace.select(RIGID_STEPS_TYPICAL, RIGID_STEPS);
             return own * step(given) + estimate * step(2.0 * given);
         }
         let asked = self.case.method.options.get("tolerance").copied().unwrap_or(SERIES_TOLERANCE);
         let longest =
             self.pace.select(RIGID_HARMONICS.0, RIGID_HARMONICS.1) * (SERIES_TOLERANCE / asked).powf(RIGID_ORDER);
         let longest = longest.min(MAX_HARMONICS);
-        let each = self.pace.select(RIGID_EACH.0, RIGID_EACH.1);
+        let each = self.pace.select(RIGID_STEPS_PER_HARMONIC.0, RIGID_STEPS_PER_HARMONIC.1);
         let sought = each * harmonic_balance::doubling_work(system, longest);
-        ELIMINATED * sought.min(harmonic_balance::most_work(system))
+        MULTIPLICATION_SECONDS * sought.min(harmonic_balance::most_work(system))
     }
 
     /// Returns the time of laws with memory in a model with rigid planar friction, s.
@@ -800,12 +803,13 @@ impl CostInputs<'_> {
         }
         let remembers = |law: &&SharedLaw| law.step().is_some() || law.rate().is_some_and(|rate| rate.states() > 0);
         let pairs: usize = laws().filter(remembers).map(|law| law.directions().pow(2)).sum();
-        (self.pace.select(MEMORY_LAWS_WITH_RIGID.0, MEMORY_LAWS_WITH_RIGID.1) * pairs as f64).min(BESIDE_RIGID_MOST)
+        (self.pace.select(MEMORY_LAWS_WITH_RIGID.0, MEMORY_LAWS_WITH_RIGID.1) * pairs as f64)
+            .min(MAX_MEMORY_LAWS_WITH_RIGID)
     }
 
     /// Returns the time to factor the dynamic stiffness for one orbit, s; zero if no factor is
     /// made.
-    fn factored(&self, harmonics: Option<f64>) -> f64 {
+    fn factorization_seconds(&self, harmonics: Option<f64>) -> f64 {
         let numbers = self.factor_bytes / NUMBER;
         let count = FACTORS.0 * harmonics.unwrap_or(SERIES_HARMONICS) + FACTORS.1;
         count * FACTOR.0 * numbers.powf(FACTOR.1)
@@ -824,7 +828,7 @@ impl CostInputs<'_> {
         let exact = self.dofs + self.sliders;
         // `width` makes methods integrate sliders that have no smooth replacement
         if self.equal_steps && (self.smooth || self.case.method.options.contains_key("width")) {
-            return self.pace.select(STEPS.0, STEPS.1) * self.step();
+            return self.pace.select(STEPS_PER_PERIOD.0, STEPS_PER_PERIOD.1) * self.step();
         }
         match (self.smooth, self.has_states) {
             (false, _) => PERIOD_EVENTS.0 * exact + PERIOD_EVENTS.1 * exact.powi(3),
@@ -878,18 +882,18 @@ impl CostInputs<'_> {
     /// moves, because friction damps the others while they are visible.
     fn least_damping(&self) -> f64 {
         let modes = &self.surveyed.survey.free().elastic;
-        let highest = self.range().map_or(f64::INFINITY, |(_, highest)| DRIVEN * highest);
+        let highest = self.range().map_or(f64::INFINITY, |(_, highest)| EXCITED_FREQUENCY_FACTOR * highest);
         let driven = modes.iter().filter(|mode| self.pace == Difficulty::Hard || mode.omega <= highest);
         driven.map(|mode| mode.damping).fold(1.0, f64::min).max(f64::MIN_POSITIVE)
     }
 
     /// Returns the time to evaluate the motion at `instants` instants, s.
     pub fn evaluation(&self, instants: f64) -> f64 {
-        INSTANT * instants * (self.dofs + self.joints)
+        INSTANT_SECONDS * instants * (self.dofs + self.joints)
     }
 
     /// Returns the time to evaluate the columns of `output` for one orbit, s.
-    pub fn extra(&self) -> f64 {
+    pub fn output_seconds(&self) -> f64 {
         match self.case.values.names("output").unwrap_or_default().len() {
             0 => 0.0,
             some => self.evaluation(some as f64 * output_columns::INSTANTS as f64),

@@ -135,7 +135,7 @@ impl CompiledQuantity {
     pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
         self.expression
             .evaluate(&environment.values)
-            .map_err(|fault| Problem::fault(&self.location, self.text_start, key, fault))
+            .map_err(|fault| Problem::from_text_error(&self.location, self.text_start, key, fault))
     }
 
     /// Returns the value in SI. It must have this dimension and lie in this range.

@@ -98,7 +98,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     // an engine order excites the modes of one nodal diameter
     let crossings = lines / waves * count("engine_orders", 6);
     let depends = costing.case.parameters.contains_key(costing.case.values.text("parameter").unwrap_or(PARAMETER));
-    let found = if depends { speeds + REFINED * crossings } else { 1.0 };
+    let found = if depends { speeds + EVALUATIONS_PER_CROSSING * crossings } else { 1.0 };
     // free and stuck joints for every wave; the complex problem of a wave has twice the size
     let size = sectors.map_or(costing.dofs, |sectors| 2.0 * costing.dofs / sectors);
     Cost {
@@ -126,13 +126,13 @@ struct NaturalFrequency {
 }
 
 impl NaturalFrequency {
-    fn is_like(&self, other: &NaturalFrequency) -> bool {
+    fn is_similar(&self, other: &NaturalFrequency) -> bool {
         (self.state, self.diameter, self.mode) == (other.state, other.diameter, other.mode)
     }
 }
 
 /// Returns the natural frequencies of a model.
-fn naturals(model: &Model, most: usize) -> Result<Vec<NaturalFrequency>, String> {
+fn natural_frequencies(model: &Model, most: usize) -> Result<Vec<NaturalFrequency>, String> {
     let mut found = Vec::new();
     let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes, reduction| {
         let all = modes.elastic.iter().take(most).enumerate();
@@ -179,7 +179,7 @@ fn excited_modes(
 }
 
 /// Typical number of evaluations per crossing.
-const REFINED: f64 = 4.0;
+const EVALUATIONS_PER_CROSSING: f64 = 4.0;
 /// Largest number of evaluations per crossing.
 const MAX_REFINED: usize = 60;
 /// Relative change of the speed at which the search for a crossing stops: a hundred times the
@@ -207,7 +207,7 @@ impl CampbellDiagram<'_> {
             .study
             .case_with_parameter(self.prepared.case.index, name, speed)
             .map_err(|error| error.to_string())?;
-        naturals(&case.model, self.mode_count)
+        natural_frequencies(&case.model, self.mode_count)
     }
 
     /// Returns the speed at which `order` times the speed equals the frequency of a mode.
@@ -239,7 +239,7 @@ impl CampbellDiagram<'_> {
             last = next;
             let all = self.at(next)?;
             let found =
-                all.iter().find(|mode| mode.is_like(one)).ok_or("a mode was not found again between two speeds")?;
+                all.iter().find(|mode| mode.is_similar(one)).ok_or("a mode was not found again between two speeds")?;
             let there = excess(next, found);
             let before = (b - a).abs();
             if (there > 0.0) == (at_a > 0.0) {
@@ -259,7 +259,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let name = values.text("parameter").unwrap_or(PARAMETER);
     let most = values.count("modes").unwrap_or(3) as usize;
     let depends = prepared.case.parameters.contains_key(name);
-    let same = (!depends).then(|| naturals(&prepared.case.model, most));
+    let same = (!depends).then(|| natural_frequencies(&prepared.case.model, most));
     let diagram = CampbellDiagram { work, prepared, mode_count: most, constant_frequencies: same };
     let mut part = UnitResult::default();
     if !depends {
@@ -291,7 +291,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         }
         if let Some((last, all)) = &before {
             for (order, natural) in excited_modes(&found, orders, sectors) {
-                let Some(was) = all.iter().find(|was| was.is_like(natural)) else { continue };
+                let Some(was) = all.iter().find(|was| was.is_similar(natural)) else { continue };
                 if work.context.stopped() || (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
                     continue; // an interrupted unit is computed again
                 }
@@ -369,7 +369,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
                 series.push(Series::marks("crossings", column(SPEED, x_factor), column(FREQUENCY, y_factor), colour));
             }
         }
-        vec![Panel { title, x: x.clone(), y: y.clone().between(0.0, top), series, ..Panel::default() }]
+        vec![Panel { title, x: x.clone(), y: y.clone().with_range(0.0, top), series, ..Panel::default() }]
     };
     Figure { panels: draw_panels::panels(drawing, &drawing.case_rows(table), &panel), ..Figure::default() }
 }

@@ -69,7 +69,7 @@ pub(super) const KIND: Kind = Kind {
 const SOLUTIONS_PER_POINT: f64 = 8.0;
 /// Steps of the curve from its large end, independent of the request: typical, and with close
 /// modes.
-const STEPS: (f64, f64) = (100.0, 200.0);
+const STEPS_FROM_LARGE_END: (f64, f64) = (100.0, 200.0);
 
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let values = &costing.case.values;
@@ -77,7 +77,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let rows = costing.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
     // odd harmonics, two parts each, of every degree of freedom
-    let elimination = costing.eliminated((harmonics + 1.0) * costing.dofs);
+    let elimination = costing.elimination_seconds((harmonics + 1.0) * costing.dofs);
     Cost {
         tables: vec![
             TableShape { rows, numbers: costing.varied + 4.0 + 3.0 * costing.places, words: 0.0 },
@@ -86,7 +86,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
         conditional_work: None,
-        work: (rows * SOLUTIONS_PER_POINT + costing.cases * costing.steps(STEPS))
+        work: (rows * SOLUTIONS_PER_POINT + costing.cases * costing.steps(STEPS_FROM_LARGE_END))
             * (costing.series(Some(harmonics)) + elimination),
     }
 }
@@ -359,7 +359,7 @@ fn disk_shapes(
         };
         let moves = shown.iter().map(|name| (name.as_str(), size(name), at(&phase_of(name))));
         disk_shape::panel(
-            &PlaceInSectors::of_ring(moves)?,
+            &PlaceInSectors::from_ring(moves)?,
             ring.sectors,
             join_title([stretch.label(), words, frequency]),
             cases,

@@ -1,7 +1,7 @@
 //! Frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck,
 //! and mode shapes.
 
-use super::shared::disk_shape::{self, PlaceInSectors, of_sector};
+use super::shared::disk_shape::{self, PlaceInSectors, place_and_sector};
 use super::shared::keys::no_requirements;
 use crate::case::values::{Values, hertz};
 use crate::check::cost::{Cost, CostInputs, TableShape};
@@ -119,14 +119,16 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     Cost {
         tables: vec![TableShape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
-        unit: if each > SPARSE { FACTOR * each } else { 8.0 * each * each },
+        unit: if each > MAX_DENSE_SIZE { FACTOR * each } else { 8.0 * each * each },
         conditional_work: None,
-        work: costing.cases * waves * if each > SPARSE { LOWEST_MODES * each.powf(1.5) } else { EIGEN * each.powi(3) },
+        work: costing.cases
+            * waves
+            * if each > MAX_DENSE_SIZE { LOWEST_MODES * each.powf(1.5) } else { EIGEN * each.powi(3) },
     }
 }
 
 /// Size above which sparse factors give only the lowest modes.
-const SPARSE: f64 = 700.0;
+const MAX_DENSE_SIZE: f64 = 700.0;
 /// Time of an eigenvalue problem per cube of its size, s.
 const EIGEN: f64 = 1e-8;
 /// Time of the lowest modes of a wave, free and stuck, per size to the power of 1.5, s.
@@ -204,7 +206,7 @@ fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) 
 
 /// Returns the places of the first sector: name in the ring and name in the sector.
 fn places(model: &Model) -> Vec<(String, String)> {
-    let both = |name: String| of_sector(&name).map(|(place, _)| (name, place));
+    let both = |name: String| place_and_sector(&name).map(|(place, _)| (name, place));
     model.sector_places().into_iter().filter_map(both).collect()
 }
 
@@ -216,7 +218,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
     let panel = |stretch: &CaseRows, title: String| Panel {
         title,
-        x: Axis::new("nodal diameters", "").whole(),
+        x: Axis::new("nodal diameters", "").with_whole_numbers(),
         y: y.clone(),
         series: lines(table, stretch, factor),
         ..Panel::default()
@@ -261,7 +263,7 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, stretch: &CaseRows) -> Vec<P
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
         let around = |(_, place): &(String, String)| {
             let moves = (at(&shape_of(place)), at(&phase_of(place)));
-            PlaceInSectors::of_wave(place.clone(), moves, diameter as usize, ring.sectors)
+            PlaceInSectors::from_wave(place.clone(), moves, diameter as usize, ring.sectors)
         };
         let many = if diameter == 1 { "" } else { "s" };
         let frequency = format!("{} Hz", format_significant(frequencies[row], 5));

@@ -74,7 +74,8 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows * (costing.places + costing.joints),
         unit: costing.kept_orbits(),
         conditional_work: None,
-        work: points * (costing.orbit() + followed + map + costing.extra() + costing.evaluation(costing.instants())),
+        work: points
+            * (costing.orbit() + followed + map + costing.output_seconds() + costing.evaluation(costing.instants())),
     }
 }
 
@@ -83,7 +84,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let (mut motion, mut summary, mut multipliers) =
         (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
     let prepared = work.case();
-    for (orbit, stable) in orbit_sweep::found(work, &mut part)? {
+    for (orbit, stable) in orbit_sweep::converged_orbits(work, &mut part)? {
         let omega = orbit.omega;
         continuum_note(prepared, &orbit).into_iter().for_each(|note| note.merge_into(&mut part.notes));
         summary.varied(&prepared.case);

@@ -346,11 +346,11 @@ impl Axis {
         Axis { scale: Scale::Log, ..self }
     }
     /// Makes the axis one of whole numbers.
-    pub fn whole(self) -> Axis {
+    pub fn with_whole_numbers(self) -> Axis {
         Axis { whole: true, ..self }
     }
     /// Fixes the two ends of the axis.
-    pub fn between(self, from: f64, to: f64) -> Axis {
+    pub fn with_range(self, from: f64, to: f64) -> Axis {
         Axis { range: Some([from.min(to), from.max(to)]), ..self }
     }
 }

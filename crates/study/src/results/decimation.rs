@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    fn fed(mut kept: DecimatedTable, table: &Table, step: usize) -> Table {
+    fn decimate(mut kept: DecimatedTable, table: &Table, step: usize) -> Table {
         let all: Vec<usize> = (0..table.rows()).collect();
         all.chunks(step).for_each(|chunk| kept.add(rows(table, chunk)));
         kept.finished()
@@ -240,7 +240,7 @@ mod tests {
     fn a_long_curve_keeps_its_envelope() {
         let (study, most) = (study("vary = { Ft = [\"2 N\"] }"), 5000);
         let table = table(1, 400_000);
-        let kept = fed(DecimatedTable::new(&study, "curve", table.rows(), most), &table, 1009);
+        let kept = decimate(DecimatedTable::new(&study, "curve", table.rows(), most), &table, 1009);
         assert!(kept.rows() < most && kept.rows() > most / 10, "{}", kept.rows());
         let (x, y) = (kept.numbers("x").unwrap(), kept.numbers("y").unwrap());
         assert!(x.is_sorted_by(|a, b| a < b));
@@ -258,7 +258,7 @@ mod tests {
         let gaps = kept.numbers("z").unwrap().iter().filter(|value| value.is_nan()).count();
         assert_eq!(gaps, 4);
         // the result does not depend on the size of the blocks
-        let other = fed(DecimatedTable::new(&study, "curve", table.rows(), most), &table, 70_001);
+        let other = decimate(DecimatedTable::new(&study, "curve", table.rows(), most), &table, 70_001);
         assert!(format!("{other:?}") == format!("{kept:?}"));
     }
 
@@ -266,13 +266,13 @@ mod tests {
     fn kept_cases_are_complete() {
         let listed = study("vary = { Ft = { from = \"1 N\", to = \"9 N\", points = 1000 } }");
         let table = table(1000, 20);
-        let kept = fed(DecimatedTable::new(&listed, "curve", table.rows(), 10_000), &table, 33);
+        let kept = decimate(DecimatedTable::new(&listed, "curve", table.rows(), 10_000), &table, 33);
         let cases = kept.numbers("Ft_N").unwrap();
         assert!(cases.iter().all(|case| (*case as usize).is_multiple_of(3)), "every third");
         assert_eq!(kept.rows(), 334 * 20);
         // of draws, the first ones
         let drawn = study("[sample]\ncount = 1000\nof = { Ft = { uniform = [\"1 N\", \"9 N\"] } }");
-        let kept = fed(DecimatedTable::new(&drawn, "curve", table.rows(), 10_000), &table, 33);
+        let kept = decimate(DecimatedTable::new(&drawn, "curve", table.rows(), 10_000), &table, 33);
         // compared as text, because of the NaN values
         assert!(format!("{kept:?}") == format!("{:?}", rows(&table, &(0..10_000).collect::<Vec<_>>())));
     }

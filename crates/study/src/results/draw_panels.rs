@@ -47,13 +47,13 @@ fn combine_draws(draws: &[&Panel]) -> Option<Panel> {
     let mut series: Vec<Series> =
         first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
     let pairs: Vec<Vec<Series>> =
-        if bands { (0..lines[0].len()).map(|at| of_lines(&lines, at)).collect() } else { Vec::new() };
+        if bands { (0..lines[0].len()).map(|at| band_and_median(&lines, at)).collect() } else { Vec::new() };
     // draws whose abscissae do not overlap leave an empty band
     if bands && pairs.iter().flatten().all(|series| !series.x.is_empty()) {
         // bands first, so that they do not hide the medians
         series.extend(pairs.iter().flat_map(|pair| pair.first()).cloned());
         series.extend(pairs.iter().flat_map(|pair| pair.get(1)).cloned());
-        series.extend(of_points(draws));
+        series.extend(mark_medians(draws));
     } else {
         let shown = evenly_chosen(&lines, MAX_CURVES);
         series.extend(shown.into_iter().flatten().map(|line| (*line).clone().pale()));
@@ -91,7 +91,7 @@ fn curves(panel: &Panel, of: fn(Style) -> bool) -> Vec<&Series> {
 }
 
 /// Returns band and median of one line of all draws.
-fn of_lines(lines: &[Vec<&Series>], at: usize) -> Vec<Series> {
+fn band_and_median(lines: &[Vec<&Series>], at: usize) -> Vec<Series> {
     let line = lines[0][at];
     let all: Vec<(Vec<f64>, Vec<f64>)> = lines.iter().map(|one| (one[at].x.clone(), one[at].y.clone())).collect();
     let mut pair = percentiles(&all, &line.label, line.colour);
@@ -100,7 +100,7 @@ fn of_lines(lines: &[Vec<&Series>], at: usize) -> Vec<Series> {
 }
 
 /// Returns the medians of marks and bars that have the same abscissae in all draws.
-fn of_points(draws: &[&Panel]) -> Vec<Series> {
+fn mark_medians(draws: &[&Panel]) -> Vec<Series> {
     let points: Vec<Vec<&Series>> =
         draws.iter().map(|panel| curves(panel, |style| matches!(style, Style::Marks | Style::Bars))).collect();
     let at = |at: usize| {
@@ -123,7 +123,7 @@ mod tests {
     fn panel(series: Vec<Series>) -> Panel {
         Panel {
             x: Axis::new("speed", "rpm"),
-            y: Axis::new("frequency", "Hz").between(0.0, 2.0),
+            y: Axis::new("frequency", "Hz").with_range(0.0, 2.0),
             series,
             ..Panel::default()
         }
@@ -146,7 +146,7 @@ mod tests {
                 let elsewhere = Series::marks("crossings", vec![*y], vec![1.0], 1);
                 let order = Series::line("engine order 1", x.clone(), x.clone(), 0).reference();
                 let mut panel = panel(vec![line, order, same, elsewhere]);
-                panel.y = panel.y.between(0.0, *y);
+                panel.y = panel.y.with_range(0.0, *y);
                 panel
             })
             .collect();

@@ -59,7 +59,8 @@ impl<'a> FigureInput<'a> {
     /// Returns true if the figure shows a mass or joint of this name.
     pub(crate) fn shows(&self, name: &str) -> bool {
         let sectors = self.study.structure.lists.disk.is_some();
-        let is = |shown: &String| shown == name || is_of(shown, name) || (sectors && is_of_sector(shown, name));
+        let is =
+            |shown: &String| shown == name || is_direction_of(shown, name) || (sectors && is_of_sector(shown, name));
         self.options().names("only").is_none_or(|names| names.iter().any(is))
     }
 
@@ -256,7 +257,7 @@ pub(crate) fn largest(table: &Table, columns: impl IntoIterator<Item = String>) 
 }
 
 /// Returns true if `name` is an axis or direction of `whole`: `root.x` of `root`.
-fn is_of(whole: &str, name: &str) -> bool {
+fn is_direction_of(whole: &str, name: &str) -> bool {
     name.strip_prefix(whole).is_some_and(|rest| rest.starts_with('.'))
 }
 

@@ -6,7 +6,7 @@ use crate::results::weibull::WeibullMaxima;
 /// Smallest number of values for a histogram.
 pub(crate) const MIN_VALUES: usize = 20;
 /// Smallest and largest number of bars.
-const BARS: (f64, f64) = (6.0, 60.0);
+const BAR_LIMITS: (f64, f64) = (6.0, 60.0);
 /// Number of first values used for the fit; more values give the percentiles without a fit.
 const MAX_FITTED: usize = 20_000;
 /// Percentiles used in design.
@@ -32,14 +32,14 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     Some(Panel {
         title: title.to_owned(),
         x: x.clone(),
-        y: Axis::new(format!("{each} per bar"), "").whole(),
+        y: Axis::new(format!("{each} per bar"), "").with_whole_numbers(),
         series: vec![Series::bars(format!("{} {each}", sorted.len()), middles, counts, 0)],
         ..Panel::default()
     })
 }
 
 /// Returns the bar width by Freedman and Diaconis (1981), `2 IQR n^(-1/3)`, within the limits
-/// [`BARS`].
+/// [`BAR_LIMITS`].
 fn freedman_diaconis_width(sorted: &[f64]) -> f64 {
     let last = sorted.len() - 1;
     let range = sorted[last] - sorted[0];
@@ -49,7 +49,7 @@ fn freedman_diaconis_width(sorted: &[f64]) -> f64 {
     }
     let quarters = sorted[3 * last / 4] - sorted[last / 4];
     let width = 2.0 * quarters / libm::cbrt(sorted.len() as f64);
-    range / (range / width).clamp(BARS.0, BARS.1).ceil()
+    range / (range / width).clamp(BAR_LIMITS.0, BAR_LIMITS.1).ceil()
 }
 
 /// Returns the histogram of maxima with their Weibull distribution.

@@ -25,7 +25,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "joint_force",
         doc: "half the peak-to-peak value of the force of every joint",
-        columns: |system| of_joints(system, "force_amplitude_N"),
+        columns: |system| joint_columns(system, "force_amplitude_N"),
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
@@ -35,7 +35,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "joint_mean",
         doc: "mean force of every joint over the period; for a contact the mean normal load",
-        columns: |system| of_joints(system, "force_mean_N"),
+        columns: |system| joint_columns(system, "force_mean_N"),
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
@@ -49,7 +49,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "joint_motion",
         doc: "half the peak-to-peak value of the relative displacement of every joint",
-        columns: |system| of_joints(system, "amplitude_m"),
+        columns: |system| joint_columns(system, "amplitude_m"),
         values: |_, orbit, _| {
             let axes = orbit.joints.iter().flat_map(|joint| &joint.displacement);
             axes.map(|(low, high)| 0.5 * (high - low).abs()).collect()
@@ -78,7 +78,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "velocity",
         doc: "half the peak-to-peak value of the velocity of every place",
-        columns: |system| of_places(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
+        columns: |system| place_columns(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
             let places = prepared.system.seen().iter();
             places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.velocity)))).collect()
@@ -87,7 +87,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "acceleration",
         doc: "half the peak-to-peak value of the acceleration of every place",
-        columns: |system| of_places(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
+        columns: |system| place_columns(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
             let places = prepared.system.seen().iter();
             places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.acceleration)))).collect()
@@ -108,7 +108,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "receptance",
         doc: "amplitude of the first harmonic of every place per unit of the largest force",
-        columns: |system| of_places(system, |unit| format!("receptance_{unit}_per_N")),
+        columns: |system| place_columns(system, |unit| format!("receptance_{unit}_per_N")),
         values: |prepared, orbit, _| {
             let model = &prepared.case.model;
             let forces = model.forces.iter().filter(|force| force.harmonic == 1 && !model.is_rotation(&force.on));
@@ -125,11 +125,11 @@ const HARMONICS: usize = 5;
 /// a sine has an error of 2e-6.
 pub(crate) const INSTANTS: usize = 1024;
 
-fn of_joints(system: &System, quantity: &str) -> Vec<String> {
+fn joint_columns(system: &System, quantity: &str) -> Vec<String> {
     system.joints().iter().flat_map(|joint| joint.labels()).map(|label| format!("{label}_{quantity}")).collect()
 }
 
-fn of_places(system: &System, quantity: fn(&str) -> String) -> Vec<String> {
+fn place_columns(system: &System, quantity: fn(&str) -> String) -> Vec<String> {
     let places = system.places().iter().zip(system.seen());
     places.map(|(place, along)| format!("{place}_{}", quantity(along.unit()))).collect()
 }

@@ -51,7 +51,7 @@ impl Block {
     }
 
     /// Builds the block of one unit.
-    pub(crate) fn of(kind: &KindInfo, unit: usize, part: UnitResult) -> Block {
+    pub(crate) fn from_unit(kind: &KindInfo, unit: usize, part: UnitResult) -> Block {
         let UnitResult { tables: rows, notes, failures, points, interrupted: cut } = part;
         let mut block = Block { units: unit..unit + 1, ..Block::empty(kind, unit) };
         // the part of a unit that was not reached has no tables

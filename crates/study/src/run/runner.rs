@@ -188,7 +188,7 @@ impl CheckedStudy {
             None => Arc::new(PreparedCase::new(&self.study, 0)?),
         };
         let kind = self.study.kind();
-        compute_parts(&self.study, &first, range, context, &mut |unit, part| take(Block::of(kind, unit, part)))
+        compute_parts(&self.study, &first, range, context, &mut |unit, part| take(Block::from_unit(kind, unit, part)))
     }
 
     /// Returns the dataset without its results, as known before the computation; see
@@ -267,7 +267,7 @@ pub fn units(study: &Study) -> usize {
 
 /// Divides a study into its units.
 fn divide(study: &Study) -> WorkUnits {
-    WorkUnits::of(study, (kinds::kind_of(study).unit_size)(study))
+    WorkUnits::new(study, (kinds::kind_of(study).unit_size)(study))
 }
 
 /// Interval at which a run checks for a stop request.

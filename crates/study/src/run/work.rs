@@ -95,7 +95,7 @@ pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodErro
         0 => refusal.to_string(),
         index => format!("{refusal} ({})", study.case_words(index)),
     };
-    let help = error.ways().map(|ways| advice(study, case, ways));
+    let help = error.ways().map(|ways| refusal_advice(study, case, ways));
     match &error.refusal {
         Refusal::Law { joint, .. } => {
             let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
@@ -122,7 +122,7 @@ pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodErro
 const TRIAL_WIDTH: f64 = 1e-3;
 
 /// Returns the advice for a refused model. A kind that uses no method cannot take another one.
-fn advice(study: &Study, case: &Case, ways: &Ways) -> String {
+fn refusal_advice(study: &Study, case: &Case, ways: &Ways) -> String {
     let kind = study.kind();
     if kind.uses_method || !ways.any() {
         return ways.to_string();
@@ -189,7 +189,7 @@ pub struct WorkUnits {
 
 impl WorkUnits {
     /// Divides `study` into units of this size.
-    pub fn of(study: &Study, grain: UnitSize) -> Self {
+    pub fn new(study: &Study, grain: UnitSize) -> Self {
         let cases = study.cases();
         let points = (study.points() / cases.max(1)).max(1);
         WorkUnits { grain, cases, points, cases_per_curve: study.values_per_curve().max(1) }

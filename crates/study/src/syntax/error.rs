@@ -48,7 +48,7 @@ impl Problem {
     ///
     /// `inner` is the byte of the source at which the text begins. It is `None` if the source
     /// does not contain the text literally; then the whole location is wrong.
-    pub fn fault(location: &Location, inner: Option<usize>, key: &str, fault: TextError) -> Self {
+    pub fn from_text_error(location: &Location, inner: Option<usize>, key: &str, fault: TextError) -> Self {
         let span = match inner {
             Some(start) => start + fault.span.start..start + fault.span.end,
             None => location.span.clone(),
@@ -96,8 +96,8 @@ impl StudyError {
             Some(source) => Arc::clone(source),
             None => Arc::new(Source { name: String::new(), text: String::new() }),
         };
-        let start = boundary(&source.text, problem.location.span.start);
-        let end = boundary(&source.text, problem.location.span.end.max(start));
+        let start = char_boundary(&source.text, problem.location.span.start);
+        let end = char_boundary(&source.text, problem.location.span.end.max(start));
         let (line, column) = line_and_column(&source.text, start);
         StudyError(Box::new(ErrorDetails {
             source,
@@ -181,7 +181,7 @@ impl StudyError {
 }
 
 /// Returns the nearest character boundary at or before `at`.
-fn boundary(text: &str, at: usize) -> usize {
+fn char_boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
         at -= 1;
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn columns_count_characters() {
         assert_eq!(line_and_column("a\nµ = 1", 5), (2, 3));
-        assert_eq!(boundary("µ", 1), 0);
-        assert_eq!(boundary("µ", 9), 2);
+        assert_eq!(char_boundary("µ", 1), 0);
+        assert_eq!(char_boundary("µ", 9), 2);
     }
 }

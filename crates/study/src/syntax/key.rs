@@ -159,7 +159,7 @@ impl Key {
 pub(crate) const DAMPING_RATIO: &str = "damping_ratio";
 
 /// A key that users look for but that does not exist, with the reason and the alternative.
-pub const fn refused(name: &'static str, why: &'static str, instead: &'static str) -> Key {
+pub const fn unsupported(name: &'static str, why: &'static str, instead: &'static str) -> Key {
     Key { name, takes: ValueType::Unsupported(why), presence: Presence::Optional, doc: instead, example: "" }
 }
 

@@ -16,7 +16,7 @@ use stickslip::{law, method};
 
 pub use crate::syntax::key::{
     ADAPTIVE_RANGE, Bounds, END_POINTS_RANGE, FREQUENCY_RANGE, Key, MAX_CASES, MAX_MASSES, MAX_POINTS, Presence,
-    VERSION, ValueType, default, optional, refused, required,
+    VERSION, ValueType, default, optional, required, unsupported,
 };
 
 /// Largest number of elements in one list (`[[spring]]`, …), repetitions included.
@@ -582,7 +582,7 @@ const MOTION: &[Key] = &[
     ENGINE_ORDER,
     NODAL_DIAMETER,
     ONE_SECTOR,
-    refused(
+    unsupported(
         "velocity",
         "a place with a constant velocity, such as a belt, is not supported: every motion repeats with the excitation",
         "for a belt of velocity v use kind = \"transient\" and a slow, long motion: with amplitude A, phase = \"-90 \

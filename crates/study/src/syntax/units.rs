@@ -55,7 +55,12 @@ struct NamedUnit {
     unit: Unit,
 }
 
-const fn named(name: &'static str, prefixes: bool, factor: (u64, u64, i32, i32), base: (i8, i8, i8, i8)) -> NamedUnit {
+const fn named_unit(
+    name: &'static str,
+    prefixes: bool,
+    factor: (u64, u64, i32, i32),
+    base: (i8, i8, i8, i8),
+) -> NamedUnit {
     let (numerator, denominator, exponent, pi) = factor;
     let (kg, m, s, rad) = base;
     NamedUnit {
@@ -67,27 +72,27 @@ const fn named(name: &'static str, prefixes: bool, factor: (u64, u64, i32, i32),
 
 // name, prefixes, (numerator, denominator, power of ten, power of π), (kg, m, s, rad)
 const UNITS: &[NamedUnit] = &[
-    named("m", true, (1, 1, 0, 0), (0, 1, 0, 0)),
-    named("g", true, (1, 1, -3, 0), (1, 0, 0, 0)),
-    named("s", true, (1, 1, 0, 0), (0, 0, 1, 0)),
-    named("N", true, (1, 1, 0, 0), (1, 1, -2, 0)),
-    named("Pa", true, (1, 1, 0, 0), (1, -1, -2, 0)),
-    named("J", true, (1, 1, 0, 0), (1, 2, -2, 0)),
-    named("W", true, (1, 1, 0, 0), (1, 2, -3, 0)),
-    named("Hz", true, (2, 1, 0, 1), (0, 0, -1, 1)),
-    named("rad", true, (1, 1, 0, 0), (0, 0, 0, 1)),
-    named("deg", false, (1, 18, -1, 1), (0, 0, 0, 1)),
-    named("°", false, (1, 18, -1, 1), (0, 0, 0, 1)),
-    named("rev", false, (2, 1, 0, 1), (0, 0, 0, 1)),
-    named("rpm", false, (1, 3, -1, 1), (0, 0, -1, 1)),
-    named("min", false, (6, 1, 1, 0), (0, 0, 1, 0)),
-    named("h", false, (36, 1, 2, 0), (0, 0, 1, 0)),
-    named("t", false, (1, 1, 3, 0), (1, 0, 0, 0)),
-    named("in", false, (254, 1, -4, 0), (0, 1, 0, 0)),
-    named("ft", false, (3048, 1, -4, 0), (0, 1, 0, 0)),
-    named("lb", false, (45_359_237, 1, -8, 0), (1, 0, 0, 0)),
-    named("lbf", false, (44_482_216_152_605, 1, -13, 0), (1, 1, -2, 0)),
-    named("%", false, (1, 1, -2, 0), (0, 0, 0, 0)),
+    named_unit("m", true, (1, 1, 0, 0), (0, 1, 0, 0)),
+    named_unit("g", true, (1, 1, -3, 0), (1, 0, 0, 0)),
+    named_unit("s", true, (1, 1, 0, 0), (0, 0, 1, 0)),
+    named_unit("N", true, (1, 1, 0, 0), (1, 1, -2, 0)),
+    named_unit("Pa", true, (1, 1, 0, 0), (1, -1, -2, 0)),
+    named_unit("J", true, (1, 1, 0, 0), (1, 2, -2, 0)),
+    named_unit("W", true, (1, 1, 0, 0), (1, 2, -3, 0)),
+    named_unit("Hz", true, (2, 1, 0, 1), (0, 0, -1, 1)),
+    named_unit("rad", true, (1, 1, 0, 0), (0, 0, 0, 1)),
+    named_unit("deg", false, (1, 18, -1, 1), (0, 0, 0, 1)),
+    named_unit("°", false, (1, 18, -1, 1), (0, 0, 0, 1)),
+    named_unit("rev", false, (2, 1, 0, 1), (0, 0, 0, 1)),
+    named_unit("rpm", false, (1, 3, -1, 1), (0, 0, -1, 1)),
+    named_unit("min", false, (6, 1, 1, 0), (0, 0, 1, 0)),
+    named_unit("h", false, (36, 1, 2, 0), (0, 0, 1, 0)),
+    named_unit("t", false, (1, 1, 3, 0), (1, 0, 0, 0)),
+    named_unit("in", false, (254, 1, -4, 0), (0, 1, 0, 0)),
+    named_unit("ft", false, (3048, 1, -4, 0), (0, 1, 0, 0)),
+    named_unit("lb", false, (45_359_237, 1, -8, 0), (1, 0, 0, 0)),
+    named_unit("lbf", false, (44_482_216_152_605, 1, -13, 0), (1, 1, -2, 0)),
+    named_unit("%", false, (1, 1, -2, 0), (0, 0, 0, 0)),
 ];
 
 /// Common spellings of units that have another name here, in lower case, and what to write

@@ -5,16 +5,16 @@ use stickslip::dimension::Dimension;
 use stickslip::model::{Body, Model, ROTATIONS};
 
 /// Largest number of listed bodies.
-const LISTED: usize = 6;
+const MAX_LISTED: usize = 6;
 
 /// Returns a line for every body; for a disk those of one sector. Only the first bodies are
 /// listed.
 pub(super) fn described(model: &Model) -> Vec<String> {
     let sectors = model.ring.map_or(1, |ring| ring.sectors.max(1));
     let own = &model.bodies[..model.bodies.len() / sectors];
-    let mut lines: Vec<String> = own.iter().take(LISTED).map(|body| line(body, model)).collect();
-    if own.len() > LISTED {
-        lines.push(format!("and {} more", own.len() - LISTED));
+    let mut lines: Vec<String> = own.iter().take(MAX_LISTED).map(|body| line(body, model)).collect();
+    if own.len() > MAX_LISTED {
+        lines.push(format!("and {} more", own.len() - MAX_LISTED));
     }
     lines
 }

@@ -207,7 +207,7 @@ impl ModelSummary {
             orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| OrbitCount::new(first.system())),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
-            size: slow.size(&cost, WorkUnits::of(study, (kind.unit_size)(study)).len()),
+            size: slow.size(&cost, WorkUnits::new(study, (kind.unit_size)(study)).len()),
             usual_time_s: usual_seconds,
             time_without: spared,
             longest_time_s: seconds.max(usual_seconds),

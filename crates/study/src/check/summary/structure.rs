@@ -9,7 +9,7 @@ use stickslip::model::{ReductionEvidence, Substructure};
 use stickslip_numerics::sparse::Matrix;
 
 /// Largest number of listed frequencies.
-const LISTED: usize = 6;
+const MAX_LISTED: usize = 6;
 
 /// Directions for which the mass is stated.
 pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
@@ -63,7 +63,7 @@ impl StructureSummary {
             error: reduced.error(),
             up_to: reduced.up_to(),
             rigid_body_modes: Some(reduced.free()).filter(|_| one.case.model.ring.is_none()),
-            frequencies: reduced.frequencies().iter().skip(reduced.free()).take(LISTED).copied().collect(),
+            frequencies: reduced.frequencies().iter().skip(reduced.free()).take(MAX_LISTED).copied().collect(),
         });
         Some(StructureSummary {
             rows: component.dofs(),

@@ -8,7 +8,7 @@ use std::fmt;
 use stickslip::model::{LinearMode, Modes};
 
 /// Largest number of listed modes and joints.
-const LISTED: usize = 10;
+const MAX_LISTED: usize = 10;
 /// Largest number of listed frequency ranges with slip per joint.
 const MAX_SLIP_RANGES: usize = 3;
 /// Width of the first column.
@@ -21,18 +21,18 @@ impl ModelSummary {
         }
         let mut order: Vec<&LinearMode> = modes.elastic.iter().collect();
         let count = order.len();
-        if let Some((from, to)) = self.range.filter(|_| count > LISTED) {
+        if let Some((from, to)) = self.range.filter(|_| count > MAX_LISTED) {
             // the modes nearest to the range, by ascending frequency
             let distance = |omega: f64| if omega < from { from / omega } else { (omega / to).max(1.0) };
             order.sort_by(|a, b| distance(a.omega).total_cmp(&distance(b.omega)));
         }
-        order.truncate(LISTED);
+        order.truncate(MAX_LISTED);
         order.sort_by(|a, b| a.omega.total_cmp(&b.omega));
         let list = |read: &dyn Fn(&LinearMode) -> String| order.iter().map(|m| read(m)).collect::<Vec<_>>().join(", ");
         let mut parts = Vec::new();
-        if count > LISTED {
+        if count > MAX_LISTED {
             let which = if self.range.is_some() { "nearest the range" } else { "lowest" };
-            parts.push(format!("{count} modes, the {LISTED} {which}:"));
+            parts.push(format!("{count} modes, the {MAX_LISTED} {which}:"));
         }
         if count == 0 {
             parts.push("no mode".to_owned());
@@ -57,7 +57,7 @@ impl ModelSummary {
     fn joint(&self, joint: &JointSummary) -> String {
         match joint.normal_force {
             Some(0.0) => return "open in static equilibrium: it closes and opens".to_owned(),
-            Some(preload) => return pressed(preload, joint.normal_force_at_rest),
+            Some(preload) => return normal_force_text(preload, joint.normal_force_at_rest),
             None => {}
         }
         if joint.limit == 0.0 {
@@ -119,7 +119,7 @@ impl ModelSummary {
 }
 
 /// Returns the joint of a direction.
-fn whole(name: &str) -> &str {
+fn joint_of_direction(name: &str) -> &str {
     name.split('.').next().unwrap_or(name)
 }
 
@@ -133,7 +133,7 @@ fn rounded_load(load: f64) -> f64 {
 const PRELOAD_CHANGE: f64 = 1e-3;
 
 /// Describes the normal load at rest that a preload produces.
-fn pressed(preload: f64, at_rest: Option<f64>) -> String {
+fn normal_force_text(preload: f64, at_rest: Option<f64>) -> String {
     let newtons = |force: f64| format_with_prefix(force, "N");
     match at_rest {
         None => {
@@ -165,7 +165,7 @@ fn pressed(preload: f64, at_rest: Option<f64>) -> String {
 impl fmt::Display for ModelSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // each direction of a joint has a line
-        let names: BTreeSet<&str> = self.joints.iter().map(|joint| whole(&joint.name)).collect();
+        let names: BTreeSet<&str> = self.joints.iter().map(|joint| joint_of_direction(&joint.name)).collect();
         let joints = names.len();
         let dofs =
             if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
@@ -188,19 +188,19 @@ impl fmt::Display for ModelSummary {
         // directions
         let mut order: Vec<&JointSummary> = self.joints.iter().collect();
         let lines = self.joints.len();
-        if lines > LISTED {
+        if lines > MAX_LISTED {
             let mut loads: BTreeMap<&str, f64> = BTreeMap::new();
             for joint in &self.joints {
                 let load = joint.onset.as_ref().map_or(0.0, relative_load);
-                let most = loads.entry(whole(&joint.name)).or_default();
+                let most = loads.entry(joint_of_direction(&joint.name)).or_default();
                 *most = most.max(rounded_load(load));
             }
-            order.sort_by(|a, b| loads[whole(&b.name)].total_cmp(&loads[whole(&a.name)]));
+            order.sort_by(|a, b| loads[joint_of_direction(&b.name)].total_cmp(&loads[joint_of_direction(&a.name)]));
         }
-        for joint in order.iter().take(LISTED) {
+        for joint in order.iter().take(MAX_LISTED) {
             line(&joint.name, &self.joint(joint))?;
         }
-        if let Some(more @ 1..) = lines.checked_sub(LISTED) {
+        if let Some(more @ 1..) = lines.checked_sub(MAX_LISTED) {
             line("", &format!("and {more} more joint{}", plural_suffix(more)))?;
         }
         match &self.orbits {

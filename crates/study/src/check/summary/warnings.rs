@@ -14,12 +14,12 @@ use stickslip::model::{Axis, FirstSlip, Loose, Modes};
 use stickslip::structure::ReducedComponent;
 
 /// Largest number of names that a warning lists; for more it states the number.
-const NAMED: usize = 6;
+const MAX_NAMED: usize = 6;
 
 /// Returns all warnings: those of the kind, and those of every study.
 pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -> Vec<String> {
     let mut warnings = of_kind;
-    warnings.extend(loose(cases));
+    warnings.extend(loose_parts(cases));
     warnings.extend(motionless_joints(&cases[0]));
     warnings.extend(massless(&cases[0]));
     warnings.extend(overstiff(&cases[0]));
@@ -34,18 +34,18 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -
 }
 
 /// Lists names in a sentence: `a, b and 3 more`.
-fn listed(names: &[String]) -> String {
-    let shown: Vec<String> = names.iter().take(NAMED).map(|name| format!("`{name}`")).collect();
-    match names.len().checked_sub(NAMED) {
+fn list_names(names: &[String]) -> String {
+    let shown: Vec<String> = names.iter().take(MAX_NAMED).map(|name| format!("`{name}`")).collect();
+    match names.len().checked_sub(MAX_NAMED) {
         None | Some(0) => shown.join(", "),
         Some(more) => format!("{} and {more} more", shown.join(", ")),
     }
 }
 
-fn loose(cases: &[SurveyedCase]) -> Vec<String> {
+fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let them = |count: usize| if count == 1 { "it" } else { "them" };
     let one = |one: &Loose| {
-        let names = listed(&one.masses);
+        let names = list_names(&one.masses);
         let them = them(one.masses.len());
         if one.held_by_friction {
             format!("no spring holds {names}: only friction keeps {them} in place, and nothing does if all joints slip")
@@ -65,15 +65,15 @@ fn loose(cases: &[SurveyedCase]) -> Vec<String> {
         format!(
             "{} can move freely in static equilibrium: only the faces of {} touch {}, and they have no preload; add \
              a preload, or hold {} by a spring",
-            listed(&bodies),
-            listed(&joints),
+            list_names(&bodies),
+            list_names(&joints),
             them(bodies.len()),
             them(bodies.len())
         )
     });
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
     let others = others.filter(|one| !between(one) && !one.held_in_motion);
-    others.take(NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
+    others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
 }
 
 /// Warns of a preload that no constant force balances, for the first such case.
@@ -84,7 +84,7 @@ fn unbalanced_preload(cases: &[SurveyedCase]) -> Option<String> {
     if bodies.is_empty() {
         return None;
     }
-    let (names, joints) = (listed(&bodies), listed(&found.joints));
+    let (names, joints) = (list_names(&bodies), list_names(&found.joints));
     let preload = quantity_text(found.preload, Some(Dimension::FORCE));
     Some(format!(
         "the preload of {joints}, {preload} in total, pushes {names} away: no spring holds {}, and no constant force \
@@ -103,7 +103,7 @@ fn massless(one: &SurveyedCase) -> Option<String> {
         format!(
             "the mass of {} {are} zero and the model has no other mass: it has no resonance, only the response of \
              the springs",
-            listed(&names)
+            list_names(&names)
         )
     })
 }
@@ -166,7 +166,7 @@ fn motionless_joints(case: &SurveyedCase) -> Option<String> {
     } else {
         ("the joints", "never move, because their two places are")
     };
-    (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", listed(&names)))
+    (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", list_names(&names)))
 }
 
 /// Relative rounding below which the weights of a row cancel.
@@ -231,7 +231,7 @@ fn unused(study: &Study) -> Option<String> {
     let varied: BTreeSet<usize> = study.varied.iter().map(|varied| varied.index).collect();
     let idle = (0..study.names.len()).filter(|i| !used.contains(i) && (varied.contains(i) || !from_template(*i)));
     let (idle_varied, idle): (Vec<usize>, Vec<usize>) = idle.partition(|index| varied.contains(index));
-    let names = |indices: &[usize]| listed(&indices.iter().map(|i| study.names[*i].clone()).collect::<Vec<_>>());
+    let names = |indices: &[usize]| list_names(&indices.iter().map(|i| study.names[*i].clone()).collect::<Vec<_>>());
     match (idle_varied.is_empty(), idle.is_empty()) {
         (true, true) => None,
         (true, false) => Some(format!("no value of the study uses the parameter {}", names(&idle))),
@@ -329,7 +329,7 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
              state the unit: \"{number} deg\""
         )
     };
-    turned.into_iter().filter(bare).take(NAMED).map(sentence).collect()
+    turned.into_iter().filter(bare).take(MAX_NAMED).map(sentence).collect()
 }
 
 /// Warns of bare numbers whose unit is easily mistaken: angles count as radians, lengths as
@@ -363,5 +363,5 @@ fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
         0 => sentence,
         more => format!("{sentence} (and {more} more)"),
     };
-    found.into_iter().take(NAMED).map(sentence).collect()
+    found.into_iter().take(MAX_NAMED).map(sentence).collect()
 }

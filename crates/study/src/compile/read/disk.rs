@@ -46,7 +46,7 @@ impl Reader {
     fn nodes(&mut self, stated: &CompiledTable) -> Option<Vec<Node>> {
         let entry = stated.entry("nodes").filter(|_| !self.study_file_only)?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
-        let read = self.text_of(name).and_then(|text| {
+        let read = self.read_text(name).and_then(|text| {
             let deck = text.trim_start_matches('\u{feff}').trim_start().starts_with('*');
             let read = if deck { deck_nodes(&text) } else { csv_nodes(&text) };
             read.map_err(|(line, message)| {
@@ -71,7 +71,7 @@ impl Reader {
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let refuse =
             |(message, help): (String, Option<String>)| Problem::new(&entry.location, key, message).maybe_help(help);
-        let rows = self.text_of(name).and_then(|text| {
+        let rows = self.read_text(name).and_then(|text| {
             csv(&text, columns).map_err(|(line, message)| {
                 (format!("`{}`, line {line}: {message}", excerpt(name)), Some(help.to_owned()))
             })
@@ -99,7 +99,7 @@ impl Reader {
                 self.problems.push(Problem::new(&entry.location, key, message).help("remove one of them"));
             }
         }
-        match self.pattern_of(name) {
+        match self.read_pattern(name) {
             Ok(pattern) => Some(pattern),
             Err((message, help)) => {
                 self.problems.push(Problem::new(&location, "file", message).maybe_help(help));
@@ -108,8 +108,8 @@ impl Reader {
         }
     }
 
-    fn pattern_of(&self, name: &str) -> Result<Vec<f64>, MessageAndHelp> {
-        pattern(&self.text_of(name)?).map_err(|(line, message)| {
+    fn read_pattern(&self, name: &str) -> Result<Vec<f64>, MessageAndHelp> {
+        pattern(&self.read_text(name)?).map_err(|(line, message)| {
             let message = format!("`{}`, line {line}: {message}", excerpt(name));
             let help = "write a line `sector,deviation` and below it `0,0.012`, `1,-0.5 %` … for every sector";
             (message, Some(help.to_owned()))
@@ -117,7 +117,7 @@ impl Reader {
     }
 
     /// Reads a file whose path is relative to the folder of the study.
-    fn text_of(&self, name: &str) -> Result<String, MessageAndHelp> {
+    fn read_text(&self, name: &str) -> Result<String, MessageAndHelp> {
         let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
         let failed = |error: std::io::Error| {
             let message = format!("`{}` cannot be read: {error}", excerpt(&path.display().to_string()));

@@ -150,7 +150,7 @@ impl Reader {
         let owner = format!("a study of kind `{}`", kind.name);
         self.check_keys(table, &keys, &owner);
         let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, ValueType::Vary)).collect();
-        let stated = self.stated(table, &rest);
+        let stated = self.compile_table(table, &rest);
         Some((kind, stated, table.get("vary")))
     }
 

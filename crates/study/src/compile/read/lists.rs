@@ -106,7 +106,7 @@ impl Reader {
             self.turn_number = number;
             let before = self.problems.len();
             let mut stated = self.table(table, keys, owner);
-            let turn = self.turn().description();
+            let turn = self.iteration().description();
             if !turn.is_empty() {
                 for problem in &mut self.problems[before..] {
                     problem.message = format!("{} ({turn})", problem.message);

@@ -34,7 +34,7 @@ use reader::Reader;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-use template::{TemplateFile, named_template};
+use template::{TemplateFile, template_and_table};
 
 /// Reads the study at `path`; `overrides` are parameters and their new values, as in `--set Ft=3N`.
 ///
@@ -251,7 +251,7 @@ impl Reader {
         let title = words(self, "title");
         let source = words(self, "source");
 
-        let (parameters, structure) = match named_template(&root) {
+        let (parameters, structure) = match template_and_table(&root) {
             Some((row, table)) => {
                 let TemplateFile { parameters, lists, source } = self.template(row)?;
                 let parameters = self.parameters(&root, parameters, overrides);

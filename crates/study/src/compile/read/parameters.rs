@@ -178,7 +178,7 @@ impl Reader {
         self.check_keys(table, SAMPLE, "`[sample]`");
         let rest: Vec<Key> =
             SAMPLE.iter().copied().filter(|key| !matches!(key.takes, ValueType::Distributions)).collect();
-        let stated = self.stated(table, &rest);
+        let stated = self.compile_table(table, &rest);
         let count = |key: &str| match stated.entry(key).map(|entry| &entry.value) {
             Some(CompiledValue::Fixed(ResolvedValue::Count(count))) => Some(*count),
             _ => None,

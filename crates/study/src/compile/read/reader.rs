@@ -47,13 +47,13 @@ impl Reader {
     }
 
     /// Returns the current turn of the repetition.
-    pub(super) fn turn(&self) -> Iteration<'_> {
+    pub(super) fn iteration(&self) -> Iteration<'_> {
         self.repetition.iteration(self.turn_number)
     }
 
     /// Compiles an expression over the parameters and the indices of the turn.
     pub(super) fn compile(&self, text: &str) -> Result<Expression, crate::syntax::units::TextError> {
-        let turn = self.turn();
+        let turn = self.iteration();
         let names: Vec<&str> = self.names.iter().map(String::as_str).chain(turn.names()).collect();
         Expression::compile_with(text, &|name| self.index.get(name).copied(), &|name| turn.value(name), &names)
     }

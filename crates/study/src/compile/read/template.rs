@@ -2,7 +2,7 @@
 //! each template.
 
 use super::reader::Reader;
-use crate::case::study::{Parameter, evaluate, model_of};
+use crate::case::study::{Parameter, case_model, evaluate};
 use crate::compile::compiled::Environment;
 use crate::compile::source_model::{ModelLists, SourceModel, TemplateSource};
 use crate::compile::templates::{self, Template, trailing_comment};
@@ -25,7 +25,7 @@ pub(super) struct TemplateFile {
 }
 
 /// Returns the template that `[model]` names, with its table.
-pub(super) fn named_template(root: &TomlTable) -> Option<(&'static Template, &TomlTable)> {
+pub(super) fn template_and_table(root: &TomlTable) -> Option<(&'static Template, &TomlTable)> {
     let TomlValue::Table(table) = &root.get("model")?.node.value else { return None };
     let TomlValue::Text { text, .. } = &table.get("template")?.node.value else { return None };
     Some((templates::find(text)?, table))
@@ -127,7 +127,7 @@ impl CompiledTemplate {
             let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
             evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), &fixed)
         };
-        let model = model_of(&self.structure, &environment, &again, &mut problems);
+        let model = case_model(&self.structure, &environment, &again, &mut problems);
         StudyError::from_problems(&self.sources, problems).map_or(Ok(model), Err)
     }
 }

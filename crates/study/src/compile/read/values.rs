@@ -73,11 +73,11 @@ impl Reader {
 
     pub(super) fn table(&mut self, table: &TomlTable, keys: &[Key], owner: &str) -> CompiledTable {
         self.check_keys(table, keys, owner);
-        self.stated(table, keys)
+        self.compile_table(table, keys)
     }
 
     /// Reads the values of known keys. [`Reader::check_keys`] reports unknown and missing keys.
-    pub(super) fn stated(&mut self, table: &TomlTable, keys: &[Key]) -> CompiledTable {
+    pub(super) fn compile_table(&mut self, table: &TomlTable, keys: &[Key]) -> CompiledTable {
         let mut entries = Vec::with_capacity(keys.len());
         for key in keys {
             let (location, value) = match (table.get(key.name), key.presence) {
@@ -149,10 +149,10 @@ impl Reader {
             }
             (ValueType::Flag, TomlValue::Flag(flag)) => Some(CompiledValue::Fixed(ResolvedValue::Flag(*flag))),
             (ValueType::Frequencies(keys), TomlValue::Text { .. } | TomlValue::Number { .. }) => {
-                Some(CompiledValue::List(vec![self.quantity(key.name, node)?], within(keys)))
+                Some(CompiledValue::List(vec![self.quantity(key.name, node)?], range_bounds(keys)))
             }
             (ValueType::Frequencies(keys), TomlValue::List(list)) => {
-                Some(CompiledValue::List(self.quantities(key.name, list, &node.location)?, within(keys)))
+                Some(CompiledValue::List(self.quantities(key.name, list, &node.location)?, range_bounds(keys)))
             }
             (ValueType::Frequencies(_), TomlValue::Table(table)) if table.get("tolerance").is_some() => {
                 self.adaptive(key, table)
@@ -162,7 +162,7 @@ impl Reader {
                 // if only the ends matter, their order gives the direction
                 let ends = |key: &Key| key.name == "points" && matches!(key.presence, Presence::Default(_));
                 let order = if keys.iter().any(ends) { RangeOrder::Any } else { RangeOrder::Rising };
-                Some(CompiledValue::Range { from, to, points, within: within(keys), order })
+                Some(CompiledValue::Range { from, to, points, within: range_bounds(keys), order })
             }
             (ValueType::ByName(dimension), TomlValue::Table(table)) => {
                 let mut names = Vec::new();
@@ -286,7 +286,7 @@ impl Reader {
     ///
     /// The name of a place may be a direction of a node, `node.direction`.
     fn name(&mut self, key: &str, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
-        let problem = match self.turn().name(text) {
+        let problem = match self.iteration().name(text) {
             Ok(name) if is_identifier(&name) => return Some(name),
             // a place of the next sector of a disk is allowed too
             Ok(name) if !matches!(key, "name" | "directions") && is_place(name.strip_prefix(NEXT).unwrap_or(&name)) => {
@@ -301,9 +301,9 @@ impl Reader {
             }
             Err(fault) if self.repetition.indices.is_empty() => {
                 let help = "braces need an index in the same entry: repeat = { i = 12 }";
-                Problem::fault(location, inner, key, fault).help(help)
+                Problem::from_text_error(location, inner, key, fault).help(help)
             }
-            Err(fault) => Problem::fault(location, inner, key, fault),
+            Err(fault) => Problem::from_text_error(location, inner, key, fault),
         };
         self.problems.push(problem);
         None
@@ -312,7 +312,7 @@ impl Reader {
     /// Reads the name or number of a row, and fills in the indices of a repetition.
     fn row(&mut self, key: &Key, node: &TomlNode) -> Option<String> {
         match &node.value {
-            TomlValue::Text { text, inner } => self.filled(key, text, *inner, &node.location),
+            TomlValue::Text { text, inner } => self.fill_name(key, text, *inner, &node.location),
             TomlValue::Number { whole: Some(number), .. } => Some(number.to_string()),
             _ => self.wrong_type(key, node).and(None),
         }
@@ -321,17 +321,17 @@ impl Reader {
     /// Reads rows with their weights.
     fn weights(&mut self, key: &Key, table: &TomlTable) -> Option<Weights> {
         let one = |entry: &TomlEntry| {
-            let name = self.filled(key, &entry.key, None, &entry.key_location)?;
+            let name = self.fill_name(key, &entry.key, None, &entry.key_location)?;
             Some((name, entry.key_location.clone(), self.quantity(&entry.key, &entry.node)?))
         };
         table.entries.iter().map(one).collect()
     }
 
-    fn filled(&mut self, key: &Key, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
-        match self.turn().name(text) {
+    fn fill_name(&mut self, key: &Key, text: &str, inner: Option<usize>, location: &Location) -> Option<String> {
+        match self.iteration().name(text) {
             Ok(name) => Some(name),
             Err(fault) => {
-                self.problems.push(Problem::fault(location, inner, key.name, fault));
+                self.problems.push(Problem::from_text_error(location, inner, key.name, fault));
                 None
             }
         }
@@ -385,7 +385,7 @@ impl Reader {
                         expression,
                     });
                 }
-                Err(fault) => Problem::fault(location, *inner, key, fault),
+                Err(fault) => Problem::from_text_error(location, *inner, key, fault),
             },
             TomlValue::Number { value, .. } if value.is_finite() => {
                 let text = value.to_string();
@@ -453,7 +453,7 @@ impl Reader {
 }
 
 /// Returns the limits of the frequencies in a range with these keys.
-fn within(keys: &[Key]) -> Bounds {
+fn range_bounds(keys: &[Key]) -> Bounds {
     let first = keys.iter().find(|key| key.name == "from").map(|key| key.takes);
     if let Some(ValueType::Quantity(_, within)) = first { within } else { Bounds::Positive }
 }

@@ -108,7 +108,8 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: rows * costing.places,
         unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
         conditional_work: None,
-        work: rows * costing.extra() + steps * SOLUTIONS_PER_STEP * costing.solved_share() * costing.series(harmonics),
+        work: rows * costing.output_seconds()
+            + steps * SOLUTIONS_PER_STEP * costing.solved_share() * costing.series(harmonics),
     }
 }
 
@@ -116,7 +117,7 @@ fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Ke
     check_masses(model)?;
     let none = |f: &Frequencies| f.get(0) == f.get(f.len() - 1) && (f.len() > 1 || values_of_last < 2);
     if values.frequencies("frequency").is_some_and(none) {
-        return Err(KeyError::new("frequency", "a branch needs a range", RANGE));
+        return Err(KeyError::new("frequency", "a branch needs a range", RANGE_HELP));
     }
     check_peak_of(values, model)?;
     check_output(values)?;
@@ -131,7 +132,7 @@ fn check(values: &Values, model: &Model, values_of_last: usize) -> Result<(), Ke
 }
 
 /// Help text: a branch needs a range of the frequency or of a parameter.
-const RANGE: &str = "write frequency = { from = …, to = … }, or vary = { Ft = [ … ] } with two different values";
+const RANGE_HELP: &str = "write frequency = { from = …, to = … }, or vary = { Ft = [ … ] } with two different values";
 
 /// The reason why a branch is missing.
 enum BranchFailure {
@@ -173,7 +174,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             return Ok(part);
         }
         Err(BranchFailure::NoRange) => {
-            part.count(label, "no-range", Some(format!("a branch needs a range: {RANGE}")));
+            part.count(label, "no-range", Some(format!("a branch needs a range: {RANGE_HELP}")));
             return Ok(part);
         }
     };
@@ -334,7 +335,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         true => drawing.displacements(system).into_iter().map(|(_, place)| vec![place]).collect(),
         false => vec![places],
     };
-    let unstable = unstable(table);
+    let unstable = unstable_rows(table);
     let line_of = |stretch: &CaseRows, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
         let mut from = stretch.rows.start;
         // between two equal values at an end of the range, the branch runs outside the range
@@ -393,7 +394,7 @@ fn name_of_axis(table: &Table, outer: usize) -> String {
 }
 
 /// Returns for every row whether it is known to be unstable.
-fn unstable(table: &Table) -> Vec<bool> {
+fn unstable_rows(table: &Table) -> Vec<bool> {
     match table.flags("stable") {
         Some(flags) => flags.iter().map(|stable| *stable == Some(false)).collect(),
         None => vec![false; table.rows()],

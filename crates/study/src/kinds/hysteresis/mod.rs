@@ -91,7 +91,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
-    let known = known(model);
+    let known = loop_names(model);
     for name in values.names("loop").unwrap_or_default() {
         known.labels("loop", "joint or moved place", name)?;
     }
@@ -117,14 +117,14 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
 }
 
 /// Returns the names that can have a loop.
-fn known(model: &Model) -> ModelNames {
+fn loop_names(model: &Model) -> ModelNames {
     ModelNames::default().with_joints(model).with_imposed_motions(model)
 }
 
 /// Returns the names of the requested loops: joints by direction, and moved places; by default
 /// every joint.
 fn requested_loops(values: &Values, model: &Model) -> Vec<String> {
-    let known = known(model);
+    let known = loop_names(model);
     let meant =
         |name: &String| known.labels("loop", "joint or moved place", name).map(<[String]>::to_vec).unwrap_or_default();
     let every = || model.joint_labels().into_iter().flatten().collect();
@@ -172,7 +172,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let several = work.several_frequencies();
     let sources = sources(prepared);
-    for (orbit, _) in orbit_sweep::found(work, &mut part)? {
+    for (orbit, _) in orbit_sweep::converged_orbits(work, &mut part)? {
         let omega = orbit.omega;
         let times = orbit_sweep::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize);
         let samples: Vec<Sample> = times.iter().map(|t| orbit.sample(*t)).collect();
@@ -341,7 +341,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let mut panels: Vec<Panel> = Vec::new();
         for stretch in stretches {
             let (outer, inner) = words(stretch);
-            for rows in tables::single(table, stretch.rows.clone()) {
+            for rows in tables::split_loops(table, stretch.rows.clone()) {
                 let from = rows.start;
                 let joint = Some(joints[from].clone()).filter(|_| several);
                 let title = join_title([outer.clone()].into_iter().chain(joint));

@@ -55,7 +55,7 @@ pub struct Loop {
 ///
 /// A loop begins at a new joint, a new frequency, or where time restarts. A missing column of a
 /// table from another source is ignored.
-pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
+pub(super) fn split_loops(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
     let (joints, frequencies, times) = (table.texts(JOINT), table.numbers(FREQUENCY), table.numbers(TIME));
     let goes_on = |a: usize, b: usize| {
         joints.is_none_or(|joints| joints[a] == joints[b])
@@ -101,7 +101,7 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
     for stretch in results.case_rows(&points, study.varied().len())? {
         // a study of one frequency has no frequency column
         let only = || study.case(stretch.case).ok()?.frequencies?.get(0).map(hertz);
-        for rows in single(points.table, stretch.rows) {
+        for rows in split_loops(points.table, stretch.rows) {
             let row = loops.len();
             if named.get(row) != Some(&joint[rows.start]) {
                 return Err(summary.foreign_rows());
@@ -141,10 +141,10 @@ mod tests {
                 column(TIME, CellValues::Number(vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 0.0])),
             ],
         };
-        assert_eq!(single(&table, 0..7), [0..2, 2..4, 4..6, 6..7]);
-        assert_eq!(single(&table, 1..3), [1..2, 2..3]);
-        assert_eq!(single(&table, 3..3), []);
+        assert_eq!(split_loops(&table, 0..7), [0..2, 2..4, 4..6, 6..7]);
+        assert_eq!(split_loops(&table, 1..3), [1..2, 2..3]);
+        assert_eq!(split_loops(&table, 3..3), []);
         table.columns.truncate(1);
-        assert_eq!(single(&table, 0..7), [0..4, 4..7]);
+        assert_eq!(split_loops(&table, 0..7), [0..4, 4..7]);
     }
 }

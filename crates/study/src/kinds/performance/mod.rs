@@ -49,14 +49,14 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Orbits that refine a peak, and parameter values that the search for an optimum tries.
-const REFINING: f64 = 12.0;
+const ORBITS_PER_PEAK: f64 = 12.0;
 const OPTIMUM: f64 = 35.0;
 
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
     let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
-    let peak =
-        costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.unchecked_orbit();
+    let peak = costing.frequencies * costing.orbit()
+        + (back * costing.frequencies + ORBITS_PER_PEAK) * costing.unchecked_orbit();
     let tried = if costing.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
         tables: vec![

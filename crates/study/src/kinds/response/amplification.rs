@@ -62,14 +62,14 @@ pub(super) fn tuned_warning(cases: &[SurveyedCase]) -> Option<String> {
 pub(super) fn row(work: &UnitTask<'_>, found: &[FoundPeak], rows: &mut TableBuilder) -> Result<(), String> {
     let (prepared, largest) = (work.case(), |a: &&FoundPeak, b: &&FoundPeak| a.peak.value.total_cmp(&b.peak.value));
     let highest = found.iter().max_by(largest).ok_or("no peak was found")?;
-    let tuned = tuned(work)?.ok_or("the tuned disk has no peak")?;
+    let tuned = tuned_peak(work)?.ok_or("the tuned disk has no peak")?;
     rows.varied(&prepared.case);
     rows.text(tables::MASS, &prepared.system.places()[highest.mass]);
     rows.number(FREQUENCY, hertz(highest.peak.omega));
     rows.number(AMPLITUDE, highest.peak.value);
     rows.number(tables::TUNED_FREQUENCY, hertz(tuned.omega));
     rows.number(tables::TUNED_AMPLITUDE, tuned.value);
-    rows.number(tables::RATIO, highest.peak.value / tuned.value);
+    rows.number(tables::AMPLIFICATION_RATIO, highest.peak.value / tuned.value);
     rows.flag(AT_RANGE_END, Some(highest.peak.at_end || tuned.at_end));
     rows.reduction_error(prepared.system.reduction_evidence());
     rows.end_row();
@@ -77,7 +77,7 @@ pub(super) fn row(work: &UnitTask<'_>, found: &[FoundPeak], rows: &mut TableBuil
 }
 
 /// Returns the highest peak of the case without mistuning, at the same frequencies.
-fn tuned(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
+fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
     let prepared = work.case();
     let case = work.study.without_mistuning().case(prepared.case.index).map_err(|error| error.to_string())?;
     let system = case.model.assemble().map_err(|error| error.to_string())?;
@@ -132,7 +132,8 @@ pub(super) fn panels(drawing: &FigureInput<'_>) -> Vec<Panel> {
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
     let of_group = |(words, group): (String, Vec<&CaseRows>)| {
         let rows = || group.iter().flat_map(|stretch| stretch.rows.clone());
-        let values: Vec<f64> = rows().flat_map(|row| numbers(table, tables::RATIO, row..row + 1)).collect();
+        let values: Vec<f64> =
+            rows().flat_map(|row| numbers(table, tables::AMPLIFICATION_RATIO, row..row + 1)).collect();
         let ends = rows().filter(|row| at_end.get(*row) == Some(&Some(true))).count();
         let ends = match ends {
             0 => String::new(),

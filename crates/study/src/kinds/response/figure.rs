@@ -26,7 +26,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     }
     let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
     let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, [DRIVE.to_owned()]), "Hz");
-    let tables = [Some(curve), drawing.table(tables::WAY_BACK)];
+    let tables = [Some(curve), drawing.table(tables::REVERSE_SWEEP)];
     let highest = tables.into_iter().flatten().map(|table| largest(table, columns())).fold(0.0, f64::max);
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
     let (unit, force_factor) = prefixed_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
@@ -35,8 +35,8 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         drawing,
         curve,
         index: curve.index(),
-        reverse_sweep: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.case_rows(table))),
-        references: drawing.table(tables::REFERENCES).map(|table| (table, references_by_case(drawing, table))),
+        reverse_sweep: drawing.table(tables::REVERSE_SWEEP).map(|table| (table, drawing.case_rows(table))),
+        references: drawing.table(tables::REFERENCES).map(|table| (table, reference_rows(drawing, table))),
         peaks: peaks_by_case(drawing),
         shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.case_rows(table))),
         factor: (x_factor, y_factor),
@@ -56,10 +56,10 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         PanelLayout::Cases => {
             // the colour scale belongs to maps; the curves of one panel have names
             let varied = (!drawn.contact_joints.is_empty()).then(|| contact_states::axis("share of the period"));
-            Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
+            Figure { panels: drawn.panels_by_case(&stretches), varied, ..Figure::default() }
         }
         PanelLayout::Masses => Figure {
-            panels: drawn.by_mass(&stretches),
+            panels: drawn.panels_by_place(&stretches),
             sharing: Sharing::Always,
             varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
             ..Figure::default()
@@ -92,7 +92,7 @@ fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
 /// Returns the rows of the linear references case by case.
 ///
 /// Results of earlier versions have only those of the first case, without varied parameters.
-fn references_by_case(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows> {
+fn reference_rows(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows> {
     let varied = drawing.study.varied_values(0).unwrap_or_default();
     if table.columns.first().is_some_and(|column| column.name == DRIVE) {
         return vec![CaseRows { case: 0, varied, rows: 0..table.rows() }];

@@ -1,7 +1,7 @@
 //! Data of a response figure: curves of places and joints, read from the tables.
 
 use crate::kinds::shared::contact_states::{self, ContactState};
-use crate::kinds::shared::disk_shape::{self, of_sector};
+use crate::kinds::shared::disk_shape::{self, place_and_sector};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
 use crate::results::drawing::{CaseRows, FigureInput, join_title, numbers};
@@ -12,11 +12,11 @@ use stickslip_numerics::leading::{EQUAL, leading};
 
 /// Largest number of places drawn one by one. For more places, the largest amplitude is drawn,
 /// with pale curves behind it.
-pub(super) const SINGLE: usize = 7;
+pub(super) const MAX_SINGLE_PLACES: usize = 7;
 
 /// Number of colours for the curves of many places: the single curves and the largest
 /// amplitude.
-const MANY: usize = 2;
+const COLOURS_OF_MANY_PLACES: usize = 2;
 
 /// Names of places with amplitude (m) and phase (degrees).
 pub(super) type DeflectionShape<'a> = Vec<(&'a str, f64, f64)>;
@@ -85,7 +85,7 @@ impl FigureData<'_> {
     ///
     /// The curve belongs to one place with its peaks, or to the largest of several, in the same
     /// colour. Most figures have no such curve.
-    pub(super) fn way_back(&self, stretch: &CaseRows, names: &[&str], colour: usize) -> Option<Series> {
+    pub(super) fn reverse_sweep_series(&self, stretch: &CaseRows, names: &[&str], colour: usize) -> Option<Series> {
         let (table, stretches) = self.reverse_sweep.as_ref()?;
         let rows = stretches.iter().find(|of| of.case == stretch.case)?.rows.clone();
         let x = numbers(table, DRIVE, rows.clone());
@@ -226,7 +226,7 @@ impl FigureData<'_> {
             }
         }
         let found = own.len();
-        if found > SINGLE {
+        if found > MAX_SINGLE_PLACES {
             own = vec![own[0], own[own.len() - 1]];
         }
         let (several, thinned) = (own.len() > 1, own.len() < found);
@@ -311,7 +311,7 @@ impl FigureData<'_> {
         state: ContactState,
     ) -> (Vec<f64>, Vec<f64>) {
         let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
-        (x, contact_states::mean(self.curve, joints, &stretch.rows, state))
+        (x, contact_states::mean_share(self.curve, joints, &stretch.rows, state))
     }
 
     /// Returns the force of a joint, or the largest of several.
@@ -329,12 +329,12 @@ impl FigureData<'_> {
     /// Each of a few joints is one group. Of many joints, those with the same name in every
     /// sector form a group.
     pub(super) fn force_groups(&self) -> Vec<(String, Vec<String>)> {
-        if self.joints.len() <= SINGLE {
+        if self.joints.len() <= MAX_SINGLE_PLACES {
             return self.joints.iter().map(|joint| (joint.clone(), vec![joint.clone()])).collect();
         }
         let mut groups: Vec<(String, Vec<String>)> = Vec::new();
         for joint in &self.joints {
-            let place = of_sector(joint).map_or_else(|| "joint".to_owned(), |(place, _)| place);
+            let place = place_and_sector(joint).map_or_else(|| "joint".to_owned(), |(place, _)| place);
             match groups.iter_mut().find(|(name, _)| *name == place) {
                 Some((_, group)) => group.push(joint.clone()),
                 None => groups.push((place, vec![joint.clone()])),
@@ -348,7 +348,7 @@ impl FigureData<'_> {
     ///
     /// It is the same in all figures if the palette has a colour for every place of the model.
     pub(super) fn colour_of(&self, name: &str, place: usize) -> usize {
-        if self.system.places().len() <= SINGLE {
+        if self.system.places().len() <= MAX_SINGLE_PLACES {
             return place;
         }
         self.shown.iter().position(|(shown, _)| shown == name).unwrap_or(place)
@@ -358,11 +358,15 @@ impl FigureData<'_> {
     /// that no colour is used twice.
     pub(super) fn colours(&self) -> [usize; 3] {
         let places = match self.draws_each_place() {
-            true => self.shown.len().max(self.system.places().len().min(SINGLE)),
-            false => MANY,
+            true => self.shown.len().max(self.system.places().len().min(MAX_SINGLE_PLACES)),
+            false => COLOURS_OF_MANY_PLACES,
         };
-        let in_sector: BTreeSet<String> =
-            self.shown.iter().filter_map(|(name, _)| Some(of_sector(name)?.0)).filter(|_| self.is_disk()).collect();
+        let in_sector: BTreeSet<String> = self
+            .shown
+            .iter()
+            .filter_map(|(name, _)| Some(place_and_sector(name)?.0))
+            .filter(|_| self.is_disk())
+            .collect();
         let joints = places + in_sector.len().min(disk_shape::MAX_PLACES);
         [places, joints, joints + if self.joints.is_empty() { 0 } else { self.force_groups().len() }]
     }
@@ -374,7 +378,7 @@ impl FigureData<'_> {
 
     /// Returns true if the places are drawn one by one.
     pub(super) fn draws_each_place(&self) -> bool {
-        self.shown.len() <= SINGLE
+        self.shown.len() <= MAX_SINGLE_PLACES
     }
 
     pub(super) fn names(&self) -> Vec<&str> {

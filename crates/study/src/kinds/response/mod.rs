@@ -27,7 +27,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::{PointRow, describe_location};
 use crate::run::work::{Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{Key, ValueType, default};
-use figure_data::SINGLE;
+use figure_data::MAX_SINGLE_PLACES;
 use peaks::{FoundPeak, PeakQuantities};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
@@ -74,7 +74,7 @@ pub(super) const KIND: Kind = Kind {
             tables::REFERENCES,
             tables::AMPLIFICATION,
             tables::SHAPES,
-            tables::WAY_BACK,
+            tables::REVERSE_SWEEP,
         ],
     },
     // an amplification needs the whole curve
@@ -97,8 +97,8 @@ pub(super) const KIND: Kind = Kind {
 
 /// Peaks per mass, as some have two; and orbits that refine a peak, including those at a unit
 /// border that two units compute.
-const PEAKS: f64 = 1.3;
-const REFINING: f64 = 6.0;
+const PEAKS_PER_MASS: f64 = 1.3;
+const ORBITS_PER_PEAK: f64 = 6.0;
 /// Peaks of the largest amplitude of a disk: about three for twelve blades that differ by 2 %.
 const DISK_PEAKS: f64 = 3.0;
 /// Share of the points of a curve at which the reverse sweep has another orbit.
@@ -110,13 +110,13 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let peaks = match values.names("peak_of") {
         _ if !sought => 0.0,
         Some(_) => costing.cases,
-        None => (costing.cases * costing.places * PEAKS).floor(),
+        None => (costing.cases * costing.places * PEAKS_PER_MASS).floor(),
     };
     // a place whose peak is at an end of the range is not refined; a structure given by
     // matrices has all its resonances in the range refined
     let refined = match (costing.resonances(), &costing.case.model.substructure) {
-        (Some(resonances), Some(_)) if costing.case.model.ring.is_none() => peaks / PEAKS * resonances,
-        (Some(resonances), _) => peaks / PEAKS * resonances.min(PEAKS),
+        (Some(resonances), Some(_)) if costing.case.model.ring.is_none() => peaks / PEAKS_PER_MASS * resonances,
+        (Some(resonances), _) => peaks / PEAKS_PER_MASS * resonances.min(PEAKS_PER_MASS),
         (None, _) => peaks,
     };
     // cases that differ only in their limits share the references
@@ -130,7 +130,8 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         None => 0.0,
     };
     let back = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
-    let curves = costing.cases.min(MAX_CURVES as f64) * costing.places.min(MAX_PANELS as f64 + SINGLE as f64);
+    let curves =
+        costing.cases.min(MAX_CURVES as f64) * costing.places.min(MAX_PANELS as f64 + MAX_SINGLE_PLACES as f64);
     Cost {
         tables: vec![
             costing.orbits(points),
@@ -143,9 +144,9 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         conditional_work: None,
-        work: points * costing.extra()
+        work: points * costing.output_seconds()
             + (points + REVERSE_SHARE * back + tuned * costing.frequencies) * costing.orbit()
-            + (back + REFINING * refined) * costing.unchecked_orbit()
+            + (back + ORBITS_PER_PEAK * refined) * costing.unchecked_orbit()
             + 2.0 * linear * costing.reference(),
     }
 }
@@ -157,7 +158,7 @@ fn many_peaks_warning(cases: &[SurveyedCase]) -> Option<String> {
     let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
     (sought && places >= MANY_PEAKS).then(|| {
         format!(
-            "the peaks of {places} places are refined one by one, with about {REFINING:.0} orbits each; \
+            "the peaks of {places} places are refined one by one, with about {ORBITS_PER_PEAK:.0} orbits each; \
              peak_of = \"all\" in [study] refines only the largest amplitude, and peaks = false refines none"
         )
     })
@@ -210,7 +211,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             peaks.end_row();
         }
         part.tables.push(peaks);
-        all.iter().filter(|found| found.leads(&prepared.system)).for_each(|found| shape(prepared, found, &mut shapes));
+        all.iter()
+            .filter(|found| found.is_largest(&prepared.system))
+            .for_each(|found| shape(prepared, found, &mut shapes));
         if work.study.has_flag(amplification::KEY.name)
             && let Err(why) = amplification::row(work, &all, &mut amplified)
         {

@@ -11,11 +11,11 @@ use crate::syntax::format::format_significant;
 
 /// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
 /// paper.
-const LIGHT: f64 = 0.5;
+const LIGHT_MASS_SHARE: f64 = 0.5;
 /// Colour of crosses at points without an orbit: the last of the palette.
-const MISSING: usize = 6;
+const FAILED_POINT_COLOUR: usize = 6;
 /// Largest number of bars that remain distinct in a panel: two for each of 60 blades.
-const BARS: usize = 120;
+const MAX_BARS: usize = 120;
 /// Bars whose heights differ by at most this share belong to equal sectors.
 const EQUAL_BARS: f64 = 1e-5;
 /// Largest number of places drawn behind the curve of the largest amplitude; thousands of
@@ -28,7 +28,7 @@ impl FigureData<'_> {
     /// A case has the curves of every place, the sectors of a disk, and the forces and contact
     /// states of joints. If the figure is full, the first cases are drawn, and the title states
     /// this.
-    pub(super) fn by_case(&self, stretches: &[CaseRows]) -> Vec<Panel> {
+    pub(super) fn panels_by_case(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         let each = self.panels_of_a_case().max(1);
         let room = (MAX_PANELS / each).clamp(1, stretches.len().max(1));
         let wheels = room * (each + 1) <= MAX_PANELS;
@@ -36,7 +36,7 @@ impl FigureData<'_> {
         let mut panels = Vec::new();
         for stretch in stretches.iter().take(room) {
             if !self.shown.is_empty() {
-                panels.push(self.masses_of(stretch));
+                panels.push(self.places_panel(stretch));
             }
             if let Some([bars, wheel]) = self.sectors_of(stretch, of_sectors) {
                 panels.extend(bars.into_iter().chain(wheel.filter(|_| wheels)));
@@ -82,10 +82,10 @@ impl FigureData<'_> {
 
     /// Draws the places of one case: each of them, or the largest amplitude in front of all
     /// others.
-    fn masses_of(&self, stretch: &CaseRows) -> Panel {
+    fn places_panel(&self, stretch: &CaseRows) -> Panel {
         let (mut panel, names) = (self.panel(stretch.label()), self.names());
         panel.series.extend(self.references(&names, &[(0, stretch)]));
-        panel.series.extend(self.failed_points(stretch, 1, MISSING));
+        panel.series.extend(self.failed_points(stretch, 1, FAILED_POINT_COLOUR));
         if self.draws_each_place() {
             // the mass is known only for a place that is one row of the structure
             let mass = |place: usize| match self.system.seen()[place].rows() {
@@ -96,12 +96,12 @@ impl FigureData<'_> {
             let heaviest = places.map(mass).filter(|mass| mass.is_finite()).fold(0.0, f64::max);
             for (name, place) in &self.shown {
                 let (x, y) = self.line(stretch, name);
-                let light = mass(*place) < LIGHT * heaviest;
+                let light = mass(*place) < LIGHT_MASS_SHARE * heaviest;
                 let style = if light { Style::Dashed } else { Style::Solid };
                 panel.series.push(Series { style, ..Series::line(name, x, y, self.colour_of(name, *place)) });
             }
             let colour_of = |(name, place): &(String, usize)| self.colour_of(name, *place);
-            let back = |shown: &(String, usize)| self.way_back(stretch, &[&shown.0], colour_of(shown));
+            let back = |shown: &(String, usize)| self.reverse_sweep_series(stretch, &[&shown.0], colour_of(shown));
             panel.series.extend(self.shown.iter().filter_map(back));
             for (name, place) in &self.shown {
                 panel.series.extend(self.marks(stretch, name, self.colour_of(name, *place)));
@@ -120,7 +120,7 @@ impl FigureData<'_> {
         let (x, y, worst) = self.envelope(stretch);
         panel.title = join_title([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} places", names.len()), x, y, 0));
-        panel.series.extend(self.way_back(stretch, &names, 0));
+        panel.series.extend(self.reverse_sweep_series(stretch, &names, 0));
         panel
     }
 
@@ -144,7 +144,7 @@ impl FigureData<'_> {
     fn sectors_of(&self, stretch: &CaseRows, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
         let (frequency, shape) = self.shape_at_maximum(stretch)?;
-        let all = PlaceInSectors::of_ring(shape)?;
+        let all = PlaceInSectors::from_ring(shape)?;
         let places = all.len();
         let shape: Vec<PlaceInSectors> = disk_shape::largest_places(&all, disk_shape::MAX_PLACES)
             .into_iter()
@@ -155,7 +155,7 @@ impl FigureData<'_> {
             let (x, y) = around.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&around.place, x, y, first + colour)
         };
-        let fit = (BARS / ring.sectors.max(1)).clamp(1, disk_shape::MAX_PLACES);
+        let fit = (MAX_BARS / ring.sectors.max(1)).clamp(1, disk_shape::MAX_PLACES);
         let series: Vec<Series> = disk_shape::largest_places(&shape, fit).into_iter().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
@@ -164,7 +164,8 @@ impl FigureData<'_> {
         let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > EQUAL_BARS * bars.y[0].abs());
         let differ = series.iter().any(differ);
         let title = join_title([stretch.label(), format!("at {} Hz", format_significant(frequency, 6))]);
-        let (x, y) = (Axis::new("sector", "").whole(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
+        let (x, y) =
+            (Axis::new("sector", "").with_whole_numbers(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
         let of = disk_shape::left_out(shape.len(), places);
         let wheel = disk_shape::panel(&shape, ring.sectors, join_title(["shape".to_owned(), title.clone(), of]), first);
         let title = join_title([title, disk_shape::left_out(series.len(), places)]);

@@ -1,7 +1,7 @@
 //! Panels of a response place by place and joint by joint: a curve for every case, or
 //! percentiles of draws.
 
-use super::figure_data::{FigureData, SINGLE};
+use super::figure_data::{FigureData, MAX_SINGLE_PLACES};
 use crate::case::study::varied_text;
 use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of};
@@ -18,9 +18,9 @@ impl FigureData<'_> {
     ///
     /// Each panel has a curve for every case. The last varied parameter distinguishes the
     /// curves of a panel, the other parameters the panels.
-    pub(super) fn by_mass(&self, stretches: &[CaseRows]) -> Vec<Panel> {
+    pub(super) fn panels_by_place(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         if self.drawing.study.draws().is_some() {
-            return self.by_percentiles(stretches);
+            return self.percentile_panels(stretches);
         }
         let outer = |stretch: &CaseRows| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
         let groups: Vec<(&[CaseRows], String)> =
@@ -43,13 +43,14 @@ impl FigureData<'_> {
     }
 
     /// Returns the same panels with percentiles of the draws for each combination of `vary`.
-    fn by_percentiles(&self, stretches: &[CaseRows]) -> Vec<Panel> {
+    fn percentile_panels(&self, stretches: &[CaseRows]) -> Vec<Panel> {
         let groups = self.drawing.group_draws(stretches);
         let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
-        let some = (groups.len() > SINGLE).then(|| format!("the first {SINGLE} of {} cases", groups.len()));
+        let some = (groups.len() > MAX_SINGLE_PLACES)
+            .then(|| format!("the first {MAX_SINGLE_PLACES} of {} cases", groups.len()));
         let panel = |mut panel: Panel, name: &str, curve: CurveFn<'_>| {
             panel.title = join_title([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
-            for (colour, (words, group)) in groups.iter().take(SINGLE).enumerate() {
+            for (colour, (words, group)) in groups.iter().take(MAX_SINGLE_PLACES).enumerate() {
                 let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();
                 panel.series.extend(percentiles(&curves, words, colour));
             }
@@ -107,7 +108,7 @@ impl FigureData<'_> {
             if let Some(crosses) = self.failed_points(stretch, row + 1, colour) {
                 let value = stretch.varied.last().map(|varied| varied.in_file_unit().0);
                 panel.series.push(Series { value, ..crosses });
-                row += usize::from(failing <= SINGLE);
+                row += usize::from(failing <= MAX_SINGLE_PLACES);
             }
             let (x, y) = match mass {
                 Some(name) => self.line(stretch, name),
@@ -116,12 +117,14 @@ impl FigureData<'_> {
                     (x, y)
                 }
             };
-            let line = of_case(stretch, mass.unwrap_or("largest"), x, y, colour);
+            let line = case_series(stretch, mass.unwrap_or("largest"), x, y, colour);
             let value = line.value;
             panel.series.push(line);
             let names = mass.map_or_else(|| self.names(), |name| vec![name]);
-            panel.series.extend(self.way_back(stretch, &names, colour).map(|back| Series { value, ..back }));
-            if let (Some(name), true) = (mass, group.len() <= SINGLE) {
+            panel
+                .series
+                .extend(self.reverse_sweep_series(stretch, &names, colour).map(|back| Series { value, ..back }));
+            if let (Some(name), true) = (mass, group.len() <= MAX_SINGLE_PLACES) {
                 panel.series.extend(self.marks(stretch, name, colour).map(|marks| Series { value, ..marks }));
             }
         }
@@ -142,7 +145,7 @@ impl FigureData<'_> {
         for (colour, stretch) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
             let (x, y) = self.force_line(stretch, all);
             let colour = if stretch.varied.is_empty() { alone } else { colour };
-            panel.series.push(of_case(stretch, joint, x, y, colour));
+            panel.series.push(case_series(stretch, joint, x, y, colour));
         }
         panel
     }
@@ -164,7 +167,7 @@ impl FigureData<'_> {
             for (colour, stretch) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
                 let (x, y) = self.share_line(stretch, joints, state);
                 let colour = if stretch.varied.is_empty() { alone } else { colour };
-                panel.series.push(of_case(stretch, name, x, y, colour));
+                panel.series.push(case_series(stretch, name, x, y, colour));
             }
             panel
         };
@@ -181,7 +184,7 @@ impl FigureData<'_> {
 
 /// Returns the curve of a case with the label of its last varied parameter, or `alone` without
 /// one.
-fn of_case(stretch: &CaseRows, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+fn case_series(stretch: &CaseRows, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
     let last = stretch.varied.last();
     let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
     Series { value: last.map(|varied| varied.in_file_unit().0), ..Series::line(label, x, y, colour) }

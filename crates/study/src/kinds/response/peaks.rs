@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-10;
 ///
 /// It is above the rounding of an orbit, and below the fall of a resonance between two points
 /// of any curve that can be drawn.
-const LEVEL: f64 = 1e-8;
+const LEVEL_TOLERANCE: f64 = 1e-8;
 
 /// Largest relative difference of two peaks of both sweeps, between the same frequencies, that
 /// count as one.
@@ -97,7 +97,7 @@ pub(super) struct FoundPeak {
 
 impl FoundPeak {
     /// Returns true if no place moves more at the peak; the first of equal places counts.
-    pub(super) fn leads(&self, system: &System) -> bool {
+    pub(super) fn is_largest(&self, system: &System) -> bool {
         let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
         leading(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
             == Some(self.mass)
@@ -203,7 +203,7 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
     let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
     let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
-    inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
+    inner.retain(|found| !is_end_of_plateau(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
         FoundPeak { mass, peak: found.peak, shape: found.values[count..].to_vec(), reverse_sweep: false }
@@ -214,10 +214,10 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
 /// Returns true if a peak is only the end of a level range.
 ///
 /// An example is a mass that moves with its support until a joint slips.
-fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
+fn is_end_of_plateau(points: &[Point], quantity: usize, peak: &Peak) -> bool {
     let at = points.partition_point(|point| point.omega < peak.omega);
     let as_high = |point: &Point| {
-        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL * peak.value)
+        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL_TOLERANCE * peak.value)
     };
     at >= 2 && points[at - 2..at].iter().all(as_high)
 }

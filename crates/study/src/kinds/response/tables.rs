@@ -18,13 +18,13 @@ pub(super) const AMPLIFICATION: &str = "amplification";
 /// One row per peak of a disk at which no other place moves more, with the shape there.
 pub(super) const SHAPES: &str = "peak_shapes";
 /// One row per orbit that only the reverse sweep finds.
-pub(super) const WAY_BACK: &str = "way_back";
+pub(super) const REVERSE_SWEEP: &str = "way_back";
 /// Frequency of the peak of the tuned disk.
 pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";
 /// Amplitude of that peak.
 pub(super) const TUNED_AMPLITUDE: &str = "tuned_amplitude_m";
 /// Largest amplitude over that of the tuned disk.
-pub(super) const RATIO: &str = "amplification";
+pub(super) const AMPLIFICATION_RATIO: &str = "amplification";
 /// The mass that has a peak.
 pub(super) const MASS: &str = "mass";
 

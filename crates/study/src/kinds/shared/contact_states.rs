@@ -45,7 +45,7 @@ pub(in crate::kinds) fn has(table: &Table, joint: &str) -> bool {
 }
 
 /// Returns the shares in percent of the period, in the order of [`ContactState::ALL`], row by row.
-fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
+fn state_shares(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
     let [stick, slip, open] =
         [columns::stick_fraction(joint), columns::slip_fraction(joint), columns::open_fraction(joint)]
             .map(|column| numbers(table, &column, rows.clone()));
@@ -57,18 +57,24 @@ fn of_joint(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4] {
 
 /// Returns the axis of a share, which is also the colour scale.
 pub(in crate::kinds) fn axis(quantity: &str) -> Axis {
-    Axis::new(quantity, "%").between(0.0, PERCENT)
+    Axis::new(quantity, "%").with_range(0.0, PERCENT)
 }
 
 /// Returns the share of the period of one state, in percent; the mean of several joints.
-pub(in crate::kinds) fn mean(table: &Table, joints: &[String], rows: &Range<usize>, state: ContactState) -> Vec<f64> {
-    let all: Vec<Vec<f64>> = joints.iter().map(|joint| of_joint(table, joint, rows)[state as usize].clone()).collect();
+pub(in crate::kinds) fn mean_share(
+    table: &Table,
+    joints: &[String],
+    rows: &Range<usize>,
+    state: ContactState,
+) -> Vec<f64> {
+    let all: Vec<Vec<f64>> =
+        joints.iter().map(|joint| state_shares(table, joint, rows)[state as usize].clone()).collect();
     (0..rows.len()).map(|i| all.iter().map(|shares| shares[i]).sum::<f64>() / all.len() as f64).collect()
 }
 
 /// Returns true if one of the joints is ever in a state.
 pub(in crate::kinds) fn occurs_in(table: &Table, joints: &[String], state: ContactState) -> bool {
-    joints.iter().any(|joint| occurs(&of_joint(table, joint, &(0..table.rows()))[state as usize]))
+    joints.iter().any(|joint| occurs(&state_shares(table, joint, &(0..table.rows()))[state as usize]))
 }
 
 /// Returns the states with a map. Stick has no map, because it is the remainder.
@@ -105,7 +111,7 @@ pub(in crate::kinds) fn panels(
     (x, over): (&[f64], &Axis),
     (title, first): (&str, usize),
 ) -> Vec<Panel> {
-    let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| of_joint(table, joint, rows)).collect();
+    let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| state_shares(table, joint, rows)).collect();
     let titled = |words: &str| if title.is_empty() { words.to_owned() } else { format!("{words}, {title}") };
     if joints.len() <= MAX_SINGLE {
         let occurring: Vec<ContactState> =
@@ -119,7 +125,7 @@ pub(in crate::kinds) fn panels(
         };
         return joints.iter().zip(&all).map(of_joint).collect();
     }
-    let names = Axis { names: joints.to_vec(), ..Axis::new("joint", "").between(-0.5, joints.len() as f64 - 0.5) };
+    let names = Axis { names: joints.to_vec(), ..Axis::new("joint", "").with_range(-0.5, joints.len() as f64 - 0.5) };
     let map = |state: ContactState| Panel {
         title: titled(&format!("share of the period in which a joint {}", state.words())),
         x: over.clone(),

@@ -18,7 +18,7 @@ pub(in crate::kinds) struct PlaceInSectors {
 impl PlaceInSectors {
     /// Returns a place of every sector in a travelling wave; each sector leads the previous one
     /// by `diameter / sectors` of a turn.
-    pub(in crate::kinds) fn of_wave(
+    pub(in crate::kinds) fn from_wave(
         place: String,
         (size, phase): (f64, f64),
         diameter: usize,
@@ -31,12 +31,12 @@ impl PlaceInSectors {
     /// Groups places of a ring, with amplitude and phase, by their name in the sector.
     ///
     /// Returns `None` if a place belongs to no sector.
-    pub(in crate::kinds) fn of_ring<'a>(
+    pub(in crate::kinds) fn from_ring<'a>(
         places: impl IntoIterator<Item = (&'a str, f64, f64)>,
     ) -> Option<Vec<PlaceInSectors>> {
         let mut all: Vec<PlaceInSectors> = Vec::new();
         for (name, size, phase) in places {
-            let (place, sector) = of_sector(name)?;
+            let (place, sector) = place_and_sector(name)?;
             match all.iter_mut().find(|around| around.place == place) {
                 Some(around) => around.sectors.push((sector, size, phase)),
                 None => all.push(PlaceInSectors { place, sectors: vec![(sector, size, phase)] }),
@@ -52,7 +52,7 @@ impl PlaceInSectors {
 
 /// Returns the name of a ring place in its sector, and the sector number: `blade` and 3 for
 /// `blade_3`, `blade.x` and 3 for `blade_3.x`.
-pub(in crate::kinds) fn of_sector(name: &str) -> Option<(String, usize)> {
+pub(in crate::kinds) fn place_and_sector(name: &str) -> Option<(String, usize)> {
     let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
     let (place, sector) = node.rsplit_once('_')?;
     let place = along.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}"));
@@ -60,9 +60,9 @@ pub(in crate::kinds) fn of_sector(name: &str) -> Option<(String, usize)> {
 }
 
 /// Length of the largest displacement as a share of the radius of the circle.
-const LARGEST: f64 = 0.35;
+const LARGEST_DISPLACEMENT: f64 = 0.35;
 /// Half the width of the picture in radii of the circle; all pictures have the same size.
-const HALF_WIDTH: f64 = 1.0 + LARGEST + 0.05;
+const HALF_WIDTH: f64 = 1.0 + LARGEST_DISPLACEMENT + 0.05;
 /// Smallest number of sectors for a picture.
 const MIN_SECTORS: usize = 3;
 /// Number of points of the circle at rest.
@@ -109,7 +109,7 @@ pub(in crate::kinds) fn panel(
         let tip = |(sector, size, phase): &(usize, f64, f64)| {
             let out = size / largest * (phase - now).to_radians().cos();
             let turn = *sector as f64 / sectors as f64;
-            (at(turn, 1.0), at(turn, 1.0 + LARGEST * out))
+            (at(turn, 1.0), at(turn, 1.0 + LARGEST_DISPLACEMENT * out))
         };
         let PlaceInSectors { place: name, sectors: of } = &places[place];
         let mut tips: Vec<_> = of.iter().map(tip).collect();
@@ -126,7 +126,7 @@ pub(in crate::kinds) fn panel(
     let first = series.iter().rev().find_map(|line| Some((*line.x.first()?, *line.y.first()?)))?;
     series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
     let title = join_title([title, left_out]);
-    let axis = || Axis::default().between(-HALF_WIDTH, HALF_WIDTH);
+    let axis = || Axis::default().with_range(-HALF_WIDTH, HALF_WIDTH);
     Some(Panel { title, x: axis(), y: axis(), series, equal_axes: true })
 }
 
@@ -139,7 +139,7 @@ mod tests {
     /// The first of equal displacements determines the instant.
     #[test]
     fn a_wave_has_its_nodal_diameters() {
-        let wave = PlaceInSectors::of_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
+        let wave = PlaceInSectors::from_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
         let found = panel(&[wave], 8, String::new(), 0).unwrap();
         let line = found.series.iter().find(|line| line.label == "blade").unwrap();
         let radii: Vec<f64> = line.x.iter().zip(&line.y).map(|(x, y)| x.hypot(*y)).collect();
@@ -157,7 +157,7 @@ mod tests {
     fn a_wheel_is_not_crowded() {
         let size = [1.0, 5.0, 2.0, 0.5, 3.0, 4.0];
         let all: Vec<PlaceInSectors> =
-            size.iter().map(|size| PlaceInSectors::of_wave(format!("p{size}"), (*size, 0.0), 1, 6)).collect();
+            size.iter().map(|size| PlaceInSectors::from_wave(format!("p{size}"), (*size, 0.0), 1, 6)).collect();
         let found = panel(&all, 6, "mode 1".to_owned(), 2).unwrap();
         let drawn: Vec<(&str, usize)> =
             found.series.iter().filter(|s| s.label.starts_with('p')).map(|s| (s.label.as_str(), s.colour)).collect();
@@ -167,13 +167,13 @@ mod tests {
 
     #[test]
     fn places_of_a_ring_by_their_sector() {
-        assert_eq!(of_sector("tip_12.x"), Some(("tip.x".to_owned(), 12)));
-        assert_eq!(of_sector("blade"), None);
-        let all = PlaceInSectors::of_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
+        assert_eq!(place_and_sector("tip_12.x"), Some(("tip.x".to_owned(), 12)));
+        assert_eq!(place_and_sector("blade"), None);
+        let all = PlaceInSectors::from_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
         assert_eq!(
             all.iter().map(|around| (around.place.as_str(), around.sectors.len())).collect::<Vec<_>>(),
             [("a", 2), ("b", 1)]
         );
-        assert!(PlaceInSectors::of_ring([("rotor", 1.0, 0.0)]).is_none());
+        assert!(PlaceInSectors::from_ring([("rotor", 1.0, 0.0)]).is_none());
     }
 }

@@ -46,7 +46,7 @@ fn all(work: &UnitTask<'_>) -> Result<Vec<SweepOutcome>, (usize, MethodError)> {
 type OrbitAndStability = (Orbit, Option<bool>);
 
 /// Returns the orbits of a unit of one case. Counts all its points and records the failures.
-pub(in crate::kinds) fn found(
+pub(in crate::kinds) fn converged_orbits(
     work: &UnitTask<'_>,
     part: &mut UnitResult,
 ) -> Result<Vec<OrbitAndStability>, (usize, MethodError)> {

@@ -144,7 +144,7 @@ impl Expression {
                 Operation::Add | Operation::Subtract => {
                     let (b, a) = (pop(), pop());
                     let (verb, sign) = if *operation == Operation::Add { ("add", 1.0) } else { ("subtract", -1.0) };
-                    let (x, y, value) = common_dimension(a, b).map_err(|e| e.into_fault(span, verb))?;
+                    let (x, y, value) = common_dimension(a, b).map_err(|e| e.into_text_error(span, verb))?;
                     ExpressionValue { si: x + sign * y, ..value }
                 }
                 Operation::Multiply | Operation::Divide => {
@@ -182,7 +182,8 @@ impl Expression {
                 Operation::Call { function: function @ ("min" | "max"), arguments } => {
                     let mut best = pop();
                     for _ in 1..arguments {
-                        let (x, y, value) = common_dimension(best, pop()).map_err(|e| e.into_fault(span, "compare"))?;
+                        let (x, y, value) =
+                            common_dimension(best, pop()).map_err(|e| e.into_text_error(span, "compare"))?;
                         best = ExpressionValue { si: if function == "min" { x.min(y) } else { x.max(y) }, ..value };
                     }
                     best
@@ -205,7 +206,7 @@ struct DimensionMismatch {
 }
 
 impl DimensionMismatch {
-    fn into_fault(self, span: &Range<usize>, verb: &str) -> TextError {
+    fn into_text_error(self, span: &Range<usize>, verb: &str) -> TextError {
         match self.other {
             Some((message, help)) => TextError { span: span.clone(), message, help },
             None => TextError::new(

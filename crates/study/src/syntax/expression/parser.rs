@@ -8,14 +8,14 @@ use std::ops::Range;
 use stickslip::dimension::Dimension;
 
 /// Lower-case names that users give to the excitation frequency.
-const OF_THE_DRIVE: [&str; 5] = ["frequency", "freq", "omega", "ohm", "w"];
+const EXCITATION_NAMES: [&str; 5] = ["frequency", "freq", "omega", "ohm", "w"];
 /// Help text: expressions read parameters only, so the frequency must be a parameter.
-const OF_PARAMETERS: &str = "an expression cannot read the excitation frequency of each point. Define a parameter \
+const EXCITATION_HELP: &str = "an expression cannot read the excitation frequency of each point. Define a parameter \
     f = \"100 Hz\" in [parameters], use `f` here, and set kind = \"orbit\", frequency = \"f\" and \
     vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
 
 /// Greatest depth of nested parentheses and powers.
-const DEEPEST: usize = 64;
+const MAX_DEPTH: usize = 64;
 
 pub(super) struct Parser<'a> {
     pub(super) text: &'a str,
@@ -52,8 +52,8 @@ impl Parser<'_> {
 
     fn check_depth(&mut self) -> Result<(), TextError> {
         self.depth += 1;
-        if self.depth > DEEPEST {
-            let message = format!("more than {DEEPEST} nested parentheses or powers");
+        if self.depth > MAX_DEPTH {
+            let message = format!("more than {MAX_DEPTH} nested parentheses or powers");
             return Err(TextError::new(self.position..self.position, message)
                 .help("define parts of the expression as parameters"));
         }
@@ -266,8 +266,8 @@ impl Parser<'_> {
             fault.help(help)
         } else if let Some(near) = suggest(name, self.names.iter().copied()) {
             fault.help(format!("did you mean `{near}`?"))
-        } else if OF_THE_DRIVE.contains(&name.to_lowercase().as_str()) {
-            fault.help(OF_PARAMETERS)
+        } else if EXCITATION_NAMES.contains(&name.to_lowercase().as_str()) {
+            fault.help(EXCITATION_HELP)
         } else if let Some(unit) = units::suggest_unit(name).filter(|_| !self.steps.is_empty()) {
             fault.help(format!("did you mean the unit `{unit}`?"))
         } else {
