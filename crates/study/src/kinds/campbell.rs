@@ -337,16 +337,16 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (y, y_factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
     let crossings = drawing.table(CROSSINGS);
     let marks = crossings.map(|table| drawing.case_rows(table)).unwrap_or_default();
-    let panel = |stretch: &CaseRows, title: String| {
-        let case = drawing.study.case(stretch.case).ok();
+    let panel = |case_rows: &CaseRows, title: String| {
+        let case = drawing.study.case(case_rows.case).ok();
         let orders = case.as_ref().and_then(|case| case.values.count("engine_orders")).unwrap_or(6) as usize;
         let ring = case.and_then(|case| case.model.ring).filter(|ring| ring.equal);
         let shown = |diameter: Option<u64>| match (diameter, ring) {
             (Some(diameter), Some(ring)) => (1..=orders).any(|o| excited_diameter(o, ring.sectors) as u64 == diameter),
             _ => true,
         };
-        let mut series = frequencies(table, stretch, (x_factor, y_factor), &shown);
-        let speeds = numbers(table, SPEED, stretch.rows.clone());
+        let mut series = frequencies(table, case_rows, (x_factor, y_factor), &shown);
+        let speeds = numbers(table, SPEED, case_rows.rows.clone());
         let (low, high) = speeds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
         let highest = series.iter().flat_map(|line| &line.y).copied().fold(0.0, f64::max);
         let top = PANEL_TOP * highest;
@@ -358,10 +358,10 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
             let y = ends.iter().map(|x| line(*x)).collect();
             series.push(Series::line(format!("engine orders 1 to {orders}"), ends, y, 0).reference());
         }
-        if let Some((table, stretch)) = crossings.zip(marks.iter().find(|marks| marks.case == stretch.case)) {
+        if let Some((table, case_rows)) = crossings.zip(marks.iter().find(|marks| marks.case == case_rows.case)) {
             for (colour, state) in STATES.into_iter().enumerate() {
                 let states = words(table, JOINTS);
-                let rows: Vec<usize> = stretch.rows.clone().filter(|row| states[*row] == state).collect();
+                let rows: Vec<usize> = case_rows.rows.clone().filter(|row| states[*row] == state).collect();
                 let column = |name: &str, factor: f64| -> Vec<f64> {
                     let all = numbers(table, name, 0..table.rows());
                     rows.iter().map(|row| all[*row] * factor).collect()
@@ -379,21 +379,21 @@ const PANEL_TOP: f64 = 1.1;
 
 fn frequencies(
     table: &Table,
-    stretch: &CaseRows,
+    case_rows: &CaseRows,
     (x_factor, y_factor): (f64, f64),
     shown: &dyn Fn(Option<u64>) -> bool,
 ) -> Vec<Series> {
     let Some(modes) = table.integers(MODE) else { return Vec::new() };
     let (states, diameters) = (words(table, JOINTS), table.integers(DIAMETER));
     let of = |row: usize| (diameters.map(|all| all[row]), modes[row]);
-    let mut kinds: Vec<(Option<u64>, u64)> = stretch.rows.clone().map(of).filter(|(d, _)| shown(*d)).collect();
+    let mut kinds: Vec<(Option<u64>, u64)> = case_rows.rows.clone().map(of).filter(|(d, _)| shown(*d)).collect();
     kinds.sort_unstable();
     kinds.dedup();
     let (x, y) = (numbers(table, SPEED, 0..table.rows()), numbers(table, FREQUENCY, 0..table.rows()));
     let mut series = Vec::new();
     for (colour, state) in STATES.into_iter().enumerate() {
         for kind in &kinds {
-            let rows = || stretch.rows.clone().filter(|row| of(*row) == *kind && states[*row] == state);
+            let rows = || case_rows.rows.clone().filter(|row| of(*row) == *kind && states[*row] == state);
             let line = Series::line(
                 format!("joints {state}"),
                 rows().map(|row| x[row] * x_factor).collect(),

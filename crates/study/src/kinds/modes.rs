@@ -126,11 +126,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let place = location_of(prepared);
     part.notes.extend(remarks(unit, &mode).into_iter().map(|text| Note::for_case(&place, text)));
     let (mut rows, mut summary) = (TableBuilder::default(), TableBuilder::default());
-    let (mut stretch, mut before) = (1, f64::INFINITY);
+    let (mut case_rows, mut before) = (1, f64::INFINITY);
     let reduction = prepared.system.reduction_evidence();
     for point in &mode.points {
         // the values jump at a turning point of the curve
-        stretch += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
+        case_rows += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
         before = point.amplitude;
         rows.varied(&prepared.case);
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
@@ -143,7 +143,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.number(&first_harmonic_in(place, along.unit()), x.norm());
             rows.number(&phase_of(place), phase.to_degrees());
         }
-        rows.integer("stretch", stretch);
+        rows.integer("case_rows", case_rows);
         rows.reduction_error(reduction);
         rows.end_row();
     }
@@ -273,59 +273,56 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         .map(|(name, _)| name.clone())
         .collect();
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, displacements.iter().map(column)), "m");
-    let stretches = drawing.case_rows(table);
-    let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
+    let cases = drawing.case_rows(table);
+    let parts = match table.columns.iter().find(|column| column.name == "case_rows").map(|column| &column.values) {
         Some(CellValues::Integer(parts)) => parts.clone(),
         _ => vec![1; table.rows()],
     };
-    let widest_of = |stretch: &CaseRows| {
-        let at_last = |place: &&String| numbers(table, &column(place), stretch.rows.clone()).last().copied();
+    let widest_of = |case_rows: &CaseRows| {
+        let at_last = |place: &&String| numbers(table, &column(place), case_rows.rows.clone()).last().copied();
         let moves = |place: &&String| at_last(place).unwrap_or(0.0);
         displacements.iter().max_by(|a, b| moves(a).total_cmp(&moves(b)))
     };
     // draws in one band show one place: that of the first draw
-    let common = stretches.first().filter(|_| drawing.study.draws().is_some()).and_then(widest_of);
-    let panel =
-        |stretches: &[CaseRows], title: &str, (quantity, unit_of): (&str, &str), read: &str, scale: f64| Panel {
-            title: title.to_owned(),
-            x: x_axis.clone().log(),
-            y: Axis::new(quantity, unit_of),
-            series: stretches
-                .iter()
-                .enumerate()
-                .flat_map(|(colour, stretch)| {
-                    let Some(widest) = common.or_else(|| widest_of(stretch)) else { return Vec::new() };
-                    // the curves of many draws form one band
-                    let alone = stretch.varied.is_empty() || drawing.study.draws().is_some();
-                    let label = if alone { widest.clone() } else { stretch.label() };
-                    let mut from = stretch.rows.start;
-                    // the line is interrupted at turning points of the curve
-                    let lines = parts[stretch.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
-                        let rows = from..from + part.len();
-                        from = rows.end;
-                        let x = numbers(table, &column(widest), rows.clone()).iter().map(|x| x * factor).collect();
-                        let y = numbers(table, read, rows).iter().map(|y| y * scale).collect();
-                        Series::line(label.clone(), x, y, colour)
-                    });
-                    lines.collect()
-                })
-                .collect(),
-            ..Panel::default()
-        };
-    let both = |stretches: &[CaseRows], title: &str| {
-        let frequency = panel(stretches, title, ("frequency", "Hz"), "frequency_Hz", 1.0);
-        vec![frequency, panel(stretches, title, ("equivalent damping ratio", "%"), "damping_ratio", 100.0)]
+    let common = cases.first().filter(|_| drawing.study.draws().is_some()).and_then(widest_of);
+    let panel = |cases: &[CaseRows], title: &str, (quantity, unit_of): (&str, &str), read: &str, scale: f64| Panel {
+        title: title.to_owned(),
+        x: x_axis.clone().log(),
+        y: Axis::new(quantity, unit_of),
+        series: cases
+            .iter()
+            .enumerate()
+            .flat_map(|(colour, case_rows)| {
+                let Some(widest) = common.or_else(|| widest_of(case_rows)) else { return Vec::new() };
+                // the curves of many draws form one band
+                let alone = case_rows.varied.is_empty() || drawing.study.draws().is_some();
+                let label = if alone { widest.clone() } else { case_rows.label() };
+                let mut from = case_rows.rows.start;
+                // the line is interrupted at turning points of the curve
+                let lines = parts[case_rows.rows.clone()].chunk_by(|a, b| a == b).map(|part| {
+                    let rows = from..from + part.len();
+                    from = rows.end;
+                    let x = numbers(table, &column(widest), rows.clone()).iter().map(|x| x * factor).collect();
+                    let y = numbers(table, read, rows).iter().map(|y| y * scale).collect();
+                    Series::line(label.clone(), x, y, colour)
+                });
+                lines.collect()
+            })
+            .collect(),
+        ..Panel::default()
+    };
+    let both = |cases: &[CaseRows], title: &str| {
+        let frequency = panel(cases, title, ("frequency", "Hz"), "frequency_Hz", 1.0);
+        vec![frequency, panel(cases, title, ("equivalent damping ratio", "%"), "damping_ratio", 100.0)]
     };
     if drawing.study.draws().is_some() {
-        let of_draw = |stretch: &CaseRows, title: String| both(std::slice::from_ref(stretch), &title);
-        return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
+        let of_draw = |case_rows: &CaseRows, title: String| both(std::slice::from_ref(case_rows), &title);
+        return Figure { panels: draw_panels::panels(drawing, &cases, &of_draw), ..Figure::default() };
     }
-    let mut panels = both(&stretches, "");
-    if panels.len() + 2 * stretches.len() <= MAX_PANELS {
+    let mut panels = both(&cases, "");
+    if panels.len() + 2 * cases.len() <= MAX_PANELS {
         panels.extend(
-            stretches
-                .iter()
-                .flat_map(|stretch| disk_shapes(drawing, table, &displacements, (stretch, stretches.len()))),
+            cases.iter().flat_map(|case_rows| disk_shapes(drawing, table, &displacements, (case_rows, cases.len()))),
         );
     }
     Figure { panels, ..Figure::default() }
@@ -339,13 +336,13 @@ fn disk_shapes(
     drawing: &FigureInput<'_>,
     table: &Table,
     places: &[String],
-    (stretch, cases): (&CaseRows, usize),
+    (case_rows, cases): (&CaseRows, usize),
 ) -> Vec<Panel> {
-    let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
+    let Ok(case) = drawing.study.case(case_rows.case) else { return Vec::new() };
     let Some(ring) = case.model.ring else { return Vec::new() };
     let shown: Vec<&String> = places.iter().filter(|name| drawing.shows(name)).collect();
     let mode = format!("mode {}", case.values.count("mode").unwrap_or(1));
-    let mut ends = vec![stretch.rows.start, stretch.rows.end - 1];
+    let mut ends = vec![case_rows.rows.start, case_rows.rows.end - 1];
     ends.dedup();
     let wheel = |row: usize| {
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
@@ -361,7 +358,7 @@ fn disk_shapes(
         disk_shape::panel(
             &PlaceInSectors::from_ring(moves)?,
             ring.sectors,
-            join_title([stretch.label(), words, frequency]),
+            join_title([case_rows.label(), words, frequency]),
             cases,
         )
     };

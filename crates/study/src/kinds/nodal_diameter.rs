@@ -216,28 +216,28 @@ fn places(model: &Model) -> Vec<(String, String)> {
 fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(table) = drawing.table(TABLE) else { return Figure::default() };
     let (y, factor) = drawing.axis(1, "frequency", largest(table, [FREQUENCY.to_owned()]), "Hz");
-    let panel = |stretch: &CaseRows, title: String| Panel {
+    let panel = |case_rows: &CaseRows, title: String| Panel {
         title,
         x: Axis::new("nodal diameters", "").with_whole_numbers(),
         y: y.clone(),
-        series: lines(table, stretch, factor),
+        series: lines(table, case_rows, factor),
         ..Panel::default()
     };
-    let stretches = drawing.case_rows(table);
-    let room = stretches.len() * (1 + MAX_SHAPES) <= MAX_PANELS;
-    let of_case = |stretch: &CaseRows, title: String| {
-        let shapes = if room { wheels(drawing, table, stretch) } else { Vec::new() };
-        std::iter::once(panel(stretch, title)).chain(shapes).collect::<Vec<_>>()
+    let cases = drawing.case_rows(table);
+    let room = cases.len() * (1 + MAX_SHAPES) <= MAX_PANELS;
+    let of_case = |case_rows: &CaseRows, title: String| {
+        let shapes = if room { wheels(drawing, table, case_rows) } else { Vec::new() };
+        std::iter::once(panel(case_rows, title)).chain(shapes).collect::<Vec<_>>()
     };
-    Figure { panels: draw_panels::panels(drawing, &stretches, &of_case), ..Figure::default() }
+    Figure { panels: draw_panels::panels(drawing, &cases, &of_case), ..Figure::default() }
 }
 
 /// Returns the shapes of a case.
 ///
 /// These are the lowest modes of one nodal diameter, one mode of the lowest nodal diameters, or
 /// one mode of one nodal diameter.
-fn wheels(drawing: &FigureInput<'_>, table: &Table, stretch: &CaseRows) -> Vec<Panel> {
-    let Ok(case) = drawing.study.case(stretch.case) else { return Vec::new() };
+fn wheels(drawing: &FigureInput<'_>, table: &Table, case_rows: &CaseRows) -> Vec<Panel> {
+    let Ok(case) = drawing.study.case(case_rows.case) else { return Vec::new() };
     let (Some(ring), values) = (case.model.ring, &case.values) else { return Vec::new() };
     let (Some(diameters), Some(modes)) = (table.integers(DIAMETER), table.integers(MODE)) else { return Vec::new() };
     if values.flag(SHAPES) == Some(false) {
@@ -269,21 +269,21 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, stretch: &CaseRows) -> Vec<P
         let frequency = format!("{} Hz", format_significant(frequencies[row], 5));
         let joints = if state == STATES[0] { String::new() } else { format!("joints {state}") };
         let title =
-            [stretch.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
+            [case_rows.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
         disk_shape::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join_title(title), STATES.len())
     };
-    stretch.rows.clone().filter(wanted).take(MAX_SHAPES).filter_map(wheel).collect()
+    case_rows.rows.clone().filter(wanted).take(MAX_SHAPES).filter_map(wheel).collect()
 }
 
-fn lines(table: &Table, stretch: &CaseRows, factor: f64) -> Vec<Series> {
+fn lines(table: &Table, case_rows: &CaseRows, factor: f64) -> Vec<Series> {
     let (Some(diameters), Some(modes)) = (table.integers(DIAMETER), table.integers(MODE)) else { return Vec::new() };
     let states = words(table, JOINTS);
     let frequencies = numbers(table, FREQUENCY, 0..table.rows());
-    let highest = stretch.rows.clone().map(|row| modes[row]).max().unwrap_or(0);
+    let highest = case_rows.rows.clone().map(|row| modes[row]).max().unwrap_or(0);
     let mut series = Vec::new();
     for (colour, state) in STATES.into_iter().enumerate() {
         for mode in 1..=highest {
-            let rows = || stretch.rows.clone().filter(|row| modes[*row] == mode && states[*row] == state);
+            let rows = || case_rows.rows.clone().filter(|row| modes[*row] == mode && states[*row] == state);
             let x: Vec<f64> = rows().map(|row| diameters[row] as f64).collect();
             let y: Vec<f64> = rows().map(|row| frequencies[row] * factor).collect();
             let style = if colour == 0 { Style::Solid } else { Style::Dashed };

@@ -212,9 +212,9 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         panels.retain(|panel| !panel.series.is_empty());
         panels
     };
-    let of_case = |stretch: &CaseRows, title: String| -> Vec<Panel> {
-        let mut from = stretch.rows.start;
-        let runs = frequencies[stretch.rows.clone()].chunk_by(|a, b| a == b).take(MAX_PANELS);
+    let of_case = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
+        let mut from = case_rows.rows.start;
+        let runs = frequencies[case_rows.rows.clone()].chunk_by(|a, b| a == b).take(MAX_PANELS);
         let of_run = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;

@@ -372,23 +372,23 @@ const TIME: &str = "time_s";
 /// every case.
 fn damping(drawing: &FigureInput<'_>, table: &Table, places: &[String]) -> Panel {
     let (unit, factor) = prefixed_unit(largest(table, ["amplitude_m".to_owned()]), "m");
-    let stretches = drawing.case_rows(table);
-    let line = |(colour, stretch): (usize, &&CaseRows)| {
-        let x = numbers(table, "amplitude_m", stretch.rows.clone()).iter().map(|x| x * factor).collect();
-        let y = numbers(table, "damping_ratio", stretch.rows.clone()).iter().map(|y| 100.0 * y).collect();
-        let place = words(table, "mass").get(stretch.rows.start).cloned().unwrap_or_default();
+    let cases = drawing.case_rows(table);
+    let line = |(colour, case_rows): (usize, &&CaseRows)| {
+        let x = numbers(table, "amplitude_m", case_rows.rows.clone()).iter().map(|x| x * factor).collect();
+        let y = numbers(table, "damping_ratio", case_rows.rows.clone()).iter().map(|y| 100.0 * y).collect();
+        let place = words(table, "mass").get(case_rows.rows.start).cloned().unwrap_or_default();
         // a single case has the colour of its place in the other panels
-        if stretch.varied.is_empty() {
+        if case_rows.varied.is_empty() {
             let colour = places.iter().position(|name| *name == place).unwrap_or(colour);
             return Series::line(place, x, y, colour);
         }
-        Series::line(stretch.label(), x, y, colour)
+        Series::line(case_rows.label(), x, y, colour)
     };
     Panel {
         title: "damping of each cycle".to_owned(),
         x: Axis::new("amplitude", unit).log(),
         y: Axis::new("equivalent damping ratio", "%"),
-        series: evenly_chosen(&stretches, MAX_CURVES).iter().enumerate().map(line).collect(),
+        series: evenly_chosen(&cases, MAX_CURVES).iter().enumerate().map(line).collect(),
         ..Panel::default()
     }
 }
@@ -415,15 +415,15 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         };
         Panel { title, x, y, series: shown.iter().map(line).collect(), ..Panel::default() }
     };
-    let of_case = |stretch: &CaseRows, title: String| -> Vec<Panel> {
-        let Some(drives) = drives else { return vec![panel(title, stretch.rows.clone())] };
-        let mut from = stretch.rows.start;
+    let of_case = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
+        let Some(drives) = drives else { return vec![panel(title, case_rows.rows.clone())] };
+        let mut from = case_rows.rows.start;
         let of_drive = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
             panel(join_title([title.clone(), format!("frequency = {}", format_hertz(run[0]))]), rows)
         };
-        let runs = drives[stretch.rows.clone()].chunk_by(|a, b| a == b);
+        let runs = drives[case_rows.rows.clone()].chunk_by(|a, b| a == b);
         runs.take(MAX_PANELS).map(of_drive).collect()
     };
     let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);

@@ -2,7 +2,7 @@
 //!
 //! Curves over an abscissa become their median and a band, point by point. A band has no
 //! meaning in three cases: a curve turns back (a loop, a branch around a fold); draws show
-//! different curves (one has an unstable stretch); or each draw has a different abscissa (a
+//! different curves (one has an unstable part); or each draw has a different abscissa (a
 //! branch with adaptive steps). Then every draw is drawn as a pale curve. Pictures of a plane
 //! are left out, and so are marks and bars whose abscissae differ between draws; the tables
 //! have them.
@@ -16,21 +16,21 @@ use crate::results::percentiles::percentiles;
 /// For draws, returns the combined panels of each combination of `vary`.
 pub(crate) fn panels(
     drawing: &FigureInput<'_>,
-    stretches: &[CaseRows],
+    cases: &[CaseRows],
     of_case: &dyn Fn(&CaseRows, String) -> Vec<Panel>,
 ) -> Vec<Panel> {
     if drawing.study.draws().is_none() {
-        let cases = stretches.iter().take(MAX_PANELS);
-        return cases.flat_map(|stretch| of_case(stretch, stretch.label())).collect();
+        let cases = cases.iter().take(MAX_PANELS);
+        return cases.flat_map(|case_rows| of_case(case_rows, case_rows.label())).collect();
     }
     let of_group = |(words, group): (String, Vec<&CaseRows>)| -> Vec<Panel> {
         let title = join_title([words, drawing.draws(group.len())]);
-        let cases: Vec<Vec<Panel>> = group.iter().map(|stretch| of_case(stretch, title.clone())).collect();
+        let cases: Vec<Vec<Panel>> = group.iter().map(|case_rows| of_case(case_rows, title.clone())).collect();
         let most = cases.iter().map(Vec::len).max().unwrap_or(0);
         let same = |at: usize| cases.iter().filter_map(|case| case.get(at)).collect::<Vec<_>>();
         (0..most).filter_map(|at| combine_draws(&same(at))).collect()
     };
-    drawing.group_draws(stretches).into_iter().take(MAX_PANELS).flat_map(of_group).take(MAX_PANELS).collect()
+    drawing.group_draws(cases).into_iter().take(MAX_PANELS).flat_map(of_group).take(MAX_PANELS).collect()
 }
 
 /// Combines the panels of all draws into one; returns `None` for pictures.

@@ -114,10 +114,10 @@ impl<'a> FigureInput<'a> {
     /// Returns the colour axis of curves that differ in the varied parameter number `which`.
     ///
     /// Returns `None` without such a parameter.
-    pub(crate) fn varied_axis(&self, stretches: &[CaseRows], which: usize) -> Option<Axis> {
-        let last = stretches.first()?.varied.get(which)?;
+    pub(crate) fn varied_axis(&self, cases: &[CaseRows], which: usize) -> Option<Axis> {
+        let last = cases.first()?.varied.get(which)?;
         let values: Vec<f64> =
-            stretches.iter().filter_map(|stretch| Some(stretch.varied.get(which)?.in_file_unit().0)).collect();
+            cases.iter().filter_map(|case_rows| Some(case_rows.varied.get(which)?.in_file_unit().0)).collect();
         let unit = last.in_file_unit().1;
         let axis = Axis {
             whole: unit.is_empty() && values.iter().all(|value| value.fract() == 0.0),
@@ -131,14 +131,13 @@ impl<'a> FigureInput<'a> {
         Some(if by_ratio { axis.log() } else { axis })
     }
 
-    /// Groups the stretches by their parameters of `vary`, without drawn parameters: text and
-    /// stretches.
-    pub(crate) fn group_draws<'s>(&self, stretches: &'s [CaseRows]) -> Vec<(String, Vec<&'s CaseRows>)> {
+    /// Groups the cases by their parameters of `vary`, without drawn parameters: text and cases.
+    pub(crate) fn group_draws<'s>(&self, cases: &'s [CaseRows]) -> Vec<(String, Vec<&'s CaseRows>)> {
         let (drawn, combinations) = (self.study.drawn_parameter_count(), self.study.cases_per_draw());
         let mut groups: BTreeMap<usize, Vec<&CaseRows>> = BTreeMap::new();
-        stretches.iter().for_each(|stretch| groups.entry(stretch.case % combinations).or_default().push(stretch));
+        cases.iter().for_each(|case_rows| groups.entry(case_rows.case % combinations).or_default().push(case_rows));
         let words =
-            |stretch: &CaseRows| crate::case::study::varied_text(stretch.varied.get(drawn..).unwrap_or_default());
+            |case_rows: &CaseRows| crate::case::study::varied_text(case_rows.varied.get(drawn..).unwrap_or_default());
         groups.into_values().map(|group| (group.first().map_or_else(String::new, |s| words(s)), group)).collect()
     }
 
@@ -175,7 +174,7 @@ impl<'a> FigureInput<'a> {
     }
 
     /// Does the same by the first `keys` varied parameters; `case` is the first case of each
-    /// stretch.
+    /// group.
     pub(crate) fn case_rows_by(&self, table: &Table, keys: usize) -> Vec<CaseRows> {
         let columns: Vec<&[f64]> = table
             .columns
@@ -187,7 +186,7 @@ impl<'a> FigureInput<'a> {
             })
             .collect();
         let same = |a: usize, b: usize| columns.iter().all(|column| column[a].to_bits() == column[b].to_bits());
-        let mut stretches: Vec<CaseRows> = Vec::new();
+        let mut cases: Vec<CaseRows> = Vec::new();
         let mut from = 0;
         let mut case = 0;
         while from < table.rows() {
@@ -203,7 +202,7 @@ impl<'a> FigureInput<'a> {
                     .zip(&columns)
                     .all(|(value, column)| value.column().1.to_bits() == column[from].to_bits())
                 {
-                    stretches.push(CaseRows { case, varied, rows: from..to });
+                    cases.push(CaseRows { case, varied, rows: from..to });
                     break;
                 }
                 case += 1;
@@ -211,7 +210,7 @@ impl<'a> FigureInput<'a> {
             case += usize::from(keys == self.study.varied().len());
             from = to;
         }
-        stretches
+        cases
     }
 }
 

@@ -536,9 +536,9 @@ mod tests {
             })
             .chain((0..700).map(|unit| Note::Stuck { case: format!("late {}", unit / 3), points: unit % 4, total: 10 }))
             .collect();
-        let joined = |stretch: usize| {
+        let joined = |size: usize| {
             let mut whole = Vec::new();
-            for notes in all.chunks(stretch) {
+            for notes in all.chunks(size) {
                 let mut part = Vec::new();
                 notes.iter().for_each(|note| note.clone().merge_into(&mut part));
                 part.into_iter().for_each(|note| note.merge_into(&mut whole));
@@ -548,8 +548,8 @@ mod tests {
         let one_by_one = joined(1);
         assert!(one_by_one.len() <= MAX_STUCK_CASES + 7, "{}", one_by_one.len());
         assert!(one_by_one.iter().any(|text| text.starts_with("In other cases")), "{one_by_one:?}");
-        for stretch in [2, 3, 7, 50, 1000, all.len()] {
-            assert_eq!(joined(stretch), one_by_one, "{stretch}");
+        for size in [2, 3, 7, 50, 1000, all.len()] {
+            assert_eq!(joined(size), one_by_one, "{size}");
         }
     }
 }

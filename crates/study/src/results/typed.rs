@@ -131,9 +131,9 @@ impl<'a> Results<'a> {
     /// Some rows belong to no case.
     pub fn case_rows(&self, written: &TypedTable<'_>, keys: usize) -> Result<Vec<CaseRows>, ResultsError> {
         let drawing = FigureInput { study: self.study, tables: &self.dataset.tables };
-        let stretches = drawing.case_rows_by(written.table, keys);
-        let all: usize = stretches.iter().map(|stretch| stretch.rows.len()).sum();
-        if all == written.table.rows() { Ok(stretches) } else { Err(written.foreign_rows()) }
+        let cases = drawing.case_rows_by(written.table, keys);
+        let all: usize = cases.iter().map(|case_rows| case_rows.rows.len()).sum();
+        if all == written.table.rows() { Ok(cases) } else { Err(written.foreign_rows()) }
     }
 }
 

@@ -218,8 +218,8 @@ impl WorkUnits {
     pub fn get(&self, index: usize) -> WorkUnit {
         match self.grain {
             UnitSize::Frequencies => {
-                let (case, stretch) = (index / self.blocks_per_case(), index % self.blocks_per_case());
-                WorkUnit { cases: case..case + 1, points: stretch * BLOCK..((stretch + 1) * BLOCK).min(self.points) }
+                let (case, block) = (index / self.blocks_per_case(), index % self.blocks_per_case());
+                WorkUnit { cases: case..case + 1, points: block * BLOCK..((block + 1) * BLOCK).min(self.points) }
             }
             UnitSize::Case => WorkUnit { cases: index..index + 1, points: 0..self.points },
             UnitSize::Curve => WorkUnit {

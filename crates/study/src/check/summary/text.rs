@@ -95,21 +95,21 @@ impl ModelSummary {
         } else if onset.slips.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
         } else if several {
-            let mut stretches: Vec<String> = onset
+            let mut ranges: Vec<String> = onset
                 .slips
                 .iter()
                 .take(MAX_SLIP_RANGES)
                 .map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b)))
                 .collect();
             if let Some(more @ 1..) = onset.slips.len().checked_sub(MAX_SLIP_RANGES) {
-                stretches.push(format!("{more} more"));
+                ranges.push(format!("{more} more"));
             }
-            let stretches = stretches.join(", ");
+            let ranges = ranges.join(", ");
             text += &match resonant {
                 true => {
-                    format!("; {slip} at {stretches}; any excitation is enough at its undamped resonance{at}")
+                    format!("; {slip} at {ranges}; any excitation is enough at its undamped resonance{at}")
                 }
-                false => format!("; {slip} at {stretches}; {factor} of the excitation is enough{at}"),
+                false => format!("; {slip} at {ranges}; {factor} of the excitation is enough{at}"),
             };
         } else {
             text += &format!("; {slip} occurs; {factor} of the excitation is enough");

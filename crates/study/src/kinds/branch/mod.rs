@@ -326,8 +326,8 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (y, factor) = drawing.axis(1, "amplitude", largest(table, all.iter().copied().map(column)), "m");
     let (name, _) = abscissa_column(along);
     let along_unit = along.map_or("Hz".to_owned(), |parameter| parameter.in_axis_unit().1);
-    let stretches = drawing.case_rows_by(table, outer.len());
-    let one = stretches.len() == 1;
+    let cases = drawing.case_rows_by(table, outer.len());
+    let one = cases.len() == 1;
     let names: Vec<&str> = places.iter().map(|place| system.places()[*place].as_str()).collect();
     let y = if one { y } else { Axis { quantity: format!("amplitude of {}", names.join(", ")), ..y } };
     // with several branches, the curve is the largest amplitude of the places whose peak counts
@@ -336,15 +336,14 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         false => vec![places],
     };
     let unstable = unstable_rows(table);
-    let line_of = |stretch: &CaseRows, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
-        let mut from = stretch.rows.start;
+    let line_of = |case_rows: &CaseRows, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
+        let mut from = case_rows.rows.start;
         // between two equal values at an end of the range, the branch runs outside the range
-        let at = numbers(table, &name_of_axis(table, outer.len()), stretch.rows.clone());
+        let at = numbers(table, &name_of_axis(table, outer.len()), case_rows.rows.clone());
         let leaves = |row: usize| row > 0 && at[row - 1] == at[row];
-        let rows: Vec<usize> = (0..stretch.rows.len()).collect();
-        let unstable = &unstable[stretch.rows.clone()];
-        // unstable stretches are dashed; each stretch begins at the last point of the previous
-        // stretch
+        let rows: Vec<usize> = (0..case_rows.rows.len()).collect();
+        let unstable = &unstable[case_rows.rows.clone()];
+        // unstable runs are dashed; each run begins at the last point of the previous one
         let runs = rows.chunk_by(|a, b| unstable[*a] == unstable[*b] && !leaves(*b)).map(|rows| {
             let run = &unstable[rows[0]..];
             let joined = usize::from(rows[0] > 0 && !leaves(rows[0]));
@@ -366,23 +365,23 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let name = |places: &[usize]| {
             places.iter().map(|place| system.places()[*place].as_str()).collect::<Vec<_>>().join(", ")
         };
-        let of_draw = |stretch: &CaseRows, title: String| {
+        let of_draw = |case_rows: &CaseRows, title: String| {
             let lines =
-                shown.iter().enumerate().flat_map(|(colour, places)| line_of(stretch, places, &name(places), colour));
+                shown.iter().enumerate().flat_map(|(colour, places)| line_of(case_rows, places, &name(places), colour));
             vec![panel(title, lines.collect())]
         };
         // the parameter along the branch does not distinguish draws
-        let apart: Vec<CaseRows> = stretches
+        let apart: Vec<CaseRows> = cases
             .iter()
-            .map(|stretch| CaseRows { varied: stretch.varied[..outer.len()].to_vec(), ..stretch.clone() })
+            .map(|case_rows| CaseRows { varied: case_rows.varied[..outer.len()].to_vec(), ..case_rows.clone() })
             .collect();
         return Figure { panels: draw_panels::panels(drawing, &apart, &of_draw), ..Figure::default() };
     }
-    let several = stretches.iter().flat_map(|stretch| shown.iter().map(move |places| (stretch, places)));
-    let line = |(colour, (stretch, places)): (usize, (&CaseRows, &Vec<usize>))| {
-        let varied = || varied_text(&stretch.varied[..outer.len()]);
+    let several = cases.iter().flat_map(|case_rows| shown.iter().map(move |places| (case_rows, places)));
+    let line = |(colour, (case_rows, places)): (usize, (&CaseRows, &Vec<usize>))| {
+        let varied = || varied_text(&case_rows.varied[..outer.len()]);
         let label = if one { system.places()[places[0]].clone() } else { varied() };
-        line_of(stretch, places, &label, colour)
+        line_of(case_rows, places, &label, colour)
     };
     let series = several.enumerate().flat_map(line).collect();
     Figure { panels: vec![panel(String::new(), series)], ..Figure::default() }

@@ -337,11 +337,11 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     }
     let frequencies = table.numbers(DRIVE);
     let several = joints.iter().any(|joint| *joint != joints[0]);
-    let panels_of = |stretches: &[CaseRows], words: &dyn Fn(&CaseRows) -> (String, String)| {
+    let panels_of = |cases: &[CaseRows], words: &dyn Fn(&CaseRows) -> (String, String)| {
         let mut panels: Vec<Panel> = Vec::new();
-        for stretch in stretches {
-            let (outer, inner) = words(stretch);
-            for rows in tables::split_loops(table, stretch.rows.clone()) {
+        for case_rows in cases {
+            let (outer, inner) = words(case_rows);
+            for rows in tables::split_loops(table, case_rows.rows.clone()) {
                 let from = rows.start;
                 let joint = Some(joints[from].clone()).filter(|_| several);
                 let title = join_title([outer.clone()].into_iter().chain(joint));
@@ -361,16 +361,16 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         }
         panels
     };
-    let stretches = drawing.case_rows(table);
+    let cases = drawing.case_rows(table);
     if drawing.study.draws().is_some() {
-        let of_draw = |stretch: &CaseRows, title: String| {
-            panels_of(std::slice::from_ref(stretch), &|_| (title.clone(), String::new()))
+        let of_draw = |case_rows: &CaseRows, title: String| {
+            panels_of(std::slice::from_ref(case_rows), &|_| (title.clone(), String::new()))
         };
-        return Figure { panels: draw_panels::panels(drawing, &stretches, &of_draw), ..Figure::default() };
+        return Figure { panels: draw_panels::panels(drawing, &cases, &of_draw), ..Figure::default() };
     }
-    let split = |stretch: &CaseRows| {
-        let (outer, inner) = stretch.varied.split_at(stretch.varied.len().saturating_sub(1));
+    let split = |case_rows: &CaseRows| {
+        let (outer, inner) = case_rows.varied.split_at(case_rows.varied.len().saturating_sub(1));
         (varied_text(outer), varied_text(inner))
     };
-    Figure { panels: panels_of(&stretches, &split), ..Figure::default() }
+    Figure { panels: panels_of(&cases, &split), ..Figure::default() }
 }

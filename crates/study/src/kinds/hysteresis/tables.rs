@@ -98,17 +98,17 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
     let (named, dissipation) = (summary.texts(JOINT)?, summary.numbers(DISSIPATION)?);
     let (stiffness, damping) = (summary.numbers(STIFFNESS)?, summary.numbers(DAMPING)?);
     let mut loops = Vec::new();
-    for stretch in results.case_rows(&points, study.varied().len())? {
+    for case_rows in results.case_rows(&points, study.varied().len())? {
         // a study of one frequency has no frequency column
-        let only = || study.case(stretch.case).ok()?.frequencies?.get(0).map(hertz);
-        for rows in split_loops(points.table, stretch.rows) {
+        let only = || study.case(case_rows.case).ok()?.frequencies?.get(0).map(hertz);
+        for rows in split_loops(points.table, case_rows.rows) {
             let row = loops.len();
             if named.get(row) != Some(&joint[rows.start]) {
                 return Err(summary.foreign_rows());
             }
             let listed = points.table.numbers(FREQUENCY).map(|frequency| frequency[rows.start]);
             loops.push(Loop {
-                varied: stretch.varied.clone(),
+                varied: case_rows.varied.clone(),
                 frequency: listed.or_else(only).ok_or_else(|| points.foreign_rows())?,
                 joint: named[row].clone(),
                 time: time[rows.clone()].to_vec(),

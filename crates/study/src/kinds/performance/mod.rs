@@ -225,16 +225,16 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     else {
         return Figure::default();
     };
-    let stretches = drawing.case_rows_by(table, outer);
-    let Some(inner) = stretches.first().and_then(|stretch| stretch.varied.last()) else { return Figure::default() };
+    let cases = drawing.case_rows_by(table, outer);
+    let Some(inner) = cases.first().and_then(|case_rows| case_rows.varied.last()) else { return Figure::default() };
     let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, [AMPLITUDE.to_owned()]), "m");
     let column = inner.column().0;
     let parameter = |table: &crate::results::dataset::Table, rows| numbers(table, &column, rows);
     let height = |table, rows| numbers(table, AMPLITUDE, rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
     // several outer parameters have no common colour scale
-    let varied = if outer == 1 { drawing.varied_axis(&stretches, 0) } else { None };
+    let varied = if outer == 1 { drawing.varied_axis(&cases, 0) } else { None };
     let value = |curve: usize| {
-        let parameter = varied.as_ref().and(stretches.get(curve))?.varied.first();
+        let parameter = varied.as_ref().and(cases.get(curve))?.varied.first();
         parameter.map(|parameter| parameter.in_file_unit().0)
     };
     let panel = |title: String, series| Panel {
@@ -245,24 +245,25 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         ..Panel::default()
     };
     if drawing.study.draws().is_some() {
-        // the stretches hold all parameters but the last; the first case represents a stretch
-        let groups = drawing.group_draws(&stretches);
+        // each entry holds all parameters but the last; its first case represents it
+        let groups = drawing.group_draws(&cases);
         let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let bands = groups.iter().take(MAX_BANDS).enumerate().flat_map(|(colour, (_, group))| {
-            let curve =
-                |stretch: &&CaseRows| (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
-            let outer = group
-                .first()
-                .map_or(&[][..], |stretch| &stretch.varied[drawing.study.drawn_parameter_count().min(outer)..outer]);
+            let curve = |case_rows: &&CaseRows| {
+                (parameter(table, case_rows.rows.clone()), height(table, case_rows.rows.clone()))
+            };
+            let outer = group.first().map_or(&[][..], |case_rows| {
+                &case_rows.varied[drawing.study.drawn_parameter_count().min(outer)..outer]
+            });
             percentiles(&group.iter().map(curve).collect::<Vec<_>>(), &varied_text(outer), colour)
         });
         return Figure { panels: vec![panel(draws, bands.collect())], ..Figure::default() };
     }
     let mut series = Vec::new();
-    for (colour, stretch) in stretches.iter().enumerate() {
-        let label = varied_text(&stretch.varied[..outer]);
+    for (colour, case_rows) in cases.iter().enumerate() {
+        let label = varied_text(&case_rows.varied[..outer]);
         let label = if label.is_empty() { "peak".to_owned() } else { label };
-        let (x, y) = (parameter(table, stretch.rows.clone()), height(table, stretch.rows.clone()));
+        let (x, y) = (parameter(table, case_rows.rows.clone()), height(table, case_rows.rows.clone()));
         let mut points: Vec<(f64, f64)> = x.into_iter().zip(y).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         if let Some(optima) = drawing.table(tables::OPTIMUM).filter(|optima| colour < optima.rows()) {

@@ -78,13 +78,13 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<PeakCurve>, Result
     let (at_range_end, failed) = (table.flags(AT_RANGE_END)?, table.integers(FAILED)?);
     let varied = study.varied();
     let mut curves = Vec::new();
-    for stretch in results.case_rows(&table, varied.len().saturating_sub(1))? {
+    for case_rows in results.case_rows(&table, varied.len().saturating_sub(1))? {
         let point = |row: usize| {
-            let of_case = study.varied_values(stretch.case + row - stretch.rows.start);
+            let of_case = study.varied_values(case_rows.case + row - case_rows.rows.start);
             let peak = |at_range_end| Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
             Some(PerformancePoint { varied: of_case?, peak: at_range_end[row].map(peak), failed_orbits: failed[row] })
         };
-        let points: Option<Vec<PerformancePoint>> = stretch.rows.clone().map(point).collect();
+        let points: Option<Vec<PerformancePoint>> = case_rows.rows.clone().map(point).collect();
         curves.push(PeakCurve { points: points.ok_or_else(|| table.foreign_rows())?, optimum: None });
     }
     let (Some(optima), true) = (results.table(OPTIMUM)?, !varied.is_empty()) else { return Ok(curves) };

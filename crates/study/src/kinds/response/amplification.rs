@@ -120,18 +120,16 @@ fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
 /// Draws, or the values of the last parameter of `vary`, form one histogram.
 pub(super) fn panels(drawing: &FigureInput<'_>) -> Vec<Panel> {
     let Some(table) = drawing.table(tables::AMPLIFICATION) else { return Vec::new() };
-    let stretches = drawing.case_rows(table);
-    let outer = |stretch: &CaseRows| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+    let cases = drawing.case_rows(table);
+    let outer = |case_rows: &CaseRows| varied_text(&case_rows.varied[..case_rows.varied.len().saturating_sub(1)]);
     let groups: Vec<(String, Vec<&CaseRows>)> = match drawing.study.draws() {
-        Some(_) => drawing.group_draws(&stretches),
-        None => {
-            stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|all| (outer(&all[0]), all.iter().collect())).collect()
-        }
+        Some(_) => drawing.group_draws(&cases),
+        None => cases.chunk_by(|a, b| outer(a) == outer(b)).map(|all| (outer(&all[0]), all.iter().collect())).collect(),
     };
     let x = Axis::new("amplification of the worst place", "");
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
     let of_group = |(words, group): (String, Vec<&CaseRows>)| {
-        let rows = || group.iter().flat_map(|stretch| stretch.rows.clone());
+        let rows = || group.iter().flat_map(|case_rows| case_rows.rows.clone());
         let values: Vec<f64> =
             rows().flat_map(|row| numbers(table, tables::AMPLIFICATION_RATIO, row..row + 1)).collect();
         let ends = rows().filter(|row| at_end.get(*row) == Some(&Some(true))).count();

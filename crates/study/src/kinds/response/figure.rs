@@ -30,7 +30,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let highest = tables.into_iter().flatten().map(|table| largest(table, columns())).fold(0.0, f64::max);
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
     let (unit, force_factor) = prefixed_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
-    let stretches = drawing.case_rows(curve);
+    let cases = drawing.case_rows(curve);
     let mut drawn = FigureData {
         drawing,
         curve,
@@ -49,19 +49,19 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         joints,
         contact_joints: faces,
         failed: 0,
-        case_count_text: drawing.shown_cases_text(stretches.len()),
+        case_count_text: drawing.shown_cases_text(cases.len()),
     };
-    drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
-    let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
+    drawn.failed = cases.iter().map(|case_rows| drawn.without_orbit(case_rows).len()).sum();
+    let mut figure = match drawing.layout(drawn.shown.len(), cases.len(), drawn.panels_of_a_case()) {
         PanelLayout::Cases => {
             // the colour scale belongs to maps; the curves of one panel have names
             let varied = (!drawn.contact_joints.is_empty()).then(|| contact_states::axis("share of the period"));
-            Figure { panels: drawn.panels_by_case(&stretches), varied, ..Figure::default() }
+            Figure { panels: drawn.panels_by_case(&cases), varied, ..Figure::default() }
         }
         PanelLayout::Masses => Figure {
-            panels: drawn.panels_by_place(&stretches),
+            panels: drawn.panels_by_place(&cases),
             sharing: Sharing::Always,
-            varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
+            varied: drawing.varied_axis(&cases, drawing.study.varied().len().saturating_sub(1)),
             ..Figure::default()
         },
     };
@@ -76,17 +76,17 @@ fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
     let (Some(table), Some(_)) = (drawn.drawing.table(tables::PEAKS), drawn.drawing.study.draws()) else {
         return Vec::new();
     };
-    let stretches = drawn.drawing.case_rows(table);
+    let cases = drawn.drawing.case_rows(table);
     let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &drawn.axes.1.unit) };
     let of_group = |(words, group): (String, Vec<&CaseRows>)| {
-        let highest = |stretch: &&CaseRows| {
-            let heights = numbers(table, AMPLITUDE, stretch.rows.clone());
+        let highest = |case_rows: &&CaseRows| {
+            let heights = numbers(table, AMPLITUDE, case_rows.rows.clone());
             heights.into_iter().fold(f64::NAN, f64::max) * drawn.factor.1
         };
         let heights: Vec<f64> = group.iter().map(highest).collect();
         histogram::panel(&heights, &x, &join_title([words, "largest peak".to_owned()]), "draws")
     };
-    drawn.drawing.group_draws(&stretches).into_iter().filter_map(of_group).collect()
+    drawn.drawing.group_draws(&cases).into_iter().filter_map(of_group).collect()
 }
 
 /// Returns the rows of the linear references case by case.
@@ -111,12 +111,12 @@ fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
         return Vec::new();
     }
     let mut peaks = Vec::new();
-    for stretch in drawing.case_rows(table) {
-        let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
-        for (i, row) in stretch.rows.clone().enumerate() {
+    for case_rows in drawing.case_rows(table) {
+        let (x, y) = (numbers(table, DRIVE, case_rows.rows.clone()), numbers(table, AMPLITUDE, case_rows.rows.clone()));
+        for (i, row) in case_rows.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
                 let way_back = way_back.get(row).copied().flatten() == Some(true);
-                peaks.push(CasePeak { case: stretch.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
+                peaks.push(CasePeak { case: case_rows.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
             }
         }
     }

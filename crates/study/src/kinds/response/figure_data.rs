@@ -73,11 +73,11 @@ impl FigureData<'_> {
     }
 
     /// Returns the curve of one place in one case, with its peaks inserted.
-    pub(super) fn line(&self, stretch: &CaseRows, name: &str) -> (Vec<f64>, Vec<f64>) {
-        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
-        let y = self.amplitudes(name, stretch.rows.clone());
+    pub(super) fn line(&self, case_rows: &CaseRows, name: &str) -> (Vec<f64>, Vec<f64>) {
+        let x = numbers(self.curve, DRIVE, case_rows.rows.clone());
+        let y = self.amplitudes(name, case_rows.rows.clone());
         self.scaled(
-            self.with_peaks(stretch, x.into_iter().zip(y).collect(), &|peak| !peak.way_back && peak.mass == name),
+            self.with_peaks(case_rows, x.into_iter().zip(y).collect(), &|peak| !peak.way_back && peak.mass == name),
         )
     }
 
@@ -85,16 +85,16 @@ impl FigureData<'_> {
     ///
     /// The curve belongs to one place with its peaks, or to the largest of several, in the same
     /// colour. Most figures have no such curve.
-    pub(super) fn reverse_sweep_series(&self, stretch: &CaseRows, names: &[&str], colour: usize) -> Option<Series> {
-        let (table, stretches) = self.reverse_sweep.as_ref()?;
-        let rows = stretches.iter().find(|of| of.case == stretch.case)?.rows.clone();
+    pub(super) fn reverse_sweep_series(&self, case_rows: &CaseRows, names: &[&str], colour: usize) -> Option<Series> {
+        let (table, cases) = self.reverse_sweep.as_ref()?;
+        let rows = cases.iter().find(|of| of.case == case_rows.case)?.rows.clone();
         let x = numbers(table, DRIVE, rows.clone());
         let all: Vec<Vec<f64>> = names.iter().map(|name| numbers(table, &amplitude_of(name), rows.clone())).collect();
         let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
         let points = (0..x.len()).map(|i| (x[i], largest(i))).collect();
-        let mut points = self.with_peaks(stretch, points, &|peak| peak.way_back && names == [peak.mass.as_str()]);
+        let mut points = self.with_peaks(case_rows, points, &|peak| peak.way_back && names == [peak.mass.as_str()]);
         // the line has a gap at frequencies at which both sweeps have the same orbit
-        let there = numbers(self.curve, DRIVE, stretch.rows.clone());
+        let there = numbers(self.curve, DRIVE, case_rows.rows.clone());
         let alike: Vec<f64> = there.into_iter().filter(|omega| !x.contains(omega)).collect();
         let within = points.first().map_or(0.0, |first| first.0)..points.last().map_or(0.0, |last| last.0);
         points.extend(alike.into_iter().filter(|x| within.contains(x)).map(|x| (x, f64::NAN)));
@@ -104,26 +104,26 @@ impl FigureData<'_> {
     }
 
     /// Returns the largest amplitude of the shown places at the frequencies of the curve.
-    pub(super) fn largest(&self, stretch: &CaseRows) -> (Vec<f64>, Vec<f64>) {
-        self.scaled(self.largest_at(stretch, &self.all(stretch)))
+    pub(super) fn largest(&self, case_rows: &CaseRows) -> (Vec<f64>, Vec<f64>) {
+        self.scaled(self.largest_at(case_rows, &self.all(case_rows)))
     }
 
     /// Returns the largest amplitude with the peaks inserted, and states which place has the
     /// maximum.
-    pub(super) fn envelope(&self, stretch: &CaseRows) -> (Vec<f64>, Vec<f64>, String) {
-        let all = self.all(stretch);
+    pub(super) fn envelope(&self, case_rows: &CaseRows) -> (Vec<f64>, Vec<f64>, String) {
+        let all = self.all(case_rows);
         let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut heights: Vec<f64> = all.iter().map(|values| highest(values)).collect();
         let alike = leading(heights.iter().copied())
             .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - EQUAL) * heights[worst]));
         // a refined peak may be higher than all points of the curve
-        for peak in self.peaks_of(stretch).filter(|peak| !peak.way_back) {
+        for peak in self.peaks_of(case_rows).filter(|peak| !peak.way_back) {
             if let Some(i) = self.shown.iter().position(|(name, _)| *name == peak.mass) {
                 heights[i] = heights[i].max(peak.at.1);
             }
         }
         let worst = leading(heights.into_iter()).filter(|_| !alike);
-        let points = self.largest_at(stretch, &all);
+        let points = self.largest_at(case_rows, &all);
         let below = |omega: f64| {
             let at = points.partition_point(|point| point.0 < omega).clamp(1, points.len().max(2) - 1);
             let ((x0, y0), (x1, y1)) = (points[at - 1], points[at]);
@@ -131,7 +131,7 @@ impl FigureData<'_> {
         };
         // a peak of one place below the curve of another place is not on the envelope
         let counts = |peak: &CasePeak| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
-        let (x, y) = self.scaled(self.with_peaks(stretch, points.clone(), &counts));
+        let (x, y) = self.scaled(self.with_peaks(case_rows, points.clone(), &counts));
         (
             x,
             y,
@@ -143,14 +143,14 @@ impl FigureData<'_> {
     }
 
     /// Returns the amplitudes of every shown place.
-    fn all(&self, stretch: &CaseRows) -> Vec<Vec<f64>> {
-        self.shown.iter().map(|(name, _)| self.amplitudes(name, stretch.rows.clone())).collect()
+    fn all(&self, case_rows: &CaseRows) -> Vec<Vec<f64>> {
+        self.shown.iter().map(|(name, _)| self.amplitudes(name, case_rows.rows.clone())).collect()
     }
 
     /// Returns the largest of several amplitudes over the frequency.
-    fn largest_at(&self, stretch: &CaseRows, all: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    fn largest_at(&self, case_rows: &CaseRows, all: &[Vec<f64>]) -> Vec<(f64, f64)> {
         let largest = |i: usize| all.iter().map(|values| values[i]).fold(f64::NAN, f64::max);
-        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
+        let x = numbers(self.curve, DRIVE, case_rows.rows.clone());
         x.into_iter().enumerate().map(|(i, x)| (x, largest(i))).collect()
     }
 
@@ -163,10 +163,11 @@ impl FigureData<'_> {
     /// (degrees) of every shown place there.
     ///
     /// The maximum is a refined peak, or a point of the curve without a higher peak.
-    pub(super) fn shape_at_maximum(&self, stretch: &CaseRows) -> Option<(f64, DeflectionShape<'_>)> {
-        let peaks = self.shapes.as_ref().and_then(|(table, stretches)| {
-            Some((*table, stretches.iter().find(|of| of.case == stretch.case)?.rows.clone()))
-        });
+    pub(super) fn shape_at_maximum(&self, case_rows: &CaseRows) -> Option<(f64, DeflectionShape<'_>)> {
+        let peaks = self
+            .shapes
+            .as_ref()
+            .and_then(|(table, cases)| Some((*table, cases.iter().find(|of| of.case == case_rows.case)?.rows.clone())));
         let highest = |(table, rows): (&Table, Range<usize>)| {
             let index = table.index();
             let number = |column: String, row: usize| {
@@ -184,28 +185,28 @@ impl FigureData<'_> {
             let row = rows.max_by(|a, b| height(*a).total_cmp(&height(*b)))?;
             Some((height(row), number(DRIVE.to_owned(), row), shape(row)))
         };
-        let both = [Some((self.curve, stretch.rows.clone())), peaks].into_iter().flatten().filter_map(highest);
+        let both = [Some((self.curve, case_rows.rows.clone())), peaks].into_iter().flatten().filter_map(highest);
         both.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, frequency, shape)| (frequency, shape))
     }
 
-    fn peaks_of(&self, stretch: &CaseRows) -> impl Iterator<Item = &CasePeak> {
-        self.peaks.iter().filter(|peak| peak.case == stretch.case)
+    fn peaks_of(&self, case_rows: &CaseRows) -> impl Iterator<Item = &CasePeak> {
+        self.peaks.iter().filter(|peak| peak.case == case_rows.case)
     }
 
     fn with_peaks(
         &self,
-        stretch: &CaseRows,
+        case_rows: &CaseRows,
         mut points: Vec<(f64, f64)>,
         counts: &dyn Fn(&CasePeak) -> bool,
     ) -> Vec<(f64, f64)> {
-        points.extend(self.peaks_of(stretch).filter(|peak| counts(peak)).map(|peak| peak.at));
+        points.extend(self.peaks_of(case_rows).filter(|peak| counts(peak)).map(|peak| peak.at));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
     }
 
     /// Returns marks at the peaks of one place.
-    pub(super) fn marks(&self, stretch: &CaseRows, name: &str, colour: usize) -> impl Iterator<Item = Series> {
-        self.peaks_of(stretch).filter(move |peak| peak.mass == name).map(move |CasePeak { at: (x, y), .. }| {
+    pub(super) fn marks(&self, case_rows: &CaseRows, name: &str, colour: usize) -> impl Iterator<Item = Series> {
+        self.peaks_of(case_rows).filter(move |peak| peak.mass == name).map(move |CasePeak { at: (x, y), .. }| {
             Series::marks("peak", vec![x * self.factor.0], vec![y * self.factor.1], colour)
         })
     }
@@ -219,10 +220,10 @@ impl FigureData<'_> {
         // a case without rows has the references of the previous case
         let of = |case: usize| known.iter().rev().find(|own| own.case <= case);
         let mut own: Vec<(usize, &CaseRows, &CaseRows)> = Vec::new();
-        for (colour, stretch) in cases {
-            let Some(reference) = of(stretch.case) else { continue };
+        for (colour, case_rows) in cases {
+            let Some(reference) = of(case_rows.case) else { continue };
             if own.iter().all(|(_, _, found)| found.rows != reference.rows) {
-                own.push((*colour, stretch, reference));
+                own.push((*colour, case_rows, reference));
             }
         }
         let found = own.len();
@@ -231,7 +232,7 @@ impl FigureData<'_> {
         }
         let (several, thinned) = (own.len() > 1, own.len() < found);
         let mut lines: Vec<Series> = Vec::new();
-        for (colour, stretch, reference) in own {
+        for (colour, case_rows, reference) in own {
             for line in self.reference(table, reference, names) {
                 // a parameter that does not change a curve gives it once
                 if lines.iter().any(|known| (&known.x, &known.y) == (&line.x, &line.y)) {
@@ -241,9 +242,9 @@ impl FigureData<'_> {
                     lines.push(line.reference());
                     continue;
                 }
-                let whose = if thinned { stretch.label() } else { "for each case".to_owned() };
+                let whose = if thinned { case_rows.label() } else { "for each case".to_owned() };
                 let (label, value) =
-                    (format!("{}, {whose}", line.label), stretch.varied.last().map(|v| v.in_file_unit().0));
+                    (format!("{}, {whose}", line.label), case_rows.varied.last().map(|v| v.in_file_unit().0));
                 lines.push(Series { label, value, colour, ..line.case_reference() });
             }
         }
@@ -251,24 +252,24 @@ impl FigureData<'_> {
     }
 
     /// Returns crosses at the points of a case without an orbit, in this row from below.
-    pub(super) fn failed_points(&self, stretch: &CaseRows, row: usize, colour: usize) -> Option<Series> {
-        let x = self.without_orbit(stretch);
+    pub(super) fn failed_points(&self, case_rows: &CaseRows, row: usize, colour: usize) -> Option<Series> {
+        let x = self.without_orbit(case_rows);
         let count = self.failed;
         let label = format!("{count} point{} without an orbit", crate::syntax::format::plural_suffix(count));
         (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
     }
 
     /// Returns the frequencies, on the axis, at which a case has no orbit.
-    pub(super) fn without_orbit(&self, stretch: &CaseRows) -> Vec<f64> {
-        let all = self.all(stretch);
-        let x = numbers(self.curve, DRIVE, stretch.rows.clone());
+    pub(super) fn without_orbit(&self, case_rows: &CaseRows) -> Vec<f64> {
+        let all = self.all(case_rows);
+        let x = numbers(self.curve, DRIVE, case_rows.rows.clone());
         let failed = |i: &usize| !all.is_empty() && all.iter().all(|values| values[*i].is_nan());
         (0..x.len()).filter(failed).map(|i| x[i] * self.factor.0).collect()
     }
 
     /// Returns the two reference curves of one case.
-    fn reference(&self, table: &Table, stretch: &CaseRows, names: &[&str]) -> Vec<Series> {
-        let rows = stretch.rows.clone();
+    fn reference(&self, table: &Table, case_rows: &CaseRows, names: &[&str]) -> Vec<Series> {
+        let rows = case_rows.rows.clone();
         let x: Vec<f64> = numbers(table, DRIVE, rows.clone()).iter().map(|x| x * self.factor.0).collect();
         let line = |(what, style): (&str, Style)| {
             let column = |name: &&str| numbers(table, &amplitude_of(&format!("{name}_{what}")), rows.clone());
@@ -306,22 +307,22 @@ impl FigureData<'_> {
     /// joints.
     pub(super) fn share_line(
         &self,
-        stretch: &CaseRows,
+        case_rows: &CaseRows,
         joints: &[String],
         state: ContactState,
     ) -> (Vec<f64>, Vec<f64>) {
-        let x = numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
-        (x, contact_states::mean_share(self.curve, joints, &stretch.rows, state))
+        let x = numbers(self.curve, DRIVE, case_rows.rows.clone()).iter().map(|x| x * self.factor.0).collect();
+        (x, contact_states::mean_share(self.curve, joints, &case_rows.rows, state))
     }
 
     /// Returns the force of a joint, or the largest of several.
-    pub(super) fn force_line(&self, stretch: &CaseRows, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn force_line(&self, case_rows: &CaseRows, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
         let of = |column: &str, factor: f64| -> Vec<f64> {
-            numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+            numbers(self.curve, column, case_rows.rows.clone()).iter().map(|value| value * factor).collect()
         };
         let all: Vec<Vec<f64>> = joints.iter().map(|joint| of(&force(joint), self.force_factor)).collect();
         let largest = |i: usize| all.iter().map(|forces| forces[i]).fold(f64::NAN, f64::max);
-        (of(DRIVE, self.factor.0), (0..stretch.rows.len()).map(largest).collect())
+        (of(DRIVE, self.factor.0), (0..case_rows.rows.len()).map(largest).collect())
     }
 
     /// Groups the joints whose forces are drawn as one line, with its name.

@@ -171,19 +171,19 @@ const MANY_PEAKS: usize = 1000;
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let case = &prepared.case;
-    let mut stretch = ResponseBuilder::new(prepared);
+    let mut builder = ResponseBuilder::new(prepared);
     let found = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
             let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
-            sweep_adaptive(work, adaptive, &mut stretch)
+            sweep_adaptive(work, adaptive, &mut builder)
         }
-        _ => sweep_given(work, &mut stretch),
+        _ => sweep_given(work, &mut builder),
     };
     let (points, others) = found.map_err(|error| (case.index, error))?;
-    let mut part = stretch.part;
+    let mut part = builder.part;
     let of = part.points.values().sum::<u64>() as usize;
-    part.notes.push(Note::Stuck { case: case.label(), points: stretch.stuck, total: of });
-    part.tables = vec![stretch.rows];
+    part.notes.push(Note::Stuck { case: case.label(), points: builder.stuck, total: of });
+    part.tables = vec![builder.rows];
     let (mut amplified, mut shapes) = (TableBuilder::default(), TableBuilder::default());
     if !points.is_empty() && !work.context.stopped() {
         let mut peaks = TableBuilder::default();
@@ -223,13 +223,13 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         part.tables.push(TableBuilder::default());
     }
     if work.study.wants_references() && !references::equal_previous(work.study, case) {
-        let (rows, absent) = references(work, &stretch.omegas);
+        let (rows, absent) = references(work, &builder.omegas);
         part.tables.push(rows);
         part.notes.extend(absent.into_iter().map(Note::Sentence));
     } else {
         part.tables.push(TableBuilder::default());
     }
-    part.tables.extend([amplified, shapes, stretch.reverse_sweep]);
+    part.tables.extend([amplified, shapes, builder.reverse_sweep]);
     Ok(part)
 }
 
@@ -318,7 +318,7 @@ fn summary_and_notes(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitErro
 type SweepPoints = (Vec<Point>, Vec<Point>);
 
 /// Computes the points at the frequencies of the unit.
-fn sweep_given(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result<SweepPoints, MethodError> {
+fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
     let sought = PeakQuantities::new(prepared);
@@ -326,13 +326,13 @@ fn sweep_given(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result
     let mut points = Vec::new();
     let mut ways = BothWays::of(&prepared.system);
     orbit_sweep::sweep(work, &mut |omega, outcome| {
-        stretch.add(omega, outcome.map(|outcome| summary_and_notes(prepared, outcome)));
+        builder.add(omega, outcome.map(|outcome| summary_and_notes(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {
             points.push(outcome.map_or_else(|_| Point::failed(omega), point));
         }
     })?;
-    let others = stretch.compare(work, ways)?;
+    let others = builder.compare(work, ways)?;
     if !wanted || points.is_empty() {
         return Ok((Vec::new(), others));
     }
@@ -359,7 +359,7 @@ fn sweep_given(work: &UnitTask<'_>, stretch: &mut ResponseBuilder<'_>) -> Result
 fn sweep_adaptive(
     work: &UnitTask<'_>,
     adaptive: Adaptive,
-    stretch: &mut ResponseBuilder<'_>,
+    builder: &mut ResponseBuilder<'_>,
 ) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
     let sought = PeakQuantities::new(prepared);
@@ -372,7 +372,7 @@ fn sweep_adaptive(
     let stop = || work.context.stopped();
     let curve = adaptive.curve(&*prepared.method, &prepared.system, &quantities, &keep, &stop)?;
     if work.context.stopped() {
-        stretch.add(adaptive.range.1, None);
+        builder.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
     let mut ways = BothWays::of(&prepared.system);
@@ -382,11 +382,11 @@ fn sweep_adaptive(
             let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length());
             ways.add_point(Point { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
         }
-        stretch.add(point.omega, Some(kept));
+        builder.add(point.omega, Some(kept));
         point.values.extend(shape);
         points.push(point);
     }
-    let others = stretch.compare(work, ways)?;
+    let others = builder.compare(work, ways)?;
     Ok((if prepared.case.values.flag("peaks").unwrap_or(true) { points } else { Vec::new() }, others))
 }
 

@@ -28,41 +28,41 @@ impl FigureData<'_> {
     /// A case has the curves of every place, the sectors of a disk, and the forces and contact
     /// states of joints. If the figure is full, the first cases are drawn, and the title states
     /// this.
-    pub(super) fn panels_by_case(&self, stretches: &[CaseRows]) -> Vec<Panel> {
+    pub(super) fn panels_by_case(&self, cases: &[CaseRows]) -> Vec<Panel> {
         let each = self.panels_of_a_case().max(1);
-        let room = (MAX_PANELS / each).clamp(1, stretches.len().max(1));
+        let room = (MAX_PANELS / each).clamp(1, cases.len().max(1));
         let wheels = room * (each + 1) <= MAX_PANELS;
         let [of_sectors, of_forces, of_shares] = self.colours();
         let mut panels = Vec::new();
-        for stretch in stretches.iter().take(room) {
+        for case_rows in cases.iter().take(room) {
             if !self.shown.is_empty() {
-                panels.push(self.places_panel(stretch));
+                panels.push(self.places_panel(case_rows));
             }
-            if let Some([bars, wheel]) = self.sectors_of(stretch, of_sectors) {
+            if let Some([bars, wheel]) = self.sectors_of(case_rows, of_sectors) {
                 panels.extend(bars.into_iter().chain(wheel.filter(|_| wheels)));
             }
             if !self.joints.is_empty() {
-                let mut panel = self.force_panel(stretch.label());
+                let mut panel = self.force_panel(case_rows.label());
                 for (i, (name, joints)) in self.force_groups().into_iter().enumerate() {
-                    let (x, y) = self.force_line(stretch, &joints);
+                    let (x, y) = self.force_line(case_rows, &joints);
                     panel.series.push(Series::line(name, x, y, of_forces + i));
                 }
                 panels.push(panel);
             }
             let x: Vec<f64> =
-                numbers(self.curve, DRIVE, stretch.rows.clone()).iter().map(|x| x * self.factor.0).collect();
+                numbers(self.curve, DRIVE, case_rows.rows.clone()).iter().map(|x| x * self.factor.0).collect();
             let over = (&x[..], &self.axes.0);
-            let label = stretch.label();
+            let label = case_rows.label();
             panels.extend(contact_states::panels(
                 self.curve,
                 &self.contact_joints,
-                &stretch.rows,
+                &case_rows.rows,
                 over,
                 (&label, of_shares),
             ));
         }
-        if let Some(first) = panels.first_mut().filter(|_| room < stretches.len()) {
-            let some = format!("the first {room} of {} cases", stretches.len());
+        if let Some(first) = panels.first_mut().filter(|_| room < cases.len()) {
+            let some = format!("the first {room} of {} cases", cases.len());
             first.title = join_title([std::mem::take(&mut first.title), some]);
         }
         panels
@@ -82,10 +82,10 @@ impl FigureData<'_> {
 
     /// Draws the places of one case: each of them, or the largest amplitude in front of all
     /// others.
-    fn places_panel(&self, stretch: &CaseRows) -> Panel {
-        let (mut panel, names) = (self.panel(stretch.label()), self.names());
-        panel.series.extend(self.references(&names, &[(0, stretch)]));
-        panel.series.extend(self.failed_points(stretch, 1, FAILED_POINT_COLOUR));
+    fn places_panel(&self, case_rows: &CaseRows) -> Panel {
+        let (mut panel, names) = (self.panel(case_rows.label()), self.names());
+        panel.series.extend(self.references(&names, &[(0, case_rows)]));
+        panel.series.extend(self.failed_points(case_rows, 1, FAILED_POINT_COLOUR));
         if self.draws_each_place() {
             // the mass is known only for a place that is one row of the structure
             let mass = |place: usize| match self.system.seen()[place].rows() {
@@ -95,40 +95,40 @@ impl FigureData<'_> {
             let places = 0..self.system.places().len();
             let heaviest = places.map(mass).filter(|mass| mass.is_finite()).fold(0.0, f64::max);
             for (name, place) in &self.shown {
-                let (x, y) = self.line(stretch, name);
+                let (x, y) = self.line(case_rows, name);
                 let light = mass(*place) < LIGHT_MASS_SHARE * heaviest;
                 let style = if light { Style::Dashed } else { Style::Solid };
                 panel.series.push(Series { style, ..Series::line(name, x, y, self.colour_of(name, *place)) });
             }
             let colour_of = |(name, place): &(String, usize)| self.colour_of(name, *place);
-            let back = |shown: &(String, usize)| self.reverse_sweep_series(stretch, &[&shown.0], colour_of(shown));
+            let back = |shown: &(String, usize)| self.reverse_sweep_series(case_rows, &[&shown.0], colour_of(shown));
             panel.series.extend(self.shown.iter().filter_map(back));
             for (name, place) in &self.shown {
-                panel.series.extend(self.marks(stretch, name, self.colour_of(name, *place)));
+                panel.series.extend(self.marks(case_rows, name, self.colour_of(name, *place)));
             }
             return panel;
         }
-        let behind = self.highest(stretch, MAX_BACKGROUND);
+        let behind = self.highest(case_rows, MAX_BACKGROUND);
         let label = match behind.len() < names.len() {
             true => format!("the {} highest of {} places", behind.len(), names.len()),
             false => format!("each of {} places", names.len()),
         };
         for name in behind {
-            let (x, y) = self.line(stretch, name);
+            let (x, y) = self.line(case_rows, name);
             panel.series.push(Series::line(label.clone(), x, y, 1).pale());
         }
-        let (x, y, worst) = self.envelope(stretch);
+        let (x, y, worst) = self.envelope(case_rows);
         panel.title = join_title([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} places", names.len()), x, y, 0));
-        panel.series.extend(self.reverse_sweep_series(stretch, &names, 0));
+        panel.series.extend(self.reverse_sweep_series(case_rows, &names, 0));
         panel
     }
 
     /// Returns at most `most` of the shown places, those with the largest amplitudes, in model
     /// order.
-    fn highest(&self, stretch: &CaseRows, most: usize) -> Vec<&str> {
+    fn highest(&self, case_rows: &CaseRows, most: usize) -> Vec<&str> {
         let names = self.names();
-        let height = |name: &str| self.amplitudes(name, stretch.rows.clone()).into_iter().fold(0.0, f64::max);
+        let height = |name: &str| self.amplitudes(name, case_rows.rows.clone()).into_iter().fold(0.0, f64::max);
         let mut by_height: Vec<(usize, f64)> = names.iter().map(|name| height(name)).enumerate().collect();
         by_height.sort_by(|a, b| b.1.total_cmp(&a.1));
         by_height.truncate(most);
@@ -141,9 +141,9 @@ impl FigureData<'_> {
     ///
     /// Both panels show the places that move most, each in one colour, beginning with colour
     /// `first`.
-    fn sectors_of(&self, stretch: &CaseRows, first: usize) -> Option<[Option<Panel>; 2]> {
+    fn sectors_of(&self, case_rows: &CaseRows, first: usize) -> Option<[Option<Panel>; 2]> {
         let ring = self.drawing.study.case(0).ok()?.model.ring?;
-        let (frequency, shape) = self.shape_at_maximum(stretch)?;
+        let (frequency, shape) = self.shape_at_maximum(case_rows)?;
         let all = PlaceInSectors::from_ring(shape)?;
         let places = all.len();
         let shape: Vec<PlaceInSectors> = disk_shape::largest_places(&all, disk_shape::MAX_PLACES)
@@ -163,7 +163,7 @@ impl FigureData<'_> {
         // bars of equal height, as for a tuned disk, are left out
         let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > EQUAL_BARS * bars.y[0].abs());
         let differ = series.iter().any(differ);
-        let title = join_title([stretch.label(), format!("at {} Hz", format_significant(frequency, 6))]);
+        let title = join_title([case_rows.label(), format!("at {} Hz", format_significant(frequency, 6))]);
         let (x, y) =
             (Axis::new("sector", "").with_whole_numbers(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
         let of = disk_shape::left_out(shape.len(), places);

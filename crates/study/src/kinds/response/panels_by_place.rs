@@ -18,13 +18,13 @@ impl FigureData<'_> {
     ///
     /// Each panel has a curve for every case. The last varied parameter distinguishes the
     /// curves of a panel, the other parameters the panels.
-    pub(super) fn panels_by_place(&self, stretches: &[CaseRows]) -> Vec<Panel> {
+    pub(super) fn panels_by_place(&self, cases: &[CaseRows]) -> Vec<Panel> {
         if self.drawing.study.draws().is_some() {
-            return self.percentile_panels(stretches);
+            return self.percentile_panels(cases);
         }
-        let outer = |stretch: &CaseRows| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
+        let outer = |case_rows: &CaseRows| varied_text(&case_rows.varied[..case_rows.varied.len().saturating_sub(1)]);
         let groups: Vec<(&[CaseRows], String)> =
-            stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
+            cases.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
         let masses: Vec<Option<&str>> =
             if self.draws_each_place() { self.names().into_iter().map(Some).collect() } else { vec![None] };
         let of_masses = groups.iter().flat_map(|(group, outer)| {
@@ -43,40 +43,41 @@ impl FigureData<'_> {
     }
 
     /// Returns the same panels with percentiles of the draws for each combination of `vary`.
-    fn percentile_panels(&self, stretches: &[CaseRows]) -> Vec<Panel> {
-        let groups = self.drawing.group_draws(stretches);
+    fn percentile_panels(&self, cases: &[CaseRows]) -> Vec<Panel> {
+        let groups = self.drawing.group_draws(cases);
         let draws = self.drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
         let some = (groups.len() > MAX_SINGLE_PLACES)
             .then(|| format!("the first {MAX_SINGLE_PLACES} of {} cases", groups.len()));
         let panel = |mut panel: Panel, name: &str, curve: CurveFn<'_>| {
             panel.title = join_title([name.to_owned(), draws.clone()].into_iter().chain(some.clone()));
             for (colour, (words, group)) in groups.iter().take(MAX_SINGLE_PLACES).enumerate() {
-                let curves: Vec<_> = group.iter().map(|stretch| curve(stretch)).collect();
+                let curves: Vec<_> = group.iter().map(|case_rows| curve(case_rows)).collect();
                 panel.series.extend(percentiles(&curves, words, colour));
             }
             panel
         };
-        let of = |stretch: &CaseRows, column: &str| {
+        let of = |case_rows: &CaseRows, column: &str| {
             let of = |column: &str, factor: f64| -> Vec<f64> {
-                numbers(self.curve, column, stretch.rows.clone()).iter().map(|value| value * factor).collect()
+                numbers(self.curve, column, case_rows.rows.clone()).iter().map(|value| value * factor).collect()
             };
             (of(DRIVE, self.factor.0), of(column, self.factor.1))
         };
         let mut panels = Vec::new();
         if self.draws_each_place() {
             for (name, _) in &self.shown {
-                panels.push(panel(self.panel(String::new()), name, &|stretch| of(stretch, &amplitude_of(name))));
+                panels.push(panel(self.panel(String::new()), name, &|case_rows| of(case_rows, &amplitude_of(name))));
             }
         } else {
             let name = format!("largest of {} places", self.shown.len());
             // without peaks: their frequencies differ between draws
-            panels.push(panel(self.panel(String::new()), &name, &|stretch| self.largest(stretch)));
+            panels.push(panel(self.panel(String::new()), &name, &|case_rows| self.largest(case_rows)));
         }
         for (name, joints) in self.force_groups() {
-            panels.push(panel(self.force_panel(String::new()), &name, &|stretch| self.force_line(stretch, &joints)));
+            panels
+                .push(panel(self.force_panel(String::new()), &name, &|case_rows| self.force_line(case_rows, &joints)));
         }
         for named in contact_states::groups(&self.contact_joints) {
-            let of_case = |stretch: &CaseRows| self.share_line(stretch, &named.1, ContactState::Slip);
+            let of_case = |case_rows: &CaseRows| self.share_line(case_rows, &named.1, ContactState::Slip);
             let shares = self.share_panel(&named, ContactState::Slip, String::new());
             let title = shares.title.clone();
             panels.push(panel(shares, &title, &of_case));
@@ -102,30 +103,30 @@ impl FigureData<'_> {
         let cases: Vec<(usize, &CaseRows)> = evenly_chosen(group, MAX_CURVES).into_iter().enumerate().collect();
         panel.series.extend(self.references(&mass.map_or_else(|| self.names(), |mass| vec![mass]), &cases));
         // each case has its row of crosses if few cases have failures
-        let failing = cases.iter().filter(|(_, stretch)| !self.without_orbit(stretch).is_empty()).count();
+        let failing = cases.iter().filter(|(_, case_rows)| !self.without_orbit(case_rows).is_empty()).count();
         let mut row = 0;
-        for (colour, stretch) in cases {
-            if let Some(crosses) = self.failed_points(stretch, row + 1, colour) {
-                let value = stretch.varied.last().map(|varied| varied.in_file_unit().0);
+        for (colour, case_rows) in cases {
+            if let Some(crosses) = self.failed_points(case_rows, row + 1, colour) {
+                let value = case_rows.varied.last().map(|varied| varied.in_file_unit().0);
                 panel.series.push(Series { value, ..crosses });
                 row += usize::from(failing <= MAX_SINGLE_PLACES);
             }
             let (x, y) = match mass {
-                Some(name) => self.line(stretch, name),
+                Some(name) => self.line(case_rows, name),
                 None => {
-                    let (x, y, _) = self.envelope(stretch);
+                    let (x, y, _) = self.envelope(case_rows);
                     (x, y)
                 }
             };
-            let line = case_series(stretch, mass.unwrap_or("largest"), x, y, colour);
+            let line = case_series(case_rows, mass.unwrap_or("largest"), x, y, colour);
             let value = line.value;
             panel.series.push(line);
             let names = mass.map_or_else(|| self.names(), |name| vec![name]);
             panel
                 .series
-                .extend(self.reverse_sweep_series(stretch, &names, colour).map(|back| Series { value, ..back }));
+                .extend(self.reverse_sweep_series(case_rows, &names, colour).map(|back| Series { value, ..back }));
             if let (Some(name), true) = (mass, group.len() <= MAX_SINGLE_PLACES) {
-                panel.series.extend(self.marks(stretch, name, colour).map(|marks| Series { value, ..marks }));
+                panel.series.extend(self.marks(case_rows, name, colour).map(|marks| Series { value, ..marks }));
             }
         }
         panel
@@ -142,10 +143,10 @@ impl FigureData<'_> {
     ) -> Panel {
         let named = Some(joint.clone()).filter(|_| self.joints.len() > 1 || self.system.joints().len() > 1);
         let mut panel = self.force_panel(join_title(named.into_iter().chain([outer.to_owned()])));
-        for (colour, stretch) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
-            let (x, y) = self.force_line(stretch, all);
-            let colour = if stretch.varied.is_empty() { alone } else { colour };
-            panel.series.push(case_series(stretch, joint, x, y, colour));
+        for (colour, case_rows) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
+            let (x, y) = self.force_line(case_rows, all);
+            let colour = if case_rows.varied.is_empty() { alone } else { colour };
+            panel.series.push(case_series(case_rows, joint, x, y, colour));
         }
         panel
     }
@@ -164,10 +165,10 @@ impl FigureData<'_> {
         let (name, joints) = named;
         let panel = |state: ContactState| {
             let mut panel = self.share_panel(named, state, outer.to_owned());
-            for (colour, stretch) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
-                let (x, y) = self.share_line(stretch, joints, state);
-                let colour = if stretch.varied.is_empty() { alone } else { colour };
-                panel.series.push(case_series(stretch, name, x, y, colour));
+            for (colour, case_rows) in evenly_chosen(group, MAX_CURVES).into_iter().enumerate() {
+                let (x, y) = self.share_line(case_rows, joints, state);
+                let colour = if case_rows.varied.is_empty() { alone } else { colour };
+                panel.series.push(case_series(case_rows, name, x, y, colour));
             }
             panel
         };
@@ -184,8 +185,8 @@ impl FigureData<'_> {
 
 /// Returns the curve of a case with the label of its last varied parameter, or `alone` without
 /// one.
-fn case_series(stretch: &CaseRows, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
-    let last = stretch.varied.last();
+fn case_series(case_rows: &CaseRows, alone: &str, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+    let last = case_rows.varied.last();
     let label = last.map_or_else(|| alone.to_owned(), |varied| varied.text.clone());
     Series { value: last.map(|varied| varied.in_file_unit().0), ..Series::line(label, x, y, colour) }
 }

@@ -108,10 +108,10 @@ impl FoundPeak {
 /// sweep.
 pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<FoundPeak>, MethodError> {
     let mut of_others = Vec::new();
-    for stretch in stretches(&points, others) {
+    for interval in stretches(&points, others) {
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
-        let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
-        let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
+        let neighbours: Vec<f64> = interval.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
+        let found = peaks_of(work, interval)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
         of_others.extend(found.map(|found| FoundPeak { reverse_sweep: true, ..found }));
     }
     let sought = PeakQuantities::new(work.case());

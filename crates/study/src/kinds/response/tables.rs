@@ -103,18 +103,18 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, Re
     let places: Vec<String> = displacements.map(|(place, _)| place.clone()).collect();
     let amplitudes =
         places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;
-    let stretches = results.case_rows(&curve, keys)?;
-    let mut curves: Vec<ResponseCurve> = stretches
+    let cases = results.case_rows(&curve, keys)?;
+    let mut curves: Vec<ResponseCurve> = cases
         .iter()
-        .map(|stretch| ResponseCurve {
-            varied: stretch.varied.clone(),
-            frequency: frequency[stretch.rows.clone()].to_vec(),
+        .map(|case_rows| ResponseCurve {
+            varied: case_rows.varied.clone(),
+            frequency: frequency[case_rows.rows.clone()].to_vec(),
             masses: places
                 .iter()
                 .zip(&amplitudes)
                 .map(|(place, amplitude)| MassCurve {
                     mass: place.clone(),
-                    amplitude: amplitude[stretch.rows.clone()].to_vec(),
+                    amplitude: amplitude[case_rows.rows.clone()].to_vec(),
                     peaks: Vec::new(),
                 })
                 .collect(),
@@ -123,9 +123,9 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, Re
     let Some(peaks) = results.table(PEAKS)? else { return Ok(curves) };
     let (masses, frequency) = (peaks.texts(MASS)?, peaks.numbers(FREQUENCY)?);
     let (amplitude, at_range_end) = (peaks.numbers(AMPLITUDE)?, peaks.flags(AT_RANGE_END)?);
-    for stretch in results.case_rows(&peaks, keys)? {
-        let case = stretches.iter().position(|of_curve| of_curve.case == stretch.case);
-        for row in stretch.rows {
+    for case_rows in results.case_rows(&peaks, keys)? {
+        let case = cases.iter().position(|of_curve| of_curve.case == case_rows.case);
+        for row in case_rows.rows {
             let mass = places.iter().position(|place| *place == masses[row]);
             let (Some(case), Some(mass), Some(at_range_end)) = (case, mass, at_range_end[row]) else {
                 return Err(peaks.foreign_rows());
