@@ -723,7 +723,7 @@ impl CostInputs<'_> {
 
     /// Returns the number of steps along a curve: `usual` in the typical case, otherwise
     /// `hard`.
-    pub fn steps(&self, (usual, hard): (f64, f64)) -> f64 {
+    pub fn steps(&self, usual: f64, hard: f64) -> f64 {
         self.pace.select(usual, hard)
     }
 

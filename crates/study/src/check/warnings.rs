@@ -10,26 +10,33 @@ use stickslip::model::{Cyclic, LinearMode, Modes};
 
 /// Warnings of a kind that needs an excitation.
 pub(crate) fn excitation_warnings(cases: &[SurveyedCase]) -> Vec<String> {
-    no_excitation(cases, false).into_iter().collect()
+    no_excitation(cases, InitialStates::Ignored).into_iter().collect()
 }
 
 /// Warnings of a kind that needs an excitation or an initial state.
 pub(crate) fn motion_warnings(cases: &[SurveyedCase]) -> Vec<String> {
-    no_excitation(cases, true).into_iter().collect()
+    no_excitation(cases, InitialStates::Counted).into_iter().collect()
 }
 
 /// Warnings of a kind that looks for resonances in a range of frequencies.
 pub(crate) fn resonance_warnings(cases: &[SurveyedCase]) -> Vec<String> {
-    no_excitation(cases, false).into_iter().chain(no_resonance(cases)).collect()
+    no_excitation(cases, InitialStates::Ignored).into_iter().chain(no_resonance(cases)).collect()
 }
 
-/// Warnings of a kind with given frequencies: those of [`resonance_warnings`], and frequencies too far
-/// apart for a resonance.
+/// Warnings of a kind with given frequencies: those of [`resonance_warnings`], and frequencies
+/// too far apart for a resonance.
 pub(crate) fn sampling_warnings(cases: &[SurveyedCase]) -> Vec<String> {
     resonance_warnings(cases).into_iter().chain(coarse_frequencies(cases)).collect()
 }
 
-fn no_excitation(cases: &[SurveyedCase], starts_count: bool) -> Option<String> {
+/// Whether an initial state or a constant load counts as an excitation.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum InitialStates {
+    Ignored,
+    Counted,
+}
+
+fn no_excitation(cases: &[SurveyedCase], initial_states: InitialStates) -> Option<String> {
     if cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
         return None;
     }
@@ -43,7 +50,7 @@ fn no_excitation(cases: &[SurveyedCase], starts_count: bool) -> Option<String> {
         let model = &one.case.model;
         model.forces.iter().any(|force| force.amplitude != 0.0) || model.motions.iter().any(|m| m.amplitude != 0.0)
     };
-    if starts_count && cases.iter().any(|one| starts(&one.case.values) || constant(one)) {
+    if initial_states == InitialStates::Counted && cases.iter().any(|one| starts(&one.case.values) || constant(one)) {
         return None;
     }
     Some(if cases.iter().any(constant) {
@@ -170,7 +177,7 @@ fn narrowest(one: &SurveyedCase) -> Option<NarrowResonance> {
         return None; // the modes are unknown
     }
     let all = one.survey.harmonics().into_iter().flat_map(|harmonic| resonances(free, stuck, harmonic));
-    narrowest_of(all, (from, to, points))
+    narrowest_of(all, from, to, points)
 }
 
 /// Like [`narrowest`], for a tuned disk in a travelling wave. Each harmonic of the excitation
@@ -191,7 +198,7 @@ fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
         waves.iter().find(|wave| wave.diameter == turns.min(sectors - turns))
     };
     let resonances_of = |harmonic: u32| met(harmonic).map(|wave| resonances(&wave.free, &wave.stuck, harmonic));
-    narrowest_of(harmonics.iter().filter_map(|harmonic| resonances_of(*harmonic)).flatten(), (from, to, points))
+    narrowest_of(harmonics.iter().filter_map(|harmonic| resonances_of(*harmonic)).flatten(), from, to, points)
 }
 
 /// Returns the excitation frequencies at which a harmonic meets each mode: the lower and the
@@ -211,7 +218,9 @@ fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)
 /// step.
 fn narrowest_of(
     all: impl Iterator<Item = (f64, f64, f64)>,
-    (from, to, points): (f64, f64, usize),
+    from: f64,
+    to: f64,
+    points: usize,
 ) -> Option<NarrowResonance> {
     // without damping there is no width; where friction bounds the motion, friction determines
     // it

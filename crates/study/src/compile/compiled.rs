@@ -130,6 +130,20 @@ pub(crate) struct Environment<'a> {
     pub values: Vec<ExpressionValue>,
 }
 
+/// The dimension and the range that a key requires of a quantity.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Expected {
+    pub dimension: Dimension,
+    pub within: Bounds,
+}
+
+impl Expected {
+    /// Any finite number of this dimension.
+    fn finite(dimension: Dimension) -> Self {
+        Expected { dimension, within: Bounds::Finite }
+    }
+}
+
 impl CompiledQuantity {
     /// Returns the value, of any dimension.
     pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
@@ -142,10 +156,11 @@ impl CompiledQuantity {
     pub fn number(
         &self,
         key: &str,
-        (dimension, within): (Dimension, Bounds),
+        expected: Expected,
         example: &str,
         environment: &Environment<'_>,
     ) -> Result<f64, Problem> {
+        let Expected { dimension, within } = expected;
         let value = self.value(key, environment)?;
         let number = self.convert(value, dimension, key, example, environment)?;
         if within.contains(number) {
@@ -251,16 +266,17 @@ impl CompiledValue {
         Ok(match self {
             CompiledValue::Fixed(given) => given.clone(),
             CompiledValue::Names(names) => ResolvedValue::Names(names.iter().map(|(name, _)| name.clone()).collect()),
-            CompiledValue::Quantity { quantity, dimension, within, example } => {
-                ResolvedValue::Quantity(quantity.number(key, (*dimension, *within), example, environment)?, *dimension)
-            }
+            CompiledValue::Quantity { quantity, dimension, within, example } => ResolvedValue::Quantity(
+                quantity.number(key, Expected { dimension: *dimension, within: *within }, example, environment)?,
+                *dimension,
+            ),
             CompiledValue::List(list, within) => {
-                let frequency = (Dimension::FREQUENCY, *within);
+                let frequency = Expected { dimension: Dimension::FREQUENCY, within: *within };
                 let numbers = list.iter().map(|q| q.number(key, frequency, "\"121 Hz\"", environment));
                 ResolvedValue::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
             }
             CompiledValue::Range { from, to, points, within, order } => {
-                let frequency = (Dimension::FREQUENCY, *within);
+                let frequency = Expected { dimension: Dimension::FREQUENCY, within: *within };
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
                 if *order == RangeOrder::Rising || start == end {
@@ -269,12 +285,12 @@ impl CompiledValue {
                 ResolvedValue::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
             }
             CompiledValue::Adaptive { from, to, tolerance } => {
-                let frequency = (Dimension::FREQUENCY, Bounds::Positive);
+                let frequency = Expected { dimension: Dimension::FREQUENCY, within: Bounds::Positive };
                 let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
                 let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
                 check_range(start, end, to, Some(Dimension::FREQUENCY))?;
-                let share =
-                    tolerance.number("tolerance", (Dimension::NONE, Bounds::Positive), "\"1 %\"", environment)?;
+                let positive = Expected { dimension: Dimension::NONE, within: Bounds::Positive };
+                let share = tolerance.number("tolerance", positive, "\"1 %\"", environment)?;
                 if !(MIN_ADAPTIVE_TOLERANCE..=MAX_ADAPTIVE_TOLERANCE).contains(&share) {
                     let message = format!(
                         "must lie between {MIN_ADAPTIVE_TOLERANCE} and {MAX_ADAPTIVE_TOLERANCE}, found {share}"
@@ -286,7 +302,7 @@ impl CompiledValue {
             CompiledValue::ByName(names, dimension) => {
                 let mut table = BTreeMap::new();
                 for (name, _, quantity) in names {
-                    let number = quantity.number(name, (*dimension, Bounds::Finite), "", environment)?;
+                    let number = quantity.number(name, Expected::finite(*dimension), "", environment)?;
                     table.insert(name.clone(), number);
                 }
                 ResolvedValue::ByName(table, *dimension)
@@ -294,18 +310,20 @@ impl CompiledValue {
             CompiledValue::Vector(parts, dimension, example) => {
                 let mut vector = [0.0; 3];
                 for (value, part) in vector.iter_mut().zip(parts) {
-                    *value = part.number(key, (*dimension, Bounds::Finite), example, environment)?;
+                    *value = part.number(key, Expected::finite(*dimension), example, environment)?;
                 }
                 ResolvedValue::Vector(vector)
             }
             CompiledValue::Quantities(parts, dimension, within, example) => {
-                let number = |part: &CompiledQuantity| part.number(key, (*dimension, *within), example, environment);
+                let number = |part: &CompiledQuantity| {
+                    part.number(key, Expected { dimension: *dimension, within: *within }, example, environment)
+                };
                 ResolvedValue::Quantities(parts.iter().map(number).collect::<Result<_, _>>()?, *dimension)
             }
             CompiledValue::Sums(sums) => {
                 let one = |sum: &Weights| {
                     let weight = |(name, _, quantity): &(String, Location, CompiledQuantity)| {
-                        let weight = quantity.number(name, (Dimension::NONE, Bounds::Finite), "", environment)?;
+                        let weight = quantity.number(name, Expected::finite(Dimension::NONE), "", environment)?;
                         Ok((name.clone(), weight))
                     };
                     sum.iter().map(weight).collect::<Result<Vec<_>, Problem>>()
@@ -339,7 +357,8 @@ fn law(
         };
         // with an exponent that is not a whole number: a plain number in SI
         let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
-        match quantity.number(parameter.key, (dimension, *within), example, environment) {
+        let expected = Expected { dimension, within: *within };
+        match quantity.number(parameter.key, expected, example, environment) {
             Ok(value) if !parameter.range.has(value) => {
                 let Parameter { key, range, .. } = *parameter;
                 let error = LawError::Value { law: row.name, key, dimension, range, value };

@@ -186,6 +186,13 @@ const MAX_REFINED: usize = 60;
 /// observed rounding of the frequencies.
 const CROSSING_TOLERANCE: f64 = 1e-11;
 
+/// A mode at a speed of rotation, rad/s.
+#[derive(Clone, Copy)]
+struct ModeAtSpeed<'a> {
+    speed: f64,
+    mode: &'a NaturalFrequency,
+}
+
 /// The evaluation of one case over its speeds.
 struct CampbellDiagram<'a> {
     work: &'a UnitTask<'a>,
@@ -216,14 +223,10 @@ impl CampbellDiagram<'_> {
     /// frequencies are nearly linear in the square of the speed, because softening and
     /// stiffening are proportional to it. So false position in these squares is nearly Newton's
     /// method. If two steps in a row do not halve the interval, the next step bisects it.
-    fn crossing(
-        &self,
-        order: f64,
-        (mut a, one): (f64, &NaturalFrequency),
-        (mut b, other): (f64, &NaturalFrequency),
-    ) -> Result<f64, String> {
+    fn crossing(&self, order: f64, from: ModeAtSpeed<'_>, to: ModeAtSpeed<'_>) -> Result<f64, String> {
+        let (mut a, mut b) = (from.speed, to.speed);
         let excess = |speed: f64, mode: &NaturalFrequency| (mode.omega - order * speed) * (mode.omega + order * speed);
-        let (mut at_a, mut at_b) = (excess(a, one), excess(b, other));
+        let (mut at_a, mut at_b) = (excess(a, from.mode), excess(b, to.mode));
         let (mut last, mut slow) = (f64::NAN, 0);
         for _ in 0..MAX_REFINED {
             if at_a == 0.0 {
@@ -238,8 +241,10 @@ impl CampbellDiagram<'_> {
             }
             last = next;
             let all = self.at(next)?;
-            let found =
-                all.iter().find(|mode| mode.is_similar(one)).ok_or("a mode was not found again between two speeds")?;
+            let found = all
+                .iter()
+                .find(|mode| mode.is_similar(from.mode))
+                .ok_or("a mode was not found again between two speeds")?;
             let there = excess(next, found);
             let before = (b - a).abs();
             if (there > 0.0) == (at_a > 0.0) {
@@ -295,7 +300,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                 if work.context.stopped() || (was.omega - order * last > 0.0) == (natural.omega - order * speed > 0.0) {
                     continue; // an interrupted unit is computed again
                 }
-                match diagram.crossing(order, (*last, was), (speed, natural)) {
+                let (from, to) = (ModeAtSpeed { speed: *last, mode: was }, ModeAtSpeed { speed, mode: natural });
+                match diagram.crossing(order, from, to) {
                     Ok(at) => {
                         write(prepared, at, &NaturalFrequency { omega: order * at, ..*natural }, &mut crossings);
                         crossings.integer(ORDER, order as u64);
@@ -345,7 +351,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
             (Some(diameter), Some(ring)) => (1..=orders).any(|o| excited_diameter(o, ring.sectors) as u64 == diameter),
             _ => true,
         };
-        let mut series = frequencies(table, case_rows, (x_factor, y_factor), &shown);
+        let mut series = frequencies(table, case_rows, x_factor, y_factor, &shown);
         let speeds = numbers(table, SPEED, case_rows.rows.clone());
         let (low, high) = speeds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
         let highest = series.iter().flat_map(|line| &line.y).copied().fold(0.0, f64::max);
@@ -380,7 +386,8 @@ const PANEL_TOP: f64 = 1.1;
 fn frequencies(
     table: &Table,
     case_rows: &CaseRows,
-    (x_factor, y_factor): (f64, f64),
+    x_factor: f64,
+    y_factor: f64,
     shown: &dyn Fn(Option<u64>) -> bool,
 ) -> Vec<Series> {
     let Some(modes) = table.integers(MODE) else { return Vec::new() };

@@ -67,9 +67,6 @@ pub(super) const KIND: Kind = Kind {
 /// Solutions of the full equations per point. Measured: 0.3 s per point for a disk of 24
 /// sectors.
 const SOLUTIONS_PER_POINT: f64 = 8.0;
-/// Steps of the curve from its large end, independent of the request: typical, and with close
-/// modes.
-const STEPS_FROM_LARGE_END: (f64, f64) = (100.0, 200.0);
 
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let values = &costing.case.values;
@@ -86,7 +83,9 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         drawn: 2.0 * rows,
         unit: points * costing.series_bytes(harmonics),
         conditional_work: None,
-        work: (rows * SOLUTIONS_PER_POINT + costing.cases * costing.steps(STEPS_FROM_LARGE_END))
+        // the curve takes about 100 steps from its large end, with close modes 200, whatever is
+        // requested
+        work: (rows * SOLUTIONS_PER_POINT + costing.cases * costing.steps(100.0, 200.0))
             * (costing.series(Some(harmonics)) + elimination),
     }
 }
@@ -322,7 +321,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let mut panels = both(&cases, "");
     if panels.len() + 2 * cases.len() <= MAX_PANELS {
         panels.extend(
-            cases.iter().flat_map(|case_rows| disk_shapes(drawing, table, &displacements, (case_rows, cases.len()))),
+            cases.iter().flat_map(|case_rows| disk_shapes(drawing, table, &displacements, case_rows, cases.len())),
         );
     }
     Figure { panels, ..Figure::default() }
@@ -336,7 +335,8 @@ fn disk_shapes(
     drawing: &FigureInput<'_>,
     table: &Table,
     places: &[String],
-    (case_rows, cases): (&CaseRows, usize),
+    case_rows: &CaseRows,
+    cases: usize,
 ) -> Vec<Panel> {
     let Ok(case) = drawing.study.case(case_rows.case) else { return Vec::new() };
     let Some(ring) = case.model.ring else { return Vec::new() };

@@ -262,8 +262,8 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, case_rows: &CaseRows) -> Vec
         let (mode, diameter) = (modes[row], diameters[row]);
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
         let around = |(_, place): &(String, String)| {
-            let moves = (at(&shape_of(place)), at(&phase_of(place)));
-            PlaceInSectors::from_wave(place.clone(), moves, diameter as usize, ring.sectors)
+            let (size, phase) = (at(&shape_of(place)), at(&phase_of(place)));
+            PlaceInSectors::from_wave(place.clone(), size, phase, diameter as usize, ring.sectors)
         };
         let many = if diameter == 1 { "" } else { "s" };
         let frequency = format!("{} Hz", format_significant(frequencies[row], 5));

@@ -117,18 +117,23 @@ impl SlipReductionCheck {
         }
     }
 
-    /// Solves some points again if `turn` is true, and returns the largest difference if a
-    /// point converged.
+    /// Discards the points of a unit that is not checked.
+    pub(crate) fn discard_points(&mut self) {
+        self.candidates = Vec::new();
+    }
+
+    /// Solves some points again, and returns the largest difference if a point converged.
     ///
     /// `at` states a frequency in words.
     pub(crate) fn solve_again(
         &mut self,
-        turn: bool,
-        (model, system, method): (&Model, &System, &dyn Method),
+        model: &Model,
+        system: &System,
+        method: &dyn Method,
         at: &dyn Fn(f64) -> String,
     ) -> Option<f64> {
         let all = std::mem::take(&mut self.candidates);
-        let farther = if turn { larger_basis_system(model, system) } else { None }?;
+        let farther = larger_basis_system(model, system)?;
         let mut of = 0;
         for index in chosen(&all) {
             let Some(again) = compare_point(&farther, method, &all[index]) else { continue };

@@ -389,9 +389,12 @@ fn check_reduction(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
     });
     let Some(slipping) = slipping else { return };
     let PreparedCase { case, system, method } = prepared;
-    let turn = study.kind().uses_method && is_checked(index, points);
+    if !study.kind().uses_method || !is_checked(index, points) {
+        slipping.discard_points();
+        return;
+    }
     let describe = |omega: f64| describe_location(case, omega);
-    if let Some(error) = slipping.solve_again(turn, (&case.model, system, &**method), &describe) {
+    if let Some(error) = slipping.solve_again(&case.model, system, &**method, &describe) {
         part.tables.iter_mut().for_each(|rows| rows.raise_reduction_error(error));
     }
 }

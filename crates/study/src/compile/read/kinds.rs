@@ -43,7 +43,8 @@ impl Reader {
     fn kind<T: 'static>(
         &mut self,
         table: &TomlTable,
-        (what, example): (&str, &str),
+        what: &str,
+        example: &str,
         rows: &'static [T],
         name: fn(&T) -> &'static str,
     ) -> Option<&'static T> {
@@ -72,7 +73,7 @@ impl Reader {
     }
 
     pub(super) fn law(&mut self, table: &TomlTable) -> Option<CompiledValue> {
-        let row: &'static LawInfo = *self.kind(table, ("the law", "coulomb"), law::TABLE, |row| row.name)?;
+        let row: &'static LawInfo = *self.kind(table, "the law", "coulomb", law::TABLE, |row| row.name)?;
         let mut keys = vec![schema::required("kind", ValueType::Text, "law", "\"coulomb\"")];
         keys.extend(row.parameters.iter().map(|p| Key {
             name: p.key,
@@ -105,7 +106,7 @@ impl Reader {
         };
         let row = match table.get("kind") {
             None => method::find("auto")?,
-            Some(_) => self.kind(table, ("[method]", "auto"), method::TABLE, |row| row.name)?,
+            Some(_) => self.kind(table, "[method]", "auto", method::TABLE, |row| row.name)?,
         };
         let mut keys = schema::METHOD.to_vec();
         keys.extend(row.options.iter().map(|option| Key {
@@ -143,7 +144,7 @@ impl Reader {
                 .push(Problem::new(&node.location, "study", message).help("write [study] and below it its kind"));
             return None;
         };
-        let kind = &self.kind(table, ("[study]", "response"), kinds::TABLE, |row| row.info.name)?.info;
+        let kind = &self.kind(table, "[study]", "response", kinds::TABLE, |row| row.info.name)?.info;
         let mut keys = STUDY.to_vec();
         keys.extend(kind.keys);
         // `vary` is not a value of the kind: it defines the cases

@@ -191,7 +191,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let (mut rows, mut peaks, mut turns) = (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
     for point in &branch.points {
         let stable = point.orbit.is_stable();
-        orbit_sweep::count(&mut part, &prepared.case, &point.orbit, (stable, Note::for_branch));
+        orbit_sweep::count(&mut part, &prepared.case, &point.orbit, stable, Note::for_branch);
         begin(&mut rows, point.value);
         PointRow::with_stability(prepared, &point.orbit, stable).write(prepared, &mut rows);
         rows.end_row();
@@ -209,7 +209,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         turns.end_row();
     }
     let reason = match branch.end {
-        End::Border => missing_range_text(&branch, range, (name.as_str(), factor)),
+        End::Border => missing_range_text(&branch, range, &name, factor),
         End::Stalled { at } => {
             Some(format!("the continuation stopped at {name} = {:.9}: no step converges", at * factor))
         }
@@ -263,7 +263,7 @@ fn method(values: &Values) -> HarmonicBalance {
 }
 
 /// States which part of the range is missing after the branch left the range, and what to do.
-fn missing_range_text(branch: &Branch, (from, to): (f64, f64), (name, factor): (&str, f64)) -> Option<String> {
+fn missing_range_text(branch: &Branch, (from, to): (f64, f64), name: &str, factor: f64) -> Option<String> {
     let reached = branch
         .points
         .iter()

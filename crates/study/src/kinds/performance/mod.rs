@@ -139,7 +139,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         optima.text("status", best.as_ref().map_or("none", status));
         optima.end_row();
         if best.is_none() {
-            let why = no_optimum(work, &curve, (&inner.name, &order));
+            let why = no_optimum(work, &curve, &inner.name, &order);
             Note::for_case(&varied_text(outer), format!("{WARNING}{why}")).merge_into(&mut part.notes);
         }
     }
@@ -148,7 +148,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 }
 
 /// States why there is no optimum; `order` has the case of every row of the curve.
-fn no_optimum(work: &UnitTask<'_>, curve: &PerformanceCurve, (parameter, order): (&str, &[usize])) -> String {
+fn no_optimum(work: &UnitTask<'_>, curve: &PerformanceCurve, parameter: &str, order: &[usize]) -> String {
     let level = curve.lowest();
     let height = |row: &usize| curve.rows[*row].peak.map_or(f64::NAN, |peak| peak.value);
     let text = |row: Option<&usize>| {

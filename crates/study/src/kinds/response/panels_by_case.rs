@@ -2,7 +2,7 @@
 //! states of joints.
 
 use super::figure_data::FigureData;
-use crate::kinds::shared::contact_states;
+use crate::kinds::shared::contact_states::{self, SharePlot};
 use crate::kinds::shared::disk_shape::{self, PlaceInSectors};
 use crate::results::columns::FREQUENCY as DRIVE;
 use crate::results::dataset::{Axis, Panel, Series, Style};
@@ -51,15 +51,9 @@ impl FigureData<'_> {
             }
             let x: Vec<f64> =
                 numbers(self.curve, DRIVE, case_rows.rows.clone()).iter().map(|x| x * self.factor.0).collect();
-            let over = (&x[..], &self.axes.0);
             let label = case_rows.label();
-            panels.extend(contact_states::panels(
-                self.curve,
-                &self.contact_joints,
-                &case_rows.rows,
-                over,
-                (&label, of_shares),
-            ));
+            let plot = SharePlot { x: &x, axis: &self.axes.0, title: &label, first_colour: of_shares };
+            panels.extend(contact_states::panels(self.curve, &self.contact_joints, &case_rows.rows, &plot));
         }
         if let Some(first) = panels.first_mut().filter(|_| room < cases.len()) {
             let some = format!("the first {room} of {} cases", cases.len());

@@ -100,17 +100,24 @@ pub(in crate::kinds) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> 
     }
 }
 
-/// Returns the panels of some rows over `x`, whose axis is `over`.
-///
-/// The panels have a title and colours from `first`; the panels of a few joints share their
-/// colours.
+/// How the panels of contact states are drawn.
+pub(in crate::kinds) struct SharePlot<'a> {
+    /// Abscissae of the rows, and their axis.
+    pub(in crate::kinds) x: &'a [f64],
+    pub(in crate::kinds) axis: &'a Axis,
+    pub(in crate::kinds) title: &'a str,
+    /// Number of the first colour; the panels of a few joints share their colours.
+    pub(in crate::kinds) first_colour: usize,
+}
+
+/// Returns the panels of some rows.
 pub(in crate::kinds) fn panels(
     table: &Table,
     joints: &[String],
     rows: &Range<usize>,
-    (x, over): (&[f64], &Axis),
-    (title, first): (&str, usize),
+    plot: &SharePlot<'_>,
 ) -> Vec<Panel> {
+    let SharePlot { x, axis: over, title, first_colour } = *plot;
     let all: Vec<[Vec<f64>; 4]> = joints.iter().map(|joint| state_shares(table, joint, rows)).collect();
     let titled = |words: &str| if title.is_empty() { words.to_owned() } else { format!("{words}, {title}") };
     if joints.len() <= MAX_SINGLE {
@@ -120,7 +127,7 @@ pub(in crate::kinds) fn panels(
             title: titled(joint),
             x: over.clone(),
             y: axis("share of the period"),
-            series: areas(shares, x, &occurring, first),
+            series: areas(shares, x, &occurring, first_colour),
             ..Panel::default()
         };
         return joints.iter().zip(&all).map(of_joint).collect();

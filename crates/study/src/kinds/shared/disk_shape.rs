@@ -20,7 +20,8 @@ impl PlaceInSectors {
     /// by `diameter / sectors` of a turn.
     pub(in crate::kinds) fn from_wave(
         place: String,
-        (size, phase): (f64, f64),
+        size: f64,
+        phase: f64,
         diameter: usize,
         sectors: usize,
     ) -> PlaceInSectors {
@@ -139,7 +140,7 @@ mod tests {
     /// The first of equal displacements determines the instant.
     #[test]
     fn a_wave_has_its_nodal_diameters() {
-        let wave = PlaceInSectors::from_wave("blade".to_owned(), (2.0, 30.0), 2, 8);
+        let wave = PlaceInSectors::from_wave("blade".to_owned(), 2.0, 30.0, 2, 8);
         let found = panel(&[wave], 8, String::new(), 0).unwrap();
         let line = found.series.iter().find(|line| line.label == "blade").unwrap();
         let radii: Vec<f64> = line.x.iter().zip(&line.y).map(|(x, y)| x.hypot(*y)).collect();
@@ -157,7 +158,7 @@ mod tests {
     fn a_wheel_is_not_crowded() {
         let size = [1.0, 5.0, 2.0, 0.5, 3.0, 4.0];
         let all: Vec<PlaceInSectors> =
-            size.iter().map(|size| PlaceInSectors::from_wave(format!("p{size}"), (*size, 0.0), 1, 6)).collect();
+            size.iter().map(|size| PlaceInSectors::from_wave(format!("p{size}"), *size, 0.0, 1, 6)).collect();
         let found = panel(&all, 6, "mode 1".to_owned(), 2).unwrap();
         let drawn: Vec<(&str, usize)> =
             found.series.iter().filter(|s| s.label.starts_with('p')).map(|s| (s.label.as_str(), s.colour)).collect();

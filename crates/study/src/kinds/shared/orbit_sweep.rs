@@ -56,7 +56,7 @@ pub(in crate::kinds) fn converged_orbits(
         match point {
             Some(Ok(orbit)) => {
                 let stable = orbit.is_stable();
-                count(part, case, &orbit, (stable, |note| note));
+                count(part, case, &orbit, stable, |note| note);
                 orbits.push((orbit, stable));
             }
             other => count_missing(part, case, omega, other.as_ref()),
@@ -70,7 +70,8 @@ pub(in crate::kinds) fn count(
     part: &mut UnitResult,
     case: &Case,
     orbit: &Orbit,
-    (stable, words): (Option<bool>, fn(Note) -> Note),
+    stable: Option<bool>,
+    words: fn(Note) -> Note,
 ) {
     part.count(|| describe_location(case, orbit.omega), orbit.evidence.accuracy.status(), None);
     Note::for_orbit(&case.model, orbit, stable)
