@@ -157,8 +157,8 @@ fn pairs<'a>(
     let moving = component.rows().iter().filter_map(|row| Some(row.rsplit_once('.')?.0));
     let named = disk.boundary.iter().flatten().flat_map(|(low, high)| [low.as_str(), high.as_str()]);
     let counts: HashSet<&str> = moving.chain(named).collect();
-    let stand: Vec<Node> = nodes.iter().filter(|(name, _)| counts.contains(name.as_str())).cloned().collect();
-    let faces = Faces::new(&stand, axis, sectors);
+    let missing: Vec<Node> = nodes.iter().filter(|(name, _)| counts.contains(name.as_str())).cloned().collect();
+    let faces = Faces::new(&missing, axis, sectors);
     let key = if disk.boundary.is_some() { "boundary" } else { "nodes" };
     let found = match &disk.boundary {
         Some(named) => faces.check(named).map(|()| Cow::from(named.as_slice())),
@@ -228,7 +228,7 @@ fn mistuned_sectors(
     let Some(CompiledValue::Table(table)) = disk.table.entry("mistuning").map(|entry| &entry.value) else {
         return Ok(Vec::new());
     };
-    let of = mistuned_quantity(disk, table, environment, first).map_err(|problem| vec![problem])?;
+    let quantity = mistuned_quantity(disk, table, environment, first).map_err(|problem| vec![problem])?;
     if let Some(message) = too_far(deviations) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
         let problem = Problem::new(table.location_of(key, None), key, message);
@@ -236,7 +236,7 @@ fn mistuned_sectors(
     }
     let mut models = Vec::with_capacity(deviations.len());
     for (sector, deviation) in deviations.iter().enumerate() {
-        models.push(match &of {
+        models.push(match &quantity {
             MistunedQuantity::Part(part) => part.deviated(first, *deviation),
             MistunedQuantity::Parameter(index) => {
                 let changed = environment.values[*index].si * (1.0 + deviation);

@@ -58,8 +58,8 @@ impl ModelNames {
             if labels.first().is_some_and(|labels| labels.len() > 1) {
                 for along in 0..labels[0].len() {
                     let Some((_, direction)) = labels[0][along].split_once('.') else { continue };
-                    let these = labels.iter().map(|labels| labels[along].clone()).collect();
-                    self.known.push((format!("{name}.{direction}"), these));
+                    let places = labels.iter().map(|labels| labels[along].clone()).collect();
+                    self.known.push((format!("{name}.{direction}"), places));
                 }
             }
             self.known.push((name.to_owned(), labels.into_iter().flatten().collect()));

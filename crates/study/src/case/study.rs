@@ -673,14 +673,15 @@ impl Study {
     /// Returns the units of the file for the table columns that are in SI, by column.
     fn written_units(&self) -> serde_json::Map<String, Json> {
         let varied = self.varied_values(0).unwrap_or_default();
-        let of_varied = varied.iter().filter_map(|value| Some((value.column().0, Json::from(value.unit.clone()?))));
+        let varied_units = varied.iter().filter_map(|value| Some((value.column().0, Json::from(value.unit.clone()?))));
         let frequency = self.study.entry("frequency").and_then(|entry| match &entry.value {
             CompiledValue::List(list, _) => list.first(),
             CompiledValue::Range { from, .. } | CompiledValue::Adaptive { from, .. } => Some(from),
             _ => None,
         });
-        let drive = frequency.and_then(literal_unit).map(|(unit, ..)| ("frequency_Hz".to_owned(), Json::from(unit)));
-        of_varied.chain(drive).collect()
+        let frequency_unit =
+            frequency.and_then(literal_unit).map(|(unit, ..)| ("frequency_Hz".to_owned(), Json::from(unit)));
+        varied_units.chain(frequency_unit).collect()
     }
 
     fn resolve(&self, index: usize, look: CheckScope, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
@@ -703,11 +704,11 @@ impl Study {
             }
         };
         let environment = Environment { names: &self.names, values };
-        let again = |changed: &[(usize, f64)]| {
+        let reevaluate = |changed: &[(usize, f64)]| {
             let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
             evaluate(&self.names, &self.parameters, &self.order, &choice, &fixed)
         };
-        let mut model = case_model(&self.structure, &environment, &again, problems);
+        let mut model = case_model(&self.structure, &environment, &reevaluate, problems);
         let values = self.study.values(&environment, problems);
         let method = self.method.values(&environment, problems);
         substructure::set_frequency_range(&mut model, &values, &method);

@@ -678,8 +678,8 @@ impl CostInputs<'_> {
                 let digit = LN_10 / (TAU * self.least_damping());
                 let most = case.method.options.get("periods").copied().unwrap_or(SETTLING_PERIODS.1);
                 let share = self.pace.select(0.0, UNSETTLED_SHARE);
-                let restless = if self.unbounded_force { share * UNSETTLED_PERIODS } else { 0.0 };
-                (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + restless).min(most) * self.period()
+                let unsettled = if self.unbounded_force { share * UNSETTLED_PERIODS } else { 0.0 };
+                (digit.clamp(SETTLING_PERIODS.0, SETTLING_PERIODS.1) + unsettled).min(most) * self.period()
             }
             "shooting" if self.equal_steps => EQUAL_STEP_PERIODS * self.period(),
             _ if self.smooth => shooting,
@@ -801,8 +801,8 @@ impl CostInputs<'_> {
         if harmonics.is_some() || !laws().any(is_rigid) {
             return 0.0;
         }
-        let remembers = |law: &&SharedLaw| law.step().is_some() || law.rate().is_some_and(|rate| rate.states() > 0);
-        let pairs: usize = laws().filter(remembers).map(|law| law.directions().pow(2)).sum();
+        let has_memory = |law: &&SharedLaw| law.step().is_some() || law.rate().is_some_and(|rate| rate.states() > 0);
+        let pairs: usize = laws().filter(has_memory).map(|law| law.directions().pow(2)).sum();
         (self.pace.select(MEMORY_LAWS_WITH_RIGID.0, MEMORY_LAWS_WITH_RIGID.1) * pairs as f64)
             .min(MAX_MEMORY_LAWS_WITH_RIGID)
     }

@@ -135,7 +135,8 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
 /// without force.
 fn stiffness(law: &dyn Law) -> f64 {
     // the stiffness of a cubic spring depends on the motion
-    let is = |parameter: &Parameter| parameter.key == "stiffness" && parameter.dimension == Dimension::STIFFNESS;
-    let linear = law.info().parameters.iter().any(is);
+    let is_stiffness =
+        |parameter: &Parameter| parameter.key == "stiffness" && parameter.dimension == Dimension::STIFFNESS;
+    let linear = law.info().parameters.iter().any(is_stiffness);
     law.value("stiffness").filter(|_| linear && !law.is_free()).unwrap_or(0.0)
 }

@@ -53,8 +53,8 @@ pub(crate) struct Iteration<'a> {
 impl Iteration<'_> {
     /// Returns the value of an index.
     pub fn value(&self, name: &str) -> Option<f64> {
-        let at = self.indices.iter().position(|index| index.name == name)?;
-        Some(self.values[at] as f64)
+        let position = self.indices.iter().position(|index| index.name == name)?;
+        Some(self.values[position] as f64)
     }
 
     /// Returns the names of the indices.

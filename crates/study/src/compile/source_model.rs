@@ -87,19 +87,20 @@ impl TemplateSource {
         let (mut own, mut all) = (BTreeSet::new(), BTreeSet::new());
         if let Some(table) = table {
             table.each_quantity(&mut |of, quantity, _| {
-                let behind = quantity.expression.parameters().filter_map(|index| self.given.get(index)).flatten();
-                let names: Vec<String> = behind.map(|name| format!("`{name}`")).collect();
+                let template_parameters =
+                    quantity.expression.parameters().filter_map(|index| self.given.get(index)).flatten();
+                let names: Vec<String> = template_parameters.map(|name| format!("`{name}`")).collect();
                 own.extend(names.iter().filter(|_| of == key).cloned());
                 all.extend(names);
             });
         }
         let names: Vec<String> = if own.is_empty() { all } else { own }.into_iter().collect();
-        let who = match &names[..] {
+        let owner = match &names[..] {
             [] => "these parameters make".to_owned(),
             [one] => format!("the value of {one} makes"),
             several => format!("the values of {} make", several.join(", ")),
         };
-        format!("{who} {element} of the template invalid: `{key}` {message}")
+        format!("{owner} {element} of the template invalid: `{key}` {message}")
     }
 }
 

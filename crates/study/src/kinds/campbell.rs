@@ -169,12 +169,12 @@ fn excited_modes(
     orders: usize,
     sectors: Option<usize>,
 ) -> impl Iterator<Item = (f64, &NaturalFrequency)> {
-    let meets = move |natural: &NaturalFrequency, order: usize| match (natural.diameter, sectors) {
+    let is_excited = move |natural: &NaturalFrequency, order: usize| match (natural.diameter, sectors) {
         (Some(diameter), Some(sectors)) => diameter == excited_diameter(order, sectors),
         _ => true,
     };
     (1..=orders).flat_map(move |order| {
-        found.iter().filter(move |natural| meets(natural, order)).map(move |natural| (order as f64, natural))
+        found.iter().filter(move |natural| is_excited(natural, order)).map(move |natural| (order as f64, natural))
     })
 }
 
@@ -392,15 +392,17 @@ fn frequencies(
 ) -> Vec<Series> {
     let Some(modes) = table.integers(MODE) else { return Vec::new() };
     let (states, diameters) = (words(table, JOINTS), table.integers(DIAMETER));
-    let of = |row: usize| (diameters.map(|all| all[row]), modes[row]);
-    let mut kinds: Vec<(Option<u64>, u64)> = case_rows.rows.clone().map(of).filter(|(d, _)| shown(*d)).collect();
+    let diameter_and_mode = |row: usize| (diameters.map(|all| all[row]), modes[row]);
+    let mut kinds: Vec<(Option<u64>, u64)> =
+        case_rows.rows.clone().map(diameter_and_mode).filter(|(d, _)| shown(*d)).collect();
     kinds.sort_unstable();
     kinds.dedup();
     let (x, y) = (numbers(table, SPEED, 0..table.rows()), numbers(table, FREQUENCY, 0..table.rows()));
     let mut series = Vec::new();
     for (colour, state) in STATES.into_iter().enumerate() {
         for kind in &kinds {
-            let rows = || case_rows.rows.clone().filter(|row| of(*row) == *kind && states[*row] == state);
+            let rows =
+                || case_rows.rows.clone().filter(|row| diameter_and_mode(*row) == *kind && states[*row] == state);
             let line = Series::line(
                 format!("joints {state}"),
                 rows().map(|row| x[row] * x_factor).collect(),

@@ -99,8 +99,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     }
     check_samples(values)?;
     let number = values.count("mode").unwrap_or(1);
-    let of_masses = model.masses.iter().map(|mass| mass.places().len());
-    let masses = of_masses.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
+    let mass_places = model.masses.iter().map(|mass| mass.places().len());
+    let masses = mass_places.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
         let message = format!("there is no mode {number}: the structure has {masses} degrees of freedom");
         return Err(KeyError::new("mode", message, "modes count from 1, by ascending frequency"));
@@ -315,8 +315,8 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         vec![frequency, panel(cases, title, ("equivalent damping ratio", "%"), "damping_ratio", 100.0)]
     };
     if drawing.study.draws().is_some() {
-        let of_draw = |case_rows: &CaseRows, title: String| both(std::slice::from_ref(case_rows), &title);
-        return Figure { panels: draw_panels::panels(drawing, &cases, &of_draw), ..Figure::default() };
+        let case_panels = |case_rows: &CaseRows, title: String| both(std::slice::from_ref(case_rows), &title);
+        return Figure { panels: draw_panels::panels(drawing, &cases, &case_panels), ..Figure::default() };
     }
     let mut panels = both(&cases, "");
     if panels.len() + 2 * cases.len() <= MAX_PANELS {
@@ -344,7 +344,7 @@ fn disk_shapes(
     let mode = format!("mode {}", case.values.count("mode").unwrap_or(1));
     let mut ends = vec![case_rows.rows.start, case_rows.rows.end - 1];
     ends.dedup();
-    let wheel = |row: usize| {
+    let shape_panel = |row: usize| {
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
         let most = places.iter().map(|name| at(&amplitude_of(name))).fold(0.0, f64::max);
         let (unit, factor) = prefixed_unit(most, "m");
@@ -362,5 +362,5 @@ fn disk_shapes(
             cases,
         )
     };
-    ends.into_iter().filter_map(wheel).collect()
+    ends.into_iter().filter_map(shape_panel).collect()
 }

@@ -224,12 +224,12 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         ..Panel::default()
     };
     let cases = drawing.case_rows(table);
-    let room = cases.len() * (1 + MAX_SHAPES) <= MAX_PANELS;
-    let of_case = |case_rows: &CaseRows, title: String| {
-        let shapes = if room { wheels(drawing, table, case_rows) } else { Vec::new() };
+    let shapes_fit = cases.len() * (1 + MAX_SHAPES) <= MAX_PANELS;
+    let case_panels = |case_rows: &CaseRows, title: String| {
+        let shapes = if shapes_fit { wheels(drawing, table, case_rows) } else { Vec::new() };
         std::iter::once(panel(case_rows, title)).chain(shapes).collect::<Vec<_>>()
     };
-    Figure { panels: draw_panels::panels(drawing, &cases, &of_case), ..Figure::default() }
+    Figure { panels: draw_panels::panels(drawing, &cases, &case_panels), ..Figure::default() }
 }
 
 /// Returns the shapes of a case.
@@ -258,10 +258,10 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, case_rows: &CaseRows) -> Vec
         .into_iter()
         .filter(|(name, _)| drawing.shows(name) && !case.model.is_rotation(name))
         .collect();
-    let wheel = |row: usize| {
+    let shape_panel = |row: usize| {
         let (mode, diameter) = (modes[row], diameters[row]);
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
-        let around = |(_, place): &(String, String)| {
+        let place_in_sectors = |(_, place): &(String, String)| {
             let (size, phase) = (at(&shape_of(place)), at(&phase_of(place)));
             PlaceInSectors::from_wave(place.clone(), size, phase, diameter as usize, ring.sectors)
         };
@@ -270,9 +270,14 @@ fn wheels(drawing: &FigureInput<'_>, table: &Table, case_rows: &CaseRows) -> Vec
         let joints = if state == STATES[0] { String::new() } else { format!("joints {state}") };
         let title =
             [case_rows.label(), format!("mode {mode}"), format!("{diameter} nodal diameter{many}"), frequency, joints];
-        disk_shape::panel(&places.iter().map(around).collect::<Vec<_>>(), ring.sectors, join_title(title), STATES.len())
+        disk_shape::panel(
+            &places.iter().map(place_in_sectors).collect::<Vec<_>>(),
+            ring.sectors,
+            join_title(title),
+            STATES.len(),
+        )
     };
-    case_rows.rows.clone().filter(wanted).take(MAX_SHAPES).filter_map(wheel).collect()
+    case_rows.rows.clone().filter(wanted).take(MAX_SHAPES).filter_map(shape_panel).collect()
 }
 
 fn lines(table: &Table, case_rows: &CaseRows, factor: f64) -> Vec<Series> {

@@ -177,7 +177,7 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
     let times_of = |rows: Range<usize>| numbers(motion, "time_s", rows);
     let longest = times_of(0..motion.rows()).into_iter().fold(0.0, f64::max);
-    let of_orbit = |title: &str, rows: Range<usize>| {
+    let orbit_panels = |title: &str, rows: Range<usize>| {
         let times = times_of(rows.clone());
         // draws in one panel share one unit
         let last = if drawing.study.draws().is_some() { longest } else { times.last().copied().unwrap_or(0.0) };
@@ -212,17 +212,17 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         panels.retain(|panel| !panel.series.is_empty());
         panels
     };
-    let of_case = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
+    let case_panels = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
         let mut from = case_rows.rows.start;
         let runs = frequencies[case_rows.rows.clone()].chunk_by(|a, b| a == b).take(MAX_PANELS);
-        let of_run = |run: &[f64]| {
+        let run_panels = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
-            of_orbit(&join_title([title.clone(), format_hertz(run[0])]), rows)
+            orbit_panels(&join_title([title.clone(), format_hertz(run[0])]), rows)
         };
-        runs.flat_map(of_run).collect()
+        runs.flat_map(run_panels).collect()
     };
-    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);
+    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &case_panels);
     panels.truncate(MAX_PANELS);
     Figure { panels, ..Figure::default() }
 }

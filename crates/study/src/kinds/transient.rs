@@ -214,16 +214,17 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         None => vec![None],
     };
     let mut part = UnitResult::default();
-    let pull = values.by_name("start");
-    let begin = values.text("begin").unwrap_or(if pull.is_some() { EQUILIBRIUM } else { UNLOADED });
-    let pulled = if begin == EQUILIBRIUM { held_equilibrium(&case.model, &prepared.system, pull) } else { None };
-    if begin == EQUILIBRIUM && pulled.is_none() {
+    let start_values = values.by_name("start");
+    let begin = values.text("begin").unwrap_or(if start_values.is_some() { EQUILIBRIUM } else { UNLOADED });
+    let start_state =
+        if begin == EQUILIBRIUM { held_equilibrium(&case.model, &prepared.system, start_values) } else { None };
+    if begin == EQUILIBRIUM && start_state.is_none() {
         let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
             with begin = \"unloaded\"";
         part.notes.push(Note::for_case(&case.label(), format!("{WARNING}{text}")));
     }
-    let start =
-        pulled.unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, pull), states: Vec::new() });
+    let start = start_state
+        .unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, start_values), states: Vec::new() });
     let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
     let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
     for drive in drives {
@@ -266,9 +267,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             // the turning points are located exactly only for the place that moves most
             let most = largest_range(&decays).filter(|_| excitation == Excitation::Free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
-                let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
-                let [x, v] = of_place(sample);
-                let motion = |time: f64| of_place(&since(time));
+                let motion_along = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
+                let [x, v] = motion_along(sample);
+                let motion = |time: f64| motion_along(&since(time));
                 decay.add([time, x, v], (Some(i) == most).then_some(&motion as &PlaceMotionFn<'_>));
                 if x.abs() > largest[i].0 {
                     largest[i] = (x.abs(), time);
@@ -299,12 +300,12 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             part.notes.extend(unread.map(|text| Note::for_case(&case.label(), text)));
         }
         (work.context.finished)();
-        let at = || drive.map_or_else(|| case.label(), |omega| describe_location(case, omega));
+        let location = || drive.map_or_else(|| case.label(), |omega| describe_location(case, omega));
         match end {
-            Ok(()) if stopped => part.count(at, NOT_REACHED, None),
-            Ok(()) => part.count(at, CONVERGED, None),
+            Ok(()) if stopped => part.count(location, NOT_REACHED, None),
+            Ok(()) => part.count(location, CONVERGED, None),
             Err(TimeHistoryError::Method(error)) => return Err((case.index, error)),
-            Err(error) => part.count(at, "breakdown", Some(error.to_string())),
+            Err(error) => part.count(location, "breakdown", Some(error.to_string())),
         }
     }
     part.tables = vec![rows, extremes, decay, summary];
@@ -415,18 +416,18 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         };
         Panel { title, x, y, series: shown.iter().map(line).collect(), ..Panel::default() }
     };
-    let of_case = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
+    let case_panels = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
         let Some(drives) = drives else { return vec![panel(title, case_rows.rows.clone())] };
         let mut from = case_rows.rows.start;
-        let of_drive = |run: &[f64]| {
+        let drive_panels = |run: &[f64]| {
             let rows = from..from + run.len();
             from = rows.end;
             panel(join_title([title.clone(), format!("frequency = {}", format_hertz(run[0]))]), rows)
         };
         let runs = drives[case_rows.rows.clone()].chunk_by(|a, b| a == b);
-        runs.take(MAX_PANELS).map(of_drive).collect()
+        runs.take(MAX_PANELS).map(drive_panels).collect()
     };
-    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &of_case);
+    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &case_panels);
     panels.truncate(MAX_PANELS);
     if let Some(decay) = drawing.table("decay").filter(|_| drawing.study.draws().is_none() && panels.len() < MAX_PANELS)
     {

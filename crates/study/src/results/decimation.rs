@@ -90,9 +90,9 @@ impl DecimatedTable {
         let keys = study.varied().len();
         let (mut cases, mut bin) = (CaseSelection::All, None);
         if rows > most {
-            let of_case = rows.div_ceil(study.cases());
+            let rows_per_case = rows.div_ceil(study.cases());
             let kept = if study.draws().is_some() {
-                let first = (most / of_case).clamp(1, study.cases());
+                let first = (most / rows_per_case).clamp(1, study.cases());
                 cases = CaseSelection::First(first);
                 first
             } else {
@@ -101,7 +101,7 @@ impl DecimatedTable {
                 study.cases().div_ceil(each)
             };
             // a bin keeps at most two rows for every column: a few dozen
-            bin = (kept * of_case > most).then(|| (of_case * kept).div_ceil(most).max(1) * ROWS_PER_BIN);
+            bin = (kept * rows_per_case > most).then(|| (rows_per_case * kept).div_ceil(most).max(1) * ROWS_PER_BIN);
         }
         DecimatedTable { rows: empty.clone(), cases, bin, key_columns: keys, current_case: None, open_bin: empty }
     }
@@ -122,8 +122,8 @@ impl DecimatedTable {
                 Some((now, number)) => (now, *number),
                 None => return,
             };
-            let room = self.bin.map_or(usize::MAX, |bin| bin - self.open_bin.rows());
-            let more = table.rows().min(from.saturating_add(room));
+            let free_rows = self.bin.map_or(usize::MAX, |bin| bin - self.open_bin.rows());
+            let more = table.rows().min(from.saturating_add(free_rows));
             let to = (from + 1..more).find(|row| key_differs(&table, *row, now)).unwrap_or(more);
             let keeps = match self.cases {
                 CaseSelection::All => true,

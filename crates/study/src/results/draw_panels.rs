@@ -23,27 +23,27 @@ pub(crate) fn panels(
         let cases = cases.iter().take(MAX_PANELS);
         return cases.flat_map(|case_rows| of_case(case_rows, case_rows.label())).collect();
     }
-    let of_group = |(words, group): (String, Vec<&CaseRows>)| -> Vec<Panel> {
+    let group_panels = |(words, group): (String, Vec<&CaseRows>)| -> Vec<Panel> {
         let title = join_title([words, drawing.draws(group.len())]);
         let cases: Vec<Vec<Panel>> = group.iter().map(|case_rows| of_case(case_rows, title.clone())).collect();
         let most = cases.iter().map(Vec::len).max().unwrap_or(0);
         let same = |at: usize| cases.iter().filter_map(|case| case.get(at)).collect::<Vec<_>>();
         (0..most).filter_map(|at| combine_draws(&same(at))).collect()
     };
-    drawing.group_draws(cases).into_iter().take(MAX_PANELS).flat_map(of_group).take(MAX_PANELS).collect()
+    drawing.group_draws(cases).into_iter().take(MAX_PANELS).flat_map(group_panels).take(MAX_PANELS).collect()
 }
 
 /// Combines the panels of all draws into one; returns `None` for pictures.
 fn combine_draws(draws: &[&Panel]) -> Option<Panel> {
     let first = draws.first().filter(|panel| !panel.equal_axes)?;
     let lines: Vec<Vec<&Series>> = draws.iter().map(|panel| curves(panel, is_line)).collect();
-    let alike = |one: &[&Series]| {
+    let is_same_line = |one: &[&Series]| {
         let same = |(a, b): (&&Series, &&Series)| a.label == b.label && a.style == b.style;
         one.len() == lines[0].len() && one.iter().zip(&lines[0]).all(same)
     };
     let rises = |line: &&Series| line.x.is_sorted();
     let common = |one: &[&Series]| one.iter().zip(&lines[0]).all(|(line, first)| is_as_fine_as(&first.x, &line.x));
-    let bands = lines.iter().all(|one| alike(one) && one.iter().all(rises) && common(one));
+    let bands = lines.iter().all(|one| is_same_line(one) && one.iter().all(rises) && common(one));
     let mut series: Vec<Series> =
         first.series.iter().filter(|series| series.emphasis == Emphasis::Reference).cloned().collect();
     let pairs: Vec<Vec<Series>> =

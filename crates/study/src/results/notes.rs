@@ -237,8 +237,8 @@ impl Note {
                     if text == same =>
                 {
                     *cases += more;
-                    let room = MAX_NAMED_CASES.saturating_sub(named.len());
-                    named.extend(others.iter().take(room).cloned());
+                    let free_names = MAX_NAMED_CASES.saturating_sub(named.len());
+                    named.extend(others.iter().take(free_names).cloned());
                     return;
                 }
                 (

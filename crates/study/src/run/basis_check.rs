@@ -133,16 +133,16 @@ impl SlipReductionCheck {
         at: &dyn Fn(f64) -> String,
     ) -> Option<f64> {
         let all = std::mem::take(&mut self.candidates);
-        let farther = larger_basis_system(model, system)?;
-        let mut of = 0;
+        let larger = larger_basis_system(model, system)?;
+        let mut solved = 0;
         for index in chosen(&all) {
-            let Some(again) = compare_point(&farther, method, &all[index]) else { continue };
-            of += 1;
+            let Some(again) = compare_point(&larger, method, &all[index]) else { continue };
+            solved += 1;
             if self.again.as_ref().is_none_or(|worst| again.error > worst.error) {
                 self.again = Some(BasisDifference { point_text: at(all[index].omega), ..again });
             }
         }
-        self.again.iter_mut().for_each(|again| again.solved_points = of);
+        self.again.iter_mut().for_each(|again| again.solved_points = solved);
         self.again.as_ref().map(|again| again.error)
     }
 

@@ -78,9 +78,9 @@ impl Tally {
     pub fn append(&mut self, next: Tally) {
         next.notes.into_iter().for_each(|note| note.merge_into(&mut self.notes));
         self.interrupted |= next.interrupted;
-        let room = MAX_FAILURES - self.failures.len();
-        self.more_failures += next.more_failures + next.failures.len().saturating_sub(room) as u64;
-        self.failures.extend(next.failures.into_iter().take(room));
+        let free_failures = MAX_FAILURES - self.failures.len();
+        self.more_failures += next.more_failures + next.failures.len().saturating_sub(free_failures) as u64;
+        self.failures.extend(next.failures.into_iter().take(free_failures));
         for (status, count) in next.points {
             *self.points.entry(status).or_default() += count;
         }

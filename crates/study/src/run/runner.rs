@@ -240,12 +240,12 @@ impl Dataset {
 /// study give an empty figure.
 pub fn figure_of_tables(study: &Study, tables: &[Table]) -> Figure {
     let rows: Vec<(&str, usize)> = tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
-    let mut thinning = Decimation::new(study, &rows);
-    if thinning.keeps_all() {
+    let mut decimation = Decimation::new(study, &rows);
+    if decimation.keeps_all() {
         return draw(study, tables);
     }
-    tables.iter().for_each(|table| thinning.add(table.clone()));
-    draw(study, &thinning.tables())
+    tables.iter().for_each(|table| decimation.add(table.clone()));
+    draw(study, &decimation.tables())
 }
 
 /// Draws the figure of the rows that a [`Decimation`] has kept.

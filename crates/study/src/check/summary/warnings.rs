@@ -43,10 +43,10 @@ fn list_names(names: &[String]) -> String {
 }
 
 fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
-    let them = |count: usize| if count == 1 { "it" } else { "them" };
+    let pronoun = |count: usize| if count == 1 { "it" } else { "them" };
     let one = |one: &Loose| {
         let names = list_names(&one.masses);
-        let them = them(one.masses.len());
+        let them = pronoun(one.masses.len());
         if one.held_by_friction {
             format!("no spring holds {names}: only friction keeps {them} in place, and nothing does if all joints slip")
         } else {
@@ -67,8 +67,8 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
              a preload, or hold {} by a spring",
             list_names(&bodies),
             list_names(&joints),
-            them(bodies.len()),
-            them(bodies.len())
+            pronoun(bodies.len()),
+            pronoun(bodies.len())
         )
     });
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
@@ -99,9 +99,9 @@ fn massless(one: &SurveyedCase) -> Option<String> {
     let none = model.substructure.is_none() && model.masses.iter().all(|mass| mass.mass == 0.0);
     (none && structure.dofs() > 0).then(|| {
         let names: Vec<String> = model.masses.iter().map(|mass| mass.name.clone()).collect();
-        let are = if names.len() == 1 { "is" } else { "are" };
+        let verb = if names.len() == 1 { "is" } else { "are" };
         format!(
-            "the mass of {} {are} zero and the model has no other mass: it has no resonance, only the response of \
+            "the mass of {} {verb} zero and the model has no other mass: it has no resonance, only the response of \
              the springs",
             list_names(&names)
         )
@@ -128,21 +128,21 @@ fn overstiff(one: &SurveyedCase) -> Option<String> {
     let stiffness = |slip: &FirstSlip| slip.displacement.map_or(0.0, |u| if u > 0.0 { slip.limit / u } else { 0.0 });
     let joint = slips.iter().filter(|slip| slip.limit.is_finite());
     let joint = joint.max_by(|a, b| stiffness(a).total_cmp(&stiffness(b)));
-    let of = |stiffness: f64| quantity_text(stiffness, Some(Dimension::STIFFNESS));
+    let stiffness_text = |stiffness: f64| quantity_text(stiffness, Some(Dimension::STIFFNESS));
     let hertz = format_significant(free.max(stuck), 3);
     Some(match (spring, joint) {
         (Some(spring), _) => {
             let [a, b] = &spring.between;
             format!(
                 "the highest natural frequency is {hertz} Hz; check the stiffness between `{a}` and `{b}`, {}",
-                of(spring.stiffness)
+                stiffness_text(spring.stiffness)
             )
         }
         (None, Some(joint)) => format!(
             "with all joints stuck the highest natural frequency is {hertz} Hz; check the stiffness of `{}`, {}; for \
              a joint that is rigid until it slips, use the law `coulomb`",
             joint.joint,
-            of(stiffness(joint))
+            stiffness_text(stiffness(joint))
         ),
         (None, None) => format!("the highest natural frequency is {hertz} Hz; check stiffnesses and masses"),
     })
@@ -229,8 +229,8 @@ fn unused(study: &Study) -> Option<String> {
         study.structure.template.as_ref().is_some_and(|template| template.source == source)
     };
     let varied: BTreeSet<usize> = study.varied.iter().map(|varied| varied.index).collect();
-    let idle = (0..study.names.len()).filter(|i| !used.contains(i) && (varied.contains(i) || !from_template(*i)));
-    let (idle_varied, idle): (Vec<usize>, Vec<usize>) = idle.partition(|index| varied.contains(index));
+    let unused = (0..study.names.len()).filter(|i| !used.contains(i) && (varied.contains(i) || !from_template(*i)));
+    let (idle_varied, idle): (Vec<usize>, Vec<usize>) = unused.partition(|index| varied.contains(index));
     let names = |indices: &[usize]| list_names(&indices.iter().map(|i| study.names[*i].clone()).collect::<Vec<_>>());
     match (idle_varied.is_empty(), idle.is_empty()) {
         (true, true) => None,

@@ -154,8 +154,8 @@ fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>,
     };
     let Some((line, head)) = lines.next() else { return Err((1, "the file is empty".to_owned())) };
     let names = fields(head);
-    let at = columns.map(|column| names.iter().position(|name| name == column));
-    if names.len() != N || at.contains(&None) {
+    let positions = columns.map(|column| names.iter().position(|name| name == column));
+    if names.len() != N || positions.contains(&None) {
         return Err((line, format!("expected the columns {}, found `{}`", columns.join(","), excerpt(head))));
     }
     let row = |(line, text): (usize, &str)| {
@@ -163,7 +163,7 @@ fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>,
         if fields.len() != N || fields.iter().any(String::is_empty) {
             return Err((line, format!("expected {}, found `{}`", columns.join(","), excerpt(text))));
         }
-        Ok((line, at.map(|at| at.and_then(|at| fields.get(at)).cloned().unwrap_or_default())))
+        Ok((line, positions.map(|at| at.and_then(|at| fields.get(at)).cloned().unwrap_or_default())))
     };
     lines.map(row).collect()
 }
@@ -200,8 +200,8 @@ fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
             let fields: Vec<&str> = text.split(',').map(str::trim).collect();
             let [node, ref at @ ..] = fields[..] else { continue };
             // a missing coordinate is zero
-            let of = |i: usize| at.get(i).copied().filter(|field| !field.is_empty()).unwrap_or("0");
-            nodes.push(node_of(line, node, [of(0), of(1), of(2)])?);
+            let field = |i: usize| at.get(i).copied().filter(|field| !field.is_empty()).unwrap_or("0");
+            nodes.push(node_of(line, node, [field(0), field(1), field(2)])?);
         }
     }
     if nodes.is_empty() { Err((1, "the file has no *NODE block with nodes".to_owned())) } else { Ok(nodes) }

@@ -106,12 +106,12 @@ impl Reader {
             self.turn_number = number;
             let before = self.problems.len();
             let mut stated = self.table(table, keys, owner);
-            let turn = self.iteration().description();
-            if !turn.is_empty() {
+            let iteration = self.iteration().description();
+            if !iteration.is_empty() {
                 for problem in &mut self.problems[before..] {
-                    problem.message = format!("{} ({turn})", problem.message);
+                    problem.message = format!("{} ({iteration})", problem.message);
                 }
-                stated.repetition = format!("{owner}, {turn}");
+                stated.repetition = format!("{owner}, {iteration}");
             }
             all.push(stated);
             if self.problems.len() > before {

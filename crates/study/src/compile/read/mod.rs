@@ -278,8 +278,9 @@ impl Reader {
         if let Some(template) = &mut structure.template {
             let choice = varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
             let stated = stated_parameters(&parameters, &choice);
-            let behind = |index: usize| template_errors::user_parameters(template.source, &stated, [index]);
-            let names = |index: usize| behind(index).into_iter().map(|index| self.names[index].clone()).collect();
+            let user_parameters = |index: usize| template_errors::user_parameters(template.source, &stated, [index]);
+            let names =
+                |index: usize| user_parameters(index).into_iter().map(|index| self.names[index].clone()).collect();
             template.given = (0..parameters.len()).map(names).collect();
         }
         self.limit_points(&study, &varied, sample)?;

@@ -154,9 +154,9 @@ impl Reader {
                 points,
             }));
         }
-        let which: Vec<usize> = varied.iter().map(|varied| varied.index).collect();
+        let indices: Vec<usize> = varied.iter().map(|varied| varied.index).collect();
         if self.problems.is_empty() {
-            self.fix_dimensions(parameters, &which)?;
+            self.fix_dimensions(parameters, &indices)?;
         }
         Some(varied)
     }
@@ -189,9 +189,10 @@ impl Reader {
             }
             _ => None,
         };
-        let of = &table.get("of")?.node;
-        let TomlValue::Table(of) = &of.value else {
-            let message = format!("expected a table from parameters to distributions, found {}", of.value.described());
+        let distributions = &table.get("of")?.node;
+        let TomlValue::Table(of) = &distributions.value else {
+            let message =
+                format!("expected a table from parameters to distributions, found {}", distributions.value.described());
             let help = "write it as in of = { Ft = { normal = [\"2 N\", \"0.2 N\"] } }";
             self.problems.push(Problem::new(&table.get("of")?.node.location, "of", message).help(help));
             return None;
@@ -220,9 +221,9 @@ impl Reader {
             let points = ParameterValues::Drawn(DrawnParameter { sample, coordinate, distribution, numbers, within });
             drawn.push(VariedParameter { index, location: entry.node.location.clone(), points });
         }
-        let which: Vec<usize> = drawn.iter().map(|drawn| drawn.index).collect();
+        let indices: Vec<usize> = drawn.iter().map(|drawn| drawn.index).collect();
         if self.problems.is_empty() {
-            self.fix_dimensions(parameters, &which)?;
+            self.fix_dimensions(parameters, &indices)?;
         }
         Some((Some(sample), drawn))
     }

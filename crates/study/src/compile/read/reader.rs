@@ -53,8 +53,8 @@ impl Reader {
 
     /// Compiles an expression over the parameters and the indices of the turn.
     pub(super) fn compile(&self, text: &str) -> Result<Expression, crate::syntax::units::TextError> {
-        let turn = self.iteration();
-        let names: Vec<&str> = self.names.iter().map(String::as_str).chain(turn.names()).collect();
-        Expression::compile_with(text, &|name| self.index.get(name).copied(), &|name| turn.value(name), &names)
+        let iteration = self.iteration();
+        let names: Vec<&str> = self.names.iter().map(String::as_str).chain(iteration.names()).collect();
+        Expression::compile_with(text, &|name| self.index.get(name).copied(), &|name| iteration.value(name), &names)
     }
 }

@@ -123,11 +123,11 @@ impl CompiledTemplate {
     fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
         let environment = Environment { names: &self.names, values: self.values(fixed)? };
         let mut problems = Vec::new();
-        let again = |changed: &[(usize, f64)]| {
+        let reevaluate = |changed: &[(usize, f64)]| {
             let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
             evaluate(&self.names, &self.parameters, &self.order, &HashMap::new(), &fixed)
         };
-        let model = case_model(&self.structure, &environment, &again, &mut problems);
+        let model = case_model(&self.structure, &environment, &reevaluate, &mut problems);
         StudyError::from_problems(&self.sources, problems).map_or(Ok(model), Err)
     }
 }

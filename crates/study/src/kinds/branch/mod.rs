@@ -339,8 +339,8 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
     let line_of = |case_rows: &CaseRows, places: &[usize], label: &str, colour: usize| -> Vec<Series> {
         let mut from = case_rows.rows.start;
         // between two equal values at an end of the range, the branch runs outside the range
-        let at = numbers(table, &name_of_axis(table, outer.len()), case_rows.rows.clone());
-        let leaves = |row: usize| row > 0 && at[row - 1] == at[row];
+        let abscissae = numbers(table, &name_of_axis(table, outer.len()), case_rows.rows.clone());
+        let leaves = |row: usize| row > 0 && abscissae[row - 1] == abscissae[row];
         let rows: Vec<usize> = (0..case_rows.rows.len()).collect();
         let unstable = &unstable[case_rows.rows.clone()];
         // unstable runs are dashed; each run begins at the last point of the previous one
@@ -365,17 +365,17 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
         let name = |places: &[usize]| {
             places.iter().map(|place| system.places()[*place].as_str()).collect::<Vec<_>>().join(", ")
         };
-        let of_draw = |case_rows: &CaseRows, title: String| {
+        let case_panels = |case_rows: &CaseRows, title: String| {
             let lines =
                 shown.iter().enumerate().flat_map(|(colour, places)| line_of(case_rows, places, &name(places), colour));
             vec![panel(title, lines.collect())]
         };
         // the parameter along the branch does not distinguish draws
-        let apart: Vec<CaseRows> = cases
+        let separate_cases: Vec<CaseRows> = cases
             .iter()
             .map(|case_rows| CaseRows { varied: case_rows.varied[..outer.len()].to_vec(), ..case_rows.clone() })
             .collect();
-        return Figure { panels: draw_panels::panels(drawing, &apart, &of_draw), ..Figure::default() };
+        return Figure { panels: draw_panels::panels(drawing, &separate_cases, &case_panels), ..Figure::default() };
     }
     let several = cases.iter().flat_map(|case_rows| shown.iter().map(move |places| (case_rows, places)));
     let line = |(colour, (case_rows, places)): (usize, (&CaseRows, &Vec<usize>))| {

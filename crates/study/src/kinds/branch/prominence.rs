@@ -19,7 +19,7 @@ pub(super) struct LocalMaximum {
 pub(super) fn prominent(tops: &[LocalMaximum], heights: &[f64], errors: &[f64]) -> Vec<bool> {
     let mut ground = heights.to_vec();
     tops.iter().for_each(|top| ground[top.row] = ground[top.row].max(top.height));
-    let stands = |top: &LocalMaximum| {
+    let is_prominent = |top: &LocalMaximum| {
         // the first of two equal tops counts as the higher point
         let before = valley((0..top.row).rev(), &ground, errors, &|height| height >= top.height);
         let behind = valley(top.row + 1..ground.len(), &ground, errors, &|height| height > top.height);
@@ -27,7 +27,7 @@ pub(super) fn prominent(tops: &[LocalMaximum], heights: &[f64], errors: &[f64]) 
         let over = [before, behind].into_iter().flatten().reduce(higher);
         over.is_none_or(|valley| top.height - valley.height > valley.error.max(errors[top.row]) * top.height)
     };
-    tops.iter().map(stands).collect()
+    tops.iter().map(is_prominent).collect()
 }
 
 /// The rows up to the next higher point: lowest height and largest error.

@@ -231,12 +231,12 @@ fn sources(prepared: &PreparedCase) -> Vec<(String, LoopSource)> {
         let mut sums: Vec<JointSum> = Vec::new();
         for (name, (j, axis)) in names.into_iter().filter_map(|name| Some((name.clone(), joint(&name)?))) {
             let direction = system.joints()[j].axes()[axis].name();
-            let at = sums.iter().position(|sum| sum.direction == direction).unwrap_or_else(|| {
+            let index = sums.iter().position(|sum| sum.direction == direction).unwrap_or_else(|| {
                 sums.push(JointSum { direction, names: Vec::new(), joints: Vec::new() });
                 sums.len() - 1
             });
-            sums[at].names.push(name);
-            sums[at].joints.push((j, axis));
+            sums[index].names.push(name);
+            sums[index].joints.push((j, axis));
         }
         let one = |sum: JointSum| {
             (sum.names.join(" + "), LoopSource { force: ForceSource::Joints(sum.joints), against: against.clone() })
@@ -348,25 +348,25 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
                 let frequency = frequencies.map(|frequencies| format_hertz(frequencies[from]));
                 let label = join_title([inner.clone()].into_iter().chain(frequency));
                 let label = if label.is_empty() { joints[from].clone() } else { label };
-                let at = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
+                let index = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
                     let (x, y) = (x_axis.clone(), y_axis.clone());
                     panels.push(Panel { title, x, y, ..Panel::default() });
                     panels.len() - 1
                 });
                 let x = numbers(table, DISPLACEMENT, rows.clone()).iter().map(|u| u * x_factor).collect();
                 let y = numbers(table, FORCE, rows).iter().map(|f| f * y_factor).collect();
-                let colour = panels[at].series.len();
-                panels[at].series.push(Series::line(label, x, y, colour));
+                let colour = panels[index].series.len();
+                panels[index].series.push(Series::line(label, x, y, colour));
             }
         }
         panels
     };
     let cases = drawing.case_rows(table);
     if drawing.study.draws().is_some() {
-        let of_draw = |case_rows: &CaseRows, title: String| {
+        let case_panels = |case_rows: &CaseRows, title: String| {
             panels_of(std::slice::from_ref(case_rows), &|_| (title.clone(), String::new()))
         };
-        return Figure { panels: draw_panels::panels(drawing, &cases, &of_draw), ..Figure::default() };
+        return Figure { panels: draw_panels::panels(drawing, &cases, &case_panels), ..Figure::default() };
     }
     let split = |case_rows: &CaseRows| {
         let (outer, inner) = case_rows.varied.split_at(case_rows.varied.len().saturating_sub(1));

@@ -57,7 +57,7 @@ pub struct Loop {
 /// table from another source is ignored.
 pub(super) fn split_loops(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
     let (joints, frequencies, times) = (table.texts(JOINT), table.numbers(FREQUENCY), table.numbers(TIME));
-    let goes_on = |a: usize, b: usize| {
+    let continues = |a: usize, b: usize| {
         joints.is_none_or(|joints| joints[a] == joints[b])
             && frequencies.is_none_or(|frequencies| frequencies[a] == frequencies[b])
             && times.is_none_or(|times| times[b] >= times[a])
@@ -65,7 +65,7 @@ pub(super) fn split_loops(table: &Table, rows: Range<usize>) -> Vec<Range<usize>
     let mut loops = Vec::new();
     let mut from = rows.start;
     while from < rows.end {
-        let to = (from + 1..rows.end).find(|row| !goes_on(row - 1, *row)).unwrap_or(rows.end);
+        let to = (from + 1..rows.end).find(|row| !continues(row - 1, *row)).unwrap_or(rows.end);
         loops.push(from..to);
         from = to;
     }

@@ -54,9 +54,9 @@ const OPTIMUM: f64 = 35.0;
 
 fn cost(costing: &CostInputs<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
-    let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
+    let reverse_sweeps = f64::from(u8::from(both_ways::is_followed(costing.system())));
     let peak = costing.frequencies * costing.orbit()
-        + (back * costing.frequencies + ORBITS_PER_PEAK) * costing.unchecked_orbit();
+        + (reverse_sweeps * costing.frequencies + ORBITS_PER_PEAK) * costing.unchecked_orbit();
     let tried = if costing.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
         tables: vec![
@@ -270,8 +270,8 @@ fn draw(drawing: &FigureInput<'_>) -> Figure {
             // one row per curve; the refined optimum is a point of the line
             let best = (parameter(optima, colour..colour + 1)[0], height(optima, colour..colour + 1)[0]);
             if best.0.is_finite() {
-                let at = points.partition_point(|point| point.0 < best.0);
-                points.insert(at, best);
+                let index = points.partition_point(|point| point.0 < best.0);
+                points.insert(index, best);
             }
         }
         let (x, y) = points.into_iter().unzip();

@@ -80,9 +80,13 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<PeakCurve>, Result
     let mut curves = Vec::new();
     for case_rows in results.case_rows(&table, varied.len().saturating_sub(1))? {
         let point = |row: usize| {
-            let of_case = study.varied_values(case_rows.case + row - case_rows.rows.start);
+            let varied_values = study.varied_values(case_rows.case + row - case_rows.rows.start);
             let peak = |at_range_end| Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
-            Some(PerformancePoint { varied: of_case?, peak: at_range_end[row].map(peak), failed_orbits: failed[row] })
+            Some(PerformancePoint {
+                varied: varied_values?,
+                peak: at_range_end[row].map(peak),
+                failed_orbits: failed[row],
+            })
         };
         let points: Option<Vec<PerformancePoint>> = case_rows.rows.clone().map(point).collect();
         curves.push(PeakCurve { points: points.ok_or_else(|| table.foreign_rows())?, optimum: None });

@@ -128,7 +128,7 @@ pub(super) fn panels(drawing: &FigureInput<'_>) -> Vec<Panel> {
     };
     let x = Axis::new("amplification of the worst place", "");
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
-    let of_group = |(words, group): (String, Vec<&CaseRows>)| {
+    let group_panel = |(words, group): (String, Vec<&CaseRows>)| {
         let rows = || group.iter().flat_map(|case_rows| case_rows.rows.clone());
         let values: Vec<f64> =
             rows().flat_map(|row| numbers(table, tables::AMPLIFICATION_RATIO, row..row + 1)).collect();
@@ -141,5 +141,5 @@ pub(super) fn panels(drawing: &FigureInput<'_>) -> Vec<Panel> {
         let title = [words, "amplification".to_owned(), ends].into_iter().filter(|part| !part.is_empty());
         histogram::panel_of_maxima(&values, &x, &title.collect::<Vec<_>>().join(", "), "disks")
     };
-    groups.into_iter().filter_map(of_group).collect()
+    groups.into_iter().filter_map(group_panel).collect()
 }

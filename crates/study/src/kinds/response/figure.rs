@@ -78,7 +78,7 @@ fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
     };
     let cases = drawn.drawing.case_rows(table);
     let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &drawn.axes.1.unit) };
-    let of_group = |(words, group): (String, Vec<&CaseRows>)| {
+    let group_panel = |(words, group): (String, Vec<&CaseRows>)| {
         let highest = |case_rows: &&CaseRows| {
             let heights = numbers(table, AMPLITUDE, case_rows.rows.clone());
             heights.into_iter().fold(f64::NAN, f64::max) * drawn.factor.1
@@ -86,7 +86,7 @@ fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
         let heights: Vec<f64> = group.iter().map(highest).collect();
         histogram::panel(&heights, &x, &join_title([words, "largest peak".to_owned()]), "draws")
     };
-    drawn.drawing.group_draws(&cases).into_iter().filter_map(of_group).collect()
+    drawn.drawing.group_draws(&cases).into_iter().filter_map(group_panel).collect()
 }
 
 /// Returns the rows of the linear references case by case.
@@ -104,7 +104,7 @@ fn reference_rows(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows> {
 fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
-    let way_back = table.flags(REVERSE_SWEEP).unwrap_or_default();
+    let reverse_sweep = table.flags(REVERSE_SWEEP).unwrap_or_default();
     let masses = words(table, tables::MASS);
     // a table from another source may lack columns
     if masses.len() != table.rows() {
@@ -115,8 +115,13 @@ fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
         let (x, y) = (numbers(table, DRIVE, case_rows.rows.clone()), numbers(table, AMPLITUDE, case_rows.rows.clone()));
         for (i, row) in case_rows.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
-                let way_back = way_back.get(row).copied().flatten() == Some(true);
-                peaks.push(CasePeak { case: case_rows.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
+                let is_reverse = reverse_sweep.get(row).copied().flatten() == Some(true);
+                peaks.push(CasePeak {
+                    case: case_rows.case,
+                    mass: masses[row].clone(),
+                    at: (x[i], y[i]),
+                    way_back: is_reverse,
+                });
             }
         }
     }

@@ -125,8 +125,8 @@ impl FigureData<'_> {
         let worst = leading(heights.into_iter()).filter(|_| !alike);
         let points = self.largest_at(case_rows, &all);
         let below = |omega: f64| {
-            let at = points.partition_point(|point| point.0 < omega).clamp(1, points.len().max(2) - 1);
-            let ((x0, y0), (x1, y1)) = (points[at - 1], points[at]);
+            let index = points.partition_point(|point| point.0 < omega).clamp(1, points.len().max(2) - 1);
+            let ((x0, y0), (x1, y1)) = (points[index - 1], points[index]);
             y0 + (omega - x0) / (x1 - x0) * (y1 - y0)
         };
         // a peak of one place below the curve of another place is not on the envelope
@@ -218,10 +218,10 @@ impl FigureData<'_> {
     pub(super) fn references(&self, names: &[&str], cases: &[(usize, &CaseRows)]) -> Vec<Series> {
         let Some((table, known)) = &self.references else { return Vec::new() };
         // a case without rows has the references of the previous case
-        let of = |case: usize| known.iter().rev().find(|own| own.case <= case);
+        let reference_of = |case: usize| known.iter().rev().find(|own| own.case <= case);
         let mut own: Vec<(usize, &CaseRows, &CaseRows)> = Vec::new();
         for (colour, case_rows) in cases {
-            let Some(reference) = of(case_rows.case) else { continue };
+            let Some(reference) = reference_of(case_rows.case) else { continue };
             if own.iter().all(|(_, _, found)| found.rows != reference.rows) {
                 own.push((*colour, case_rows, reference));
             }
@@ -242,9 +242,9 @@ impl FigureData<'_> {
                     lines.push(line.reference());
                     continue;
                 }
-                let whose = if thinned { case_rows.label() } else { "for each case".to_owned() };
+                let case_text = if thinned { case_rows.label() } else { "for each case".to_owned() };
                 let (label, value) =
-                    (format!("{}, {whose}", line.label), case_rows.varied.last().map(|v| v.in_file_unit().0));
+                    (format!("{}, {case_text}", line.label), case_rows.varied.last().map(|v| v.in_file_unit().0));
                 lines.push(Series { label, value, colour, ..line.case_reference() });
             }
         }
@@ -275,8 +275,8 @@ impl FigureData<'_> {
             let column = |name: &&str| numbers(table, &amplitude_of(&format!("{name}_{what}")), rows.clone());
             let all: Vec<Vec<f64>> = names.iter().map(column).collect();
             let y = (0..x.len()).map(|i| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max) * self.factor.1);
-            let of = if names.len() > 1 { ", largest" } else { "" };
-            Series { style, ..Series::line(format!("all joints {what}{of}"), x.clone(), y.collect(), 0) }
+            let suffix = if names.len() > 1 { ", largest" } else { "" };
+            Series { style, ..Series::line(format!("all joints {what}{suffix}"), x.clone(), y.collect(), 0) }
         };
         // the notes state why a reference is missing
         let lines = [("free", Style::Dashed), ("stuck", Style::Dotted)].into_iter().map(line);
@@ -317,12 +317,12 @@ impl FigureData<'_> {
 
     /// Returns the force of a joint, or the largest of several.
     pub(super) fn force_line(&self, case_rows: &CaseRows, joints: &[String]) -> (Vec<f64>, Vec<f64>) {
-        let of = |column: &str, factor: f64| -> Vec<f64> {
+        let column_values = |column: &str, factor: f64| -> Vec<f64> {
             numbers(self.curve, column, case_rows.rows.clone()).iter().map(|value| value * factor).collect()
         };
-        let all: Vec<Vec<f64>> = joints.iter().map(|joint| of(&force(joint), self.force_factor)).collect();
+        let all: Vec<Vec<f64>> = joints.iter().map(|joint| column_values(&force(joint), self.force_factor)).collect();
         let largest = |i: usize| all.iter().map(|forces| forces[i]).fold(f64::NAN, f64::max);
-        (of(DRIVE, self.factor.0), (0..case_rows.rows.len()).map(largest).collect())
+        (column_values(DRIVE, self.factor.0), (0..case_rows.rows.len()).map(largest).collect())
     }
 
     /// Groups the joints whose forces are drawn as one line, with its name.

@@ -129,7 +129,7 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
         Some(_) => peaks,
         None => 0.0,
     };
-    let back = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
+    let reverse_points = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
     let curves =
         costing.cases.min(MAX_CURVES as f64) * costing.places.min(MAX_PANELS as f64 + MAX_SINGLE_PLACES as f64);
     Cost {
@@ -139,14 +139,14 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
             TableShape { rows: linear, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
             TableShape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
             TableShape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
-            costing.orbits((REVERSE_SHARE * back).floor()),
+            costing.orbits((REVERSE_SHARE * reverse_points).floor()),
         ],
         drawn: curves * costing.frequencies,
         unit: costing.orbit_bytes(),
         conditional_work: None,
         work: points * costing.output_seconds()
-            + (points + REVERSE_SHARE * back + tuned * costing.frequencies) * costing.orbit()
-            + (back + ORBITS_PER_PEAK * refined) * costing.unchecked_orbit()
+            + (points + REVERSE_SHARE * reverse_points + tuned * costing.frequencies) * costing.orbit()
+            + (reverse_points + ORBITS_PER_PEAK * refined) * costing.unchecked_orbit()
             + 2.0 * linear * costing.reference(),
     }
 }
@@ -181,8 +181,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     };
     let (points, others) = found.map_err(|error| (case.index, error))?;
     let mut part = builder.part;
-    let of = part.points.values().sum::<u64>() as usize;
-    part.notes.push(Note::Stuck { case: case.label(), points: builder.stuck, total: of });
+    let total = part.points.values().sum::<u64>() as usize;
+    part.notes.push(Note::Stuck { case: case.label(), points: builder.stuck, total });
     part.tables = vec![builder.rows];
     let (mut amplified, mut shapes) = (TableBuilder::default(), TableBuilder::default());
     if !points.is_empty() && !work.context.stopped() {
@@ -190,14 +190,14 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let all = peaks::all(work, points, &others).map_err(|error| (case.index, error))?;
         for found in &all {
             if let Some(why) = found.peak.unsettled {
-                let at = || {
+                let location = || {
                     format!(
                         "peak of {}, {}",
                         prepared.system.places()[found.mass],
                         describe_location(case, found.peak.omega)
                     )
                 };
-                part.count(at, "peak-unsettled", Some(why.to_string()));
+                part.count(location, "peak-unsettled", Some(why.to_string()));
             }
             peaks.varied(case);
             peaks.text(tables::MASS, &prepared.system.places()[found.mass]);

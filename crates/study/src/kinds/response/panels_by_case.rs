@@ -30,16 +30,16 @@ impl FigureData<'_> {
     /// this.
     pub(super) fn panels_by_case(&self, cases: &[CaseRows]) -> Vec<Panel> {
         let each = self.panels_of_a_case().max(1);
-        let room = (MAX_PANELS / each).clamp(1, cases.len().max(1));
-        let wheels = room * (each + 1) <= MAX_PANELS;
+        let shown_cases = (MAX_PANELS / each).clamp(1, cases.len().max(1));
+        let draws_shapes = shown_cases * (each + 1) <= MAX_PANELS;
         let [of_sectors, of_forces, of_shares] = self.colours();
         let mut panels = Vec::new();
-        for case_rows in cases.iter().take(room) {
+        for case_rows in cases.iter().take(shown_cases) {
             if !self.shown.is_empty() {
                 panels.push(self.places_panel(case_rows));
             }
             if let Some([bars, wheel]) = self.sectors_of(case_rows, of_sectors) {
-                panels.extend(bars.into_iter().chain(wheel.filter(|_| wheels)));
+                panels.extend(bars.into_iter().chain(wheel.filter(|_| draws_shapes)));
             }
             if !self.joints.is_empty() {
                 let mut panel = self.force_panel(case_rows.label());
@@ -55,8 +55,8 @@ impl FigureData<'_> {
             let plot = SharePlot { x: &x, axis: &self.axes.0, title: &label, first_colour: of_shares };
             panels.extend(contact_states::panels(self.curve, &self.contact_joints, &case_rows.rows, &plot));
         }
-        if let Some(first) = panels.first_mut().filter(|_| room < cases.len()) {
-            let some = format!("the first {room} of {} cases", cases.len());
+        if let Some(first) = panels.first_mut().filter(|_| shown_cases < cases.len()) {
+            let some = format!("the first {shown_cases} of {} cases", cases.len());
             first.title = join_title([std::mem::take(&mut first.title), some]);
         }
         panels
@@ -95,19 +95,20 @@ impl FigureData<'_> {
                 panel.series.push(Series { style, ..Series::line(name, x, y, self.colour_of(name, *place)) });
             }
             let colour_of = |(name, place): &(String, usize)| self.colour_of(name, *place);
-            let back = |shown: &(String, usize)| self.reverse_sweep_series(case_rows, &[&shown.0], colour_of(shown));
-            panel.series.extend(self.shown.iter().filter_map(back));
+            let reverse_series =
+                |shown: &(String, usize)| self.reverse_sweep_series(case_rows, &[&shown.0], colour_of(shown));
+            panel.series.extend(self.shown.iter().filter_map(reverse_series));
             for (name, place) in &self.shown {
                 panel.series.extend(self.marks(case_rows, name, self.colour_of(name, *place)));
             }
             return panel;
         }
-        let behind = self.highest(case_rows, MAX_BACKGROUND);
-        let label = match behind.len() < names.len() {
-            true => format!("the {} highest of {} places", behind.len(), names.len()),
+        let background = self.highest(case_rows, MAX_BACKGROUND);
+        let label = match background.len() < names.len() {
+            true => format!("the {} highest of {} places", background.len(), names.len()),
             false => format!("each of {} places", names.len()),
         };
-        for name in behind {
+        for name in background {
             let (x, y) = self.line(case_rows, name);
             panel.series.push(Series::line(label.clone(), x, y, 1).pale());
         }
@@ -145,9 +146,9 @@ impl FigureData<'_> {
             .map(|place| all[place].clone())
             .collect();
         let bars = |colour: usize| {
-            let around = &shape[colour];
-            let (x, y) = around.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
-            Series::bars(&around.place, x, y, first + colour)
+            let place = &shape[colour];
+            let (x, y) = place.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
+            Series::bars(&place.place, x, y, first + colour)
         };
         let fit = (MAX_BARS / ring.sectors.max(1)).clamp(1, disk_shape::MAX_PLACES);
         let series: Vec<Series> = disk_shape::largest_places(&shape, fit).into_iter().map(bars).collect();
@@ -160,9 +161,10 @@ impl FigureData<'_> {
         let title = join_title([case_rows.label(), format!("at {} Hz", format_significant(frequency, 6))]);
         let (x, y) =
             (Axis::new("sector", "").with_whole_numbers(), Axis::new(&self.axes.1.quantity, &self.axes.1.unit));
-        let of = disk_shape::left_out(shape.len(), places);
-        let wheel = disk_shape::panel(&shape, ring.sectors, join_title(["shape".to_owned(), title.clone(), of]), first);
+        let shown_text = disk_shape::left_out(shape.len(), places);
+        let shape_panel =
+            disk_shape::panel(&shape, ring.sectors, join_title(["shape".to_owned(), title.clone(), shown_text]), first);
         let title = join_title([title, disk_shape::left_out(series.len(), places)]);
-        Some([differ.then(|| Panel { title, x, y, series, ..Panel::default() }), wheel])
+        Some([differ.then(|| Panel { title, x, y, series, ..Panel::default() }), shape_panel])
     }
 }

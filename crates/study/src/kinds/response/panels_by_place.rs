@@ -27,19 +27,19 @@ impl FigureData<'_> {
             cases.chunk_by(|a, b| outer(a) == outer(b)).map(|group| (group, outer(&group[0]))).collect();
         let masses: Vec<Option<&str>> =
             if self.draws_each_place() { self.names().into_iter().map(Some).collect() } else { vec![None] };
-        let of_masses = groups.iter().flat_map(|(group, outer)| {
+        let mass_panels = groups.iter().flat_map(|(group, outer)| {
             masses.iter().map(|mass| self.cases_of_mass(*mass, group, outer, masses.len())).collect::<Vec<_>>()
         });
         let [_, of_forces, of_shares] = self.colours();
-        let of_joints = groups.iter().flat_map(|(group, outer)| {
+        let joint_panels = groups.iter().flat_map(|(group, outer)| {
             let joints = self.force_groups().into_iter().zip(of_forces..);
             joints.map(move |(joint, alone)| self.cases_of_joint(&joint, group, outer, alone))
         });
-        let of_faces = groups.iter().flat_map(|(group, outer)| {
+        let share_panels = groups.iter().flat_map(|(group, outer)| {
             let groups = contact_states::groups(&self.contact_joints).into_iter().zip(of_shares..);
             groups.flat_map(move |(joints, alone)| self.shares_in_cases(&joints, group, outer, alone))
         });
-        of_masses.chain(of_joints).chain(of_faces).take(MAX_PANELS).collect()
+        mass_panels.chain(joint_panels).chain(share_panels).take(MAX_PANELS).collect()
     }
 
     /// Returns the same panels with percentiles of the draws for each combination of `vary`.
@@ -56,16 +56,18 @@ impl FigureData<'_> {
             }
             panel
         };
-        let of = |case_rows: &CaseRows, column: &str| {
-            let of = |column: &str, factor: f64| -> Vec<f64> {
+        let curve_of = |case_rows: &CaseRows, column: &str| {
+            let column_values = |column: &str, factor: f64| -> Vec<f64> {
                 numbers(self.curve, column, case_rows.rows.clone()).iter().map(|value| value * factor).collect()
             };
-            (of(DRIVE, self.factor.0), of(column, self.factor.1))
+            (column_values(DRIVE, self.factor.0), column_values(column, self.factor.1))
         };
         let mut panels = Vec::new();
         if self.draws_each_place() {
             for (name, _) in &self.shown {
-                panels.push(panel(self.panel(String::new()), name, &|case_rows| of(case_rows, &amplitude_of(name))));
+                panels.push(panel(self.panel(String::new()), name, &|case_rows| {
+                    curve_of(case_rows, &amplitude_of(name))
+                }));
             }
         } else {
             let name = format!("largest of {} places", self.shown.len());
@@ -77,10 +79,10 @@ impl FigureData<'_> {
                 .push(panel(self.force_panel(String::new()), &name, &|case_rows| self.force_line(case_rows, &joints)));
         }
         for named in contact_states::groups(&self.contact_joints) {
-            let of_case = |case_rows: &CaseRows| self.share_line(case_rows, &named.1, ContactState::Slip);
+            let case_line = |case_rows: &CaseRows| self.share_line(case_rows, &named.1, ContactState::Slip);
             let shares = self.share_panel(&named, ContactState::Slip, String::new());
             let title = shares.title.clone();
-            panels.push(panel(shares, &title, &of_case));
+            panels.push(panel(shares, &title, &case_line));
         }
         panels.truncate(MAX_PANELS);
         panels
@@ -90,11 +92,11 @@ impl FigureData<'_> {
     /// figure has `panels` such panels.
     fn cases_of_mass(&self, mass: Option<&str>, group: &[CaseRows], outer: &str, panels: usize) -> Panel {
         let named = mass.filter(|_| panels > 1).map(str::to_owned);
-        let thinned_out = match group.len() > MAX_CURVES {
+        let thinning_text = match group.len() > MAX_CURVES {
             true => Some(format!("{MAX_CURVES} of {} cases", group.len())),
             false => self.case_count_text.clone(),
         };
-        let mut panel = self.panel(join_title(named.into_iter().chain([outer.to_owned()]).chain(thinned_out)));
+        let mut panel = self.panel(join_title(named.into_iter().chain([outer.to_owned()]).chain(thinning_text)));
         if mass.is_none() {
             panel.y.quantity = format!("largest amplitude of {} places", self.shown.len());
         } else if panels == 1 && self.system.places().len() > 1 {

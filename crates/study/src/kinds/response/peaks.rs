@@ -107,19 +107,19 @@ impl FoundPeak {
 /// Returns the peaks of both sweeps by frequency; `others` are the other orbits of the reverse
 /// sweep.
 pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<FoundPeak>, MethodError> {
-    let mut of_others = Vec::new();
+    let mut reverse_peaks = Vec::new();
     for interval in stretches(&points, others) {
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
         let neighbours: Vec<f64> = interval.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
         let found = peaks_of(work, interval)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
-        of_others.extend(found.map(|found| FoundPeak { reverse_sweep: true, ..found }));
+        reverse_peaks.extend(found.map(|found| FoundPeak { reverse_sweep: true, ..found }));
     }
     let sought = PeakQuantities::new(work.case());
-    of_others.retain(|found| !is_jump_to_forward(found, &points, others, &sought));
+    reverse_peaks.retain(|found| !is_jump_to_forward(found, &points, others, &sought));
     let omegas: Vec<f64> = points.iter().map(|point| point.omega).collect();
     let mut all = peaks_of(work, points)?;
     all.retain(|found| !is_jump_to_branch(found, &omegas, others, &sought));
-    for found in of_others {
+    for found in reverse_peaks {
         match all.iter_mut().find(|other| is_same_peak(other, &found, &omegas)) {
             Some(same) if found.peak.value > same.peak.value => *same = FoundPeak { reverse_sweep: false, ..found },
             Some(_) => {}
@@ -215,9 +215,9 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
 ///
 /// An example is a mass that moves with its support until a joint slips.
 fn is_end_of_plateau(points: &[Point], quantity: usize, peak: &Peak) -> bool {
-    let at = points.partition_point(|point| point.omega < peak.omega);
+    let index = points.partition_point(|point| point.omega < peak.omega);
     let as_high = |point: &Point| {
         point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL_TOLERANCE * peak.value)
     };
-    at >= 2 && points[at - 2..at].iter().all(as_high)
+    index >= 2 && points[index - 2..index].iter().all(as_high)
 }

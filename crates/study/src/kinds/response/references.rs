@@ -21,11 +21,12 @@ pub(super) const REFERENCE_POINTS: usize = 4;
 pub(super) fn equal_previous(study: &Study, case: &Case) -> bool {
     let before = case.index.checked_sub(1).and_then(|index| study.case(index).ok());
     before.is_some_and(|before| {
-        let alike = |reference: LinearReference| match (reference.model(&before.model), reference.model(&case.model)) {
+        let is_equal = |reference: LinearReference| match (reference.model(&before.model), reference.model(&case.model))
+        {
             (Ok(before), Ok(case)) => before == case,
             (before, case) => before.is_err() && case.is_err(),
         };
-        before.frequencies == case.frequencies && LinearReference::ALL.into_iter().all(alike)
+        before.frequencies == case.frequencies && LinearReference::ALL.into_iter().all(is_equal)
     })
 }
 
@@ -39,8 +40,8 @@ pub(super) fn distinct_cases(study: &Study) -> f64 {
         return 0.0;
     }
     let (cases, looked) = (study.cases(), study.cases().min(SAMPLED_CASES));
-    let looked_at = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
-    let own = looked_at.filter(|case| !equal_previous(study, case)).count();
+    let sampled = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
+    let own = sampled.filter(|case| !equal_previous(study, case)).count();
     own as f64 * cases as f64 / looked as f64
 }
 

@@ -123,14 +123,14 @@ pub(in crate::kinds) fn panels(
     if joints.len() <= MAX_SINGLE {
         let occurring: Vec<ContactState> =
             ContactState::ALL.into_iter().filter(|state| occurs_in(table, joints, *state)).collect();
-        let of_joint = |(joint, shares): (&String, &[Vec<f64>; 4])| Panel {
+        let joint_panel = |(joint, shares): (&String, &[Vec<f64>; 4])| Panel {
             title: titled(joint),
             x: over.clone(),
             y: axis("share of the period"),
             series: areas(shares, x, &occurring, first_colour),
             ..Panel::default()
         };
-        return joints.iter().zip(&all).map(of_joint).collect();
+        return joints.iter().zip(&all).map(joint_panel).collect();
     }
     let names = Axis { names: joints.to_vec(), ..Axis::new("joint", "").with_range(-0.5, joints.len() as f64 - 0.5) };
     let map = |state: ContactState| Panel {

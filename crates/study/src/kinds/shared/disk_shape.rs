@@ -73,11 +73,11 @@ pub(in crate::kinds) const MAX_PLACES: usize = 4;
 
 /// Returns the indices of at most `most` places that move most, in ascending order.
 pub(in crate::kinds) fn largest_places(places: &[PlaceInSectors], most: usize) -> Vec<usize> {
-    let mut leaders: Vec<usize> = (0..places.len()).collect();
-    leaders.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
-    leaders.truncate(most);
-    leaders.sort_unstable();
-    leaders
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_by(|a, b| places[*b].largest().total_cmp(&places[*a].largest()));
+    order.truncate(most);
+    order.sort_unstable();
+    order
 }
 
 /// States how many of the places are shown, if not all.
@@ -102,15 +102,15 @@ pub(in crate::kinds) fn panel(
     }
     let shown = largest_places(places, MAX_PLACES);
     let left_out = left_out(shown.len(), places.len());
-    let at = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
-    let rest = (0..=CIRCLE).map(|i| at(i as f64 / CIRCLE as f64, 1.0)).unzip();
+    let point = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
+    let rest = (0..=CIRCLE).map(|i| point(i as f64 / CIRCLE as f64, 1.0)).unzip();
     let (x, y): (Vec<f64>, Vec<f64>) = rest;
     let mut series = vec![Series::line("at rest", x, y, 0).reference()];
     for place in shown {
         let tip = |(sector, size, phase): &(usize, f64, f64)| {
-            let out = size / largest * (phase - now).to_radians().cos();
+            let displacement = size / largest * (phase - now).to_radians().cos();
             let turn = *sector as f64 / sectors as f64;
-            (at(turn, 1.0), at(turn, 1.0 + LARGEST_DISPLACEMENT * out))
+            (point(turn, 1.0), point(turn, 1.0 + LARGEST_DISPLACEMENT * displacement))
         };
         let PlaceInSectors { place: name, sectors: of } = &places[place];
         let mut tips: Vec<_> = of.iter().map(tip).collect();
