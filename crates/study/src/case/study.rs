@@ -6,9 +6,8 @@ use crate::case::sample::{DrawnParameter, SampleSettings};
 use crate::case::stress_stiffening::StiffnessExports;
 use crate::case::substructure;
 use crate::case::values::{Frequencies, ResolvedValue, Values, in_table_unit, quantity_json, range_point, table_unit};
-use crate::check::figure;
-use crate::check::memory_limit;
 use crate::check::overstiff::{overstiff_element, too_slow, too_soft};
+use crate::check::{figure, memory_limit};
 use crate::compile::bare_numbers::literal_unit;
 use crate::compile::compiled::{
     CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, check_range,

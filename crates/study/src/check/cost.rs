@@ -6,9 +6,8 @@
 use crate::case::study::{Case, Study};
 use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::results::decimation::MAX_ROWS;
-use crate::run::basis_check;
-use crate::run::output_columns;
 use crate::run::work::UNITS_AHEAD;
+use crate::run::{basis_check, output_columns};
 use crate::syntax::error::{Problem, StudyError};
 use crate::syntax::format::format_bytes;
 use std::collections::BTreeSet;

@@ -3,8 +3,7 @@
 use crate::case::names::ModelNames;
 use crate::case::values::Values;
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::syntax::suggest;
-use crate::syntax::units;
+use crate::syntax::{suggest, units};
 use stickslip::model::Model;
 
 /// Checks the values of `[figure]`.

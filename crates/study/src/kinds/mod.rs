@@ -1,8 +1,10 @@
-//! Study kinds: the available computations. Each kind is one file or folder and one line in [`TABLE`].
+//! Study kinds: the available computations. Each kind is one folder and one line in [`TABLE`].
 //!
 //! A kind states its keys of `[study]`; the reader checks them and passes their
 //! [`Values`](crate::Values) for every case.
 //!
+//! - `NAME/mod.rs`: keys, conditions, cost and computation of a kind; `NAME/figure.rs` draws its
+//!   tables, `NAME/tables.rs` reads them back as typed values;
 //! - `info`: the description of a kind: keys and conditions;
 //! - `kind`: a row of the table: how studies of the kind are divided, computed and drawn;
 //! - `shared`: shared by several kinds.

@@ -1,4 +1,7 @@
 //! `[sample]`: uncertain parameters, drawn at random.
+//!
+//! - `distribution`: distributions by their quantiles;
+//! - `design`: the points of the draws in the unit cube.
 
 mod design;
 mod distribution;

@@ -2,6 +2,11 @@
 //! memory and time.
 //!
 //! All results come from the linear structure and from counting; no orbit is computed.
+//!
+//! - `text`: the summary in words;
+//! - `structure`: the summary of a structure given by matrices;
+//! - `bodies`: the rigid bodies in words;
+//! - `warnings`: likely mistakes, as sentences.
 
 mod bodies;
 mod structure;

@@ -1,4 +1,12 @@
 //! Response curves: amplitude over excitation frequency.
+//!
+//! - `peaks`: the peaks of a range of a curve;
+//! - `references`: the linear references;
+//! - `amplification`: amplification of a mistuned disk;
+//! - `tables`: names, columns and typed values of the tables;
+//! - `figure`: the figure, made of the panels of the next two;
+//! - `panels_by_case`, `panels_by_place`: panels per case, and panels per place;
+//! - `figure_data`: the data of the figure, read from the tables.
 
 mod amplification;
 mod figure;

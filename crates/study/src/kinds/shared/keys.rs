@@ -3,8 +3,7 @@
 use crate::case::values::Values;
 use crate::kinds::info::KeyError;
 use crate::run::output_columns;
-use crate::syntax::key::FREQUENCY_RANGE;
-use crate::syntax::key::{Key, ValueType, default, optional, required};
+use crate::syntax::key::{FREQUENCY_RANGE, Key, ValueType, default, optional, required};
 use std::collections::BTreeSet;
 use stickslip::method::{MethodError, Options};
 use stickslip::model::{Mass, Model, System};

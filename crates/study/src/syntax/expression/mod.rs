@@ -3,6 +3,10 @@
 //! An expression has `+ - * / ^`, parentheses, numbers, numbers with a unit, names of
 //! parameters, `pi`, and the functions of [`FUNCTIONS`].
 //!
+//! - `value`: numbers with or without a dimension;
+//! - `operation`: the steps of an expression, and the reserved words;
+//! - `parser`: from the text to the steps.
+//!
 //! **Bare numbers.** A bare number has no unit, and so no dimension yet. Its key supplies the
 //! dimension: the number is in the SI unit that the key expects, also when it arrives through a
 //! parameter. The rules:
