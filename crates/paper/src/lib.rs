@@ -68,7 +68,8 @@ struct Extent {
 /// # Example
 /// ```no_run
 /// use stickslip_study::run::Context;
-/// let outcome = stickslip_paper::paper("out".as_ref(), &Context::without_progress(1), &|line| eprintln!("{line}"))?;
+/// let context = Context::without_progress(1);
+/// let outcome = stickslip_paper::paper("out".as_ref(), &context, &|line| eprintln!("{line}"))?;
 /// print!("{}", outcome.summary);
 /// # Ok::<(), stickslip_paper::PaperError>(())
 /// ```

@@ -32,7 +32,8 @@
 //! let checked = check(&read_study("couple.toml", text, &[("kt".into(), "12 N/mm".into())]).unwrap()).unwrap();
 //! let points = Arc::new(AtomicUsize::new(0));
 //! let counter = points.clone();
-//! let context = Context { finished: Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed)), ..Context::without_progress(1) };
+//! let finished = Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed));
+//! let context = Context { finished, ..Context::without_progress(1) };
 //! // `context.stop.store(true, …)` ends the run early
 //! let mut block = checked.block(0..2, &context).unwrap();
 //! block.append(checked.block(2..checked.units(), &context).unwrap());

@@ -304,7 +304,8 @@ impl Study {
     }
 
     /// Returns the memory limit of a run, bytes: the limit that was set, or
-    /// [`DEFAULT_MEMORY_LIMIT`](memory_limit::DEFAULT_MEMORY_LIMIT), or the machine's free memory if that is less.
+    /// [`DEFAULT_MEMORY_LIMIT`](memory_limit::DEFAULT_MEMORY_LIMIT), or the machine's free memory
+    /// if that is less.
     pub fn memory_limit(&self) -> u64 {
         self.memory.unwrap_or_else(memory_limit::default_limit)
     }

@@ -61,8 +61,8 @@ pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
 /// No reduction; [`set_frequency_range`] sets the frequency up to which modes are damped.
 const UNREDUCED: Reduction = Reduction::None { up_to: 0.0 };
 
-/// Builds the structure of `[structure]`. If the file does not state a reduction, [`set_frequency_range`]
-/// decides later.
+/// Builds the structure of `[structure]`. If the file does not state a reduction,
+/// [`set_frequency_range`] decides later.
 pub(crate) fn structure_from_table(
     MatrixSource { table, stress_stiffening: stiffened, .. }: &MatrixSource,
     component: &Component,

@@ -553,8 +553,8 @@ const COUPLED_CONTACTS: f64 = 4e-8;
 /// Factors on the time of an orbit if only contacts hold some bodies of a structure that is not
 /// solved by one sector.
 ///
-/// With a warm start, and without one: no neighbouring frequency is within [`NEAR_WIDTHS`] widths of a
-/// resonance. Measured: 0.4 s and 4 s for 12 mistuned blades with wedges.
+/// With a warm start, and without one: no neighbouring frequency is within [`NEAR_WIDTHS`]
+/// widths of a resonance. Measured: 0.4 s and 4 s for 12 mistuned blades with wedges.
 const CONTACT_HELD: (f64, f64) = (14.0, 200.0);
 const NEAR_WIDTHS: f64 = 10.0;
 /// Number of harmonics for which [`SERIES`] holds.

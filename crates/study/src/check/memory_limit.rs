@@ -4,7 +4,8 @@
 /// memory.
 pub const DEFAULT_MEMORY_LIMIT: u64 = 2_000_000_000;
 
-/// Returns the default limit: [`DEFAULT_MEMORY_LIMIT`], or the machine's free memory if that is less.
+/// Returns the default limit: [`DEFAULT_MEMORY_LIMIT`], or the machine's free memory if that is
+/// less.
 pub(crate) fn default_limit() -> u64 {
     DEFAULT_MEMORY_LIMIT.min(available_memory().unwrap_or(DEFAULT_MEMORY_LIMIT))
 }

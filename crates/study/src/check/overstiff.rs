@@ -72,8 +72,8 @@ const ROUNDING_SHARE: f64 = 1e-6;
 /// Returns the error of a spring whose stiffness is lost in the rounding of the inertia at
 /// `omega`, rad/s.
 ///
-/// The condition is `ε √(m Ω²/k) >` [`ROUNDING_SHARE`] for the stiffest element of a mass. Returns `None`
-/// without such a spring.
+/// The condition is `ε √(m Ω²/k) >` [`ROUNDING_SHARE`] for the stiffest element of a mass.
+/// Returns `None` without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     let lost =
         |held: &AttachedMass<'_>| f64::EPSILON * omega > ROUNDING_SHARE * (held.stiffness / held.mass.mass).sqrt();

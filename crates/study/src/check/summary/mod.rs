@@ -124,8 +124,8 @@ pub struct JointSummary {
 /// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
 /// the model is true for all of them.
 const MAX_CHECKED_CASES: usize = 9;
-/// The summary states the longest time if it exceeds the usual time by the factor [`LONG_TIME_FACTOR`] and
-/// exceeds [`SHORT_TIME`], s.
+/// The summary states the longest time if it exceeds the usual time by the factor
+/// [`LONG_TIME_FACTOR`] and exceeds [`SHORT_TIME`], s.
 const LONG_TIME_FACTOR: f64 = 3.0;
 const SHORT_TIME: f64 = 5.0;
 /// Duration above which a run announces its expected time at the start, s.

@@ -85,7 +85,8 @@ pub(super) fn split_loops(table: &Table, rows: Range<usize>) -> Vec<Range<usize>
 /// use stickslip_study::{kinds::hysteresis, read_study, run::{Context, run}};
 /// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
-/// let loops = hysteresis::loops(&study, &run(&study, &Context::without_progress(1)).unwrap()).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
+/// let loops = hysteresis::loops(&study, &dataset).unwrap();
 /// assert!((loops[1].dissipation - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
 /// ```
 pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError> {

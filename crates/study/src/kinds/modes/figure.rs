@@ -22,7 +22,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         .collect();
     let (x_axis, factor) = drawing.axis(0, "amplitude", largest(table, displacements.iter().map(column)), "m");
     let cases = drawing.case_rows(table);
-    let parts = match table.columns.iter().find(|column| column.name == "case_rows").map(|column| &column.values) {
+    let parts = match table.columns.iter().find(|column| column.name == "stretch").map(|column| &column.values) {
         Some(CellValues::Integer(parts)) => parts.clone(),
         _ => vec![1; table.rows()],
     };

@@ -122,11 +122,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let place = location_of(prepared);
     part.notes.extend(remarks(unit, &mode).into_iter().map(|text| Note::for_case(&place, text)));
     let (mut rows, mut summary) = (TableBuilder::default(), TableBuilder::default());
-    let (mut case_rows, mut before) = (1, f64::INFINITY);
+    let (mut stretch, mut before) = (1, f64::INFINITY);
     let reduction = prepared.system.reduction_evidence();
     for point in &mode.points {
         // the values jump at a turning point of the curve
-        case_rows += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
+        stretch += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
         before = point.amplitude;
         rows.varied(&prepared.case);
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
@@ -139,7 +139,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.number(&first_harmonic_in(place, along.unit()), x.norm());
             rows.number(&phase_of(place), phase.to_degrees());
         }
-        rows.integer("case_rows", case_rows);
+        rows.integer("stretch", stretch);
         rows.reduction_error(reduction);
         rows.end_row();
     }

@@ -68,7 +68,8 @@ pub struct Optimum {
 /// vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
 /// "#;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
-/// let curves = performance::curves(&study, &run(&study, &Context::without_progress(1)).unwrap()).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
+/// let curves = performance::curves(&study, &dataset).unwrap();
 /// assert!((curves[0].optimum.unwrap().value - 6.684).abs() < 0.01);
 /// ```
 pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<PeakCurve>, ResultsError> {

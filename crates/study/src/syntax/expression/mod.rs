@@ -63,7 +63,8 @@ impl Expression {
     /// use stickslip::dimension::Dimension;
     /// use stickslip_study::expression::{Expression, ExpressionValue};
     /// let e = Expression::compile("m - m1/2", &["m", "m1"]).unwrap();
-    /// let value = e.evaluate(&[ExpressionValue::new(0.182, Dimension::MASS), ExpressionValue::bare(0.002)]).unwrap();
+    /// let mass = ExpressionValue::new(0.182, Dimension::MASS);
+    /// let value = e.evaluate(&[mass, ExpressionValue::bare(0.002)]).unwrap();
     /// assert_eq!(value.si_in(Dimension::MASS), Ok(0.181));
     /// ```
     pub fn compile<S: AsRef<str>>(text: &str, parameters: &[S]) -> Result<Self, TextError> {
