@@ -168,7 +168,7 @@ impl VariedValue {
     /// Returns the value and the unit as the file states them, for a colour scale.
     pub fn in_file_unit(&self) -> (f64, String) {
         match self.unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
-            Some((name, unit)) => (without_rounding(self.si / unit.to_si("1")), name.to_owned()),
+            Some((name, unit)) => (without_rounding(self.si / unit.si_value("1")), name.to_owned()),
             None => self.in_axis_unit(),
         }
     }
@@ -395,7 +395,7 @@ impl Study {
         let parts = self.resolve_with_case_name(index, CheckScope::NumbersOnly(fixed), &mut problems);
         let error = StudyError::from_problems(&self.sources, problems);
         match (parts, error) {
-            (Some(parts), None) => Ok(self.into_case(index, parts)),
+            (Some(parts), None) => Ok(self.finish_case(index, parts)),
             (_, Some(error)) => Err(error),
             (None, None) => {
                 Err(StudyError::file(&self.sources[0].name, "the values of this case could not be computed", None))
@@ -653,7 +653,7 @@ impl Study {
                     quantity.text.trim().to_owned()
                 }
                 _ => match unit.as_deref().and_then(|unit| Some((unit, units::parse(unit)?))) {
-                    Some((name, unit)) => format!("{} {name}", quantity_text(value.si / unit.to_si("1"), None)),
+                    Some((name, unit)) => format!("{} {name}", quantity_text(value.si / unit.si_value("1"), None)),
                     None => quantity_text(value.si, value.dimension),
                 },
             };
@@ -744,7 +744,7 @@ impl Study {
         Some(ResolvedCase { environment: environment.values, model, values, method })
     }
 
-    fn into_case(&self, index: usize, parts: ResolvedCase) -> Case {
+    fn finish_case(&self, index: usize, parts: ResolvedCase) -> Case {
         let ResolvedCase { environment, model, values, method } = parts;
         let varied = self.varied_of(&environment, &self.value_indices(index));
         let parameters = self

@@ -47,9 +47,9 @@ pub(crate) fn in_table_unit(si: f64, dimension: Dimension) -> f64 {
         }
     }
     let Some(unit) = units::find(unit).filter(|_| si.is_finite()) else { return si };
-    let near = si / unit.to_si("1");
+    let near = si / unit.si_value("1");
     // 17 digits distinguish all doubles; 15 digits of any decimal number survive in a double
-    let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.signed_to_si(text) == si);
+    let typed = (15..=17).map(|digits| format!("{near:.*e}", digits - 1)).find(|text| unit.signed_si_value(text) == si);
     typed.and_then(|text| text.parse().ok()).unwrap_or(near)
 }
 
@@ -220,7 +220,7 @@ pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, inde
     };
     let unit = if dimension == Dimension::ANGLE { "deg" } else { "Hz" };
     match units::find(unit).filter(|_| cycles || dimension == Dimension::ANGLE) {
-        Some(unit) => unit.signed_to_si(&decimal),
+        Some(unit) => unit.signed_si_value(&decimal),
         None => decimal.parse().unwrap_or(value),
     }
 }
@@ -357,7 +357,7 @@ mod tests {
 
     #[test]
     fn values_come_back_as_typed() {
-        let omega = |text: &str| units::find("Hz").unwrap().to_si(text);
+        let omega = |text: &str| units::find("Hz").unwrap().si_value(text);
         // numbers of up to eight digits
         for i in 1..20_000u32 {
             for text in [format!("{}", f64::from(i) / 40.0), format!("{:.5}", f64::from(i) * 1.7e-4)] {
@@ -367,7 +367,7 @@ mod tests {
         let lost = (1..2000).filter(|&i| f64::from(i) / 10.0 * TAU / TAU != f64::from(i) / 10.0).count();
         assert!(lost > 100, "the division alone loses {lost} of 2000");
         for (i, text) in ["30", "0.1", "-45", "12.345678", "0"].iter().enumerate() {
-            let si = units::find("deg").unwrap().signed_to_si(text);
+            let si = units::find("deg").unwrap().signed_si_value(text);
             assert_eq!(in_table_unit(si, Dimension::ANGLE), text.parse::<f64>().unwrap(), "{i}");
         }
         // the fast path and the unit agree bitwise, also beyond the powers of ten that are

@@ -46,7 +46,7 @@ pub(crate) fn literal_unit(quantity: &CompiledQuantity) -> Option<(&str, f64, Di
     let unit =
         if unit.starts_with(['e', 'E']) && units::find(unit).is_none() { unit.split_once(' ')?.1.trim() } else { unit };
     let found = units::parse(unit)?;
-    Some((unit, found.to_si("1"), found.dimension))
+    Some((unit, found.si_value("1"), found.dimension))
 }
 
 /// Returns the value of a literal without a unit, unless it is zero.

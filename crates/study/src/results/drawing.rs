@@ -103,7 +103,7 @@ impl<'a> FigureInput<'a> {
         let (unit_key, scale_key) = [("x_unit", "x"), ("y_unit", "y")][which];
         let asked = options.text(unit_key).and_then(|text| Some((text.to_owned(), units::parse(text)?)));
         let (unit, factor) = match asked {
-            Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.to_si("1")) / unit.to_si("1")),
+            Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.si_value("1")) / unit.si_value("1")),
             None if si == "Hz" => (si.to_owned(), 1.0),
             None => prefixed_unit(largest, si),
         };

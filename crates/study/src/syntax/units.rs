@@ -176,7 +176,7 @@ pub fn ratio(from: &str, to: &str) -> Option<f64> {
         return Some(1.0);
     }
     let (from, to) = (parse(from)?, parse(to)?);
-    (from.dimension == to.dimension).then(|| from.to_si("1") / to.to_si("1"))
+    (from.dimension == to.dimension).then(|| from.si_value("1") / to.si_value("1"))
 }
 
 impl Unit {
@@ -207,7 +207,7 @@ impl Unit {
 
     /// Returns the SI value of `literal` (digits, a point, an exponent) in this unit. The
     /// result is rounded once if the unit has no fraction and no π.
-    pub(crate) fn to_si(&self, literal: &str) -> f64 {
+    pub(crate) fn si_value(&self, literal: &str) -> f64 {
         let (mantissa, exponent) = literal.split_once(['e', 'E']).unwrap_or((literal, "0"));
         // an exponent out of the range of i32 is far out of the range of f64
         let clamped = if exponent.starts_with('-') { -100_000 } else { 100_000 };
@@ -227,11 +227,11 @@ impl Unit {
 }
 
 impl Unit {
-    /// Like [`Unit::to_si`], for a number with an optional minus sign.
-    pub(crate) fn signed_to_si(&self, literal: &str) -> f64 {
+    /// Like [`Unit::si_value`], for a number with an optional minus sign.
+    pub(crate) fn signed_si_value(&self, literal: &str) -> f64 {
         match literal.strip_prefix('-') {
-            Some(positive) => -self.to_si(positive),
-            None => self.to_si(literal),
+            Some(positive) => -self.si_value(positive),
+            None => self.si_value(literal),
         }
     }
 }
@@ -519,7 +519,7 @@ mod tests {
         let cut = text.find(' ').unwrap();
         let (unit, end) = read(text, cut + 1, &names).unwrap();
         assert_eq!((end, unit.dimension), (text.len(), dimension), "{text}");
-        assert_eq!(unit.to_si(&text[..cut]), expected, "{text}");
+        assert_eq!(unit.si_value(&text[..cut]), expected, "{text}");
     }
 
     #[test]
@@ -587,7 +587,7 @@ mod tests {
     }
 
     fn quantity_of(unit: &str) -> f64 {
-        read_unit(unit).to_si("1")
+        read_unit(unit).si_value("1")
     }
 
     fn read_dimension(unit: &str) -> Dimension {

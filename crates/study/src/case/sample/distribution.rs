@@ -123,22 +123,22 @@ impl Distribution {
     /// Returns the quantile of the distribution restricted to `least` and `most`; `None` if the
     /// part is empty.
     pub fn quantile_within(&self, p: f64, [least, most]: [f64; 2]) -> Option<f64> {
-        let (a, b) = (self.to_standard(least), self.to_standard(most));
+        let (a, b) = (self.standardize(least), self.standardize(most));
         // from the side of the nearer tail, to avoid cancellation
         let value = if a > 0.0 {
             let (above_a, above_b) = (normal_cdf(-a), normal_cdf(-b));
             let above = above_a - (above_a - above_b) * p;
-            (above > 0.0 && above_a > above_b).then(|| self.from_standard(-normal_quantile(above)))
+            (above > 0.0 && above_a > above_b).then(|| self.destandardize(-normal_quantile(above)))
         } else {
             let (below_a, below_b) = (normal_cdf(a), normal_cdf(b));
             let below = below_a + (below_b - below_a) * p;
-            (below > 0.0 && below < 1.0 && below_a < below_b).then(|| self.from_standard(normal_quantile(below)))
+            (below > 0.0 && below < 1.0 && below_a < below_b).then(|| self.destandardize(normal_quantile(below)))
         };
         value.map(|value| value.clamp(least, most))
     }
 
     /// Returns the standard normal number of a value of a distribution with tails.
-    fn to_standard(&self, value: f64) -> f64 {
+    fn standardize(&self, value: f64) -> f64 {
         match self {
             Distribution::Lognormal(_) if value <= 0.0 => f64::NEG_INFINITY,
             Distribution::Lognormal(numbers) => {
@@ -150,7 +150,7 @@ impl Distribution {
         }
     }
 
-    fn from_standard(&self, z: f64) -> f64 {
+    fn destandardize(&self, z: f64) -> f64 {
         match self {
             Distribution::Lognormal(numbers) => {
                 let [mu, sigma] = logarithm_parameters(numbers);
@@ -318,7 +318,7 @@ mod tests {
     fn bounded_distributions_keep_their_shape() {
         for distribution in [Distribution::Normal([2.0, 0.5]), Distribution::Lognormal([2.0, 0.5])] {
             for bounds in [[1.5, 2.1], [2.5, 9.0], [0.1, 1.0], [4.0, 5.0]] {
-                let (a, b) = (distribution.to_standard(bounds[0]), distribution.to_standard(bounds[1]));
+                let (a, b) = (distribution.standardize(bounds[0]), distribution.standardize(bounds[1]));
                 let mut last = bounds[0];
                 for p in [0.01, 0.25, 0.5, 0.75, 0.99] {
                     let value = distribution.quantile_within(p, bounds).unwrap();
@@ -327,7 +327,7 @@ mod tests {
                     // the share below the value, relative to the share between the bounds, from
                     // the shares above
                     let above = |z: f64| normal_cdf(-z);
-                    let share = (above(a) - above(distribution.to_standard(value))) / (above(a) - above(b));
+                    let share = (above(a) - above(distribution.standardize(value))) / (above(a) - above(b));
                     assert!((share - p).abs() < 1e-9, "{distribution:?} {bounds:?}: {share} {p}");
                 }
             }

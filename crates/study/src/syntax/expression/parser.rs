@@ -186,12 +186,12 @@ impl Parser<'_> {
             Some(c) if units::starts_unit(c) || units::starts_with_divisor(self.rest(), &names) => {
                 let (unit, end) = units::read(self.text, self.position, &names)?;
                 self.position = end;
-                ExpressionValue::new(unit.to_si(literal), unit.dimension)
+                ExpressionValue::new(unit.si_value(literal), unit.dimension)
             }
             Some('/') => match self.inverse_unit() {
                 Some((unit, inverse, end)) => {
                     self.position = end;
-                    ExpressionValue::new(literal.parse().unwrap_or(f64::NAN) / unit.to_si("1"), inverse)
+                    ExpressionValue::new(literal.parse().unwrap_or(f64::NAN) / unit.si_value("1"), inverse)
                 }
                 None => ExpressionValue::bare(literal.parse().unwrap_or(f64::NAN)),
             },
