@@ -176,7 +176,7 @@ fn finds_series(case: &Case, system: &System) -> bool {
 }
 
 impl<'a> CostInputs<'a> {
-    /// Returns the costing of a study whose orbits are hard to find.
+    /// Returns the inputs for a study whose orbits are hard to find.
     pub(crate) fn new(study: &'a Study, surveyed: &'a SurveyedCase) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
         // the option `width` makes exact laws smooth
@@ -208,7 +208,7 @@ impl<'a> CostInputs<'a> {
         }
     }
 
-    /// Returns the costing of the same study with typical orbits.
+    /// Returns the inputs for the same study with typical orbits.
     pub(crate) fn typical(&self) -> Self {
         CostInputs { pace: Difficulty::Typical, ..self.clone() }
     }

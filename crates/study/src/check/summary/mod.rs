@@ -186,13 +186,14 @@ impl ModelSummary {
         });
         let joints = joints.collect();
         let kind = kinds::kind_of(study);
-        let costings: Vec<CostInputs<'_>> = cases.iter().map(|one| CostInputs::new(study, one)).collect();
+        let all_inputs: Vec<CostInputs<'_>> = cases.iter().map(|one| CostInputs::new(study, one)).collect();
         // the time of all cases if they were like this one
-        let time = |costing: &CostInputs<'_>| costing.seconds(&(kind.cost)(costing));
-        let mean =
-            |times: &dyn Fn(&CostInputs<'_>) -> f64| costings.iter().map(times).sum::<f64>() / costings.len() as f64;
+        let time = |inputs: &CostInputs<'_>| inputs.seconds(&(kind.cost)(inputs));
+        let mean = |times: &dyn Fn(&CostInputs<'_>) -> f64| {
+            all_inputs.iter().map(times).sum::<f64>() / all_inputs.len() as f64
+        };
         let (usual_seconds, seconds) = (mean(&|one| time(&one.typical())), mean(&time));
-        let (slow, usual) = (&costings[0], costings[0].typical());
+        let (slow, usual) = (&all_inputs[0], all_inputs[0].typical());
         let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
         let whole = usual.seconds(&usual_cost);
         let spared = usual_cost.conditional_work.map(|(work, place)| {

@@ -91,9 +91,9 @@ const SOLUTIONS_PER_STEP: f64 = 15.0;
 /// Peaks and turning points per branch.
 const MARKS: f64 = 2.0;
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let values = &costing.case.values;
-    let branches = if along_parameter(costing.study) { costing.curves() } else { costing.cases };
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let values = &inputs.case.values;
+    let branches = if along_parameter(inputs.study) { inputs.curves() } else { inputs.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
     let harmonics = values.count("harmonics").map(|h| h as f64);
     let length = harmonics.unwrap_or(HARMONICS as f64);
@@ -101,14 +101,14 @@ fn cost(costing: &CostInputs<'_>) -> Cost {
     let rows = steps * POINTS;
     Cost {
         tables: vec![
-            costing.orbits(rows),
-            TableShape { rows: branches * MARKS, numbers: costing.varied + 2.0, words: 0.0 },
+            inputs.orbits(rows),
+            TableShape { rows: branches * MARKS, numbers: inputs.varied + 2.0, words: 0.0 },
         ],
-        drawn: rows * costing.places,
-        unit: rows / branches * costing.kept_series_bytes(length, samples) + costing.series_bytes(length),
+        drawn: rows * inputs.places,
+        unit: rows / branches * inputs.kept_series_bytes(length, samples) + inputs.series_bytes(length),
         conditional_work: None,
-        work: rows * costing.output_seconds()
-            + steps * SOLUTIONS_PER_STEP * costing.solved_share() * costing.series(harmonics),
+        work: rows * inputs.output_seconds()
+            + steps * SOLUTIONS_PER_STEP * inputs.solved_share() * inputs.series(harmonics),
     }
 }
 

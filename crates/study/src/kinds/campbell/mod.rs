@@ -86,28 +86,28 @@ fn check(values: &Values, _: &Model, _: usize) -> Result<(), KeyError> {
 /// Time of an eigenvalue problem per cube of its size, s.
 const EIGEN: f64 = 1e-8;
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let values = &costing.case.values;
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let values = &inputs.case.values;
     let speeds = values.frequencies("speed").map_or(2, crate::case::values::Frequencies::len) as f64;
     let count = |key: &str, or: u64| values.count(key).unwrap_or(or) as f64;
-    let sectors = costing.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors as f64);
+    let sectors = inputs.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors as f64);
     let waves = sectors.map_or(1.0, |sectors| sectors / 2.0 + 1.0);
     let lines = 2.0 * waves * count("modes", 3);
     // an engine order excites the modes of one nodal diameter
     let crossings = lines / waves * count("engine_orders", 6);
-    let depends = costing.case.parameters.contains_key(costing.case.values.text("parameter").unwrap_or(PARAMETER));
+    let depends = inputs.case.parameters.contains_key(inputs.case.values.text("parameter").unwrap_or(PARAMETER));
     let found = if depends { speeds + EVALUATIONS_PER_CROSSING * crossings } else { 1.0 };
     // free and stuck joints for every wave; the complex problem of a wave has twice the size
-    let size = sectors.map_or(costing.dofs, |sectors| 2.0 * costing.dofs / sectors);
+    let size = sectors.map_or(inputs.dofs, |sectors| 2.0 * inputs.dofs / sectors);
     Cost {
         tables: vec![
-            TableShape { rows: costing.cases * speeds * lines, numbers: costing.varied + 4.0, words: 1.0 },
-            TableShape { rows: costing.cases * crossings, numbers: costing.varied + 5.0, words: 1.0 },
+            TableShape { rows: inputs.cases * speeds * lines, numbers: inputs.varied + 4.0, words: 1.0 },
+            TableShape { rows: inputs.cases * crossings, numbers: inputs.varied + 5.0, words: 1.0 },
         ],
-        drawn: costing.cases * (speeds * lines + crossings),
+        drawn: inputs.cases * (speeds * lines + crossings),
         unit: speeds * lines * 8.0,
         conditional_work: None,
-        work: costing.cases * found * 2.0 * waves * size.powi(3) * EIGEN,
+        work: inputs.cases * found * 2.0 * waves * size.powi(3) * EIGEN,
     }
 }
 

@@ -66,25 +66,25 @@ pub(super) const KIND: Kind = Kind {
     draw: figure::draw,
 };
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let (values, points) = (&costing.case.values, costing.points());
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let (values, points) = (&inputs.case.values, inputs.points());
     let loops = match values.names("loop") {
         _ if values.flag("sum") == Some(true) => MOST_DIRECTIONS as f64,
-        None if costing.joints == 0.0 => costing.case.model.motions.len() as f64,
-        _ => requested_loops(values, &costing.case.model).len() as f64,
+        None if inputs.joints == 0.0 => inputs.case.model.motions.len() as f64,
+        _ => requested_loops(values, &inputs.case.model).len() as f64,
     };
-    let rows = points * loops * costing.instants();
-    let keys = costing.varied + costing.frequency_columns();
-    let read = costing.instants() + loops * (QUADRATURE * FIVE.len()) as f64;
+    let rows = points * loops * inputs.instants();
+    let keys = inputs.varied + inputs.frequency_columns();
+    let read = inputs.instants() + loops * (QUADRATURE * FIVE.len()) as f64;
     Cost {
         tables: vec![
             TableShape { rows, numbers: keys + 3.0, words: 1.0 },
             TableShape { rows: points * loops, numbers: keys + 5.0, words: 2.0 },
         ],
         drawn: rows,
-        unit: costing.kept_orbits() + costing.samples_bytes(),
+        unit: inputs.kept_orbits() + inputs.samples_bytes(),
         conditional_work: None,
-        work: points * (costing.orbit() + costing.evaluation(read)),
+        work: points * (inputs.orbit() + inputs.evaluation(read)),
     }
 }
 

@@ -65,25 +65,25 @@ pub(super) const KIND: Kind = Kind {
 /// sectors.
 const SOLUTIONS_PER_POINT: f64 = 8.0;
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let values = &costing.case.values;
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let values = &inputs.case.values;
     let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
-    let rows = costing.cases * points;
+    let rows = inputs.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
     // odd harmonics, two parts each, of every degree of freedom
-    let elimination = costing.elimination_seconds((harmonics + 1.0) * costing.dofs);
+    let elimination = inputs.elimination_seconds((harmonics + 1.0) * inputs.dofs);
     Cost {
         tables: vec![
-            TableShape { rows, numbers: costing.varied + 4.0 + 3.0 * costing.places, words: 0.0 },
-            TableShape { rows: costing.cases, numbers: costing.varied + 5.0, words: 0.0 },
+            TableShape { rows, numbers: inputs.varied + 4.0 + 3.0 * inputs.places, words: 0.0 },
+            TableShape { rows: inputs.cases, numbers: inputs.varied + 5.0, words: 0.0 },
         ],
         drawn: 2.0 * rows,
-        unit: points * costing.series_bytes(harmonics),
+        unit: points * inputs.series_bytes(harmonics),
         conditional_work: None,
         // the curve takes about 100 steps from its large end, with close modes 200, whatever is
         // requested
-        work: (rows * SOLUTIONS_PER_POINT + costing.cases * costing.steps(100.0, 200.0))
-            * (costing.series(Some(harmonics)) + elimination),
+        work: (rows * SOLUTIONS_PER_POINT + inputs.cases * inputs.steps(100.0, 200.0))
+            * (inputs.series(Some(harmonics)) + elimination),
     }
 }
 

@@ -108,18 +108,18 @@ fn check_disk(model: &Model) -> Result<(), KeyError> {
     }
 }
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let modes = costing.case.values.count("modes").unwrap_or(4) as f64;
-    let sectors = costing.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
-    let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * costing.dofs / sectors);
-    let rows = costing.cases * waves * 2.0 * modes;
-    let shapes = 2.0 * costing.places / sectors;
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let modes = inputs.case.values.count("modes").unwrap_or(4) as f64;
+    let sectors = inputs.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
+    let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * inputs.dofs / sectors);
+    let rows = inputs.cases * waves * 2.0 * modes;
+    let shapes = 2.0 * inputs.places / sectors;
     Cost {
-        tables: vec![TableShape { rows, numbers: costing.varied + 4.0 + shapes, words: 1.0 }],
+        tables: vec![TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
         unit: if each > MAX_DENSE_SIZE { FACTOR * each } else { 8.0 * each * each },
         conditional_work: None,
-        work: costing.cases
+        work: inputs.cases
             * waves
             * if each > MAX_DENSE_SIZE { LOWEST_MODES * each.powf(1.5) } else { EIGEN * each.powi(3) },
     }

@@ -52,27 +52,27 @@ pub(super) const KIND: Kind = Kind {
     draw: figure::draw,
 };
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let points = costing.points();
-    let rows = points * costing.instants();
-    let orbits = costing.orbits(points);
-    let wanted = costing.case.values.flag("multipliers") == Some(true);
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let points = inputs.points();
+    let rows = points * inputs.instants();
+    let orbits = inputs.orbits(points);
+    let wanted = inputs.case.values.flag("multipliers") == Some(true);
     // the return check of a harmonic balance orbit takes one period; multipliers take one more,
     // with the derivative
-    let followed = if costing.is_series() { costing.period() } else { 0.0 };
-    let (multipliers, map) = if wanted { (points * 2.0 * costing.dofs, costing.period()) } else { (0.0, 0.0) };
+    let followed = if inputs.is_series() { inputs.period() } else { 0.0 };
+    let (multipliers, map) = if wanted { (points * 2.0 * inputs.dofs, inputs.period()) } else { (0.0, 0.0) };
     Cost {
         tables: vec![
-            costing.motion(rows),
+            inputs.motion(rows),
             TableShape { numbers: orbits.numbers + 4.0, ..orbits },
-            TableShape { rows: multipliers, numbers: costing.varied + 5.0, words: 0.0 },
+            TableShape { rows: multipliers, numbers: inputs.varied + 5.0, words: 0.0 },
         ],
         // the panels beyond the limit are also built
-        drawn: rows * (costing.places + costing.joints),
-        unit: costing.kept_orbits(),
+        drawn: rows * (inputs.places + inputs.joints),
+        unit: inputs.kept_orbits(),
         conditional_work: None,
         work: points
-            * (costing.orbit() + followed + map + costing.output_seconds() + costing.evaluation(costing.instants())),
+            * (inputs.orbit() + followed + map + inputs.output_seconds() + inputs.evaluation(inputs.instants())),
     }
 }
 

@@ -51,19 +51,19 @@ pub(super) const KIND: Kind = Kind {
 const ORBITS_PER_PEAK: f64 = 12.0;
 const OPTIMUM: f64 = 35.0;
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let (cases, curves) = (costing.cases, costing.curves());
-    let reverse_sweeps = f64::from(u8::from(both_ways::is_followed(costing.system())));
-    let peak = costing.frequencies * costing.orbit()
-        + (reverse_sweeps * costing.frequencies + ORBITS_PER_PEAK) * costing.unchecked_orbit();
-    let tried = if costing.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let (cases, curves) = (inputs.cases, inputs.curves());
+    let reverse_sweeps = f64::from(u8::from(both_ways::is_followed(inputs.system())));
+    let peak = inputs.frequencies * inputs.orbit()
+        + (reverse_sweeps * inputs.frequencies + ORBITS_PER_PEAK) * inputs.unchecked_orbit();
+    let tried = if inputs.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
         tables: vec![
-            TableShape { rows: cases, numbers: costing.varied + 4.0, words: 1.0 },
-            TableShape { rows: curves, numbers: costing.varied + 2.0, words: 1.0 },
+            TableShape { rows: cases, numbers: inputs.varied + 4.0, words: 1.0 },
+            TableShape { rows: curves, numbers: inputs.varied + 2.0, words: 1.0 },
         ],
         drawn: cases,
-        unit: costing.orbit_bytes(),
+        unit: inputs.orbit_bytes(),
         work: (cases + tried) * peak,
         conditional_work: (tried > 0.0).then_some((tried * peak, "if no optimum lies between the values")),
     }

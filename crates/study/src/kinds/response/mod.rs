@@ -112,50 +112,49 @@ const DISK_PEAKS: f64 = 3.0;
 /// Share of the points of a curve at which the reverse sweep has another orbit.
 const REVERSE_SHARE: f64 = 0.2;
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let (points, values) = (costing.points(), &costing.case.values);
-    let sought = values.flag("peaks") != Some(false) && costing.frequencies > 2.0;
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let (points, values) = (inputs.points(), &inputs.case.values);
+    let sought = values.flag("peaks") != Some(false) && inputs.frequencies > 2.0;
     let peaks = match values.names("peak_of") {
         _ if !sought => 0.0,
-        Some(_) => costing.cases,
-        None => (costing.cases * costing.places * PEAKS_PER_MASS).floor(),
+        Some(_) => inputs.cases,
+        None => (inputs.cases * inputs.places * PEAKS_PER_MASS).floor(),
     };
     // a place whose peak is at an end of the range is not refined; a structure given by
     // matrices has all its resonances in the range refined
-    let refined = match (costing.resonances(), &costing.case.model.substructure) {
-        (Some(resonances), Some(_)) if costing.case.model.ring.is_none() => peaks / PEAKS_PER_MASS * resonances,
+    let refined = match (inputs.resonances(), &inputs.case.model.substructure) {
+        (Some(resonances), Some(_)) if inputs.case.model.ring.is_none() => peaks / PEAKS_PER_MASS * resonances,
         (Some(resonances), _) => peaks / PEAKS_PER_MASS * resonances.min(PEAKS_PER_MASS),
         (None, _) => peaks,
     };
     // cases that differ only in their limits share the references
-    let others = references::distinct_cases(costing.study);
-    let linear = (costing.frequencies * REFERENCE_POINTS as f64 * others).floor();
+    let others = references::distinct_cases(inputs.study);
+    let linear = (inputs.frequencies * REFERENCE_POINTS as f64 * others).floor();
     // a tuned disk takes the time of one sector, at the frequencies of the mistuned disk
-    let tuned = if values.flag(amplification::KEY.name) == Some(true) { costing.cases } else { 0.0 };
-    let shapes = match costing.case.model.ring {
-        Some(_) if values.names("peak_of").is_none() => peaks.min(DISK_PEAKS * costing.cases),
+    let tuned = if values.flag(amplification::KEY.name) == Some(true) { inputs.cases } else { 0.0 };
+    let shapes = match inputs.case.model.ring {
+        Some(_) if values.names("peak_of").is_none() => peaks.min(DISK_PEAKS * inputs.cases),
         Some(_) => peaks,
         None => 0.0,
     };
-    let reverse_points = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
-    let curves =
-        costing.cases.min(MAX_CURVES as f64) * costing.places.min(MAX_PANELS as f64 + MAX_SINGLE_PLACES as f64);
+    let reverse_points = if both_ways::is_followed(inputs.system()) { points } else { 0.0 };
+    let curves = inputs.cases.min(MAX_CURVES as f64) * inputs.places.min(MAX_PANELS as f64 + MAX_SINGLE_PLACES as f64);
     Cost {
         tables: vec![
-            costing.orbits(points),
-            TableShape { rows: peaks, numbers: costing.varied + 3.0, words: 1.0 },
-            TableShape { rows: linear, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
-            TableShape { rows: tuned, numbers: costing.varied + 5.0, words: 1.0 },
-            TableShape { rows: shapes, numbers: costing.varied + 1.0 + 2.0 * costing.places, words: 0.0 },
-            costing.orbits((REVERSE_SHARE * reverse_points).floor()),
+            inputs.orbits(points),
+            TableShape { rows: peaks, numbers: inputs.varied + 3.0, words: 1.0 },
+            TableShape { rows: linear, numbers: inputs.varied + 1.0 + 2.0 * inputs.places, words: 0.0 },
+            TableShape { rows: tuned, numbers: inputs.varied + 5.0, words: 1.0 },
+            TableShape { rows: shapes, numbers: inputs.varied + 1.0 + 2.0 * inputs.places, words: 0.0 },
+            inputs.orbits((REVERSE_SHARE * reverse_points).floor()),
         ],
-        drawn: curves * costing.frequencies,
-        unit: costing.orbit_bytes(),
+        drawn: curves * inputs.frequencies,
+        unit: inputs.orbit_bytes(),
         conditional_work: None,
-        work: points * costing.output_seconds()
-            + (points + REVERSE_SHARE * reverse_points + tuned * costing.frequencies) * costing.orbit()
-            + (reverse_points + ORBITS_PER_PEAK * refined) * costing.unchecked_orbit()
-            + 2.0 * linear * costing.reference(),
+        work: points * inputs.output_seconds()
+            + (points + REVERSE_SHARE * reverse_points + tuned * inputs.frequencies) * inputs.orbit()
+            + (reverse_points + ORBITS_PER_PEAK * refined) * inputs.unchecked_orbit()
+            + 2.0 * linear * inputs.reference(),
     }
 }
 

@@ -105,9 +105,9 @@ pub(super) const KIND: Kind = Kind {
 };
 
 /// Returns the duration of one transient (s) and the number of its samples.
-fn lengths(costing: &CostInputs<'_>) -> (f64, f64) {
-    let values = &costing.case.values;
-    let (low, high) = costing.range().unzip();
+fn lengths(inputs: &CostInputs<'_>) -> (f64, f64) {
+    let values = &inputs.case.values;
+    let (low, high) = inputs.range().unzip();
     let period = |omega: f64| TAU / omega;
     let cycles = values.count("cycles").zip(low).map(|(cycles, omega)| cycles as f64 * period(omega));
     let run_up = values.table("run_up").and_then(|table| table.quantity("duration"));
@@ -117,32 +117,32 @@ fn lengths(costing: &CostInputs<'_>) -> (f64, f64) {
     (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
 }
 
-fn cost(costing: &CostInputs<'_>) -> Cost {
-    let (duration, samples) = lengths(costing);
-    let points = costing.points();
-    let table = costing.motion(points * samples);
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let (duration, samples) = lengths(inputs);
+    let points = inputs.points();
+    let table = inputs.motion(points * samples);
     // the steps resolve both the excitation and the modes
-    let fastest = costing.range().map_or(0.0, |(_, high)| high).max(costing.slowest_mode());
+    let fastest = inputs.range().map_or(0.0, |(_, high)| high).max(inputs.slowest_mode());
     let periods = duration * fastest / TAU;
     // the cycles of a free decay, and their summary
-    let free = costing.range().is_none();
+    let free = inputs.range().is_none();
     let cycles = if free { points * periods.floor() } else { 0.0 };
     let summaries = if free { points } else { 0.0 };
     Cost {
         tables: vec![
-            TableShape { numbers: table.numbers + costing.frequency_columns(), ..table },
+            TableShape { numbers: table.numbers + inputs.frequency_columns(), ..table },
             TableShape {
-                rows: points * costing.places,
-                numbers: costing.varied + costing.frequency_columns() + 2.0,
+                rows: points * inputs.places,
+                numbers: inputs.varied + inputs.frequency_columns() + 2.0,
                 words: 1.0,
             },
-            TableShape { rows: cycles, numbers: costing.varied + 4.0, words: 1.0 },
-            TableShape { rows: summaries, numbers: costing.varied + 10.0, words: 1.0 },
+            TableShape { rows: cycles, numbers: inputs.varied + 4.0, words: 1.0 },
+            TableShape { rows: summaries, numbers: inputs.varied + 10.0, words: 1.0 },
         ],
-        drawn: points.min(MAX_PANELS as f64) * samples * costing.places,
+        drawn: points.min(MAX_PANELS as f64) * samples * inputs.places,
         unit: 0.0,
         conditional_work: None,
-        work: points * (periods * costing.period() + costing.patterns(periods) + costing.evaluation(samples)),
+        work: points * (periods * inputs.period() + inputs.patterns(periods) + inputs.evaluation(samples)),
     }
 }
 
