@@ -101,7 +101,7 @@ fn main() -> ExitCode {
 /// study.
 fn new(name: &str, file: Option<&Path>) -> Exit {
     let Some(template) = templates::find(name) else {
-        let meant = templates::nearest(name).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+        let meant = templates::suggest(name).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
         let names: Vec<&str> = templates::TABLE.iter().map(|t| t.name).collect();
         complain!("error: unknown template `{name}`{meant}; the templates are {}", names.join(", "));
         return Exit::WrongInput;

@@ -10,7 +10,7 @@ use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry, names};
 use stickslip_numerics::sparse;
-use stickslip_study::Exports;
+use stickslip_study::StiffnessExports;
 
 /// Name of the file with `[structure]` and `[[place]]`.
 const TABLES: &str = "structure.toml";
@@ -114,10 +114,14 @@ fn without_rotation(substructure: &Substructure, places: &[Place]) -> Result<Red
 }
 
 /// Reduces with one basis for all speeds up to that of the second export.
-fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<ReducedStructure, String> {
+fn over_speeds(
+    substructure: &Substructure,
+    places: &[Place],
+    exports: &StiffnessExports,
+) -> Result<ReducedStructure, String> {
     let seen: Vec<Row> =
         places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
-    let reduced = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);
+    let reduced = exports.at_rest.reduced_between(&exports.at_speed, &seen, &substructure.reduction);
     let reduced = reduced.map_err(|error| error.to_string())?;
     let mut seen = reduced.seen.into_iter();
     let mut places: Vec<Place> = places.to_vec();
@@ -132,11 +136,11 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
         reduced.kind,
         reduced.error,
         reduced.up_to / TAU,
-        60.0 * exports.at / TAU
+        60.0 * exports.export_speed / TAU
     );
     let speed = format!(
         "stiffened = {{ file = \"stiffened.mtx\", at = \"{:e} rad/s\", speed = {:?} }}   # an expression over the parameters of the study",
-        exports.at, exports.speed
+        exports.export_speed, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
     Ok(ReducedStructure { system, description: what, keys, second_stiffness: Some(reduced.there), sector: None })

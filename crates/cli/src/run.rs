@@ -18,10 +18,10 @@ use stickslip_report::output::json::write_dataset_json;
 use stickslip_report::stream::{self, Shard, StartMode, StreamError};
 use stickslip_report::{Outputs, check_writable, terminal::Terminal};
 use stickslip_study::dataset::Dataset;
-use stickslip_study::run::{CONVERGED, Checked, Context, check as check_study};
-use stickslip_study::schema::MOST_BYTES;
+use stickslip_study::decimation::MAX_ROWS;
+use stickslip_study::run::{CONVERGED, CheckedStudy, Context, check as check_study};
+use stickslip_study::schema::MAX_FILE_BYTES;
 use stickslip_study::summary::ModelSummary;
-use stickslip_study::thinning::MOST_ROWS;
 use stickslip_study::{Study, StudyError, read_bytes, read_file};
 
 /// The studies named on the command line.
@@ -38,7 +38,7 @@ pub struct Request<'a> {
 
 impl Request<'_> {
     /// Reads and checks every file before anything runs.
-    fn read(&self) -> Result<Vec<Checked>, Exit> {
+    fn read(&self) -> Result<Vec<CheckedStudy>, Exit> {
         let mut studies = Vec::new();
         let mut wrong = false;
         for file in self.files {
@@ -53,7 +53,7 @@ impl Request<'_> {
                 })
                 .and_then(|study| check_study(&study))
                 // With several studies, each releases the data that its run can compute again.
-                .map(|checked| if self.files.len() > 1 { checked.lean() } else { checked });
+                .map(|checked| if self.files.len() > 1 { checked.without_first_case() } else { checked });
             match study {
                 Ok(study) => studies.push(study),
                 Err(error) => {
@@ -76,7 +76,7 @@ fn read(file: &Path, set: &[(String, String)]) -> Result<Study, StudyError> {
     }
     let mut bytes = Vec::new();
     // A partly read study is not valid.
-    match std::io::stdin().lock().take(MOST_BYTES + 1).read_to_end(&mut bytes) {
+    match std::io::stdin().lock().take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes) {
         Ok(_) => read_bytes("stdin", &bytes, set),
         Err(_) => read_bytes("stdin", &[], set),
     }
@@ -141,7 +141,7 @@ pub struct RunOptions<'a> {
 }
 
 /// Returns the summary of a study, and prints its warnings on standard error.
-fn print_warnings(checked: &Checked) -> &ModelSummary {
+fn print_warnings(checked: &CheckedStudy) -> &ModelSummary {
     checked.summary().warnings.iter().for_each(|warning| complain!("{warning}"));
     checked.summary()
 }
@@ -235,7 +235,7 @@ fn once(
         Err(exit) => return exit,
     };
     let mut names = BTreeSet::new();
-    if let Some(twice) = studies.iter().map(Checked::study).find(|study| !names.insert(study.name())) {
+    if let Some(twice) = studies.iter().map(CheckedStudy::study).find(|study| !names.insert(study.name())) {
         complain!(
             "error: two files have the name `{}`, so their results would be in the same folder; rename one file",
             twice.name()
@@ -267,7 +267,7 @@ fn once(
 
 /// Runs one study once.
 fn one(
-    checked: &Checked,
+    checked: &CheckedStudy,
     destination: &Destination,
     outputs: &Outputs,
     options: &RunOptions<'_>,
@@ -407,7 +407,7 @@ pub(crate) fn report(assembled: &Assembled, known: &[String], display: Display) 
     }
     let exit = if json && !is_whole {
         Exit::Failed(format!(
-            "--json cannot print tables with more than {MOST_ROWS} rows; the results are in {}",
+            "--json cannot print tables with more than {MAX_ROWS} rows; the results are in {}",
             files.first().map_or(String::new(), |file| file.with_file_name("").display().to_string())
         ))
     } else if json {
@@ -481,7 +481,7 @@ pub fn paper(destination: &Destination, open: bool) -> Exit {
         Ok(threads) => threads,
         Err(exit) => return exit,
     };
-    let context = Context { stop: progress::stop_flag(), ..Context::unwatched(threads) };
+    let context = Context { stop: progress::stop_flag(), ..Context::without_progress(threads) };
     let say = |line: &str| {
         if std::io::stderr().is_terminal() {
             complain!("{line}");

@@ -68,7 +68,8 @@ struct Effort {
 /// # Example
 /// ```no_run
 /// use stickslip_study::run::Context;
-/// let outcome = stickslip_paper::paper("out".as_ref(), &Context::unwatched(1), &|line| eprintln!("{line}"))?;
+/// let context = Context::without_progress(1);
+/// let outcome = stickslip_paper::paper("out".as_ref(), &context, &|line| eprintln!("{line}"))?;
 /// print!("{}", outcome.summary);
 /// # Ok::<(), stickslip_paper::PaperError>(())
 /// ```
@@ -179,7 +180,7 @@ mod tests {
 
     fn reduced(stop: bool) -> (tempfile::TempDir, Outcome) {
         let out = tempfile::tempdir().unwrap();
-        let context = Context { stop: Arc::new(AtomicBool::new(stop)), ..Context::unwatched(1) };
+        let context = Context { stop: Arc::new(AtomicBool::new(stop)), ..Context::without_progress(1) };
         let effort = Effort { points: Some(25), outputs: Outputs::select(&["csv", "json", "svg"]).unwrap() };
         let outcome = produce(out.path(), &context, &|_| (), &effort).unwrap();
         (out, outcome)
@@ -221,7 +222,7 @@ mod tests {
         let out = tempfile::tempdir().unwrap();
         let whole = out.path().join("report.html");
         std::fs::write(&whole, "whole").unwrap();
-        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
+        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::without_progress(1) };
         let effort = Effort { points: Some(25), outputs: Outputs::select(&["json"]).unwrap() };
         let outcome = produce(out.path(), &context, &|_| (), &effort).unwrap();
         assert_eq!(std::fs::read_to_string(&whole).unwrap(), "whole");

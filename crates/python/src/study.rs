@@ -12,9 +12,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
-use stickslip_study::block::{Block, Tally};
-use stickslip_study::dataset::{self, Column, Values};
-use stickslip_study::run::{Checked, check, redrawn, units};
+use stickslip_study::dataset::{self, CellValues, Column};
+use stickslip_study::result_block::{Block, Tally};
+use stickslip_study::run::{CheckedStudy, check, figure_of_tables, units};
 use stickslip_study::{StudyError, read_bytes, read_file, templates};
 
 /// A study, read and checked.
@@ -37,11 +37,11 @@ pub struct PyStudy {
     overrides: Vec<(String, String)>,
     method: Option<String>,
     /// Result of the check, which prepares every case. Computed on the first request.
-    checked: Arc<Mutex<Option<Arc<Checked>>>>,
+    checked: Arc<Mutex<Option<Arc<CheckedStudy>>>>,
 }
 
 impl PyStudy {
-    fn checked(&self, py: Python<'_>) -> PyResult<Arc<Checked>> {
+    fn checked(&self, py: Python<'_>) -> PyResult<Arc<CheckedStudy>> {
         let kept = || self.checked.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(checked) = kept().as_ref() {
             return Ok(checked.clone());
@@ -319,7 +319,7 @@ impl PyStudy {
     /// Identification of the matrices in its files; ``None`` without such files.
     #[getter]
     fn _matrices(&self) -> Option<String> {
-        self.study.matrices_check()
+        self.study.matrices_checksum()
     }
 
     /// Computes the units from `start` to `stop` (exclusive) on one thread.
@@ -393,10 +393,12 @@ pub fn _joined<'py>(
     for (name, columns) in tables {
         let column = |(name, kind, values): (String, String, Bound<'py, PyAny>)| {
             let values = match kind.as_str() {
-                "double" => Values::Number(values.extract::<numpy::PyReadonlyArray1<'_, f64>>()?.as_array().to_vec()),
-                "uint64" => Values::Integer(values.extract()?),
-                "bool" => Values::Flag(values.extract()?),
-                _ => Values::Text(values.extract()?),
+                "double" => {
+                    CellValues::Number(values.extract::<numpy::PyReadonlyArray1<'_, f64>>()?.as_array().to_vec())
+                }
+                "uint64" => CellValues::Integer(values.extract()?),
+                "bool" => CellValues::Flag(values.extract()?),
+                _ => CellValues::Text(values.extract()?),
             };
             Ok(Column { name, values })
         };
@@ -406,8 +408,8 @@ pub fn _joined<'py>(
         tally.append(serde_json::from_str(text).map_err(|cause| error::report(py, cause))?);
     }
     let mut whole = py.detach(|| {
-        let figure = redrawn(checked.study(), &all);
-        checked.outline(1).completed(all, figure, tally, Duration::ZERO)
+        let figure = figure_of_tables(checked.study(), &all);
+        checked.dataset_without_results(1).with_results(all, figure, tally, Duration::ZERO)
     });
     // The wall time of all batches, on all machines.
     whole.record.wall_time_s = seconds;

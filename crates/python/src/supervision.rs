@@ -149,8 +149,11 @@ pub fn run_supervised<T: Send>(
     let count = move || {
         counter.fetch_add(1, Ordering::Relaxed);
     };
-    let context =
-        Context { stop: stop.clone(), finished: Arc::new(count), ..Context::unwatched(pool.current_num_threads()) };
+    let context = Context {
+        stop: stop.clone(),
+        finished: Arc::new(count),
+        ..Context::without_progress(pool.current_num_threads())
+    };
     let (send, receive) = mpsc::channel();
     let receive = Mutex::new(receive);
     std::thread::scope(|scope| {

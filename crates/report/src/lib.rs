@@ -26,13 +26,14 @@
 //! ```
 //! use std::sync::Arc;
 //! use std::sync::atomic::{AtomicUsize, Ordering};
-//! use stickslip_study::{read_study, run::{Context, check, redrawn}};
+//! use stickslip_study::{read_study, run::{Context, check, figure_of_tables}};
 //!
 //! let text = stickslip_study::templates::find("blade-couple").unwrap().study;
 //! let checked = check(&read_study("couple.toml", text, &[("kt".into(), "12 N/mm".into())]).unwrap()).unwrap();
 //! let points = Arc::new(AtomicUsize::new(0));
 //! let counter = points.clone();
-//! let context = Context { finished: Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed)), ..Context::unwatched(1) };
+//! let finished = Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed));
+//! let context = Context { finished, ..Context::without_progress(1) };
 //! // `context.stop.store(true, …)` ends the run early
 //! let mut block = checked.block(0..2, &context).unwrap();
 //! block.append(checked.block(2..checked.units(), &context).unwrap());
@@ -40,7 +41,7 @@
 //! let curve = &block.tables[0];
 //! let units: Vec<_> = curve.columns.iter().take(3).map(|column| (column.name.as_str(), column.unit())).collect();
 //! assert_eq!(units[2], ("blade1_amplitude_m", Some("m".to_owned())));
-//! let figure = redrawn(checked.study(), &block.tables);
+//! let figure = figure_of_tables(checked.study(), &block.tables);
 //! assert!(stickslip_report::svg::to_svg(&figure).starts_with("<svg"));
 //! assert!(stickslip_report::html::to_html(&figure, "plotly.js").contains("plotly.js"));
 //! ```

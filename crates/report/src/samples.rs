@@ -62,7 +62,7 @@ pub(crate) fn ring() -> Dataset {
         x: Axis::new("frequency", "Hz"),
         y: Axis {
             names: (0..12).map(|j| format!("shroud_{j}")).collect(),
-            ..Axis::new("joint", "").between(-0.5, 11.5)
+            ..Axis::new("joint", "").with_range(-0.5, 11.5)
         },
         series: (0..12).map(stripe).collect(),
         ..Panel::default()
@@ -76,11 +76,11 @@ pub(crate) fn ring() -> Dataset {
     let wheel = Panel {
         title: "three nodal diameters".into(),
         series: vec![circle("at rest", 0.0).reference(), circle("blade", 0.3)],
-        picture: true,
+        equal_axes: true,
         ..Panel::default()
     };
     let mut dataset = bare("ring", "A ring of twelve", vec![map, wheel]);
-    dataset.figure.varied = Some(Axis::new("share of the period", "%").between(0.0, 100.0));
+    dataset.figure.varied = Some(Axis::new("share of the period", "%").with_range(0.0, 100.0));
     dataset
 }
 
@@ -139,8 +139,8 @@ pub(crate) fn response() -> Dataset {
                     Column::numbers("blade1_amplitude_m", a1),
                     Column::numbers("contact_amplitude_m", a2),
                     Column::numbers("blade3_amplitude_m", a3),
-                    Column { name: "stable".into(), values: Values::Flag(vec![Some(true); 964]) },
-                    Column { name: "iterations".into(), values: Values::Integer(vec![4; 964]) },
+                    Column { name: "stable".into(), values: CellValues::Flag(vec![Some(true); 964]) },
+                    Column { name: "iterations".into(), values: CellValues::Integer(vec![4; 964]) },
                     text("status", &["converged"; 964]),
                 ],
             },
@@ -274,7 +274,7 @@ pub(crate) fn hostile() -> Dataset {
         ],
         figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels, ..Figure::default() },
         notes: vec!["A <note> & more.".into()],
-        failures: (0..9).map(|i| Failure { at: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
+        failures: (0..9).map(|i| Failure { location: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
             reason: "shooting stopped after 50 iterations, residual 3.1e-4; try more harmonics <or> start from a neighbour".into() }).collect(),
         record: record(&[("converged", 240), ("not converged", 9)]),
     }
@@ -335,8 +335,8 @@ pub(crate) fn cases(count: usize) -> Dataset {
         let limit = (k + 1) as f64;
         let y = curve(120.0 + 20.0 * part, 0.012 + 0.12 * part * (1.0 - part));
         let top = (0..y.len()).max_by(|i, j| y[*i].total_cmp(&y[*j])).unwrap();
-        list.push(Series::marks("peak", vec![f[top]], vec![y[top]], k).of(limit));
-        list.push(Series::line(format!("Ft = {limit} N"), f.clone(), y, k).of(limit));
+        list.push(Series::marks("peak", vec![f[top]], vec![y[top]], k).with_value(limit));
+        list.push(Series::line(format!("Ft = {limit} N"), f.clone(), y, k).with_value(limit));
     }
     list.push(Series::line("free", f.clone(), curve(120.0, 0.001), 0).reference());
     list.push(Series { style: Style::Dotted, ..Series::line("stuck", f.clone(), curve(140.0, 0.004), 0).reference() });
@@ -362,7 +362,7 @@ pub(crate) fn masses() -> Dataset {
     let panel = |name: &str, height: f64| {
         let list = (0..12).map(|k| {
             let y = f.iter().map(|f| height * resonance(*f, 115.0 + 2.5 * f64::from(k), 0.02)).collect();
-            Series::line(name, f.clone(), y, k as usize).of(f64::from(1u32 << k))
+            Series::line(name, f.clone(), y, k as usize).with_value(f64::from(1u32 << k))
         });
         Panel {
             title: name.into(),
@@ -393,8 +393,8 @@ pub(crate) fn envelope() -> Dataset {
     list.push(Series::line("largest (blade 17)", f.clone(), largest.clone(), 1));
     let first = Panel {
         title: "48 blades".into(),
-        x: axis("frequency", "Hz").between(110.0, 140.0),
-        y: axis("amplitude", "mm").log().between(0.1, 10.0),
+        x: axis("frequency", "Hz").with_range(110.0, 140.0),
+        y: axis("amplitude", "mm").log().with_range(0.1, 10.0),
         series: list,
         ..Panel::default()
     };

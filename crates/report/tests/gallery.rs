@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fs;
 use std::path::{Path, PathBuf};
 use stickslip_report::output::Outputs;
-use stickslip_study::dataset::{Dataset, Table, Values};
+use stickslip_study::dataset::{CellValues, Dataset, Table};
 use stickslip_study::run::{Context, run};
 use stickslip_study::{Study, read_study};
 
@@ -75,7 +75,7 @@ fn reduced(text: &str) -> String {
 }
 
 fn dataset(name: &str, text: &str) -> Dataset {
-    run(&study(name, text), &Context::unwatched(1)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    run(&study(name, text), &Context::without_progress(1)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn picture(dataset: &Dataset) -> String {
@@ -255,7 +255,7 @@ fn the_contact_mass_has_the_same_peaks_by_both_methods() {
         let found = dataset(name, &text(name));
         let peaks = table(&found, "peaks");
         let column = peaks.columns.iter().find(|column| column.name == "mass").unwrap();
-        let Values::Text(masses) = &column.values else { panic!("masses have names") };
+        let CellValues::Text(masses) = &column.values else { panic!("masses have names") };
         let heights = peaks.numbers("amplitude_m").unwrap();
         let of_blade = masses.iter().zip(heights).filter(|(mass, _)| *mass == "blade1");
         // The maximum at the end of the range, at 119 Hz, is not a resonance.

@@ -4,66 +4,30 @@
 //! ([`toml`]). The tree becomes statements: every expression is compiled and every location is
 //! known. Then every case is resolved once, so that all errors are found before anything is
 //! written. [`schema`] describes all tables and keys as data.
+//!
+//! - `syntax`: text, keys, units and expressions;
+//! - `compile`: from the text to compiled statements;
+//! - `case`: the cases of a study, each with its model and values;
+//! - `check`: checks and estimates before a run;
+//! - [`kinds`]: the study kinds;
+//! - [`run`](mod@run): computes the units of a study;
+//! - [`results`]: tables, figures, notes and typed values.
 
-pub mod block;
-pub mod book;
-mod cause;
-mod columns;
-pub mod cost;
-pub mod dataset;
-mod decay;
-mod disk;
-mod document;
-mod drawing;
-mod draws;
-mod error;
-pub mod expression;
-mod extra;
-mod farther;
-mod figure;
-mod histogram;
-mod immovable;
-mod info;
-mod key;
-mod kind;
+mod case;
+mod check;
+mod compile;
 pub mod kinds;
-mod linear;
-pub mod memory;
-mod mistaken;
-mod mixed;
-mod names;
-mod near;
-mod note;
-mod percentiles;
-mod point;
-mod read;
-mod repeat;
 pub mod results;
-mod rows;
 pub mod run;
-mod sample;
-pub mod schema;
-mod sector;
-mod start;
-mod stated;
-mod statement;
-mod stiffened;
-mod study;
-mod substructure;
-pub mod summary;
-mod survey;
-pub mod templates;
-pub mod thinning;
-pub mod unit_sets;
-pub mod units;
-mod values;
-mod warnings;
-mod weibull;
-mod words;
-pub mod work;
+mod syntax;
 
-pub use error::StudyError;
-pub use read::{TemplateParameter, read_bytes, read_document, read_file, read_stored, read_study};
-pub use stiffened::Exports;
-pub use study::{Case, MethodChoice, Study, VariedValue};
-pub use values::{Frequencies, Values, hertz};
+pub use case::stress_stiffening::StiffnessExports;
+pub use case::study::{Case, MethodChoice, Study, VariedValue};
+pub use case::values::{Frequencies, Values, hertz};
+pub use check::{cost, memory_limit, summary};
+pub use compile::read::{TemplateParameter, read_bytes, read_document, read_file, read_for_results, read_study};
+pub use compile::templates;
+pub use results::{dataset, decimation};
+pub use run::{result_block, work};
+pub use syntax::error::StudyError;
+pub use syntax::{book, expression, schema, unit_sets, units};

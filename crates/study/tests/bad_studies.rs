@@ -183,7 +183,7 @@ fn frequencies() {
 /// Users look for a belt under `velocity`: the message says why there is no such key and what
 /// to do.
 #[test]
-fn a_velocity_is_no_motion() {
+fn a_constant_velocity_is_refused() {
     let belt = "[[motion]]\non = \"belt\"\namplitude = \"1 m\"\nvelocity = \"50 mm/s\"\n[[force]]";
     check("[[force]]", belt, (43, 12), "velocity", &["constant velocity, such as a belt", "transient", "v/A"]);
     // lists of keys do not contain it
@@ -275,7 +275,7 @@ fn a_refusal_of_one_case_names_it() {
 /// A stiffness with `m Ω² < ε k`, where inertia is lost in double precision, is refused. Such
 /// studies took up to minutes.
 #[test]
-fn masses_that_cannot_move_are_refused() {
+fn excessive_stiffness_is_refused() {
     let omega = 119.5 * std::f64::consts::TAU;
     let most = 0.181_09 * omega * omega / f64::EPSILON;
     let with = |stiffness: f64| read_study("a.toml", &EXAMPLE.replacen("\"k\"", &format!("{stiffness:e}"), 1), &[]);
@@ -301,7 +301,7 @@ fn masses_that_cannot_move_are_refused() {
 /// A stiffness that is lost relative to inertia, `ε √(m Ω²/k) > 1e-6`, is refused: rounding
 /// took a tenth of the motion of a mass of 1e30 kg.
 #[test]
-fn springs_that_do_nothing_are_refused() {
+fn negligible_stiffness_is_refused() {
     let omega = 122.5 * std::f64::consts::TAU;
     let least = 0.181_09 * (omega * f64::EPSILON / 1e-6).powi(2);
     let with = |stiffness: f64| read_study("a.toml", &EXAMPLE.replacen("\"k\"", &format!("{stiffness:e}"), 1), &[]);
@@ -315,7 +315,7 @@ fn springs_that_do_nothing_are_refused() {
 /// An excitation so slow that no mass has inertia is an error of the frequency; the frequency
 /// of the help is accepted.
 #[test]
-fn drives_without_inertia_are_refused() {
+fn frequencies_without_inertia_are_refused() {
     let text = |frequency: &str| {
         format!(
             r#"
@@ -345,7 +345,7 @@ frequency = "{frequency}"
 
 /// An error of all cases does not name the first one.
 #[test]
-fn an_error_of_all_cases_names_none() {
+fn an_error_of_all_cases_names_no_case() {
     let error = read_study("bad.toml", &EXAMPLE.replace("stiffness = \"k\"", "stiffness = \"2 s\""), &[]).unwrap_err();
     assert!(!error.message().contains("case"), "{error}");
     let text = EXAMPLE.replace("[\"2 N\", \"4 N\", \"6 N\", \"8 N\"]", "{ from = \"-2 N\", to = \"2 N\", points = 5 }");
@@ -407,7 +407,7 @@ fn files_that_are_no_studies() {
 fn survives(text: &str) {
     match read_study("any.toml", text, &[]) {
         Ok(study) => {
-            study.resolved();
+            study.to_record();
         }
         Err(error) => {
             let line = error.to_string();
@@ -499,7 +499,7 @@ fn large_files_are_read_in_reasonable_time() {
 }
 
 #[test]
-fn what_is_wrong_in_a_template_names_the_values_of_the_user() {
+fn template_errors_name_user_parameters() {
     let study = |parameters: &str, vary: &str| {
         format!(
             "schema = 1\nmodel = {{ template = \"under-platform-wedge\" }}\n[parameters]\n{parameters}\n[study]\nkind = \"response\"\n\
@@ -568,7 +568,7 @@ fn refused(edits: &[(&str, &str)], key: &str, words: &[&str]) {
 }
 
 #[test]
-fn quantities_of_another_dimension_say_what_was_meant() {
+fn wrong_dimensions_give_advice() {
     let stiffness = "10 N/mm * (1 + (n/(6000 rpm))^2)";
     refused(&[(stiffness, "10 N/mm^2")], "stiffness", &["this is a pressure", "10 N/mm"]);
     refused(&[("limit = \"1 N\"", "limit = \"1 MPa\"")], "limit", &["this is a pressure", "area"]);
@@ -615,7 +615,7 @@ fn a_step_in_a_range_becomes_a_number_of_points() {
 }
 
 #[test]
-fn words_that_hold_the_right_one_lead_to_it() {
+fn words_within_phrases_are_suggested() {
     for (kind, meant) in
         [("frequency response", "response"), ("nonlinear modes", "modes"), ("hysteresis loop", "hysteresis")]
     {
@@ -627,7 +627,7 @@ fn words_that_hold_the_right_one_lead_to_it() {
 /// A bare number next to quantities in another unit is refused: it counts in SI, so 1200 would
 /// be 72,000 rpm.
 #[test]
-fn bare_numbers_beside_other_units() {
+fn bare_numbers_among_units_are_refused() {
     let study = "points = 11 }";
     let vary = |values: &str| format!("points = 11 }}\nvary = {{ n = {values} }}");
     for values in ["[\"1100 rpm\", 1200]", "[1200]", "{ from = \"1100 rpm\", to = 1200, points = 3 }"] {
@@ -651,7 +651,7 @@ fn bare_numbers_beside_other_units() {
 
 /// The damping ratio ζ of a spring with the mass at its end gives c = 2 ζ sqrt(k m).
 #[test]
-fn damping_as_a_share_of_the_critical_one() {
+fn damping_ratio_of_a_spring() {
     let spring = |damping: &str| {
         oscillator(&[("damping = \"2 N s/m\"", damping), ("10 N/mm * (1 + (n/(6000 rpm))^2)", "10 N/mm")])
     };

@@ -55,7 +55,7 @@ output = ["velocity", "acceleration", "harmonics"]
 
 fn dataset(text: &str) -> Dataset {
     let study = read_study("body.toml", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let found = run(&study, &Context::unwatched(1)).unwrap_or_else(|error| panic!("{error}"));
+    let found = run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"));
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     found
 }
@@ -85,7 +85,7 @@ fn cramer(a: [[Complex64; 3]; 3], b: [Complex64; 3]) -> [Complex64; 3] {
 /// Compares a bar with `(K + jωC - ω²M) (x, z, θ) = f`. Its rows are written by hand: a point
 /// at (a, 0, c) moves by `x + c θ` and `z - a θ`.
 #[test]
-fn a_bar_moves_as_its_three_equations_say() {
+fn a_bar_matches_its_equations_of_motion() {
     let found = dataset(BAR);
     let omega = TAU * 80.0;
     let rows = [
@@ -128,7 +128,7 @@ fn a_bar_moves_as_its_three_equations_say() {
 /// A disc that an imposed rotation of another body turns through a shaft has the amplitude
 /// `a k/(k - J ω²)`.
 #[test]
-fn a_shaft_passes_an_imposed_rotation_on() {
+fn a_shaft_transmits_an_imposed_rotation() {
     let text = r#"
 schema = 1
 [[body]]
@@ -166,7 +166,7 @@ frequency = "40 Hz"
 /// A body in space under a force off its axes: static motion by hand. The product of inertia
 /// has no effect at rest, and a face is rotated.
 #[test]
-fn a_body_in_space_has_six_directions_and_turned_faces() {
+fn a_body_in_space_has_six_degrees_of_freedom() {
     let spring =
         |place: &str, k: &str| format!("[[spring]]\nbetween = [\"{place}\", \"ground\"]\nstiffness = \"{k}\"\n");
     let springs: String = ["b.x", "b.y", "b.z"].map(|place| spring(place, "1e6 N/m")).concat()
@@ -210,7 +210,7 @@ frequency = "1e-3 Hz"
 /// `check` describes a cylinder between a floor and a spring at its centre. While the cylinder
 /// rolls, its effective mass is 3/2 m.
 #[test]
-fn check_says_what_a_body_is_and_how_it_rolls() {
+fn summary_describes_bodies() {
     let text = r#"
 schema = 1
 parameters = { m = "40 g", r = "3 mm" }
@@ -338,7 +338,7 @@ fn refused(from: &str, to: &str, key: &str, words: &[&str]) {
 }
 
 #[test]
-fn what_is_wrong_is_said_where_it_stands() {
+fn errors_of_bodies_have_locations() {
     let inertia = "\"15000 kg mm^2\"";
     refused(inertia, "0", "inertia", &["about every axis must be above zero", "[[mass]]"]);
     refused(

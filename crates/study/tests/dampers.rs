@@ -12,7 +12,7 @@ fn study(template: &str, parameters: &[(&str, String)], study: &str) -> Dataset 
     let parameters: String = parameters.iter().map(|(name, value)| format!("{name} = \"{value}\"\n")).collect();
     let text = format!("schema = 1\nmodel = {{ template = \"{template}\" }}\n[parameters]\n{parameters}\n{study}");
     let study = read_study("damper.toml", &text, &[]).unwrap_or_else(|error| panic!("{template}: {error}"));
-    let found = run(&study, &Context::unwatched(1)).unwrap_or_else(|error| panic!("{template}: {error}"));
+    let found = run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{template}: {error}"));
     assert!(found.failures.is_empty(), "{template}: {:?}", found.failures);
     found
 }
@@ -58,7 +58,7 @@ fn frequencies(
 /// The wedge at rest: both loads from its balance along and across the radius, by Cramer's
 /// rule. No place moves from its reference position.
 #[test]
-fn a_wedge_is_pressed_by_its_balance() {
+fn loads_of_a_wedge_at_rest() {
     for (a1, a2, rpm) in
         [(30.0f64, 30.0f64, 3000.0f64), (15.0, 40.0, 6000.0), (60.0, 10.0, 1500.0), (45.0, 44.0, 9000.0)]
     {
@@ -212,7 +212,7 @@ fn stuck_dampers_that_turn_are_springs_between_blades() {
 /// The loads of a cylinder at rest are those of a wedge: both pass through its centre, and no
 /// friction is needed.
 #[test]
-fn a_cylinder_is_pressed_by_its_balance() {
+fn loads_of_a_cylinder_at_rest() {
     let (a1, a2) = (15.0f64, 40.0f64);
     let parameters = [("a1", format!("{a1} deg")), ("a2", format!("{a2} deg")), ("F0", "1e-3 N".to_owned())];
     let found = study(
@@ -235,7 +235,7 @@ fn a_cylinder_is_pressed_by_its_balance() {
 /// Without excitation the wedge stays at rest. An excitation of a billionth of the wedge's load
 /// has a proportional response.
 #[test]
-fn a_wedge_that_nothing_drives_rests() {
+fn small_excitation_gives_proportional_response() {
     let amplitude = |force: &str| {
         let parameters = [("F0", force.to_owned()), ("a1", "35 deg".to_owned())];
         let study = study(
@@ -257,7 +257,7 @@ fn a_wedge_that_nothing_drives_rests() {
 /// `h (Δ - h/kc)`, with the difference h of both forces and the range Δ of the blades'
 /// distance.
 #[test]
-fn a_slipping_wedge_loses_what_its_limits_say() {
+fn energy_loss_of_a_slipping_wedge() {
     let (kt, kn, mu): (f64, f64, f64) = (40e3, 50e3, 0.3);
     for a in [30.0f64, 40.0] {
         let parameters = [

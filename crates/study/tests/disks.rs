@@ -59,7 +59,7 @@ fn a_sector_becomes_a_ring() {
     assert_eq!(model.joints[5].between, ["blade_5", "blade_0"]);
     assert_eq!(model.ring.unwrap().order, Some(5));
     let study = read("engine_order = -1", "", STUDY).unwrap();
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     let names: Vec<&str> = data.tables[0].columns.iter().map(|column| column.name.as_str()).collect();
     // all sectors are alike, so bars would show nothing
     let amplitudes = (0..6).map(|s| data.tables[0].numbers(&format!("blade_{s}_amplitude_m")).unwrap()[0]);
@@ -81,7 +81,7 @@ fn bars_stand_at_the_peak() {
     let method = "[figure]\ny_unit = \"m\"\n[method]\nkind = \"harmonic-balance\"\nharmonics = 1\ntolerance = 0.9\n";
     let result = |study: &str| {
         let study = read("engine_order = 1", mistuned, &format!("[study]\nkind = \"response\"\n{study}\n{method}"));
-        run(&study.unwrap(), &Context::unwatched(1)).unwrap()
+        run(&study.unwrap(), &Context::without_progress(1)).unwrap()
     };
     for more in ["", "peak_of = \"all\""] {
         let found = result(&format!("frequency = {{ from = \"100 Hz\", to = \"150 Hz\", points = 5 }}\n{more}"));
@@ -222,7 +222,7 @@ fn names_of_a_sector_stand_for_all() {
 #[test]
 fn frequencies_by_nodal_diameter() {
     let study = read("", "", "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n").unwrap();
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     let table = &data.tables[0];
     let (d, f) = (table.integers("nodal_diameter").unwrap(), table.numbers("frequency_Hz").unwrap());
     let joints = table.texts("joints").unwrap();
@@ -247,7 +247,7 @@ fn campbell_crossings() {
     let kind =
         "[study]\nkind = \"campbell\"\nspeed = { from = \"20 Hz\", to = \"200 Hz\", points = 7 }\nengine_orders = 8\n";
     let crossings = |text: &str| {
-        let data = run(&read_study("c.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+        let data = run(&read_study("c.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
         data.tables.into_iter().find(|table| table.name == "crossings").unwrap()
     };
     let plain = sector
@@ -342,7 +342,7 @@ fn samples_of_a_disk_by_its_matrices() {
     for (own, drawn) in disk.deviations.iter().zip(stickslip::model::normal_pattern(6, 0.01, 3)) {
         assert!((own - ((1.0 + drawn).powi(2) - 1.0)).abs() < 1e-15, "a share of frequency is nearly two of stiffness");
     }
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     let tip = data.tables[0].numbers("tip_5_amplitude_m").unwrap();
     assert!(
@@ -355,7 +355,7 @@ fn samples_of_a_disk_by_its_matrices() {
 /// in a travelling wave. The ring is solved without its symmetry, with elastic, rigid and
 /// smooth friction.
 #[test]
-fn a_sector_by_its_matrices_with_a_joint_is_its_ring() {
+fn a_matrix_sector_with_a_joint_equals_its_ring() {
     let laws = [
         "kind = \"jenkins\", stiffness = \"2e3 N/m\", limit = \"0.2 N\"",
         "kind = \"coulomb\", limit = \"0.2 N\"",
@@ -404,7 +404,7 @@ fn a_campbell_diagram_of_a_sector_that_rotation_stiffens() {
                 engine_orders = 8\nmodes = 3\n";
     let key = "stiffened = { file = \"k100.mtx\", at = \"100 Hz\", speed = \"speed\" }";
     let study = stiffened(key, "boundary = \"pairs.csv\"", &format!("{SHROUD}{kind}")).unwrap();
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     let expected = |diameter: u64, speed: f64, stuck: bool| -> Vec<f64> {
         let waves = 2.0 * (1.0 - (TAU * diameter as f64 / 6.0).cos());
@@ -539,10 +539,10 @@ fn in_space(disk: &str, more: &str) -> Result<Study, StudyError> {
 
 /// Coordinates determine the matching nodes of both sides, and verify the stated pairs.
 #[test]
-fn coordinates_tell_a_wrong_sector() {
+fn coordinates_detect_a_wrong_sector() {
     let study = "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n";
     let frequencies = |disk: &str| {
-        let data = run(&in_space(disk, study).unwrap(), &Context::unwatched(1)).unwrap();
+        let data = run(&in_space(disk, study).unwrap(), &Context::without_progress(1)).unwrap();
         // the error of six modes relative to the full structure, in every row
         let errors = data.tables[0].numbers("reduction_error").unwrap();
         assert!(errors.iter().all(|error| *error == errors[0] && *error >= 0.0));
@@ -594,7 +594,7 @@ fn dense_modes(model: &Model) -> (Vec<String>, Vec<(f64, Vec<f64>)>) {
 fn shapes_of_a_sector_are_those_of_the_ring() {
     let more = "[[place]]\nname = \"rim\"\ndof = \"2.x\"\n[study]\nkind = \"nodal-diameter\"\nmodes = 3\n";
     let study = in_space("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"", more).unwrap();
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     let table = &data.tables[0];
     let (names, modes) = dense_modes(&study.case(0).unwrap().model);
     let (diameters, found) = (table.integers("nodal_diameter").unwrap(), table.numbers("frequency_Hz").unwrap());
@@ -630,18 +630,18 @@ fn shapes_of_a_sector_are_those_of_the_ring() {
     }
     // the first mode of the nodal diameters 0 to 3
     let titles: Vec<&str> =
-        data.figure.panels.iter().filter(|panel| panel.picture).map(|panel| panel.title.as_str()).collect();
+        data.figure.panels.iter().filter(|panel| panel.equal_axes).map(|panel| panel.title.as_str()).collect();
     assert_eq!(titles.len(), 4);
     assert!(titles[1].starts_with("mode 1, 1 nodal diameter, "), "{titles:?}");
 }
 
 /// The shapes that the figure of kind `nodal-diameter` shows, and those that it omits.
 #[test]
-fn the_shapes_that_are_drawn() {
+fn drawn_mode_shapes() {
     let titles = |keys: &str| -> Vec<String> {
         let study = read("", "", &format!("[study]\nkind = \"nodal-diameter\"\nmodes = 2\n{keys}\n")).unwrap();
-        let panels = run(&study, &Context::unwatched(1)).unwrap().figure.panels;
-        panels.into_iter().filter(|panel| panel.picture).map(|panel| panel.title).collect()
+        let panels = run(&study, &Context::without_progress(1)).unwrap().figure.panels;
+        panels.into_iter().filter(|panel| panel.equal_axes).map(|panel| panel.title).collect()
     };
     assert_eq!(titles("shapes = false").len(), 0);
     // ω² = (k + 2 kc (1 - cos θ))/m, θ = 120 degrees, with the joints' springs
@@ -661,7 +661,7 @@ fn the_shapes_that_are_drawn() {
 fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
     let kind = "[study]\nkind = \"modes\"\nmode = 3\nharmonics = 1\nsamples = 64\namplitude = { from = \"10 mm\", to = \"10 m\", points = 2 }\n";
     let study = read("", "mistuning = { of = \"k\", deviation = \"5 %\", seed = 7 }", kind).unwrap();
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     let (names, modes) = dense_modes(&study.case(0).unwrap().model);
     let (hertz, shape) = &modes[2];
     let largest = shape.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap();
@@ -674,7 +674,7 @@ fn a_mode_of_a_mistuned_ring_has_the_shape_of_every_blade() {
         assert!((found - 10.0 * x / largest).abs() < 1e-2, "{name}: {found} {}", 10.0 * x / largest);
     }
     let titles: Vec<&str> =
-        data.figure.panels.iter().filter(|panel| panel.picture).map(|panel| panel.title.as_str()).collect();
+        data.figure.panels.iter().filter(|panel| panel.equal_axes).map(|panel| panel.title.as_str()).collect();
     assert!(titles.len() == 2 && titles[1].starts_with("mode 3 at 10 m, "), "{titles:?}");
 }
 
@@ -688,7 +688,7 @@ fn peaks_are_those_of_a_node_in_all_sectors() {
              [method]\nkind = \"harmonic-balance\"\nharmonics = 1\ntolerance = 0.9\n"
         );
         let study = in_space("sectors = 6\naxis = \"z\"\nboundary = \"right.csv\"", &more).unwrap();
-        let data = run(&study, &Context::unwatched(1)).unwrap();
+        let data = run(&study, &Context::without_progress(1)).unwrap();
         let peaks = data.tables.iter().find(|table| table.name == "peaks").unwrap();
         peaks.texts("mass").unwrap().to_vec()
     };
@@ -712,7 +712,7 @@ fn amplification_is_the_ratio_of_two_studies() {
              [method]\nkind = \"harmonic-balance\"\nharmonics = 1\ntolerance = 0.9\n"
         )
     };
-    let result = |text: &str| run(&read_study("disk.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+    let result = |text: &str| run(&read_study("disk.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
     let column = |text: &str, table: &str, name: &str| {
         let found = result(text);
         let table = found.tables.iter().find(|found| found.name == table).unwrap();
@@ -743,7 +743,7 @@ fn amplification_is_the_ratio_of_two_studies() {
     assert!(panel.title.contains("99.9 % below"), "{}", panel.title);
     // the figure of one case shows the disk's shape
     let one = result(&text("3 %", ""));
-    assert!(one.figure.panels.iter().any(|panel| panel.picture), "{:?}", one.figure.panels.len());
+    assert!(one.figure.panels.iter().any(|panel| panel.equal_axes), "{:?}", one.figure.panels.len());
 }
 
 #[test]

@@ -94,7 +94,7 @@ fn the_example_of_the_design_reads() {
     let frequencies = case.frequencies.unwrap();
     assert_eq!((frequencies.len(), frequencies.get(0)), (241, Some(119.5 * TAU)));
     assert!(study.case(4).is_err());
-    let resolved = study.resolved();
+    let resolved = study.to_record();
     assert_eq!(resolved["cases"][3]["parameters"]["Ft"]["si"], 8.0);
     assert_eq!(resolved["file"], EXAMPLE);
 }
@@ -133,7 +133,7 @@ fn set_replaces_a_parameter_and_everything_that_follows_from_it() {
 }
 
 #[test]
-fn transient_keys_arrive() {
+fn transient_keys_are_read() {
     let study_table = "[study]\nkind = \"transient\"\nrun_up = { from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }\n\
                        start = { blade1 = \"1 mm\" }\n";
     let text = format!("{}{study_table}", &EXAMPLE[..EXAMPLE.find("[study]").unwrap()]);
@@ -286,7 +286,7 @@ fn set_replaces_the_values_of_vary_and_says_so() {
     let case = study.case(0).unwrap();
     assert_eq!((case.varied[0].si, case.model.joints[0].law.values()), (3.0, vec![3.0]));
     assert_eq!(study.notes(), ["Ft = 3N from `--set` replaces the 4 values of `vary`."]);
-    assert_eq!(study.resolved()["replaced"][0]["values_in_file"], 4);
+    assert_eq!(study.to_record()["replaced"][0]["values_in_file"], 4);
     // the last of several counts; another parameter of `vary` keeps its values
     let text = EXAMPLE.replace("vary = { Ft = [", "vary = { kt = { from = 1, to = 9, points = 5 }, Ft = [");
     let study = read_study("fig06.toml", &text, &[set("Ft", "3 N"), set("Ft", "m * 10 m/s^2")].concat()).unwrap();
@@ -352,7 +352,7 @@ fn joint_law(directions: usize, law: &str) -> Result<law::SharedLaw, String> {
 }
 
 #[test]
-fn dimensions_are_raised_to_the_exponent_of_the_law() {
+fn dimensions_depend_on_exponents() {
     let with = |beta: &str, exponent: &str| {
         let law =
             format!("kind = \"bouc-wen\", stiffness = \"1 N/mm\", gamma = 0, beta = {beta}, exponent = {exponent}");

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use stickslip_study::schema::{FILE, Key, METHOD, Presence, SAMPLE, STUDY, Takes};
+use stickslip_study::schema::{FILE, Key, METHOD, Presence, SAMPLE, STUDY, ValueType};
 use stickslip_study::{kinds, read_file, run};
 use toml::{Table, Value};
 
@@ -271,14 +271,14 @@ fn walk(
     kind: Option<&'static kinds::Kind>,
     tried: &mut dyn FnMut(&str, &Key, Table),
 ) {
-    for key in keys.iter().filter(|key| key.is_taken()) {
+    for key in keys.iter().filter(|key| key.is_supported()) {
         if key.example != "[]" {
             tried(table, key, study_with(table, key, outer, kind));
         }
         let inner = match key.takes {
-            Takes::Table(keys) | Takes::TableOrNone(keys) | Takes::List(keys) => keys,
-            Takes::Sample => SAMPLE,
-            Takes::Method => METHOD,
+            ValueType::Table(keys) | ValueType::TableOrFalse(keys) | ValueType::List(keys) => keys,
+            ValueType::Sample => SAMPLE,
+            ValueType::Method => METHOD,
             _ => continue,
         };
         let name = if table.is_empty() { key.name.to_owned() } else { format!("{table}.{}", key.name) };

@@ -67,7 +67,7 @@ fn refusals(outcome: &Result<Dataset, StudyError>) -> Vec<String> {
 /// Checks and runs a study; returns whether it was accepted.
 fn hold(what: &str, text: &str) -> bool {
     let study = read_study("study.toml", text, &[]).unwrap_or_else(|error| panic!("{what}: {error}\n{text}"));
-    let (checked, run) = (check(&study), run(&study, &Context::unwatched(1)));
+    let (checked, run) = (check(&study), run(&study, &Context::without_progress(1)));
     match checked {
         Ok(_) => assert_eq!(refusals(&run), Vec::<String>::new(), "{what}: checked, and refused when it runs"),
         // the run refuses in the same words
@@ -88,7 +88,7 @@ fn every_kind_has_a_study_here() {
 }
 
 #[test]
-fn what_was_checked_is_not_refused_when_it_runs() {
+fn checked_studies_are_not_refused() {
     let (mut taken, mut refused) = (0, 0);
     for row in TABLE {
         for (kind, keys) in STUDIES {
@@ -123,7 +123,7 @@ fn a_method_is_refused_or_taken_when_it_is_checked() {
 /// A transient refuses a law that no integrator follows, and advises a width. With the advised
 /// width it runs.
 #[test]
-fn a_transient_that_needs_a_width_says_so() {
+fn transients_advise_a_width() {
     let mut smoothed = 0;
     for row in TABLE {
         let (_, keys) = STUDIES.iter().find(|(kind, _)| *kind == "transient").unwrap();

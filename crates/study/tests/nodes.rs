@@ -59,7 +59,7 @@ fn read(study: &str) -> Result<Study, StudyError> {
 }
 
 fn dataset(study: &str) -> Dataset {
-    run(&read(study).unwrap(), &Context::unwatched(1)).unwrap()
+    run(&read(study).unwrap(), &Context::without_progress(1)).unwrap()
 }
 
 fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
@@ -201,7 +201,8 @@ fn a_turned_face_is_the_same_contact() {
             if place.is_empty() { "z" } else { "n" },
         )
     };
-    let result = |text: &str| run(&read_study("turned.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap();
+    let result =
+        |text: &str| run(&read_study("turned.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
     let straight = result(&text("m", ""));
     let turned = result(&text("face", "[[place]]\nname = \"face\"\nof = \"m\"\nnormal = [\"-sin(a)\", 0, \"cos(a)\"]"));
     let column = |found: &Dataset, name: &str| found.tables[0].numbers(name).unwrap().to_vec();
@@ -219,7 +220,7 @@ fn a_turned_face_is_the_same_contact() {
 }
 
 #[test]
-fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
+fn invalid_rotated_faces_are_refused() {
     let error = |place: &str, directions: &str| {
         let text = format!(
             "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n{directions}\n[[place]]\nname = \"face\"\n{place}\n\
@@ -245,7 +246,7 @@ fn a_turned_face_that_cannot_be_is_refused_with_the_reason() {
 /// The normal direction does not depend on the order in which nodes are named: nodes of
 /// different orders are refused. An excitation amplitude whose square underflows is refused, too.
 #[test]
-fn normals_and_sizes_that_mislead_are_refused() {
+fn inconsistent_normals_are_refused() {
     let study = "[study]\nkind = \"orbit\"\nfrequency = \"1 Hz\"\n";
     let good = text(study)
         + "[[mass]]\nname = \"other\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n\
@@ -257,7 +258,7 @@ fn normals_and_sizes_that_mislead_are_refused() {
             Ok(study) => study,
             Err(error) => return Some(error.to_string()),
         };
-        run(&study, &Context::unwatched(1)).err().map(|error| error.to_string())
+        run(&study, &Context::without_progress(1)).err().map(|error| error.to_string())
     };
     assert_eq!(refused(&good), None);
     let turned = good.replace(

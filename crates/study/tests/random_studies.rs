@@ -21,7 +21,7 @@ use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::{self, Method, Options};
 use stickslip::orbit::{Accuracy, Orbit};
-use stickslip_study::dataset::{Dataset, Table, Values};
+use stickslip_study::dataset::{CellValues, Dataset, Table};
 use stickslip_study::run::{CONVERGED, Context, check, run};
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, read_study};
@@ -127,7 +127,7 @@ fn not_finite(table: &Table) -> Option<String> {
     let status = table.columns.iter().find(|column| column.name == "status");
     let all: Vec<String>;
     let status = match status.map(|column| &column.values) {
-        Some(Values::Text(status)) => status,
+        Some(CellValues::Text(status)) => status,
         // tables without a status contain converged orbits only
         _ => {
             all = vec![CONVERGED.to_owned(); table.rows()];
@@ -136,7 +136,7 @@ fn not_finite(table: &Table) -> Option<String> {
     };
     let timed = ["orbit", "loops", "motion"].contains(&table.name.as_str());
     for column in &table.columns {
-        let Values::Number(values) = &column.values else { continue };
+        let CellValues::Number(values) = &column.values else { continue };
         if !timed && !must_be_finite(&column.name) {
             continue;
         }
@@ -172,7 +172,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>, slowness: f64) -> R
         return Ok(None);
     }
     let summary = ModelSummary::new(&study).map_err(|error| error.to_string())?;
-    let (estimate, usual) = (summary.seconds, summary.usual_seconds);
+    let (estimate, usual) = (summary.longest_time_s, summary.usual_time_s);
     if estimate > number("STICKSLIP_RANDOM_LONG").map_or(LONG, |long| long as f64) {
         let kind = study.kind().name;
         return Ok(Some(Done { seed, kind, seconds: 0.0, estimate: 0.0, usual: 0.0, points: BTreeMap::new() }));
@@ -183,7 +183,7 @@ fn one(seed: u64, text: &str, slot: &Mutex<Option<Running>>, slowness: f64) -> R
     }
     let clock = Clock::start();
     let dataset =
-        run(&study, &Context::unwatched(1)).map_err(|error| format!("accepted, and then refused: {error}"))?;
+        run(&study, &Context::without_progress(1)).map_err(|error| format!("accepted, and then refused: {error}"))?;
     match fault(&study, &dataset) {
         Some(fault) => Err(fault),
         None => {

@@ -2,12 +2,12 @@
 //! single loops.
 
 use std::f64::consts::TAU;
-use stickslip_study::dataset::{Dataset, Emphasis, Panel, Style, Table, Values};
+use stickslip_study::dataset::{CellValues, Dataset, Emphasis, Panel, Style, Table};
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
 
 fn dataset(text: &str) -> Dataset {
-    run(&read_study("study.toml", text, &[]).unwrap(), &Context::unwatched(1)).unwrap()
+    run(&read_study("study.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap()
 }
 
 fn table<'a>(dataset: &'a Dataset, name: &str) -> &'a Table {
@@ -172,7 +172,7 @@ output = ["velocity", "acceleration", "harmonics", "receptance", "joint_force", 
 /// At this low frequency only springs and friction count: the joint slips at 2 N of the 5 N,
 /// and loads the other blade by 2 N.
 #[test]
-fn a_method_that_finds_nothing_is_followed_by_another_and_both_are_named() {
+fn auto_reports_the_replacing_method() {
     let found = dataset(
         r#"
 schema = 1
@@ -337,7 +337,7 @@ peak_of = "all"
     let single = dataset(&text.replace("peak_of = \"all\"", ""));
     let all = table(&single, "peaks");
     let (limits, heights) = (numbers(&single, "peaks", "Ft_N"), numbers(&single, "peaks", "amplitude_m"));
-    let Values::Text(masses) = &table(&found, "peaks").columns[1].values else { panic!() };
+    let CellValues::Text(masses) = &table(&found, "peaks").columns[1].values else { panic!() };
     for limit in [2.0, 8.0] {
         let highest = (0..all.rows()).filter(|&row| limits[row] == limit).map(|row| heights[row]).fold(0.0, f64::max);
         let rows = (0..masses.len()).filter(|&row| numbers(&found, "peaks", "Ft_N")[row] == limit);
@@ -506,7 +506,7 @@ fn axes_take_every_unit_of_their_quantity() {
 /// Without damping, friction with a small limit does not bound the resonance, so the curve has
 /// no peak. With damping it has one.
 #[test]
-fn a_peak_without_neighbours_is_none() {
+fn an_unbounded_point_is_not_a_peak() {
     let text = r#"
 schema = 1
 [[mass]]
@@ -561,7 +561,7 @@ amplitude = "{force}"
 /// number and place of the points. The peak equals that of the branch by arc length. SciPy's
 /// DOP853, swept up, is on it at 18.29 Hz.
 #[test]
-fn the_high_branch_goes_on_whatever_the_points_are() {
+fn the_upper_branch_is_followed_on_every_grid() {
     for frequency in ["points = 151", "points = 601", "tolerance = \"0.1 %\""] {
         for method in ["auto", "harmonic-balance"] {
             let range = format!("frequency = {{ from = \"10 Hz\", to = \"25 Hz\", {frequency} }}");
@@ -584,7 +584,7 @@ fn the_high_branch_goes_on_whatever_the_points_are() {
 /// `auto` uses the event-driven method if Iwan's distribution is a few sliders, and harmonic
 /// balance otherwise. One table has the columns of both.
 #[test]
-fn cases_of_two_methods_stand_in_one_table() {
+fn cases_of_two_methods_share_a_table() {
     let law = r#"kind = "iwan", stiffness = "2 N/mm", limit = "1 N", chi = -0.5, beta = 0.3, elements = "n""#;
     let rest = r#"
 [parameters]
@@ -610,7 +610,7 @@ vary = { n = [4, 0, 4] }"#;
 /// there: a note says that the table has another orbit. With twenty times the damping the bend
 /// is a hundredth of the width, and there is one orbit.
 #[test]
-fn a_curve_that_folds_is_followed_both_ways() {
+fn a_folded_curve_is_swept_in_both_directions() {
     let study = |stiffness: &str, damping: f64, points: usize| {
         let law = format!("kind = \"cubic\", stiffness = \"{stiffness} N/m^3\"");
         let range = format!("frequency = {{ from = \"13 Hz\", to = \"20 Hz\", points = {points} }}");
@@ -634,7 +634,7 @@ fn a_curve_that_folds_is_followed_both_ways() {
 /// which is independent of points and direction. The rows of the reverse sweep are on that
 /// branch, and the figure shows them.
 #[test]
-fn a_peak_that_only_the_way_back_meets_is_found() {
+fn the_reverse_sweep_finds_its_peak() {
     let study = |kind: &str, points: &str| {
         let range = format!("frequency = {{ from = \"14 Hz\", to = \"17 Hz\" {points} }}");
         let rest = format!("[study]\nkind = \"{kind}\"\n{range}");
@@ -691,7 +691,7 @@ vary = { k3 = ["-1e9 N/m^3", "-1 N/m^3"] }"#;
 /// model approached it slowly and gave up 3 % below. Both peaks by arc length must be found on
 /// every grid.
 #[test]
-fn tops_in_front_of_a_fold_are_found_on_coarse_curves() {
+fn peaks_near_folds_are_found_on_coarse_grids() {
     let two = r#"
 [[mass]]
 name = "a0"
@@ -855,7 +855,7 @@ amplitude = "2 N"
 /// The contact state of joints with faces is stick, slip or apart; a stop is closed or open, by
 /// its force; a spring has none. All methods agree.
 #[test]
-fn contact_is_said_of_what_has_faces() {
+fn contact_states_need_faces() {
     let contacts = |law: &str, method: &str| {
         let found = single(law, &format!("kind = \"orbit\"\nfrequency = \"4 Hz\"\n[method]\nkind = \"{method}\""));
         let words = table(&found, "orbit").texts("j_contact").unwrap().to_vec();
@@ -945,15 +945,15 @@ fn a_decay_with_creep_has_no_negative_damping() {
 /// A run that stops after all points of a unit, but before the search for its peaks, has not
 /// finished that unit. A continued run computes the unit again, with its peaks.
 #[test]
-fn a_unit_without_its_peaks_is_not_whole() {
+fn a_unit_without_its_peaks_is_unfinished() {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     let text = stickslip_study::templates::find("blade-couple").unwrap().study.replace("points = 241", "points = 41");
     let checked = stickslip_study::run::check(&read_study("couple.toml", &text, &[]).unwrap()).unwrap();
-    let rows = |block: &stickslip_study::block::Block, name: &str| {
+    let rows = |block: &stickslip_study::result_block::Block, name: &str| {
         block.tables.iter().find(|table| table.name == name).unwrap().rows()
     };
-    let whole = checked.block(0..1, &Context::unwatched(1)).unwrap();
+    let whole = checked.block(0..1, &Context::without_progress(1)).unwrap();
     let points = rows(&whole, "curve");
     assert!(whole.tally.is_whole() && rows(&whole, "peaks") > 0 && points == 41);
     for last in [points - 1, points] {
@@ -964,7 +964,7 @@ fn a_unit_without_its_peaks_is_not_whole() {
                 set.store(true, Ordering::Relaxed);
             }
         };
-        let context = Context { stop, finished: Arc::new(count), ..Context::unwatched(1) };
+        let context = Context { stop, finished: Arc::new(count), ..Context::without_progress(1) };
         let cut = checked.block(0..1, &context).unwrap();
         assert!(!cut.tally.is_whole(), "stopped after {last} of {points} points");
     }
@@ -1017,7 +1017,7 @@ fn contacts_of_all_cases_are_drawn() {
 
 /// Places, forces and states have different colours in the legend of a figure.
 #[test]
-fn no_two_names_have_one_colour() {
+fn colours_are_unique() {
     let found = on_faces("\"0.5 N\", \"1 N\"");
     let named = found.figure.panels.iter().flat_map(|panel| &panel.series).filter(|series| !series.label.is_empty());
     let mut colours: std::collections::BTreeMap<usize, &str> = std::collections::BTreeMap::new();
@@ -1118,7 +1118,7 @@ kind = "event-driven"
 /// Backbone of a mass on a cubic spring: the half of peak-to-peak includes the third harmonic;
 /// the first harmonic has another column.
 #[test]
-fn modes_tell_amplitude_and_first_harmonic() {
+fn modes_have_amplitude_and_first_harmonic() {
     let text = r#"
 schema = 1
 [[mass]]

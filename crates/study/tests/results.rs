@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, atomic::AtomicBool};
-use stickslip_study::dataset::{Dataset, Values};
+use stickslip_study::dataset::{CellValues, Dataset};
 use stickslip_study::kinds::{hysteresis, performance, response};
 use stickslip_study::results::{ResultsError, worst_evidence};
 use stickslip_study::run::{Context, run};
@@ -11,7 +11,7 @@ use stickslip_study::{Study, read_study};
 
 fn of(text: &str) -> (Study, Dataset) {
     let study = read_study("study.toml", text, &[]).unwrap();
-    let dataset = run(&study, &Context::unwatched(1)).unwrap();
+    let dataset = run(&study, &Context::without_progress(1)).unwrap();
     (study, dataset)
 }
 
@@ -187,11 +187,11 @@ const REFINED: f64 = 1e-9;
 #[test]
 fn performance_curves_are_made_of_the_peaks_of_responses() {
     let study = couple("performance", r#"kt = ["8000 N/m", "10000 N/m"], Ft = ["4 N", "6.5 N", "9 N"]"#);
-    let dataset = run(&study, &Context::unwatched(1)).unwrap();
+    let dataset = run(&study, &Context::without_progress(1)).unwrap();
     let curves = performance::curves(&study, &dataset).unwrap();
     let peak_of_response = |kt: f64, limit: f64| {
         let study = couple("response", &format!(r#"kt = ["{kt} N/m"], Ft = ["{limit} N"]"#));
-        let dataset = run(&study, &Context::unwatched(1)).unwrap();
+        let dataset = run(&study, &Context::without_progress(1)).unwrap();
         response::curves(&study, &dataset).unwrap()[0].masses[0].highest_peak().unwrap()
     };
     assert_eq!(curves.len(), 2);
@@ -240,7 +240,7 @@ vary = { c = ["0.1 kg/s", "0.2 kg/s", "0.3 kg/s"] }
 fn an_interrupted_run_has_what_was_finished() {
     let stopped = |kind: &str| {
         let study = couple(kind, r#"Ft = ["4 N", "6 N", "8 N"]"#);
-        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::unwatched(1) };
+        let context = Context { stop: Arc::new(AtomicBool::new(true)), ..Context::without_progress(1) };
         let dataset = run(&study, &context).unwrap();
         assert!(dataset.record.interrupted);
         (study, dataset)
@@ -254,7 +254,7 @@ fn an_interrupted_run_has_what_was_finished() {
 }
 
 #[test]
-fn what_is_not_the_result_of_the_study_is_refused() {
+fn foreign_results_are_refused() {
     let (study, dataset) = oscillators(SWEEP);
     let wrong_kind = hysteresis::loops(&study, &dataset).unwrap_err();
     assert!(wrong_kind.to_string().contains("`study` is of kind `response`"), "{wrong_kind}");
@@ -264,7 +264,7 @@ fn what_is_not_the_result_of_the_study_is_refused() {
     let column = response::curves(&study, &broken).unwrap_err();
     assert!(column.to_string().contains("`curve` of `study` lacks the column `fast_amplitude_m`"), "{column}");
     let mut broken = dataset.clone();
-    let Values::Number(values) = &mut broken.tables[1].columns[3].values else {
+    let CellValues::Number(values) = &mut broken.tables[1].columns[3].values else {
         panic!("k, c, mass, then the frequency")
     };
     values.pop();
@@ -281,7 +281,7 @@ fn the_worst_evidence_is_the_largest() {
     let (_, mut dataset) = oscillators(SWEEP);
     let (mut largest, mut least) = (0.0f64, f64::INFINITY);
     for column in dataset.tables[0].columns.iter_mut().filter(|column| column.name == "energy_gap") {
-        let Values::Number(values) = &mut column.values else { panic!("a gap is a number") };
+        let CellValues::Number(values) = &mut column.values else { panic!("a gap is a number") };
         values[3] = 0.5;
         values[4] = f64::NAN;
         values.iter().for_each(|value| (largest, least) = (largest.max(*value), least.min(*value)));
@@ -297,7 +297,7 @@ fn the_worst_evidence_is_the_largest() {
 /// Rigid joints in a triangle become indistinguishable within the first period, and the transient
 /// breaks down. The rows until then exist, and their summary covers them.
 #[test]
-fn a_transient_that_breaks_down_keeps_what_it_has() {
+fn an_aborted_transient_keeps_its_rows() {
     let text = r#"
 schema = 1
 [[mass]]
@@ -358,7 +358,7 @@ cycles = 20
 /// A note reports a stuck joint in a model with a stop: the position at which it sticks
 /// determines when the stop closes. Without the stop, or if the joint slips, there is no note.
 #[test]
-fn a_stuck_joint_beside_a_stop_is_told() {
+fn a_stuck_joint_with_a_stop_is_reported() {
     let stop = "[[joint]]\nname = \"stop\"\nbetween = [\"b\", \"ground\"]\nlaw = { kind = \"gap\", gap = \"0.05 mm\", stiffness = \"30 N/mm\" }\n";
     let (rigid, spring) = (r#"kind = "coulomb""#, r#"kind = "jenkins", stiffness = "20 N/mm""#);
     for (limit, law, stop, told) in [
@@ -418,7 +418,7 @@ kind = "event-driven"
 /// the return map is then that of slip: 1.41 for a stable orbit, without the contact that stays
 /// open. Such an orbit is one of a continuum, and its stability is unknown.
 #[test]
-fn what_sticks_up_to_its_limit_is_not_called_unstable() {
+fn sticking_up_to_the_limit_has_unknown_stability() {
     let text = r#"
 schema = 1
 [[mass]]

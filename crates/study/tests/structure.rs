@@ -83,7 +83,7 @@ fn results(folder: &Path, text: &str) -> Dataset {
     let path = folder.join("study.toml");
     std::fs::write(&path, text).unwrap();
     let study = read_file(&path, &[]).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
-    let data = run(&study, &Context::unwatched(1)).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
     assert!(data.failures.is_empty(), "{:?}", data.failures);
     data
 }
@@ -151,7 +151,7 @@ fn files_of_several_formats_and_units_have_one_response() {
 /// The error of a reduced model is at most the recorded one, for each kind of reduction and by
 /// every method.
 #[test]
-fn reductions_are_as_good_as_they_say() {
+fn reduced_models_meet_their_error() {
     let brick = blade();
     let (node, z) = (tip(&brick, 0, 1), brick.row([8, 0, 1], 2).unwrap());
     let folder = tempfile::tempdir().unwrap();
@@ -214,7 +214,7 @@ fn errors_are_those_of_the_studys_frequencies() {
 /// Along x the mass of 8 elements with a fixed first face is `ρ V (1 - (2/3)/8)`: the square of
 /// a line from 0 to 1 has the mean 1/3.
 #[test]
-fn a_structure_says_what_it_weighs() {
+fn summary_states_the_mass() {
     let brick = blade();
     let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
     // written in tonnes and newtons per millimetre
@@ -236,7 +236,7 @@ fn a_structure_says_what_it_weighs() {
 
 /// If two matrices differ in size, the message names the file with fewer rows as truncated.
 #[test]
-fn a_stiffness_cut_short_is_named() {
+fn a_truncated_matrix_is_named() {
     let brick = blade();
     let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
     write_pair(folder.path(), &brick, "sti", (1.0, 1.0));
@@ -263,7 +263,7 @@ fn early(line: &str) -> bool {
 /// Without an excitation frequency the range of a reduction is undetermined, and the message
 /// asks for it.
 #[test]
-fn modes_of_a_structure_need_an_end() {
+fn a_reduction_needs_a_frequency_range() {
     let brick = blade();
     let (node, folder) = (tip(&brick, 0, 1), tempfile::tempdir().unwrap());
     write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
@@ -338,7 +338,7 @@ fn masses_and_springs_are_added_at_places() {
 /// A row of the structure has an imposed motion. The others equal a dense solution with its
 /// column on the right-hand side.
 #[test]
-fn rows_can_be_moved() {
+fn rows_can_have_imposed_motions() {
     let brick = blade();
     let (node, z) = (tip(&brick, 0, 0), brick.row([8, 0, 0], 2).unwrap());
     let other = brick.row([4, 1, 1], 2).unwrap();
@@ -424,7 +424,7 @@ fn rows_of_a_frame_are_taken_by_their_names() {
 
 /// Each error names the file or key, and what to do.
 #[test]
-fn what_is_wrong_is_said() {
+fn errors_name_file_or_key() {
     let brick = blade();
     let node = tip(&brick, 0, 1);
     let folder = tempfile::tempdir().unwrap();
@@ -813,7 +813,7 @@ fn orders_of_residual_vectors() {
 /// The error of the reduction is in every row with an orbit or a frequency, of every kind: in
 /// all tables except time samples.
 #[test]
-fn the_error_of_the_reduction_stands_beside_every_result() {
+fn every_result_has_its_reduction_error() {
     let brick = blade();
     let folder = tempfile::tempdir().unwrap();
     write_pair(folder.path(), &brick, "npz", (1.0, 1.0));
@@ -889,7 +889,7 @@ fn write_chain(folder: &Path, masses: usize) {
 /// Harmonics of a joint meet modes far above the excitation, here the seventh harmonic. The
 /// default frequency range contains these modes. This small structure is not reduced by default.
 #[test]
-fn few_coordinates_know_the_modes_that_harmonics_of_a_joint_meet() {
+fn default_reduction_covers_joint_harmonics() {
     let folder = tempfile::tempdir().unwrap();
     write_chain(folder.path(), 60);
     let of = |reduce: &str| {
@@ -943,7 +943,7 @@ fn a_structure_without_stiffness() {
 /// range of the reduced model. The note of the run states the difference from all rows, here
 /// computed by another method.
 #[test]
-fn what_few_coordinates_leave_out_of_the_harmonics_of_joints_is_measured() {
+fn reduction_error_of_joint_harmonics_is_measured() {
     const MASSES: usize = 300;
     let folder = tempfile::tempdir().unwrap();
     write_chain(folder.path(), MASSES);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use stickslip_study::run::{Context, check, run};
-use stickslip_study::summary::{ModelSummary, Orbits};
+use stickslip_study::summary::{ModelSummary, OrbitCount};
 use stickslip_study::{Study, read_study, templates};
 
 fn study(text: &str) -> Study {
@@ -36,7 +36,7 @@ fn silent(text: &str) {
 }
 
 #[test]
-fn starting_studies_have_nothing_to_warn_of() {
+fn templates_have_no_warnings() {
     for row in templates::TABLE {
         let mut warnings = summary(row.study).warnings;
         // only friction keeps a friction ring in place
@@ -46,7 +46,7 @@ fn starting_studies_have_nothing_to_warn_of() {
 }
 
 #[test]
-fn the_couple_says_its_modes_and_where_it_slips() {
+fn summary_of_the_couple() {
     let text = summary(templates::find("blade-couple").unwrap().study).to_string();
     // free 121.25 Hz (theory 6.1), damping 7.23e-4; strongest stuck force 19.7237 N at 120.9589
     // Hz (6.8): 2 N are 10.1 % of it
@@ -66,7 +66,7 @@ fn the_couple_says_its_modes_and_where_it_slips() {
 }
 
 #[test]
-fn a_model_that_nothing_drives() {
+fn a_model_without_excitation() {
     warns(&template("blade-couple", &[("F0 = \"10 N\"", "F0 = \"0 N\"")]), &["all forces and motions are zero"]);
     warns(
         &template("blade-couple", &[("amplitude = \"F0\"", "amplitude = \"F0\"\nharmonic = 0")]),
@@ -95,7 +95,7 @@ fn a_model_that_nothing_drives() {
 }
 
 #[test]
-fn masses_that_nothing_holds() {
+fn unconstrained_masses() {
     let edits = [("[[joint]]", "[[mass]]\nname = \"lost\"\nmass = \"1 g\"\n\n[[joint]]")];
     warns(&template("blade-couple", &edits), &["`lost` can move freely"]);
     let ground = [
@@ -108,7 +108,7 @@ fn masses_that_nothing_holds() {
 /// A block on a contact whose preload pushes it away: there is no warning if a force pushes it
 /// back.
 #[test]
-fn a_preload_that_nothing_balances() {
+fn an_unbalanced_preload() {
     let block = |press: &str| {
         format!(
             "schema = 1\n[[mass]]\nname = \"block\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[joint]]\nname = \"foot\"\n\
@@ -122,7 +122,7 @@ fn a_preload_that_nothing_balances() {
 }
 
 #[test]
-fn parameters_that_nothing_uses() {
+fn unused_parameters() {
     let edits = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\"\nother = \"2 * spare\"")];
     warns(&template("blade-couple", &edits), &["uses the parameter `spare`, `other`"]);
     let varied = [("F0 = \"10 N\"", "F0 = \"10 N\"\nspare = \"1 N\""), ("vary = { Ft =", "vary = { spare =")];
@@ -253,7 +253,7 @@ fn warnings_stand_in_the_record() {
         "blade-couple",
         &[("from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241", "from = \"100 Hz\", to = \"110 Hz\", points = 3")],
     );
-    let context = Context::unwatched(1);
+    let context = Context::without_progress(1);
     let dataset = run(&study(&text), &context).unwrap();
     assert!(dataset.notes[0].starts_with("warning: no resonance"), "{:?}", dataset.notes);
     let record = &dataset.record.study["summary"];
@@ -263,7 +263,7 @@ fn warnings_stand_in_the_record() {
 }
 
 #[test]
-fn an_optimum_at_the_edge_is_warned_of() {
+fn an_optimum_at_the_boundary_gives_a_warning() {
     let text = template(
         "blade-couple",
         &[
@@ -272,7 +272,7 @@ fn an_optimum_at_the_edge_is_warned_of() {
             ("\"2 N\", \"4 N\", \"6 N\", \"8 N\"", "\"2 N\", \"3 N\", \"4 N\""),
         ],
     );
-    let context = Context::unwatched(1);
+    let context = Context::without_progress(1);
     let notes = run(&study(&text), &context).unwrap().notes;
     assert!(
         notes.iter().any(|note| note.starts_with("warning: the lowest peak is at an end of the values of Ft")),
@@ -284,12 +284,12 @@ fn an_optimum_at_the_edge_is_warned_of() {
 /// memory limit.
 fn refused(text: &str, key: &str) {
     let study = study(text).with_memory_limit(2_000_000_000);
-    let context = Context { finished: Arc::new(|| panic!("nothing is computed")), ..Context::unwatched(1) };
+    let context = Context { finished: Arc::new(|| panic!("nothing is computed")), ..Context::without_progress(1) };
     let error = run(&study, &context).unwrap_err();
     assert!(error.message().contains("GB of memory") && error.message().contains("the limit is 2.0 GB"), "{error}");
     assert!(error.help_text().unwrap().contains(key) && error.line().is_some(), "{error:?}");
     let size = ModelSummary::new(&study).unwrap().size;
-    assert!(size.memory < size.whole && size.whole > 2_000_000_000, "{size:?}");
+    assert!(size.memory < size.memory_all_tables && size.memory_all_tables > 2_000_000_000, "{size:?}");
     // a run that writes its tables continuously is refused at its own size
     let error = check(&study.clone().with_memory_limit(size.memory - 1)).unwrap_err();
     assert!(error.message().contains("B of memory"), "{error}");
@@ -355,7 +355,7 @@ fn a_branch_is_counted_by_what_it_keeps() {
 
 #[test]
 fn sizes_are_those_of_the_tables() {
-    let context = Context::unwatched(1);
+    let context = Context::without_progress(1);
     let small = ("points = 241", "points = 7");
     let one = ("vary = { Ft = [\"2 N\", \"4 N\", \"6 N\", \"8 N\"] }", "");
     let drive = "kind = \"response\"\nfrequency = { from = \"119.5 Hz\", to = \"122.5 Hz\", points = 241 }";
@@ -399,9 +399,9 @@ fn sizes_are_those_of_the_tables() {
 fn the_time_is_estimated_within_bounds() {
     // A run of a second must not be estimated at an hour, nor the reverse. A property test
     // checks a factor of ten.
-    let small = summary(templates::find("element").unwrap().study).seconds;
+    let small = summary(templates::find("element").unwrap().study).longest_time_s;
     assert!((0.05..2.0).contains(&small), "{small}");
-    let points = |count: &str| summary(&template("blade-couple", &[("points = 241", count)])).seconds;
+    let points = |count: &str| summary(&template("blade-couple", &[("points = 241", count)])).longest_time_s;
     let (few, many) = (points("points = 1000"), points("points = 100000"));
     assert!(many > 50.0 * few && many < 100.0 * few, "{few} {many}");
 }
@@ -409,7 +409,7 @@ fn the_time_is_estimated_within_bounds() {
 /// Measured: ten million orbits of the couple take 282 s of processor time. The summary also
 /// states the longest time.
 #[test]
-fn the_usual_time_is_told_beside_the_longest() {
+fn usual_and_longest_time_are_stated() {
     let text = template(
         "blade-couple",
         &[
@@ -418,8 +418,8 @@ fn the_usual_time_is_told_beside_the_longest() {
         ],
     );
     let summary = summary(&text);
-    assert!((140.0..1000.0).contains(&summary.usual_seconds), "{}", summary.usual_seconds);
-    assert!(summary.usual_seconds < summary.seconds);
+    assert!((140.0..1000.0).contains(&summary.usual_time_s), "{}", summary.usual_time_s);
+    assert!(summary.usual_time_s < summary.longest_time_s);
     let said = summary.to_string();
     assert!(said.contains("minutes on one thread, up to "), "{said}");
 }
@@ -466,10 +466,10 @@ harmonics = 15
         ))
     };
     let large = ring(96);
-    assert!((0.4..4.0).contains(&large.seconds), "{} s", large.seconds);
-    assert!(large.usual_seconds < large.seconds);
+    assert!((0.4..4.0).contains(&large.longest_time_s), "{} s", large.longest_time_s);
+    assert!(large.usual_time_s < large.longest_time_s);
     // with banded matrices the time is proportional to the number of blades, plus a constant
-    let growth = (ring(192).seconds - large.seconds) / (large.seconds - ring(48).seconds);
+    let growth = (ring(192).longest_time_s - large.longest_time_s) / (large.longest_time_s - ring(48).longest_time_s);
     assert!((1.5..3.0).contains(&growth), "{growth}");
 }
 
@@ -478,7 +478,7 @@ harmonics = 15
 /// - 36 mistuned sectors of two masses, event-driven, at nine distant frequencies;
 /// - a ring of 300 rigid joints with five harmonics, without a warm start.
 #[test]
-fn the_usual_time_is_that_which_was_measured() {
+fn usual_time_agrees_with_measurements() {
     let contacts = r#"
 schema = 1
 [parameters]
@@ -585,8 +585,8 @@ harmonics = 5
 "#;
     for (name, text, measured) in [("contacts", contacts, 1.07), ("sectors", sectors, 16.2), ("ring", ring, 2.1)] {
         let summary = summary(text);
-        let usual = summary.usual_seconds;
-        assert!(usual <= summary.seconds, "{name}: {usual} s, up to {} s", summary.seconds);
+        let usual = summary.usual_time_s;
+        assert!(usual <= summary.longest_time_s, "{name}: {usual} s, up to {} s", summary.longest_time_s);
         assert!((measured / 3.0..3.0 * measured).contains(&usual), "{name}: {usual} s, measured {measured} s");
     }
 }
@@ -600,7 +600,7 @@ fn peaks_are_refined_where_resonances_are() {
         let given = r#"frequency = { from = "119.5 Hz", to = "122.5 Hz", points = 241 }"#;
         let cases = r#"vary = { Ft = { from = "1 N", to = "10 N", points = 1000 } }"#;
         let vary = r#"vary = { Ft = ["2 N", "4 N", "6 N", "8 N"] }"#;
-        summary(&template("blade-couple", &[(given, &range), (vary, cases)])).seconds
+        summary(&template("blade-couple", &[(given, &range), (vary, cases)])).longest_time_s
     };
     // at 121 Hz and below the contact's own resonance: nearest to the middle of the first
     // range, to an end of the second
@@ -614,7 +614,7 @@ fn peaks_are_refined_where_resonances_are() {
 /// blades, one preload, on one thread, and of 12 mistuned blades. The three points of the last
 /// study are distant, and every orbit of its peak has no warm start. It was stopped after 36 s.
 #[test]
-fn the_usual_time_of_wedges_is_that_which_was_measured() {
+fn usual_time_of_wedges_agrees_with_measurements() {
     let vary = r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#;
     let mistuned = "sectors = \"N\"\nmistuning = { of = \"kx\", deviation = \"2 %\", seed = 7 }";
     let tuned = "sectors = \"N\"";
@@ -630,8 +630,8 @@ fn the_usual_time_of_wedges_is_that_which_was_measured() {
         let edits = [("N = 12 ", &*blades), ("points = 71 ", &points), (vary, ""), (tuned, disk)];
         let text = template("under-platform-wedge", &edits);
         let summary = summary(&text);
-        let usual = summary.usual_seconds;
-        assert!(usual <= summary.seconds, "{blades}, {points}: {usual} s, up to {} s", summary.seconds);
+        let usual = summary.usual_time_s;
+        assert!(usual <= summary.longest_time_s, "{blades}, {points}: {usual} s, up to {} s", summary.longest_time_s);
         assert!(
             (measured / 3.0..3.0 * measured).contains(&usual),
             "{blades}, {points}: {usual} s, measured {measured} s"
@@ -648,7 +648,7 @@ fn a_branch_of_a_tuned_disk_takes_the_time_of_a_sector() {
     let vary = (r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#, "");
     let seconds = |blades: &str| {
         let edits = [kind, (", points = 71", ""), vary, (method, "\n"), ("references = true", ""), ("N = 12 ", blades)];
-        summary(&template("under-platform-wedge", &edits)).usual_seconds
+        summary(&template("under-platform-wedge", &edits)).usual_time_s
     };
     let (few, many) = (seconds("N = 12 "), seconds("N = 36 "));
     assert!((0.7..7.0).contains(&few) && (few - many).abs() < 0.2 * few, "{few} s, {many} s");
@@ -664,12 +664,12 @@ fn an_optimum_takes_its_time_if_there_is_one() {
         "blade-couple",
         &[small, kind, ("kind = \"coulomb\"", "kind = \"coulomb-arctan\", alpha = \"25 s/mm\"")],
     ));
-    let (least, place) = curve.spared.unwrap();
-    assert!(least < 0.2 * curve.usual_seconds, "{least} s of {} s", curve.usual_seconds);
+    let (least, place) = curve.time_without.unwrap();
+    assert!(least < 0.2 * curve.usual_time_s, "{least} s of {} s", curve.usual_time_s);
     assert!(curve.to_string().contains(place), "{curve}");
     // two values have none between them
     let two = (r#"["2 N", "4 N", "6 N", "8 N"]"#, r#"["2 N", "4 N"]"#);
-    assert!(summary(&template("blade-couple", &[kind, two])).spared.is_none());
+    assert!(summary(&template("blade-couple", &[kind, two])).time_without.is_none());
 }
 
 /// Measured: transients of 13 points take 0.4 s with the exact law, 26 s with the smooth one.
@@ -688,9 +688,9 @@ fn transients_usually_die_with_the_modes_that_are_driven() {
             ],
         );
         let summary = summary(&(text + "\n[method]\nkind = \"transient\"\n"));
-        let usual = summary.usual_seconds;
+        let usual = summary.usual_time_s;
         assert!((0.5 * measured..10.0 * measured).contains(&usual), "{usual} s, measured {measured} s");
-        assert!(summary.seconds > 50.0 * usual, "{} s", summary.seconds);
+        assert!(summary.longest_time_s > 50.0 * usual, "{} s", summary.longest_time_s);
     }
 }
 
@@ -699,13 +699,13 @@ fn transients_usually_die_with_the_modes_that_are_driven() {
 #[test]
 fn several_orbits_are_announced() {
     let coulomb = r#"law = { kind = "coulomb", limit = "Ft" }"#;
-    assert_eq!(summary(&template("blade-couple", &[])).orbits, Some(Orbits::One));
+    assert_eq!(summary(&template("blade-couple", &[])).orbits, Some(OrbitCount::One));
     let falling = r#"law = { kind = "stribeck", limit = "Ft", static_limit = "1.5*Ft", velocity = "1 mm/s" }"#;
     let falling = summary(&template("blade-couple", &[(coulomb, falling)]));
-    assert_eq!(falling.orbits, Some(Orbits::Several("`stribeck` of shroud".to_owned())));
+    assert_eq!(falling.orbits, Some(OrbitCount::Several("`stribeck` of shroud".to_owned())));
     assert!(falling.to_string().contains("several may exist at one frequency (`stribeck` of shroud)"), "{falling}");
     let stop = summary(&stop(r#"kind = "gap", gap = "1 mm", stiffness = "1e5 N/m""#, ""));
-    assert_eq!(stop.orbits, Some(Orbits::Several("`gap` of j".to_owned())));
+    assert_eq!(stop.orbits, Some(OrbitCount::Several("`gap` of j".to_owned())));
 }
 
 /// A stop for a mass of 1 kg, with a gap as a bare number, and a figure with references.
@@ -755,7 +755,7 @@ fn references_that_no_law_has_are_missed_before_the_run() {
         assert!(warning.contains(&words), "{warning}");
     }
     // a run reports it once
-    let notes = run(&study(&text), &Context::unwatched(1)).unwrap().notes;
+    let notes = run(&study(&text), &Context::without_progress(1)).unwrap().notes;
     assert_eq!(notes.iter().filter(|note| note.contains("no reference curve")).count(), 2, "{notes:?}");
     silent(&stop("kind = \"gap\", gap = \"1 mm\", stiffness = \"1 N/mm\"", references));
 }
@@ -769,13 +769,13 @@ fn references_of_draws_are_missed_before_the_run() {
     let text = stop(law, sample).replace("schema = 1", "schema = 1\n[parameters]\nc = \"1 kg/s\"");
     let text = text.replace("damping = \"5 N s/m\"", "damping = \"c\"");
     warns(&text, &["`references` has no effect", "[sample]"]);
-    let found = run(&study(&text), &Context::unwatched(1)).unwrap();
+    let found = run(&study(&text), &Context::without_progress(1)).unwrap();
     assert!(found.tables.iter().all(|table| table.name != "references"));
     assert_eq!(found.notes.iter().filter(|note| note.contains("`references` has no effect")).count(), 1);
 }
 
 #[test]
-fn a_long_run_says_so_at_its_start() {
+fn a_long_run_is_announced() {
     let points = |law: &str, count: &str| summary(&stop(law, "").replace("points = 11", count)).long_run();
     let smooth = "kind = \"bouc-wen\", stiffness = \"100 N/mm\", beta = \"500 1/m\", gamma = \"500 1/m\", exponent = 1";
     assert_eq!(points(smooth, "points = 11"), None);
@@ -826,12 +826,16 @@ output = "joint_mean"
 /// The spring of the structure takes the fraction `k/(k + kn)` of the preload, and the constant
 /// force is shared likewise. The mean of a small vibration is the same.
 #[test]
-fn what_the_structure_takes_of_a_preload() {
+fn preload_at_rest() {
     for (preload, constant, left) in [(40.0, 0.0, 10.0), (40.0, 40.0, 40.0), (40.0, 80.0, 70.0), (40.0, -40.0, -20.0)] {
         let text = pressed(&format!("{preload} N"), &format!("{constant} N"));
         let found = summary(&text);
         let normal = found.joints.iter().find(|joint| joint.name == "face.n" || joint.name == "face.z").unwrap();
-        assert!((normal.at_rest.unwrap() - left).abs() < 1e-9 * preload, "{:?} {left}", normal.at_rest);
+        assert!(
+            (normal.normal_force_at_rest.unwrap() - left).abs() < 1e-9 * preload,
+            "{:?} {left}",
+            normal.normal_force_at_rest
+        );
         let said = found.to_string();
         let words = match left {
             10.0 => "pressed with 10 N in static equilibrium; the structure carries 30 N of its preload of 40 N",
@@ -841,7 +845,7 @@ fn what_the_structure_takes_of_a_preload() {
         };
         assert!(said.contains(words), "{words}: {said}");
         if left > 0.0 {
-            let data = run(&study(&text), &Context::unwatched(1)).unwrap();
+            let data = run(&study(&text), &Context::without_progress(1)).unwrap();
             let column =
                 data.tables[0].columns.iter().find(|c| c.name.starts_with("face_") && c.name.contains("z_force_mean"));
             let column = column.unwrap_or_else(|| panic!("{:?}", data.tables[0].columns.iter().map(|c| &c.name)));
@@ -854,7 +858,7 @@ fn what_the_structure_takes_of_a_preload() {
 /// Contacts that are open at rest count as closed in the modes with all joints stuck, as in the
 /// reference curve of a figure.
 #[test]
-fn stuck_is_closed() {
+fn stuck_contacts_count_as_closed() {
     let hertz = |k: f64| (k / 2.0).sqrt() / std::f64::consts::TAU;
     for preload in ["0 N", "40 N"] {
         let found = summary(&pressed(preload, "0 N"));
@@ -871,7 +875,7 @@ fn stuck_is_closed() {
 /// A wedge without a load lies loose between its faces: one warning for all wedges says what is
 /// missing.
 #[test]
-fn wedges_that_nothing_presses() {
+fn wedges_without_load() {
     let edit = ("speed = \"2600 rpm\"", "speed = \"0 rpm\"");
     let alone = ("vary = { speed = [\"2000 rpm\", \"2600 rpm\", \"4000 rpm\", \"8000 rpm\"] }\n", "");
     let words = [
@@ -906,7 +910,7 @@ fn a_tuned_disk_is_warned_of_the_nodal_diameters_that_its_excitation_meets() {
 }
 
 #[test]
-fn what_only_rounding_loads_does_not_slip() {
+fn rounding_does_not_cause_slip() {
     let first = |amplitude: &str| {
         let text = format!(
             "schema = 1\nmodel = {{ template = \"bladed-disk\" }}\n[parameters]\nEO = 0\nF0 = \"{amplitude}\"\n[study]\nkind = \"response\"\n\
@@ -977,7 +981,7 @@ fn models_without_mass() {
 }
 
 #[test]
-fn stiffnesses_that_no_structure_has() {
+fn implausible_stiffness() {
     let stiff = JENKINS.replace("2 N/mm", "2e9 N/mm");
     warns(&rubbing(&stiff, &[]), &["225", "stiffness of `foot`, 2e12 N/m", "`coulomb`"]);
     let spring = rubbing(
@@ -1010,7 +1014,7 @@ fn stuck_bristles_damp() {
 /// An Iwan joint of 4 N slips completely at FS (1 + beta)/(KT (beta + (chi+1)/(chi+2))) = 4.105
 /// mm, and partly before.
 #[test]
-fn an_iwan_joint_says_its_macro_slip() {
+fn summary_states_macro_slip_of_iwan() {
     let law = "kind = \"iwan\", stiffness = \"2 N/mm\", limit = \"4 N\", chi = -0.5, beta = 0.3";
     let found = summary(&rubbing(law, &[]));
     let text = found.to_string();
@@ -1036,7 +1040,7 @@ fn bouc_wen_has_one_limit_and_both_references() {
     let found = summary(&text);
     assert!(found.to_string().contains("slips at 18.75 N, 1.25 mm of relative displacement"), "{found}");
     assert!(found.warnings.iter().all(|warning| !warning.contains("slip limit")), "{:?}", found.warnings);
-    let data = run(&study(&text), &Context::unwatched(1)).unwrap();
+    let data = run(&study(&text), &Context::without_progress(1)).unwrap();
     let table = data.tables.iter().find(|table| table.name == "references").unwrap();
     let column = |name: &str| table.numbers(name).unwrap();
     let linear = |k: f64, f: f64| {

@@ -84,7 +84,7 @@ fn rows(name: &str) -> Vec<Vec<f64>> {
 fn apart(rows: &[Vec<f64>], reduce: &str) -> Vec<(f64, &'static str, f64)> {
     let folder = folder(&format!("reduce = {reduce}"));
     let study = read_file(&folder.path().join("blade.toml"), &[]).unwrap();
-    let found = run(&study, &Context::unwatched(1)).unwrap();
+    let found = run(&study, &Context::without_progress(1)).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     let table = &found.tables[0];
     let hertz = table.numbers("frequency_Hz").unwrap();
@@ -149,7 +149,7 @@ fn inner_rows_of_incompatible_modes() {
         let path = folder.path().join("strip.toml");
         std::fs::write(&path, text).unwrap();
         let study = read_file(&path, &[]).unwrap();
-        let data = run(&study, &Context::unwatched(1)).unwrap();
+        let data = run(&study, &Context::without_progress(1)).unwrap();
         assert!(data.failures.is_empty(), "{:?}", data.failures);
         let table = &data.tables[0];
         let error = table.numbers("reduction_error").map_or(0.0, |errors| errors[0]);

@@ -63,7 +63,7 @@ fn tip() -> String {
 }
 
 fn computed(study: &Study) -> Dataset {
-    let found = run(study, &Context::unwatched(1)).unwrap();
+    let found = run(study, &Context::without_progress(1)).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     found
 }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Around, Disk, Mistuned, Model, ModelError, Ring, normal_pattern, too_far};
-use stickslip_study::schema::MOST_MASSES;
+use stickslip_study::schema::MAX_MASSES;
 
 /// Returns the distribution of a force or an imposed motion around a disk, if one is given.
 pub fn around(
@@ -108,10 +108,10 @@ pub fn ring(
                        [disk] in a study file or in Study.from_dict";
         return Err(error::model(py, message));
     }
-    let most = MOST_MASSES / sector.masses.len().max(1);
+    let most = MAX_MASSES / sector.masses.len().max(1);
     if disk.sectors > most {
         let message = format!(
-            "{} sectors with {} masses each exceed the limit of {MOST_MASSES} masses",
+            "{} sectors with {} masses each exceed the limit of {MAX_MASSES} masses",
             disk.sectors,
             sector.masses.len()
         );

@@ -243,7 +243,7 @@ impl RunRecord {
         let mut failures = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             *points.entry(row.status.to_owned()).or_default() += 1;
-            failures.extend(row.failure.iter().map(|reason| Failure { at: at(index), reason: reason.clone() }));
+            failures.extend(row.failure.iter().map(|reason| Failure { location: at(index), reason: reason.clone() }));
         }
         RunRecord { methods, notes: Vec::new(), failures, points, threads, seconds: start.elapsed().as_secs_f64() }
     }

@@ -3,7 +3,7 @@
 use stickslip::method::{Method, OrbitError};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
-use stickslip_study::dataset::{Column, Table, Values, column_name};
+use stickslip_study::dataset::{CellValues, Column, Table, column_name};
 use stickslip_study::hertz;
 
 /// Table row of one orbit, or of a failed point.
@@ -82,7 +82,7 @@ pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Metho
             columns.push(numbers(&format!("{}_{what}", joint.name()), &|row| row.joints[j][k]));
         }
     }
-    let stable = Values::Flag(rows.iter().map(|row| row.stable).collect());
+    let stable = CellValues::Flag(rows.iter().map(|row| row.stable).collect());
     columns.push(Column { name: "stable".to_owned(), values: stable });
     for (k, what) in ["residual", "energy_gap", "truncation", "return_defect"].into_iter().enumerate() {
         // If the method closes the motion, the residual is the return defect.
@@ -90,7 +90,7 @@ pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Metho
             columns.push(numbers(what, &|row| row.evidence[k]));
         }
     }
-    let iterations = Values::Integer(rows.iter().map(|row| row.iterations).collect());
+    let iterations = CellValues::Integer(rows.iter().map(|row| row.iterations).collect());
     columns.push(Column { name: "iterations".to_owned(), values: iterations });
     columns.push(Column::texts("found_by", rows.iter().map(|row| row.found_by.to_owned()).collect()));
     columns.push(Column::texts("status", rows.iter().map(|row| row.status.to_owned()).collect()));

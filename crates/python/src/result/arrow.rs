@@ -13,7 +13,7 @@ use pyo3::types::PyCapsule;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::ptr;
 use std::sync::Arc;
-use stickslip_study::dataset::{Column, Dataset, Values};
+use stickslip_study::dataset::{CellValues, Column, Dataset};
 
 #[repr(C)]
 struct ArrowSchema {
@@ -134,12 +134,12 @@ unsafe extern "C" fn release_stream(stream: *mut ArrowArrayStream) {
 }
 
 /// Returns Arrow's format string of a column.
-fn format_of(values: &Values) -> &'static str {
+fn format_of(values: &CellValues) -> &'static str {
     match values {
-        Values::Number(_) => "g",
-        Values::Integer(_) => "L",
-        Values::Text(_) => "U",
-        Values::Flag(_) => "b",
+        CellValues::Number(_) => "g",
+        CellValues::Integer(_) => "L",
+        CellValues::Text(_) => "U",
+        CellValues::Flag(_) => "b",
     }
 }
 
@@ -224,7 +224,7 @@ fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
     // The first buffer is the validity bitmap.
     let mut buffers: Vec<*const c_void> = vec![ptr::null()];
     match &column.values {
-        Values::Number(values) => {
+        CellValues::Number(values) => {
             nulls = values.iter().filter(|value| value.is_nan()).count();
             if nulls > 0 {
                 data.bits.push(bits(values.iter().map(|value| !value.is_nan())));
@@ -232,8 +232,8 @@ fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
             }
             buffers.push(values.as_ptr().cast());
         }
-        Values::Integer(values) => buffers.push(values.as_ptr().cast()),
-        Values::Text(values) => {
+        CellValues::Integer(values) => buffers.push(values.as_ptr().cast()),
+        CellValues::Text(values) => {
             data.offsets = std::iter::once(0)
                 .chain(values.iter().scan(0, |end, text| {
                     *end += text.len() as i64;
@@ -243,7 +243,7 @@ fn child(dataset: &Arc<Dataset>, column: &Column) -> ArrowArray {
             data.text = values.iter().flat_map(|text| text.bytes()).collect();
             buffers.extend([data.offsets.as_ptr().cast(), data.text.as_ptr().cast::<c_void>()]);
         }
-        Values::Flag(values) => {
+        CellValues::Flag(values) => {
             nulls = values.iter().filter(|value| value.is_none()).count();
             data.bits.push(bits(values.iter().map(Option::is_some)));
             data.bits.push(bits(values.iter().map(|value| *value == Some(true))));

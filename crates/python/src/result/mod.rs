@@ -10,7 +10,7 @@ use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stickslip_report::{Outputs, html, png, svg, terminal::Terminal, write_dataset};
-use stickslip_study::dataset::{self, Column, Dataset, Values};
+use stickslip_study::dataset::{self, CellValues, Column, Dataset};
 use stickslip_study::results::worst_evidence;
 
 /// Results of a run: tables, a figure, notes, and the record of the run.
@@ -74,7 +74,7 @@ impl PyResultSet {
     /// Points without a result: pairs of the point and the reason.
     #[getter]
     fn failures(&self) -> Vec<(&str, &str)> {
-        self.dataset.failures.iter().map(|failure| (failure.at.as_str(), failure.reason.as_str())).collect()
+        self.dataset.failures.iter().map(|failure| (failure.location.as_str(), failure.reason.as_str())).collect()
     }
 
     /// Number of points by status, for example ``{"converged": 244}``.
@@ -237,7 +237,7 @@ fn same_table(one: &dataset::Table, other: &dataset::Table) -> bool {
     let same_column = |(one, other): (&Column, &Column)| {
         one.name == other.name
             && match (&one.values, &other.values) {
-                (Values::Number(one), Values::Number(other)) => {
+                (CellValues::Number(one), CellValues::Number(other)) => {
                     one.len() == other.len() && one.iter().zip(other).all(same_number)
                 }
                 (one, other) => one == other,
@@ -339,12 +339,12 @@ impl Table {
         match &found.values {
             // SAFETY: the array refers to the table, which keeps the immutable dataset
             #[allow(unsafe_code)]
-            Values::Number(values) => Ok(unsafe { numpy_view::array(values, owner) }.into_any()),
+            CellValues::Number(values) => Ok(unsafe { numpy_view::array(values, owner) }.into_any()),
             // SAFETY: the array refers to the table, which keeps the immutable dataset
             #[allow(unsafe_code)]
-            Values::Integer(values) => Ok(unsafe { numpy_view::array(values, owner) }.into_any()),
-            Values::Text(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "str")),
-            Values::Flag(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "object")),
+            CellValues::Integer(values) => Ok(unsafe { numpy_view::array(values, owner) }.into_any()),
+            CellValues::Text(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "str")),
+            CellValues::Flag(values) => numpy()?.call_method1("array", (PyList::new(py, values)?, "object")),
         }
     }
 
@@ -437,10 +437,10 @@ impl Table {
         let row = PyDict::new(py);
         for column in &table.columns {
             match &column.values {
-                Values::Number(values) => row.set_item(&column.name, values[index])?,
-                Values::Integer(values) => row.set_item(&column.name, values[index])?,
-                Values::Text(values) => row.set_item(&column.name, &values[index])?,
-                Values::Flag(values) => row.set_item(&column.name, values[index])?,
+                CellValues::Number(values) => row.set_item(&column.name, values[index])?,
+                CellValues::Integer(values) => row.set_item(&column.name, values[index])?,
+                CellValues::Text(values) => row.set_item(&column.name, &values[index])?,
+                CellValues::Flag(values) => row.set_item(&column.name, values[index])?,
             }
         }
         Ok(row)

@@ -2,7 +2,7 @@
 
 use crate::run::stored::Stored;
 use std::collections::BTreeMap;
-use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Table};
 use stickslip_study::{Case, VariedValue};
 
 /// Columns with error measures instead of results.
@@ -71,7 +71,7 @@ impl ColumnRoles {
     /// Returns the columns to compare.
     pub(super) fn values<'t>(&self, table: &'t Table) -> Vec<&'t str> {
         let wanted = |column: &&Column| {
-            matches!(column.values, Values::Number(_))
+            matches!(column.values, CellValues::Number(_))
                 && !self.keys.contains(&column.name)
                 && self.abscissa.as_ref() != Some(&column.name)
                 && !EVIDENCE.contains(&column.name.as_str())

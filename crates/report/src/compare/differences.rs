@@ -5,7 +5,7 @@ use super::column_roles::{ColumnRoles, RunTable, with_parameter_columns};
 use super::row_matching::{MatchedRow, TablePair, difference, pairs};
 use crate::run::stored::Stored;
 use std::collections::BTreeMap;
-use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Table};
 
 /// Prefix of columns with values of the first run.
 pub(super) const FIRST: &str = "first_";
@@ -171,7 +171,9 @@ impl Differences {
         let mut made: Vec<Column> = vec![Column::texts("run", pairs.iter().map(|_| run.to_owned()).collect())];
         for key in reading.keys.iter().filter_map(|key| table.column(key)) {
             made.push(match &key.values {
-                Values::Number(values) => Column::numbers(&key.name, pairs.iter().map(|p| values[p.first]).collect()),
+                CellValues::Number(values) => {
+                    Column::numbers(&key.name, pairs.iter().map(|p| values[p.first]).collect())
+                }
                 values => {
                     Column::texts(&key.name, pairs.iter().map(|p| crate::output::csv::cell(values, p.first)).collect())
                 }
@@ -192,8 +194,8 @@ impl Differences {
             Some(t) => {
                 for (column, more) in t.columns.iter_mut().zip(made) {
                     match (&mut column.values, more.values) {
-                        (Values::Number(a), Values::Number(b)) => a.extend(b),
-                        (Values::Text(a), Values::Text(b)) => a.extend(b),
+                        (CellValues::Number(a), CellValues::Number(b)) => a.extend(b),
+                        (CellValues::Text(a), CellValues::Text(b)) => a.extend(b),
                         _ => {}
                     }
                 }
@@ -217,7 +219,7 @@ impl Differences {
             words("how", &|row| row.how.to_owned()),
             Column {
                 name: "points".into(),
-                values: Values::Integer(rows.iter().map(|row| row.largest.points).collect()),
+                values: CellValues::Integer(rows.iter().map(|row| row.largest.points).collect()),
             },
             numbers("first_value", &|row| row.largest.values.0),
             numbers("value", &|row| row.largest.values.1),
@@ -230,7 +232,7 @@ impl Differences {
 /// Returns the rows of peaks inside the frequency range, or all rows of other tables.
 fn inside(table: &Table, rows: &[usize]) -> Vec<usize> {
     match table.column("at_range_end").map(|column| &column.values) {
-        Some(Values::Flag(ends)) if table.name == "peaks" => {
+        Some(CellValues::Flag(ends)) if table.name == "peaks" => {
             rows.iter().copied().filter(|row| ends[*row] != Some(true)).collect()
         }
         _ => rows.to_vec(),

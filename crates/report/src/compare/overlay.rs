@@ -228,7 +228,7 @@ mod tests {
             let own = |case: usize| {
                 let y = factor * (case as f64 + 1.0);
                 let line = Series::line("all joints free, for each case", vec![1.0, 2.0], vec![y, y], case);
-                line.reference_of_its_own()
+                line.case_reference()
             };
             figure.panels[0].series = (0..3).map(own).collect();
             figure

@@ -2,7 +2,7 @@
 
 use super::differences::{DIFFERENCES, FIRST};
 use crate::terminal;
-use stickslip_study::dataset::{Column, Dataset, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Dataset, Table};
 
 /// Returns the comparison with units and percentages. Quantities that are equal in all runs are
 /// omitted.
@@ -11,15 +11,15 @@ pub fn for_terminal(comparison: &Dataset) -> Dataset {
     let mut formatted = comparison.clone();
     for table in &mut formatted.tables {
         let several = table.column("run").is_some_and(|column| match &column.values {
-            Values::Text(runs) => runs.iter().any(|run| *run != runs[0]),
+            CellValues::Text(runs) => runs.iter().any(|run| *run != runs[0]),
             _ => false,
         });
         table.columns.retain(|column| several || column.name != "run");
         // A narrow terminal drops the last columns.
         table.columns.sort_by_key(|column| column.name.starts_with(FIRST));
         for column in &mut table.columns {
-            if let (Values::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
-                column.values = Values::Text(values.iter().map(|value| percent(*value, true)).collect());
+            if let (CellValues::Number(values), true) = (&column.values, column.name.ends_with("_change")) {
+                column.values = CellValues::Text(values.iter().map(|value| percent(*value, true)).collect());
             }
         }
         if table.name == DIFFERENCES {
@@ -35,7 +35,7 @@ pub fn for_terminal(comparison: &Dataset) -> Dataset {
 /// Formats the differences. Returns the names of columns without any difference.
 fn shown_differences(table: &mut Table) -> Vec<String> {
     let words = |name: &str| match table.column(name).map(|column| &column.values) {
-        Some(Values::Text(words)) => words.clone(),
+        Some(CellValues::Text(words)) => words.clone(),
         _ => vec![String::new(); table.rows()],
     };
     let numbers = |name: &str| table.numbers(name).map_or_else(|| vec![f64::NAN; table.rows()], <[f64]>::to_vec);

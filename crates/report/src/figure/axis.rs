@@ -364,8 +364,9 @@ mod tests {
 
     #[test]
     fn no_tick_stands_between_whole_numbers() {
-        let count =
-            |from, to, count| axis_ticks(&Axis::new("disks", "").whole(), range(from, to, Scale::Linear), count);
+        let count = |from, to, count| {
+            axis_ticks(&Axis::new("disks", "").with_whole_numbers(), range(from, to, Scale::Linear), count)
+        };
         assert_eq!(count(0.0, 2.1, 7.0).labels, ["0", "1", "2"]);
         assert_eq!(count(-0.4, 5.4, 3.0).labels, ["0", "2", "4"]);
         assert_eq!(count(0.0, 12.0, 5.0).labels, ["0", "5", "10"]);
@@ -420,11 +421,11 @@ mod tests {
     #[test]
     fn impossible_ends_count_as_absent() {
         let axis = Axis::new("a", "m");
-        assert_eq!(AxisRange::fixed(&axis.clone().between(2.0, 1.0)), Some(range(1.0, 2.0, Scale::Linear)));
+        assert_eq!(AxisRange::fixed(&axis.clone().with_range(2.0, 1.0)), Some(range(1.0, 2.0, Scale::Linear)));
         for [from, to] in [[1.0, 1.0], [f64::NAN, 1.0], [0.0, f64::INFINITY], [f64::MIN, f64::MAX]] {
             assert_eq!(AxisRange::fixed(&Axis { range: Some([from, to]), ..axis.clone() }), None);
         }
-        assert_eq!(AxisRange::fixed(&axis.log().between(0.0, 1.0)), None);
+        assert_eq!(AxisRange::fixed(&axis.log().with_range(0.0, 1.0)), None);
     }
 
     #[test]

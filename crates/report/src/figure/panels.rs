@@ -554,7 +554,7 @@ mod tests {
         assert_eq!(tops(&figure(Sharing::Never, [2.0, 4.0])), [(2.1, true), (4.2, true)]);
         // A fixed range of one panel does not apply to the other panel.
         let mut fixed = figure(Sharing::Always, [2.0, 4.0]);
-        fixed.panels[0].y = fixed.panels[0].y.clone().between(0.0, 1.0);
+        fixed.panels[0].y = fixed.panels[0].y.clone().with_range(0.0, 1.0);
         assert_eq!(tops(&fixed), [(1.0, true), (4.2, true)]);
     }
 

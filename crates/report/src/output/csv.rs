@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::ops::Range;
-use stickslip_study::dataset::{Table, Values};
+use stickslip_study::dataset::{CellValues, Table};
 
 /// The output `csv`.
 pub const OUTPUT: Output = Output {
@@ -86,20 +86,20 @@ fn cells(table: &Table, rows: Range<usize>, writer: &mut RecordWriter) -> ::csv:
 }
 
 /// Returns the text of one cell.
-pub(crate) fn cell(values: &Values, row: usize) -> String {
+pub(crate) fn cell(values: &CellValues, row: usize) -> String {
     let mut text = String::new();
     write_cell(values, row, &mut text);
     text
 }
 
-fn write_cell(values: &Values, row: usize, text: &mut String) {
+fn write_cell(values: &CellValues, row: usize, text: &mut String) {
     // Writing to a string cannot fail.
     let _ = match values {
-        Values::Number(v) if v[row].is_nan() => Ok(()),
-        Values::Number(v) => write!(text, "{:?}", v[row]),
-        Values::Integer(v) => write!(text, "{}", v[row]),
-        Values::Text(v) => text.write_str(&v[row]),
-        Values::Flag(v) => v[row].map_or(Ok(()), |flag| write!(text, "{flag}")),
+        CellValues::Number(v) if v[row].is_nan() => Ok(()),
+        CellValues::Number(v) => write!(text, "{:?}", v[row]),
+        CellValues::Integer(v) => write!(text, "{}", v[row]),
+        CellValues::Text(v) => text.write_str(&v[row]),
+        CellValues::Flag(v) => v[row].map_or(Ok(()), |flag| write!(text, "{flag}")),
     };
 }
 
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use stickslip_study::dataset::Column;
 
-    fn column(name: &str, values: Values) -> Column {
+    fn column(name: &str, values: CellValues) -> Column {
         Column { name: name.into(), values }
     }
 
@@ -118,10 +118,10 @@ mod tests {
         let table = Table {
             name: "t".into(),
             columns: vec![
-                column("x_m", Values::Number(values.clone())),
-                column("n", Values::Integer(vec![u64::MAX; 9])),
-                column("why, \"if\" any", Values::Text(vec!["a,b\n\"c\" <é>".into(); 9])),
-                column("stable", Values::Flag([Some(true), Some(false), None].repeat(3))),
+                column("x_m", CellValues::Number(values.clone())),
+                column("n", CellValues::Integer(vec![u64::MAX; 9])),
+                column("why, \"if\" any", CellValues::Text(vec!["a,b\n\"c\" <é>".into(); 9])),
+                column("stable", CellValues::Flag([Some(true), Some(false), None].repeat(3))),
             ],
         };
         let bytes = to_csv(&table).unwrap();
@@ -143,11 +143,11 @@ mod tests {
 
     #[test]
     fn empty_tables_keep_their_header_and_uneven_ones_are_refused() {
-        let empty = Table { name: "e".into(), columns: vec![column("a", Values::Number(vec![]))] };
+        let empty = Table { name: "e".into(), columns: vec![column("a", CellValues::Number(vec![]))] };
         assert_eq!(to_csv(&empty).unwrap(), b"a\n");
         assert_eq!(to_csv(&Table { name: "none".into(), columns: vec![] }).unwrap(), b"");
         let mut uneven = empty;
-        uneven.columns.push(column("b", Values::Number(vec![1.0])));
+        uneven.columns.push(column("b", CellValues::Number(vec![1.0])));
         let message = to_csv(&uneven).unwrap_err().to_string();
         assert!(message.contains("`e`") && message.contains("`b`"), "{message}");
     }

@@ -4,7 +4,7 @@
 
 use crate::output::result_file::{File, Output, ReportError};
 use serde::ser::{Serialize, SerializeMap, Serializer};
-use stickslip_study::dataset::{Dataset, Table, Values};
+use stickslip_study::dataset::{CellValues, Dataset, Table};
 
 /// The output `json`.
 pub const OUTPUT: Output = Output {
@@ -87,12 +87,12 @@ pub(crate) fn record_json(dataset: &Dataset, shapes: &[TableShape], files: &[Str
 }
 
 /// Returns the type name of a column's cells, which reading the table back requires.
-pub(crate) fn value_type(values: &Values) -> &'static str {
+pub(crate) fn value_type(values: &CellValues) -> &'static str {
     match values {
-        Values::Number(_) => "number",
-        Values::Integer(_) => "integer",
-        Values::Text(_) => "text",
-        Values::Flag(_) => "flag",
+        CellValues::Number(_) => "number",
+        CellValues::Integer(_) => "integer",
+        CellValues::Text(_) => "text",
+        CellValues::Flag(_) => "flag",
     }
 }
 
@@ -146,12 +146,12 @@ impl Serialize for RowObject<'_> {
         for column in &table.columns {
             match &column.values {
                 // JSON has neither NaN nor infinity.
-                Values::Number(v) => {
+                CellValues::Number(v) => {
                     map.serialize_entry(&column.name, &v.get(*row).copied().filter(|value| value.is_finite()))?;
                 }
-                Values::Integer(v) => map.serialize_entry(&column.name, &v.get(*row))?,
-                Values::Text(v) => map.serialize_entry(&column.name, &v.get(*row))?,
-                Values::Flag(v) => map.serialize_entry(&column.name, &v.get(*row).copied().flatten())?,
+                CellValues::Integer(v) => map.serialize_entry(&column.name, &v.get(*row))?,
+                CellValues::Text(v) => map.serialize_entry(&column.name, &v.get(*row))?,
+                CellValues::Flag(v) => map.serialize_entry(&column.name, &v.get(*row).copied().flatten())?,
             }
         }
         map.end()

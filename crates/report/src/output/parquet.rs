@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::io::Write;
-use stickslip_study::dataset::{Table, Values};
+use stickslip_study::dataset::{CellValues, Table};
 
 /// The output `parquet`.
 pub const OUTPUT: Output = Output {
@@ -96,12 +96,12 @@ fn begin<'a>(table: &Table, writer: Box<dyn Write + 'a>) -> Result<Box<dyn Table
 }
 
 /// Removes the values before index `from`.
-fn keep_from(values: &mut Values, from: usize) {
+fn keep_from(values: &mut CellValues, from: usize) {
     match values {
-        Values::Number(v) => drop(v.drain(..from.min(v.len()))),
-        Values::Integer(v) => drop(v.drain(..from.min(v.len()))),
-        Values::Text(v) => drop(v.drain(..from.min(v.len()))),
-        Values::Flag(v) => drop(v.drain(..from.min(v.len()))),
+        CellValues::Number(v) => drop(v.drain(..from.min(v.len()))),
+        CellValues::Integer(v) => drop(v.drain(..from.min(v.len()))),
+        CellValues::Text(v) => drop(v.drain(..from.min(v.len()))),
+        CellValues::Flag(v) => drop(v.drain(..from.min(v.len()))),
     }
 }
 
@@ -163,10 +163,10 @@ impl ParquetWriter<'_> {
         });
         for column in columns {
             let (kind, optional, converted) = match &column.values {
-                Values::Number(_) => (DOUBLE, 1, None),
-                Values::Integer(_) => (INT64, 0, Some(UINT_64)),
-                Values::Flag(_) => (BOOLEAN, 1, None),
-                Values::Text(_) => (BYTE_ARRAY, 0, Some(UTF8)),
+                CellValues::Number(_) => (DOUBLE, 1, None),
+                CellValues::Integer(_) => (INT64, 0, Some(UINT_64)),
+                CellValues::Flag(_) => (BOOLEAN, 1, None),
+                CellValues::Text(_) => (BYTE_ARRAY, 0, Some(UTF8)),
             };
             out.structure(|element| {
                 element.number(1, kind);
@@ -205,12 +205,12 @@ impl ParquetWriter<'_> {
 }
 
 impl ColumnChunk {
-    fn describe(&self, values: &Values, name: &str, rows: usize, meta: &mut ThriftWriter) {
+    fn describe(&self, values: &CellValues, name: &str, rows: usize, meta: &mut ThriftWriter) {
         let kind = match values {
-            Values::Number(_) => DOUBLE,
-            Values::Integer(_) => INT64,
-            Values::Flag(_) => BOOLEAN,
-            Values::Text(_) => BYTE_ARRAY,
+            CellValues::Number(_) => DOUBLE,
+            CellValues::Integer(_) => INT64,
+            CellValues::Flag(_) => BOOLEAN,
+            CellValues::Text(_) => BYTE_ARRAY,
         };
         meta.number(1, kind);
         let encodings = if self.dictionary > 0 { vec![PLAIN, RLE, self.encoding] } else { vec![RLE, self.encoding] };
@@ -240,9 +240,9 @@ impl ColumnChunk {
 }
 
 /// Encodes the first `rows` values of a column.
-fn chunk(values: &Values, rows: usize) -> ColumnChunk {
+fn chunk(values: &CellValues, rows: usize) -> ColumnChunk {
     match values {
-        Values::Number(v) => {
+        CellValues::Number(v) => {
             let there: Vec<f64> = v[..rows].iter().copied().filter(|value| !value.is_nan()).collect();
             let range = there.iter().copied().reduce(f64::min).zip(there.iter().copied().reduce(f64::max));
             // The format does not order the two zeros: the minimum becomes -0.0, the maximum
@@ -262,7 +262,7 @@ fn chunk(values: &Values, rows: usize) -> ColumnChunk {
                 });
             ColumnChunk { nulls: rows - there.len(), range, ..chunk }
         }
-        Values::Integer(v) => {
+        CellValues::Integer(v) => {
             let range = v[..rows].iter().min().zip(v[..rows].iter().max());
             let plain = |value: &u64, out: &mut Vec<u8>| out.extend(value.to_le_bytes());
             let chunk = dictionary_encoded(&v[..rows], |value| *value, plain, &[], rows).unwrap_or_else(|| {
@@ -270,14 +270,14 @@ fn chunk(values: &Values, rows: usize) -> ColumnChunk {
             });
             ColumnChunk { range: range.map(|(least, most)| [least.to_le_bytes(), most.to_le_bytes()]), ..chunk }
         }
-        Values::Flag(v) => {
+        CellValues::Flag(v) => {
             let there: Vec<bool> = v[..rows].iter().copied().flatten().collect();
             let mut body = definition_levels(v[..rows].iter().map(Option::is_some));
             body.extend(there.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))));
             // The bits of an incomplete last byte are its low bits.
             ColumnChunk { nulls: rows - there.len(), ..data(PLAIN, &body, rows) }
         }
-        Values::Text(v) => {
+        CellValues::Text(v) => {
             let plain = |value: &String, out: &mut Vec<u8>| {
                 out.extend((value.len() as u32).to_le_bytes());
                 out.extend(value.as_bytes());
@@ -521,18 +521,21 @@ mod tests {
         Table {
             name: "curve".to_owned(),
             columns: vec![
-                column("Ft_N", Values::Number((0..rows).map(|i| (i / 1000) as f64).collect())),
-                column("amplitude_m", Values::Number((0..rows).map(number).collect())),
-                column("iterations", Values::Integer((0..rows).map(|i| (i % 7) as u64).collect())),
-                column("large", Values::Integer((0..rows).map(|i| u64::MAX - i as u64).collect())),
-                column("stable", Values::Flag((0..rows).map(|i| [Some(true), Some(false), None][i / 3 % 3]).collect())),
+                column("Ft_N", CellValues::Number((0..rows).map(|i| (i / 1000) as f64).collect())),
+                column("amplitude_m", CellValues::Number((0..rows).map(number).collect())),
+                column("iterations", CellValues::Integer((0..rows).map(|i| (i % 7) as u64).collect())),
+                column("large", CellValues::Integer((0..rows).map(|i| u64::MAX - i as u64).collect())),
+                column(
+                    "stable",
+                    CellValues::Flag((0..rows).map(|i| [Some(true), Some(false), None][i / 3 % 3]).collect()),
+                ),
                 column(
                     "status",
-                    Values::Text(
+                    CellValues::Text(
                         (0..rows).map(|i| if i % 50 == 0 { "not-found" } else { "converged" }.to_owned()).collect(),
                     ),
                 ),
-                column("label", Values::Text((0..rows).map(|i| format!("käse {i}")).collect())),
+                column("label", CellValues::Text((0..rows).map(|i| format!("käse {i}")).collect())),
             ],
         }
     }
@@ -541,10 +544,10 @@ mod tests {
         let mut part = table.clone();
         for column in &mut part.columns {
             match &mut column.values {
-                Values::Number(v) => *v = v[rows.clone()].to_vec(),
-                Values::Integer(v) => *v = v[rows.clone()].to_vec(),
-                Values::Text(v) => *v = v[rows.clone()].to_vec(),
-                Values::Flag(v) => *v = v[rows.clone()].to_vec(),
+                CellValues::Number(v) => *v = v[rows.clone()].to_vec(),
+                CellValues::Integer(v) => *v = v[rows.clone()].to_vec(),
+                CellValues::Text(v) => *v = v[rows.clone()].to_vec(),
+                CellValues::Flag(v) => *v = v[rows.clone()].to_vec(),
             }
         }
         part
@@ -625,7 +628,7 @@ mod tests {
     fn split_doubles_read_back_bit_for_bit() {
         let values: Vec<f64> =
             (0..1000).map(|i| (i as f64 * 0.37).exp() - if i % 10 == 0 { f64::NAN } else { 0.0 }).collect();
-        let chunk = chunk(&Values::Number(values.clone()), values.len());
+        let chunk = chunk(&CellValues::Number(values.clone()), values.len());
         assert_eq!((chunk.encoding, chunk.nulls), (BYTE_STREAM_SPLIT, 100));
         let gzip = chunk.bytes.windows(2).position(|pair| pair == [0x1f, 0x8b]).unwrap();
         let mut body = Vec::new();

@@ -12,10 +12,10 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stickslip_study::Study;
-use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::Dataset;
-use stickslip_study::run::drawn;
-use stickslip_study::thinning::Thinning;
+use stickslip_study::decimation::Decimation;
+use stickslip_study::result_block::{Block, Tally};
+use stickslip_study::run::draw;
 
 /// Reason why results cannot be assembled from journals.
 #[derive(Debug, thiserror::Error)]
@@ -99,8 +99,10 @@ fn written(
     }
     shapes.retain(|shape| !shape.header.columns.is_empty());
 
-    let mut thinning =
-        Thinning::new(study, &shapes.iter().map(|shape| (shape.header.name.as_str(), shape.rows)).collect::<Vec<_>>());
+    let mut thinning = Decimation::new(
+        study,
+        &shapes.iter().map(|shape| (shape.header.name.as_str(), shape.rows)).collect::<Vec<_>>(),
+    );
     let is_whole = thinning.keeps_all();
     let (mut begun, mut names): (Vec<String>, Vec<String>) = Default::default();
     let mut sinks: Vec<(&str, Box<dyn TableWriter>)> = Vec::new();
@@ -133,8 +135,8 @@ fn written(
         rows.end()?;
     }
     let tables = thinning.tables();
-    let figure = drawn(study, &tables);
-    let dataset = parts.outline.clone().completed(tables, figure, tally, Duration::from_secs_f64(time));
+    let figure = draw(study, &tables);
+    let dataset = parts.outline.clone().with_results(tables, figure, tally, Duration::from_secs_f64(time));
     let mut files = Vec::new();
     // A run that was stopped before its first result has nothing to draw.
     let empty = dataset.record.interrupted && shapes.iter().all(|shape| shape.rows == 0);

@@ -9,8 +9,8 @@ use crate::output::result_file::{File, ReportError, file_name, write_if_changed}
 use crate::output::{FIGURES, Outputs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use stickslip_study::dataset::{Column, Dataset, Record, Table, Values};
-use stickslip_study::{Study, StudyError, read_stored, run};
+use stickslip_study::dataset::{CellValues, Column, Dataset, Record, Table};
+use stickslip_study::{Study, StudyError, read_for_results, run};
 
 /// Kind of a dataset that compares runs. Such a dataset has no study.
 pub const COMPARISON: &str = "comparison";
@@ -157,7 +157,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
         title: study.title().to_owned(),
         source: record["source"].as_str().map(str::to_owned),
         kind,
-        figure: run::redrawn(&study, &tables),
+        figure: run::figure_of_tables(&study, &tables),
         tables,
         notes: serde_json::from_value(part("notes")).unwrap_or_default(),
         failures: serde_json::from_value(part("failures")).unwrap_or_default(),
@@ -194,7 +194,7 @@ pub fn study_of(stored: &Value, path: &Path) -> Result<Study, StoredError> {
     };
     let set: Vec<(String, String)> = serde_json::from_value(stored["set"].clone()).unwrap_or_default();
     let failed = |cause| StoredError::Study { path: path.to_owned(), cause: Box::new(cause) };
-    let study = read_stored(&format!("{name}.toml"), text, &set).map_err(failed)?;
+    let study = read_for_results(&format!("{name}.toml"), text, &set).map_err(failed)?;
     match stored["cases"][0]["method"]["kind"].as_str() {
         Some(method) => study.with_method(method).map_err(failed),
         None => Ok(study),
@@ -277,24 +277,24 @@ fn header(names: &[String], cells: &::csv::StringRecord) -> Result<(), String> {
     Ok(())
 }
 
-fn empty(sort: &str) -> Option<Values> {
+fn empty(sort: &str) -> Option<CellValues> {
     Some(match sort {
-        "number" => Values::Number(Vec::new()),
-        "integer" => Values::Integer(Vec::new()),
-        "text" => Values::Text(Vec::new()),
-        "flag" => Values::Flag(Vec::new()),
+        "number" => CellValues::Number(Vec::new()),
+        "integer" => CellValues::Integer(Vec::new()),
+        "text" => CellValues::Text(Vec::new()),
+        "flag" => CellValues::Flag(Vec::new()),
         _ => return None,
     })
 }
 
 /// Adds a cell, or returns the name of the expected type.
-fn push(values: &mut Values, cell: &str) -> Result<(), &'static str> {
+fn push(values: &mut CellValues, cell: &str) -> Result<(), &'static str> {
     match values {
-        Values::Number(v) if cell.is_empty() => v.push(f64::NAN),
-        Values::Number(v) => v.push(cell.parse().map_err(|_| "a number")?),
-        Values::Integer(v) => v.push(cell.parse().map_err(|_| "a count")?),
-        Values::Text(v) => v.push(cell.to_owned()),
-        Values::Flag(v) => v.push(match cell {
+        CellValues::Number(v) if cell.is_empty() => v.push(f64::NAN),
+        CellValues::Number(v) => v.push(cell.parse().map_err(|_| "a number")?),
+        CellValues::Integer(v) => v.push(cell.parse().map_err(|_| "a count")?),
+        CellValues::Text(v) => v.push(cell.to_owned()),
+        CellValues::Flag(v) => v.push(match cell {
             "" => None,
             "true" => Some(true),
             "false" => Some(false),
@@ -351,11 +351,11 @@ impl Stored {
     ///
     /// Returns `true` if that version still describes the stored results.
     pub fn apply_figure_of(&mut self, like: &Study) -> bool {
-        let cases = |study: &Study| study.resolved()["cases"].take();
+        let cases = |study: &Study| study.to_record()["cases"].take();
         let same = like.kind().name == self.study.kind().name && cases(like) == cases(&self.study);
-        self.study = self.study.clone().drawn_like(like);
+        self.study = self.study.clone().with_figure_of(like);
         self.dataset.title = self.study.title().to_owned();
-        self.dataset.figure = run::redrawn(&self.study, &self.dataset.tables);
+        self.dataset.figure = run::figure_of_tables(&self.study, &self.dataset.tables);
         same
     }
 }
@@ -404,7 +404,7 @@ amplitude = "2 N"
 
     fn ran(kind: &str) -> Dataset {
         let study = read_study("rub.toml", &format!("{STUDY}[study]\n{kind}\n"), &[]).unwrap();
-        run::run(&study, &Context::unwatched(1)).unwrap()
+        run::run(&study, &Context::without_progress(1)).unwrap()
     }
 
     fn written(kind: &str) -> (TempDir, PathBuf) {
@@ -537,7 +537,7 @@ amplitude = "2 N"
                     cut.columns.remove(column);
                     let mut tables = stored.dataset.tables.clone();
                     tables[t] = cut;
-                    assert_eq!(run::redrawn(&stored.study, &tables).title, "Rubbing");
+                    assert_eq!(run::figure_of_tables(&stored.study, &tables).title, "Rubbing");
                 }
             }
         }

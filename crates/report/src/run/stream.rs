@@ -11,8 +11,8 @@ use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use stickslip_study::block::Block;
-use stickslip_study::run::{Checked, Context};
+use stickslip_study::result_block::Block;
+use stickslip_study::run::{CheckedStudy, Context};
 
 /// One of several parts of the units of a study: number and total.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,7 +139,7 @@ pub fn folder(out: &Path, name: &str, shard: Option<Shard>) -> Result<PathBuf, R
 /// [`StreamError`] if the file system fails, if another run is in progress, or if the journal
 /// belongs to a different run.
 pub fn begin(
-    checked: &Checked,
+    checked: &CheckedStudy,
     out: &Path,
     shard: Option<Shard>,
     start: StartMode,
@@ -183,14 +183,14 @@ pub fn begin(
 /// [`StreamError`] if the study cannot be computed or the file system fails. Earlier units
 /// stay.
 pub fn compute(
-    checked: &Checked,
+    checked: &CheckedStudy,
     journal: &mut Journal,
     context: &Context,
     on_sync: &dyn Fn(&Journal),
 ) -> Result<Vec<Block>, StreamError> {
     let mut rest: Option<Block> = None;
     let missing = journal.units().end..journal.head().range.end;
-    let computed = checked.each(missing, context, &mut |block| {
+    let computed = checked.for_each_block(missing, context, &mut |block| {
         match &mut rest {
             Some(rest) => rest.append(block),
             None if !block.tally.is_whole() => rest = Some(block),

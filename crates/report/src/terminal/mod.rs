@@ -8,7 +8,7 @@ use serde_json::Value as Json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip_study::dataset::{Column, Dataset, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Dataset, Table};
 use stickslip_study::units;
 
 /// Format of the text.
@@ -217,7 +217,7 @@ fn in_study_units<'t>(table: &'t Table, written: &'t Json) -> Vec<ConvertedColum
             let own = column.unit()?;
             let factor = units::ratio(&own, unit)?;
             let values = column.as_numbers()?.iter().map(|value| rounded(value * factor)).collect();
-            Some((Values::Number(values), unit))
+            Some((CellValues::Number(values), unit))
         });
         ConvertedColumn { column, converted }
     };
@@ -227,11 +227,11 @@ fn in_study_units<'t>(table: &'t Table, written: &'t Json) -> Vec<ConvertedColum
 /// A column, with converted values if the study uses another unit.
 struct ConvertedColumn<'t> {
     column: &'t Column,
-    converted: Option<(Values, &'t str)>,
+    converted: Option<(CellValues, &'t str)>,
 }
 
 impl ConvertedColumn<'_> {
-    fn values(&self) -> &Values {
+    fn values(&self) -> &CellValues {
         self.converted.as_ref().map_or(&self.column.values, |(values, _)| values)
     }
 }
@@ -254,8 +254,8 @@ const WRITTEN_DIGITS: i32 = 7;
 const DIFFERENCE_DIGITS: i32 = 3;
 
 /// Returns heading and formatted cells of a column.
-fn column(name: &str, values: &Values, written: Option<&str>) -> (String, Vec<String>) {
-    let Values::Number(numbers) = values else {
+fn column(name: &str, values: &CellValues, written: Option<&str>) -> (String, Vec<String>) {
+    let CellValues::Number(numbers) = values else {
         return (
             name.replace('_', " "),
             (0..values.len()).map(|row| clean(&crate::output::csv::cell(values, row))).collect(),
@@ -323,7 +323,7 @@ fn shown(name: &str, table: &[ConvertedColumn<'_>], limit: usize) -> String {
             let (heading, cells) = column(&c.name, &head(one.values(), rows), unit);
             let heading = clean(&heading);
             let width = cells.iter().chain([&heading]).map(|text| text.chars().count()).max().unwrap_or(0);
-            let right = matches!(c.values, Values::Number(_) | Values::Integer(_));
+            let right = matches!(c.values, CellValues::Number(_) | CellValues::Integer(_));
             FormattedColumn { name: &c.name, heading, cells, right, width }
         })
         .collect();
@@ -388,12 +388,12 @@ fn abbreviated(texts: Vec<&str>) -> Vec<String> {
 }
 
 /// Returns the first `rows` values of a column.
-fn head(values: &Values, rows: usize) -> Values {
+fn head(values: &CellValues, rows: usize) -> CellValues {
     match values {
-        Values::Number(v) => Values::Number(v.iter().take(rows).copied().collect()),
-        Values::Integer(v) => Values::Integer(v.iter().take(rows).copied().collect()),
-        Values::Text(v) => Values::Text(v.iter().take(rows).cloned().collect()),
-        Values::Flag(v) => Values::Flag(v.iter().take(rows).copied().collect()),
+        CellValues::Number(v) => CellValues::Number(v.iter().take(rows).copied().collect()),
+        CellValues::Integer(v) => CellValues::Integer(v.iter().take(rows).copied().collect()),
+        CellValues::Text(v) => CellValues::Text(v.iter().take(rows).cloned().collect()),
+        CellValues::Flag(v) => CellValues::Flag(v.iter().take(rows).copied().collect()),
     }
 }
 
@@ -429,8 +429,8 @@ results/fig02/: loops_summary.csv, figure.svg
     fn long_names_leave_room_for_the_other_columns() {
         let name = |end: &str| format!("{}_{end}", "the_third_stage_of_the_low_pressure_turbine".repeat(2));
         let mut dataset = samples::response();
-        let numbers = |name: String| Column { name, values: Values::Number(vec![1.25e-3, 2.5e-3]) };
-        let mass = Column { name: "mass".to_owned(), values: Values::Text(vec![name("left"), name("right")]) };
+        let numbers = |name: String| Column { name, values: CellValues::Number(vec![1.25e-3, 2.5e-3]) };
+        let mass = Column { name: "mass".to_owned(), values: CellValues::Text(vec![name("left"), name("right")]) };
         dataset.tables = vec![Table {
             name: "peaks".to_owned(),
             columns: vec![
@@ -478,7 +478,7 @@ results/fig02/: loops_summary.csv, figure.svg
     fn long(name: &str, rows: usize) -> Dataset {
         let column = |name: &str, unit: f64| Column {
             name: name.into(),
-            values: Values::Number((0..rows).map(|i| unit * (1.0 + i as f64)).collect()),
+            values: CellValues::Number((0..rows).map(|i| unit * (1.0 + i as f64)).collect()),
         };
         let mut columns = vec![column("frequency_Hz", 1.0), column("amplitude_m", 1e-3)];
         columns.extend(ERROR_COLUMNS.map(|name| column(name, 1e-9)));
@@ -560,7 +560,7 @@ results/fig02/: loops_summary.csv, figure.svg
         for (name, heading) in
             [("alpha_s_per_m", "alpha (s/m)"), ("v_m_per_s", "v (m/s)"), ("rate_Hz_per_s", "rate (Hz/s)"), ("n", "n")]
         {
-            assert_eq!(column(name, &Values::Number(vec![2.0]), None).0, heading);
+            assert_eq!(column(name, &CellValues::Number(vec![2.0]), None).0, heading);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Peak tables for the terminal: the largest peak of every case first, equal sectors merged.
 
-use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Table};
 
 /// Relative difference up to which the peaks of two sectors are equal: the accuracy of peak
 /// refinement.
@@ -56,11 +56,11 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
     let picked = |column: &Column| Column {
         name: column.name.clone(),
         values: match &column.values {
-            Values::Text(_) if column.name == "mass" => Values::Text(shown.iter().map(word).collect()),
-            Values::Number(v) => Values::Number(shown.iter().map(|peak| v[peak.row]).collect()),
-            Values::Integer(v) => Values::Integer(shown.iter().map(|peak| v[peak.row]).collect()),
-            Values::Text(v) => Values::Text(shown.iter().map(|peak| v[peak.row].clone()).collect()),
-            Values::Flag(v) => Values::Flag(shown.iter().map(|peak| v[peak.row]).collect()),
+            CellValues::Text(_) if column.name == "mass" => CellValues::Text(shown.iter().map(word).collect()),
+            CellValues::Number(v) => CellValues::Number(shown.iter().map(|peak| v[peak.row]).collect()),
+            CellValues::Integer(v) => CellValues::Integer(shown.iter().map(|peak| v[peak.row]).collect()),
+            CellValues::Text(v) => CellValues::Text(shown.iter().map(|peak| v[peak.row].clone()).collect()),
+            CellValues::Flag(v) => CellValues::Flag(shown.iter().map(|peak| v[peak.row]).collect()),
         },
     };
     Some(Table { name: table.name.clone(), columns: table.columns.iter().map(picked).collect() })

@@ -111,9 +111,9 @@ pub(super) fn layout(figure: &Figure, page: PageWidth, palette: &mut Palette) ->
         let bottom = (top - plot_height / inside).max(0.0);
         let panels = &figure.panels;
         let x_partner =
-            (0..i).find(|&j| !panel.picture && panels::same_quantity(&panels[j].x, &panel.x) && axes[j].x == own.x);
+            (0..i).find(|&j| !panel.equal_axes && panels::same_quantity(&panels[j].x, &panel.x) && axes[j].x == own.x);
         let y_partner =
-            (0..i).find(|&j| !panel.picture && panels::same_quantity(&panels[j].y, &panel.y) && axes[j].y == own.y);
+            (0..i).find(|&j| !panel.equal_axes && panels::same_quantity(&panels[j].y, &panel.y) && axes[j].y == own.y);
         let mut x =
             axis(own.x, [left, right], axis_name("y", i), x_partner.map(|j| axis_name("x", j)), [limit, ROOM[0]]);
         x["title"]["text"] = json!(broken(&x_titles[i]));
@@ -134,7 +134,7 @@ pub(super) fn layout(figure: &Figure, page: PageWidth, palette: &mut Palette) ->
                 made["ticktext"] = json!(ticks.labels.iter().map(|name| plain(name)).collect::<Vec<_>>());
             }
         }
-        if panel.picture {
+        if panel.equal_axes {
             (x["visible"], y["visible"]) = (json!(false), json!(false));
             y["scaleanchor"] = json!(axis_name("x", i));
         }

@@ -151,7 +151,7 @@ impl Bar {
 
 impl PlotArea {
     pub(super) fn new(panel: &Panel, axes: &Axes, width: f64, height: f64) -> PlotArea {
-        if panel.picture {
+        if panel.equal_axes {
             return PlotArea::of_picture(panel, axes, width, height);
         }
         let Axes { x, y, x_differs, y_differs } = *axes;

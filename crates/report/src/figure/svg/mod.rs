@@ -141,7 +141,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
         }
     }
     // The zero lines of a loop.
-    let zeros = if panel.picture { 0 } else { 2 };
+    let zeros = if panel.equal_axes { 0 } else { 2 };
     for (inside, from, to) in [
         (plot.x.from < 0.0 && plot.x.to > 0.0, plot.map((0.0, plot.y.from)), plot.map((0.0, plot.y.to))),
         (plot.y.from < 0.0 && plot.y.to > 0.0, plot.map((plot.x.from, 0.0)), plot.map((plot.x.to, 0.0))),
@@ -153,7 +153,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
             svg.line(from, to, "#b0b0b0");
         }
     }
-    if !panel.picture {
+    if !panel.equal_axes {
         svg.frame(plot.left, plot.top, plot.width, plot.height);
     }
     for x in plot.x_ticks.minor.iter().map(x_of) {

@@ -1,7 +1,7 @@
 //! Binary form of a result block: numbers by their bits, equal consecutive texts once.
 
-use stickslip_study::block::Block;
-use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::dataset::{CellValues, Column, Table};
+use stickslip_study::result_block::Block;
 
 /// Appends a block and its wall time in s.
 pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
@@ -23,19 +23,19 @@ pub(super) fn write(block: &Block, time: f64, out: &mut Vec<u8>) {
         for column in &table.columns {
             text(out, &column.name);
             match &column.values {
-                Values::Number(values) => {
+                CellValues::Number(values) => {
                     out.push(0);
                     values.iter().for_each(|value| out.extend(value.to_le_bytes()));
                 }
-                Values::Integer(values) => {
+                CellValues::Integer(values) => {
                     out.push(1);
                     values.iter().for_each(|value| out.extend(value.to_le_bytes()));
                 }
-                Values::Flag(values) => {
+                CellValues::Flag(values) => {
                     out.push(2);
                     out.extend(values.iter().map(|value| value.map_or(2, u8::from)));
                 }
-                Values::Text(values) => {
+                CellValues::Text(values) => {
                     out.push(3);
                     // Consecutive rows mostly have equal texts.
                     for run in values.chunk_by(|a, b| a == b) {
@@ -68,21 +68,21 @@ pub(super) fn read(mut bytes: &[u8]) -> Option<(Block, f64)> {
     Some((Block { units, tables, tally }, time))
 }
 
-fn values(from: &mut &[u8], rows: usize) -> Option<Values> {
+fn values(from: &mut &[u8], rows: usize) -> Option<CellValues> {
     Some(match take(from, 1)? {
-        [0] => Values::Number(
+        [0] => CellValues::Number(
             take(from, rows.checked_mul(8)?)?
                 .chunks_exact(8)
                 .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
                 .collect(),
         ),
-        [1] => Values::Integer(
+        [1] => CellValues::Integer(
             take(from, rows.checked_mul(8)?)?
                 .chunks_exact(8)
                 .filter_map(|b| Some(u64::from_le_bytes(b.try_into().ok()?)))
                 .collect(),
         ),
-        [2] => Values::Flag(
+        [2] => CellValues::Flag(
             take(from, rows)?
                 .iter()
                 .map(|b| [Some(false), Some(true)].get(usize::from(*b)).copied().flatten())
@@ -97,7 +97,7 @@ fn values(from: &mut &[u8], rows: usize) -> Option<Values> {
                 }
                 values.extend(std::iter::repeat_n(word.to_owned(), count));
             }
-            Values::Text(values)
+            CellValues::Text(values)
         }
         _ => return None,
     })

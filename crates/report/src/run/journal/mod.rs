@@ -26,9 +26,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stickslip_study::StudyError;
-use stickslip_study::block::{Block, Tally};
 use stickslip_study::dataset::Dataset;
-use stickslip_study::run::Checked;
+use stickslip_study::result_block::{Block, Tally};
+use stickslip_study::run::CheckedStudy;
 
 /// Name of the file in its folder.
 pub(crate) const FILE: &str = "journal";
@@ -56,8 +56,8 @@ pub struct RunHeader {
 
 impl RunHeader {
     /// Describes a run of these units.
-    pub fn new(checked: &Checked, range: Range<usize>, threads: usize) -> RunHeader {
-        RunHeader { outline: checked.outline(threads), units: checked.units(), range }
+    pub fn new(checked: &CheckedStudy, range: Range<usize>, threads: usize) -> RunHeader {
+        RunHeader { outline: checked.dataset_without_results(threads), units: checked.units(), range }
     }
 
     /// Returns a description of the difference between the runs of two journals.
@@ -503,13 +503,13 @@ mod tests {
     use stickslip_study::read_study;
     use stickslip_study::run::{Context, check};
 
-    fn couple() -> Checked {
+    fn couple() -> CheckedStudy {
         let text = stickslip_study::templates::find("blade-couple").unwrap().study;
         check(&read_study("couple.toml", text, &[]).unwrap()).unwrap()
     }
 
-    fn units(checked: &Checked) -> Vec<Block> {
-        let context = Context::unwatched(1);
+    fn units(checked: &CheckedStudy) -> Vec<Block> {
+        let context = Context::without_progress(1);
         (0..checked.units()).map(|unit| checked.block(unit..unit + 1, &context).unwrap()).collect()
     }
 

@@ -1,10 +1,10 @@
 //! The tables of hysteresis loops: names, columns, and their content as typed values.
 
-use crate::columns::FREQUENCY;
-use crate::dataset::{Dataset, Table};
+use crate::case::study::{Study, VariedValue};
+use crate::case::values::hertz;
+use crate::results::columns::FREQUENCY;
+use crate::results::dataset::{Dataset, Table};
 use crate::results::{Results, ResultsError};
-use crate::study::{Study, VariedValue};
-use crate::values::hertz;
 use std::ops::Range;
 
 /// Name of the kind.
@@ -55,9 +55,9 @@ pub struct Loop {
 ///
 /// A loop begins at a new joint, a new frequency, or where time restarts. A missing column of a
 /// table from another source is ignored.
-pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
+pub(super) fn split_loops(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
     let (joints, frequencies, times) = (table.texts(JOINT), table.numbers(FREQUENCY), table.numbers(TIME));
-    let goes_on = |a: usize, b: usize| {
+    let continues = |a: usize, b: usize| {
         joints.is_none_or(|joints| joints[a] == joints[b])
             && frequencies.is_none_or(|frequencies| frequencies[a] == frequencies[b])
             && times.is_none_or(|times| times[b] >= times[a])
@@ -65,7 +65,7 @@ pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
     let mut loops = Vec::new();
     let mut from = rows.start;
     while from < rows.end {
-        let to = (from + 1..rows.end).find(|row| !goes_on(row - 1, *row)).unwrap_or(rows.end);
+        let to = (from + 1..rows.end).find(|row| !continues(row - 1, *row)).unwrap_or(rows.end);
         loops.push(from..to);
         from = to;
     }
@@ -85,11 +85,12 @@ pub(super) fn single(table: &Table, rows: Range<usize>) -> Vec<Range<usize>> {
 /// use stickslip_study::{kinds::hysteresis, read_study, run::{Context, run}};
 /// let text = stickslip_study::templates::find("element").unwrap().study;
 /// let study = read_study("element.toml", text, &[]).unwrap();
-/// let loops = hysteresis::loops(&study, &run(&study, &Context::unwatched(1)).unwrap()).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
+/// let loops = hysteresis::loops(&study, &dataset).unwrap();
 /// assert!((loops[1].dissipation - 4e-6).abs() < 1e-15);   // 4 Ft (a - Ft/kt), a = 2 mm
 /// ```
 pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError> {
-    let results = Results::of(NAME, study, dataset)?;
+    let results = Results::new(NAME, study, dataset)?;
     let (Some(points), Some(summary)) = (results.table(LOOPS)?, results.table(SUMMARY)?) else {
         return Ok(Vec::new());
     };
@@ -98,18 +99,18 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
     let (named, dissipation) = (summary.texts(JOINT)?, summary.numbers(DISSIPATION)?);
     let (stiffness, damping) = (summary.numbers(STIFFNESS)?, summary.numbers(DAMPING)?);
     let mut loops = Vec::new();
-    for stretch in results.stretches(&points, study.varied().len())? {
+    for case_rows in results.case_rows(&points, study.varied().len())? {
         // a study of one frequency has no frequency column
-        let only = || study.case(stretch.case).ok()?.frequencies?.get(0).map(hertz);
-        for rows in single(points.table, stretch.rows) {
+        let only = || study.case(case_rows.case).ok()?.frequencies?.get(0).map(hertz);
+        for rows in split_loops(points.table, case_rows.rows) {
             let row = loops.len();
             if named.get(row) != Some(&joint[rows.start]) {
-                return Err(summary.other_rows());
+                return Err(summary.foreign_rows());
             }
             let listed = points.table.numbers(FREQUENCY).map(|frequency| frequency[rows.start]);
             loops.push(Loop {
-                varied: stretch.varied.clone(),
-                frequency: listed.or_else(only).ok_or_else(|| points.other_rows())?,
+                varied: case_rows.varied.clone(),
+                frequency: listed.or_else(only).ok_or_else(|| points.foreign_rows())?,
                 joint: named[row].clone(),
                 time: time[rows.clone()].to_vec(),
                 displacement: displacement[rows.clone()].to_vec(),
@@ -120,13 +121,13 @@ pub fn loops(study: &Study, dataset: &Dataset) -> Result<Vec<Loop>, ResultsError
             });
         }
     }
-    if loops.len() == named.len() { Ok(loops) } else { Err(summary.other_rows()) }
+    if loops.len() == named.len() { Ok(loops) } else { Err(summary.foreign_rows()) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{Column, Values};
+    use crate::results::dataset::{CellValues, Column};
 
     /// A loop ends where joint, frequency or period end, even if the next loop has equal
     /// values.
@@ -136,15 +137,15 @@ mod tests {
         let mut table = Table {
             name: LOOPS.to_owned(),
             columns: vec![
-                column(FREQUENCY, Values::Number(vec![1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0])),
-                column(JOINT, Values::Text(["a", "a", "b", "b", "b", "b", "b"].map(str::to_owned).to_vec())),
-                column(TIME, Values::Number(vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 0.0])),
+                column(FREQUENCY, CellValues::Number(vec![1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0])),
+                column(JOINT, CellValues::Text(["a", "a", "b", "b", "b", "b", "b"].map(str::to_owned).to_vec())),
+                column(TIME, CellValues::Number(vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 0.0])),
             ],
         };
-        assert_eq!(single(&table, 0..7), [0..2, 2..4, 4..6, 6..7]);
-        assert_eq!(single(&table, 1..3), [1..2, 2..3]);
-        assert_eq!(single(&table, 3..3), []);
+        assert_eq!(split_loops(&table, 0..7), [0..2, 2..4, 4..6, 6..7]);
+        assert_eq!(split_loops(&table, 1..3), [1..2, 2..3]);
+        assert_eq!(split_loops(&table, 3..3), []);
         table.columns.truncate(1);
-        assert_eq!(single(&table, 0..7), [0..4, 4..7]);
+        assert_eq!(split_loops(&table, 0..7), [0..4, 4..7]);
     }
 }

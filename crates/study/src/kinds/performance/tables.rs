@@ -1,9 +1,9 @@
 //! The tables of performance curves: names, columns, and their content as typed values.
 
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
-use crate::dataset::Dataset;
+use crate::case::study::{Study, VariedValue};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
+use crate::results::dataset::Dataset;
 use crate::results::{Peak, Results, ResultsError};
-use crate::study::{Study, VariedValue};
 
 /// Name of the kind.
 pub(super) const NAME: &str = "performance";
@@ -16,16 +16,16 @@ pub(super) const FAILED: &str = "failed_orbits";
 
 /// The resonance peak over a parameter, the last one of `vary`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct PeakCurve {
     /// The peak at each value of the parameter.
-    pub points: Vec<Point>,
+    pub points: Vec<PerformancePoint>,
     /// Its lowest point, refined between the values; `None` without an optimum between them.
     pub optimum: Option<Optimum>,
 }
 
 /// The resonance peak at one value of the parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct PerformancePoint {
     /// The varied parameters of the case; the last one is the parameter of the curve.
     pub varied: Vec<VariedValue>,
     /// The peak; `None` if no orbit was found.
@@ -68,33 +68,38 @@ pub struct Optimum {
 /// vary = { Ft = ["5.5 N", "6.5 N", "7.5 N"] }
 /// "#;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
-/// let curves = performance::curves(&study, &run(&study, &Context::unwatched(1)).unwrap()).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
+/// let curves = performance::curves(&study, &dataset).unwrap();
 /// assert!((curves[0].optimum.unwrap().value - 6.684).abs() < 0.01);
 /// ```
-pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsError> {
-    let results = Results::of(NAME, study, dataset)?;
+pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<PeakCurve>, ResultsError> {
+    let results = Results::new(NAME, study, dataset)?;
     let Some(table) = results.table(PERFORMANCE)? else { return Ok(Vec::new()) };
     let (frequency, amplitude) = (table.numbers(FREQUENCY)?, table.numbers(AMPLITUDE)?);
     let (at_range_end, failed) = (table.flags(AT_RANGE_END)?, table.integers(FAILED)?);
     let varied = study.varied();
     let mut curves = Vec::new();
-    for stretch in results.stretches(&table, varied.len().saturating_sub(1))? {
+    for case_rows in results.case_rows(&table, varied.len().saturating_sub(1))? {
         let point = |row: usize| {
-            let of_case = study.varied_values(stretch.case + row - stretch.rows.start);
+            let varied_values = study.varied_values(case_rows.case + row - case_rows.rows.start);
             let peak = |at_range_end| Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
-            Some(Point { varied: of_case?, peak: at_range_end[row].map(peak), failed_orbits: failed[row] })
+            Some(PerformancePoint {
+                varied: varied_values?,
+                peak: at_range_end[row].map(peak),
+                failed_orbits: failed[row],
+            })
         };
-        let points: Option<Vec<Point>> = stretch.rows.clone().map(point).collect();
-        curves.push(Curve { points: points.ok_or_else(|| table.other_rows())?, optimum: None });
+        let points: Option<Vec<PerformancePoint>> = case_rows.rows.clone().map(point).collect();
+        curves.push(PeakCurve { points: points.ok_or_else(|| table.foreign_rows())?, optimum: None });
     }
     let (Some(optima), true) = (results.table(OPTIMUM)?, !varied.is_empty()) else { return Ok(curves) };
     if optima.table.rows() != curves.len() {
-        return Err(optima.other_rows());
+        return Err(optima.foreign_rows());
     }
     let (frequency, amplitude) = (optima.numbers(FREQUENCY)?, optima.numbers(AMPLITUDE)?);
     for (row, curve) in curves.iter_mut().enumerate() {
         let parameter = curve.points.first().and_then(|point| point.varied.last());
-        let column = parameter.ok_or_else(|| table.other_rows())?.column().0;
+        let column = parameter.ok_or_else(|| table.foreign_rows())?.column().0;
         let (value, frequency, amplitude) = (optima.numbers(&column)?[row], frequency[row], amplitude[row]);
         curve.optimum = value.is_finite().then_some(Optimum { value, frequency, amplitude });
     }

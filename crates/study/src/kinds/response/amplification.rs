@@ -1,20 +1,20 @@
 //! Amplification: the largest amplitude of a mistuned disk over that of the tuned disk, each at
 //! its peak.
 
-use super::super::peak_of::{displacements, named_places, worst};
-use super::peaks::Found;
+use super::peaks::FoundPeak;
 use super::tables;
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
-use crate::dataset::{Axis, Panel};
-use crate::drawing::{Drawing, Stretch, numbers};
-use crate::histogram;
-use crate::info::Complaint;
-use crate::key::{Key, Takes, default};
-use crate::rows::Rows;
-use crate::study::varied_text;
-use crate::survey::Surveyed;
-use crate::values::{Frequencies, Values, hertz};
-use crate::work::Work;
+use crate::case::study::varied_text;
+use crate::case::values::{Frequencies, Values, hertz};
+use crate::check::survey::SurveyedCase;
+use crate::kinds::info::KeyError;
+use crate::kinds::shared::peak_of::{displacements, largest_amplitude, named_places};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
+use crate::results::dataset::{Axis, Panel};
+use crate::results::drawing::{CaseRows, FigureInput, numbers};
+use crate::results::histogram;
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::UnitTask;
+use crate::syntax::key::{Key, ValueType, default};
 use stickslip::curve::adaptive::Adaptive;
 use stickslip::curve::peak::{self, Peak, Point};
 use stickslip::method::advised;
@@ -24,7 +24,7 @@ use stickslip::orbit::Orbit;
 /// The key `amplification`.
 pub(super) const KEY: Key = default(
     "amplification",
-    Takes::Flag,
+    ValueType::Flag,
     "false",
     "for a mistuned disk: its largest peak over the peak of the tuned disk, case by case in amplification.csv, with \
      the distribution over the cases",
@@ -32,7 +32,7 @@ pub(super) const KEY: Key = default(
 );
 
 /// Checks the requirements of the key.
-pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
+pub(super) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
     if values.flag(KEY.name) != Some(true) {
         return Ok(());
     }
@@ -46,11 +46,11 @@ pub(super) fn check(values: &Values, model: &Model) -> Result<(), Complaint> {
     } else {
         return Ok(());
     };
-    Err(Complaint::new(KEY.name, message, help))
+    Err(KeyError::new(KEY.name, message, help))
 }
 
 /// Warns if no blade differs in any case, so that every amplification is one.
-pub(super) fn none(cases: &[Surveyed]) -> Option<String> {
+pub(super) fn tuned_warning(cases: &[SurveyedCase]) -> Option<String> {
     let asked = cases.iter().any(|one| one.case.values.flag(KEY.name) == Some(true));
     let tuned = cases.iter().all(|one| one.case.model.ring.is_some_and(|ring| ring.equal));
     (asked && tuned).then(|| {
@@ -59,33 +59,33 @@ pub(super) fn none(cases: &[Surveyed]) -> Option<String> {
 }
 
 /// Writes the row of a case with the peaks `found`; returns the reason if there is no row.
-pub(super) fn row(work: &Work<'_>, found: &[Found], rows: &mut Rows) -> Result<(), String> {
-    let (prepared, largest) = (work.case(), |a: &&Found, b: &&Found| a.peak.value.total_cmp(&b.peak.value));
+pub(super) fn row(work: &UnitTask<'_>, found: &[FoundPeak], rows: &mut TableBuilder) -> Result<(), String> {
+    let (prepared, largest) = (work.case(), |a: &&FoundPeak, b: &&FoundPeak| a.peak.value.total_cmp(&b.peak.value));
     let highest = found.iter().max_by(largest).ok_or("no peak was found")?;
-    let tuned = tuned(work)?.ok_or("the tuned disk has no peak")?;
+    let tuned = tuned_peak(work)?.ok_or("the tuned disk has no peak")?;
     rows.varied(&prepared.case);
     rows.text(tables::MASS, &prepared.system.places()[highest.mass]);
     rows.number(FREQUENCY, hertz(highest.peak.omega));
     rows.number(AMPLITUDE, highest.peak.value);
     rows.number(tables::TUNED_FREQUENCY, hertz(tuned.omega));
     rows.number(tables::TUNED_AMPLITUDE, tuned.value);
-    rows.number(tables::RATIO, highest.peak.value / tuned.value);
+    rows.number(tables::AMPLIFICATION_RATIO, highest.peak.value / tuned.value);
     rows.flag(AT_RANGE_END, Some(highest.peak.at_end || tuned.at_end));
-    rows.reduced(prepared.system.reduction_evidence());
-    rows.end();
+    rows.reduction_error(prepared.system.reduction_evidence());
+    rows.end_row();
     Ok(())
 }
 
 /// Returns the highest peak of the case without mistuning, at the same frequencies.
-fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
+fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
     let prepared = work.case();
-    let case = work.study.tuned().case(prepared.case.index).map_err(|error| error.to_string())?;
+    let case = work.study.without_mistuning().case(prepared.case.index).map_err(|error| error.to_string())?;
     let system = case.model.assemble().map_err(|error| error.to_string())?;
     let mut places = named_places(prepared);
     if places.is_empty() {
         places = displacements(&system);
     }
-    let quantities = |orbit: &Orbit| vec![worst(orbit, &places)];
+    let quantities = |orbit: &Orbit| vec![largest_amplitude(orbit, &places)];
     let method = &*prepared.method;
     let points: Vec<Point> = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
@@ -118,21 +118,20 @@ fn tuned(work: &Work<'_>) -> Result<Option<Peak>, String> {
 /// Draws histograms of the amplification of many disks.
 ///
 /// Draws, or the values of the last parameter of `vary`, form one histogram.
-pub(super) fn panels(drawing: &Drawing<'_>) -> Vec<Panel> {
+pub(super) fn panels(drawing: &FigureInput<'_>) -> Vec<Panel> {
     let Some(table) = drawing.table(tables::AMPLIFICATION) else { return Vec::new() };
-    let stretches = drawing.stretches(table);
-    let outer = |stretch: &Stretch| varied_text(&stretch.varied[..stretch.varied.len().saturating_sub(1)]);
-    let groups: Vec<(String, Vec<&Stretch>)> = match drawing.study.draws() {
-        Some(_) => drawing.by_listed(&stretches),
-        None => {
-            stretches.chunk_by(|a, b| outer(a) == outer(b)).map(|all| (outer(&all[0]), all.iter().collect())).collect()
-        }
+    let cases = drawing.case_rows(table);
+    let outer = |case_rows: &CaseRows| varied_text(&case_rows.varied[..case_rows.varied.len().saturating_sub(1)]);
+    let groups: Vec<(String, Vec<&CaseRows>)> = match drawing.study.draws() {
+        Some(_) => drawing.group_draws(&cases),
+        None => cases.chunk_by(|a, b| outer(a) == outer(b)).map(|all| (outer(&all[0]), all.iter().collect())).collect(),
     };
     let x = Axis::new("amplification of the worst place", "");
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
-    let of_group = |(words, group): (String, Vec<&Stretch>)| {
-        let rows = || group.iter().flat_map(|stretch| stretch.rows.clone());
-        let values: Vec<f64> = rows().flat_map(|row| numbers(table, tables::RATIO, row..row + 1)).collect();
+    let group_panel = |(words, group): (String, Vec<&CaseRows>)| {
+        let rows = || group.iter().flat_map(|case_rows| case_rows.rows.clone());
+        let values: Vec<f64> =
+            rows().flat_map(|row| numbers(table, tables::AMPLIFICATION_RATIO, row..row + 1)).collect();
         let ends = rows().filter(|row| at_end.get(*row) == Some(&Some(true))).count();
         let ends = match ends {
             0 => String::new(),
@@ -142,5 +141,5 @@ pub(super) fn panels(drawing: &Drawing<'_>) -> Vec<Panel> {
         let title = [words, "amplification".to_owned(), ends].into_iter().filter(|part| !part.is_empty());
         histogram::panel_of_maxima(&values, &x, &title.collect::<Vec<_>>().join(", "), "disks")
     };
-    groups.into_iter().filter_map(of_group).collect()
+    groups.into_iter().filter_map(group_panel).collect()
 }

@@ -1,15 +1,15 @@
 //! The figure of a response.
 
-use super::super::shares;
-use super::drawn::{Drawn, PeakOf, force};
+use super::figure_data::{CasePeak, FigureData, force};
 use super::{amplification, tables};
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, WAY_BACK, amplitude_of};
-use crate::dataset::{Axis, Figure, Panel, Sharing, Table};
-use crate::drawing::{Drawing, Layout, MOST_PANELS, Stretch, join, largest, numbers, words};
-use crate::histogram;
-use crate::words::display_unit;
+use crate::kinds::shared::contact_states;
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP, amplitude_of};
+use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
+use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, PanelLayout, join_title, largest, numbers, words};
+use crate::results::histogram;
+use crate::syntax::format::prefixed_unit;
 
-pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
+pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(curve), Some(system)) = (drawing.table(tables::CURVE), drawing.system()) else {
         return Figure::default();
     };
@@ -20,25 +20,25 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
         names.filter(|name| drawing.shows(name) && curve.numbers(&force(name)).is_some()).collect();
     // with `output = "contact"` only
     let names = system.joints().iter().map(|joint| joint.name().to_owned());
-    let faces: Vec<String> = names.filter(|name| drawing.shows(name) && shares::has(curve, name)).collect();
+    let faces: Vec<String> = names.filter(|name| drawing.shows(name) && contact_states::has(curve, name)).collect();
     if shown.is_empty() && joints.is_empty() && faces.is_empty() {
         return Figure::default();
     }
     let columns = || shown.iter().map(|(name, _)| amplitude_of(name));
     let (x, x_factor) = drawing.axis(0, "frequency", largest(curve, [DRIVE.to_owned()]), "Hz");
-    let tables = [Some(curve), drawing.table(tables::WAY_BACK)];
+    let tables = [Some(curve), drawing.table(tables::REVERSE_SWEEP)];
     let highest = tables.into_iter().flatten().map(|table| largest(table, columns())).fold(0.0, f64::max);
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
-    let (unit, force_factor) = display_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
-    let stretches = drawing.stretches(curve);
-    let mut drawn = Drawn {
+    let (unit, force_factor) = prefixed_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
+    let cases = drawing.case_rows(curve);
+    let mut drawn = FigureData {
         drawing,
         curve,
         index: curve.index(),
-        way_back: drawing.table(tables::WAY_BACK).map(|table| (table, drawing.stretches(table))),
-        references: drawing.table(tables::REFERENCES).map(|table| (table, references_by_case(drawing, table))),
+        reverse_sweep: drawing.table(tables::REVERSE_SWEEP).map(|table| (table, drawing.case_rows(table))),
+        references: drawing.table(tables::REFERENCES).map(|table| (table, reference_rows(drawing, table))),
         peaks: peaks_by_case(drawing),
-        shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.stretches(table))),
+        shapes: drawing.table(tables::SHAPES).map(|table| (table, drawing.case_rows(table))),
         factor: (x_factor, y_factor),
         force_factor,
         axes: (x, y),
@@ -47,76 +47,81 @@ pub(super) fn draw(drawing: &Drawing<'_>) -> Figure {
         system: &system,
         shown,
         joints,
-        faces,
+        contact_joints: faces,
         failed: 0,
-        left_out: drawing.left_out(stretches.len()),
+        case_count_text: drawing.shown_cases_text(cases.len()),
     };
-    drawn.failed = stretches.iter().map(|stretch| drawn.without_orbit(stretch).len()).sum();
-    let mut figure = match drawing.layout(drawn.shown.len(), stretches.len(), drawn.panels_of_a_case()) {
-        Layout::Cases => {
+    drawn.failed = cases.iter().map(|case_rows| drawn.without_orbit(case_rows).len()).sum();
+    let mut figure = match drawing.layout(drawn.shown.len(), cases.len(), drawn.panels_of_a_case()) {
+        PanelLayout::Cases => {
             // the colour scale belongs to maps; the curves of one panel have names
-            let varied = (!drawn.faces.is_empty()).then(|| shares::axis("share of the period"));
-            Figure { panels: drawn.by_case(&stretches), varied, ..Figure::default() }
+            let varied = (!drawn.contact_joints.is_empty()).then(|| contact_states::axis("share of the period"));
+            Figure { panels: drawn.panels_by_case(&cases), varied, ..Figure::default() }
         }
-        Layout::Masses => Figure {
-            panels: drawn.by_mass(&stretches),
+        PanelLayout::Masses => Figure {
+            panels: drawn.panels_by_place(&cases),
             sharing: Sharing::Always,
-            varied: drawing.varied_axis(&stretches, drawing.study.varied().len().saturating_sub(1)),
+            varied: drawing.varied_axis(&cases, drawing.study.varied().len().saturating_sub(1)),
             ..Figure::default()
         },
     };
     let amplified = amplification::panels(drawing);
     figure.panels.extend(if amplified.is_empty() { heights(&drawn) } else { amplified });
-    figure.panels.truncate(MOST_PANELS);
+    figure.panels.truncate(MAX_PANELS);
     figure
 }
 
 /// Draws histograms of the largest peak of many draws.
-fn heights(drawn: &Drawn<'_>) -> Vec<Panel> {
+fn heights(drawn: &FigureData<'_>) -> Vec<Panel> {
     let (Some(table), Some(_)) = (drawn.drawing.table(tables::PEAKS), drawn.drawing.study.draws()) else {
         return Vec::new();
     };
-    let stretches = drawn.drawing.stretches(table);
+    let cases = drawn.drawing.case_rows(table);
     let x = Axis { quantity: "largest peak".to_owned(), ..Axis::new("", &drawn.axes.1.unit) };
-    let of_group = |(words, group): (String, Vec<&Stretch>)| {
-        let highest = |stretch: &&Stretch| {
-            let heights = numbers(table, AMPLITUDE, stretch.rows.clone());
+    let group_panel = |(words, group): (String, Vec<&CaseRows>)| {
+        let highest = |case_rows: &&CaseRows| {
+            let heights = numbers(table, AMPLITUDE, case_rows.rows.clone());
             heights.into_iter().fold(f64::NAN, f64::max) * drawn.factor.1
         };
         let heights: Vec<f64> = group.iter().map(highest).collect();
-        histogram::panel(&heights, &x, &join([words, "largest peak".to_owned()]), "draws")
+        histogram::panel(&heights, &x, &join_title([words, "largest peak".to_owned()]), "draws")
     };
-    drawn.drawing.by_listed(&stretches).into_iter().filter_map(of_group).collect()
+    drawn.drawing.group_draws(&cases).into_iter().filter_map(group_panel).collect()
 }
 
 /// Returns the rows of the linear references case by case.
 ///
 /// Results of earlier versions have only those of the first case, without varied parameters.
-fn references_by_case(drawing: &Drawing<'_>, table: &Table) -> Vec<Stretch> {
+fn reference_rows(drawing: &FigureInput<'_>, table: &Table) -> Vec<CaseRows> {
     let varied = drawing.study.varied_values(0).unwrap_or_default();
     if table.columns.first().is_some_and(|column| column.name == DRIVE) {
-        return vec![Stretch { case: 0, varied, rows: 0..table.rows() }];
+        return vec![CaseRows { case: 0, varied, rows: 0..table.rows() }];
     }
-    drawing.stretches(table)
+    drawing.case_rows(table)
 }
 
 /// Returns the peaks inside the frequency range.
-fn peaks_by_case(drawing: &Drawing<'_>) -> Vec<PeakOf> {
+fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
     let Some(table) = drawing.table(tables::PEAKS) else { return Vec::new() };
     let at_end = table.flags(AT_RANGE_END).unwrap_or_default();
-    let way_back = table.flags(WAY_BACK).unwrap_or_default();
+    let reverse_sweep = table.flags(REVERSE_SWEEP).unwrap_or_default();
     let masses = words(table, tables::MASS);
     // a table from another source may lack columns
     if masses.len() != table.rows() {
         return Vec::new();
     }
     let mut peaks = Vec::new();
-    for stretch in drawing.stretches(table) {
-        let (x, y) = (numbers(table, DRIVE, stretch.rows.clone()), numbers(table, AMPLITUDE, stretch.rows.clone()));
-        for (i, row) in stretch.rows.clone().enumerate() {
+    for case_rows in drawing.case_rows(table) {
+        let (x, y) = (numbers(table, DRIVE, case_rows.rows.clone()), numbers(table, AMPLITUDE, case_rows.rows.clone()));
+        for (i, row) in case_rows.rows.clone().enumerate() {
             if at_end.get(row) == Some(&Some(false)) {
-                let way_back = way_back.get(row).copied().flatten() == Some(true);
-                peaks.push(PeakOf { case: stretch.case, mass: masses[row].clone(), at: (x[i], y[i]), way_back });
+                let is_reverse = reverse_sweep.get(row).copied().flatten() == Some(true);
+                peaks.push(CasePeak {
+                    case: case_rows.case,
+                    mass: masses[row].clone(),
+                    at: (x[i], y[i]),
+                    way_back: is_reverse,
+                });
             }
         }
     }

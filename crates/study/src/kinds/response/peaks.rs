@@ -1,7 +1,7 @@
 //! The peaks of a range of a response curve.
 
-use super::super::peak_of::{named_places, worst};
-use crate::work::{Prepared, Work};
+use crate::kinds::shared::peak_of::{largest_amplitude, named_places};
+use crate::run::work::{PreparedCase, UnitTask};
 use stickslip::curve::both_ways::stretches;
 use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
@@ -15,16 +15,16 @@ const ROUNDING: f64 = 1e-10;
 ///
 /// It is above the rounding of an orbit, and below the fall of a resonance between two points
 /// of any curve that can be drawn.
-const LEVEL: f64 = 1e-8;
+const LEVEL_TOLERANCE: f64 = 1e-8;
 
 /// Largest relative difference of two peaks of both sweeps, between the same frequencies, that
 /// count as one.
 ///
 /// Searches on a level top end at points that depend on the warm start.
-const SAME: f64 = 1e-2;
+const SAME_PEAK: f64 = 1e-2;
 
 /// The quantities of an orbit for the peak search.
-pub(super) struct Sought {
+pub(super) struct PeakQuantities {
     /// The places whose largest amplitude counts; empty if each place has separate peaks.
     named: Vec<usize>,
     places: usize,
@@ -32,10 +32,10 @@ pub(super) struct Sought {
     shapes: bool,
 }
 
-impl Sought {
-    pub(super) fn new(prepared: &Prepared) -> Self {
+impl PeakQuantities {
+    pub(super) fn new(prepared: &PreparedCase) -> Self {
         let shapes = prepared.case.model.ring.is_some();
-        Sought { named: named_places(prepared), places: prepared.system.places().len(), shapes }
+        PeakQuantities { named: named_places(prepared), places: prepared.system.places().len(), shapes }
     }
 
     /// Returns the amplitudes for the peak search.
@@ -49,7 +49,9 @@ impl Sought {
             let height = |place: &PlaceMotion| if place.radius.is_some() { 0.0 } else { place.amplitude() };
             return orbit.places.iter().map(height).collect();
         }
-        std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
+        std::iter::once(largest_amplitude(orbit, named))
+            .chain(named.iter().map(|place| orbit.places[*place].amplitude()))
+            .collect()
     }
 
     /// Returns amplitude and phase (degrees) of every place; empty if no shape is kept.
@@ -71,7 +73,7 @@ impl Sought {
     }
 
     /// Returns the index of the quantity of a peak.
-    fn quantity(&self, found: &Found) -> usize {
+    fn quantity(&self, found: &FoundPeak) -> usize {
         if self.named.is_empty() { found.mass } else { 0 }
     }
 
@@ -84,18 +86,18 @@ impl Sought {
 }
 
 /// A peak and its place.
-pub(super) struct Found {
+pub(super) struct FoundPeak {
     pub(super) mass: usize,
     pub(super) peak: Peak,
     /// Amplitude (m) and phase (degrees) of every place, for a refined peak of a disk.
     pub(super) shape: Vec<f64>,
     /// True if only the reverse sweep has the peak.
-    pub(super) way_back: bool,
+    pub(super) reverse_sweep: bool,
 }
 
-impl Found {
+impl FoundPeak {
     /// Returns true if no place moves more at the peak; the first of equal places counts.
-    pub(super) fn leads(&self, system: &System) -> bool {
+    pub(super) fn is_largest(&self, system: &System) -> bool {
         let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
         first_largest(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
             == Some(self.mass)
@@ -104,22 +106,22 @@ impl Found {
 
 /// Returns the peaks of both sweeps by frequency; `others` are the other orbits of the reverse
 /// sweep.
-pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<Found>, MethodError> {
-    let mut of_others = Vec::new();
-    for stretch in stretches(&points, others) {
+pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<FoundPeak>, MethodError> {
+    let mut reverse_peaks = Vec::new();
+    for interval in stretches(&points, others) {
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
-        let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
-        let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
-        of_others.extend(found.map(|found| Found { way_back: true, ..found }));
+        let neighbours: Vec<f64> = interval.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
+        let found = peaks_of(work, interval)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
+        reverse_peaks.extend(found.map(|found| FoundPeak { reverse_sweep: true, ..found }));
     }
-    let sought = Sought::new(work.case());
-    of_others.retain(|found| !is_of_the_way_there(found, &points, others, &sought));
+    let sought = PeakQuantities::new(work.case());
+    reverse_peaks.retain(|found| !is_jump_to_forward(found, &points, others, &sought));
     let omegas: Vec<f64> = points.iter().map(|point| point.omega).collect();
     let mut all = peaks_of(work, points)?;
-    all.retain(|found| !is_edge(found, &omegas, others, &sought));
-    for found in of_others {
-        match all.iter_mut().find(|other| is_same(other, &found, &omegas)) {
-            Some(same) if found.peak.value > same.peak.value => *same = Found { way_back: false, ..found },
+    all.retain(|found| !is_jump_to_branch(found, &omegas, others, &sought));
+    for found in reverse_peaks {
+        match all.iter_mut().find(|other| is_same_peak(other, &found, &omegas)) {
+            Some(same) if found.peak.value > same.peak.value => *same = FoundPeak { reverse_sweep: false, ..found },
             Some(_) => {}
             None => all.push(found),
         }
@@ -129,10 +131,13 @@ pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Resu
 }
 
 /// Returns true if a peak of the forward sweep and a peak of the reverse sweep are the same.
-fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
+fn is_same_peak(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
     let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
     let (a, b) = (&there.peak, &back.peak);
-    !there.way_back && there.mass == back.mass && below(a) == below(b) && (a.value - b.value).abs() <= SAME * a.value
+    !there.reverse_sweep
+        && there.mass == back.mass
+        && below(a) == below(b)
+        && (a.value - b.value).abs() <= SAME_PEAK * a.value
 }
 
 /// Returns true if a peak of the reverse sweep is only its jump to the orbits of the forward
@@ -140,7 +145,7 @@ fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
 ///
 /// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
 /// than to that of the reverse sweep, and not higher.
-fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought: &Sought) -> bool {
+fn is_jump_to_forward(found: &FoundPeak, points: &[Point], others: &[Point], sought: &PeakQuantities) -> bool {
     let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
     let there = points.iter().find(|point| point.omega == own.omega);
@@ -151,7 +156,7 @@ fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought
 
 /// Returns true if a peak is only the jump of the forward sweep to a branch on which the
 /// reverse sweep reaches a higher amplitude.
-fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> bool {
+fn is_jump_to_branch(found: &FoundPeak, omegas: &[f64], others: &[Point], sought: &PeakQuantities) -> bool {
     let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
     let next = omegas.iter().find(|omega| **omega > other.omega);
@@ -162,9 +167,9 @@ fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> 
 /// Returns the peaks of a range of a curve by frequency.
 ///
 /// An end of the whole curve is a peak at the range end if the curve falls from it.
-fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
+fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, MethodError> {
     let prepared = work.case();
-    let sought = Sought::new(prepared);
+    let sought = PeakQuantities::new(prepared);
     let count = sought.amplitudes_count();
     let omegas = prepared
         .case
@@ -172,13 +177,13 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         .as_ref()
         .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
     let wanted = if sought.named.is_empty() { count } else { 1 };
-    let at_end = |end: &Point, neighbour: &Point| -> Vec<Found> {
+    let at_end = |end: &Point, neighbour: &Point| -> Vec<FoundPeak> {
         let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
         (0..wanted.min(end.values.len()))
             .filter(falls)
             .map(|q| {
                 let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
-                Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), way_back: false }
+                FoundPeak { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), reverse_sweep: false }
             })
             .collect()
     };
@@ -198,10 +203,10 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
     let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
     let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
-    inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
+    inner.retain(|found| !is_end_of_plateau(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
-        Found { mass, peak: found.peak, shape: found.values[count..].to_vec(), way_back: false }
+        FoundPeak { mass, peak: found.peak, shape: found.values[count..].to_vec(), reverse_sweep: false }
     });
     Ok(first.into_iter().chain(inner).chain(last).filter(|found| moves(&found.peak)).collect())
 }
@@ -209,10 +214,10 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
 /// Returns true if a peak is only the end of a level range.
 ///
 /// An example is a mass that moves with its support until a joint slips.
-fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
-    let at = points.partition_point(|point| point.omega < peak.omega);
+fn is_end_of_plateau(points: &[Point], quantity: usize, peak: &Peak) -> bool {
+    let index = points.partition_point(|point| point.omega < peak.omega);
     let as_high = |point: &Point| {
-        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL * peak.value)
+        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL_TOLERANCE * peak.value)
     };
-    at >= 2 && points[at - 2..at].iter().all(as_high)
+    index >= 2 && points[index - 2..index].iter().all(as_high)
 }

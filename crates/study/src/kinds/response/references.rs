@@ -1,13 +1,13 @@
 //! The linear references of a response: the same structure with all joints free, and with all
 //! joints stuck.
 
-use crate::columns::{FREQUENCY as DRIVE, amplitude_in};
-use crate::linear::Reference;
-use crate::note::WARNING;
-use crate::rows::Rows;
-use crate::study::{Case, Study};
-use crate::values::hertz;
-use crate::work::{Prepared, Work};
+use crate::case::linear_reference::LinearReference;
+use crate::case::study::{Case, Study};
+use crate::case::values::hertz;
+use crate::results::columns::{FREQUENCY as DRIVE, amplitude_in};
+use crate::results::notes::WARNING;
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{PreparedCase, UnitTask};
 use stickslip::method::{self, MethodError, Options, Solver};
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -18,29 +18,30 @@ pub(super) const REFERENCE_POINTS: usize = 4;
 
 /// Returns true if the previous case has the same references: linear structures, excitation and
 /// frequencies are equal.
-pub(super) fn are_known(study: &Study, case: &Case) -> bool {
+pub(super) fn equal_previous(study: &Study, case: &Case) -> bool {
     let before = case.index.checked_sub(1).and_then(|index| study.case(index).ok());
     before.is_some_and(|before| {
-        let alike = |reference: Reference| match (reference.model(&before.model), reference.model(&case.model)) {
+        let is_equal = |reference: LinearReference| match (reference.model(&before.model), reference.model(&case.model))
+        {
             (Ok(before), Ok(case)) => before == case,
             (before, case) => before.is_err() && case.is_err(),
         };
-        before.frequencies == case.frequencies && Reference::ALL.into_iter().all(alike)
+        before.frequencies == case.frequencies && LinearReference::ALL.into_iter().all(is_equal)
     })
 }
 
 /// Number of cases examined to estimate the number of references.
-const LOOKED_AT: usize = 9;
+const SAMPLED_CASES: usize = 9;
 
 /// Estimates the number of cases with different references, from some of the cases; zero if
 /// none are requested.
-pub(super) fn others(study: &Study) -> f64 {
+pub(super) fn distinct_cases(study: &Study) -> f64 {
     if !study.wants_references() {
         return 0.0;
     }
-    let (cases, looked) = (study.cases(), study.cases().min(LOOKED_AT));
-    let looked_at = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
-    let own = looked_at.filter(|case| !are_known(study, case)).count();
+    let (cases, looked) = (study.cases(), study.cases().min(SAMPLED_CASES));
+    let sampled = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
+    let own = sampled.filter(|case| !equal_previous(study, case)).count();
     own as f64 * cases as f64 / looked as f64
 }
 
@@ -48,7 +49,7 @@ pub(super) fn others(study: &Study) -> f64 {
 ///
 /// Its joints have other laws than those for which the method was chosen. If that method does
 /// not support them, the first method that does is used.
-fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+fn solver<'a>(prepared: &PreparedCase, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
         let others = method::ways(system).methods.into_iter().filter_map(method::find);
         let mut takes = others.filter_map(|row| (row.build)(&Options::new()).ok()?.solver(system).ok());
@@ -58,7 +59,7 @@ fn solver<'a>(prepared: &Prepared, system: &'a System) -> Result<Box<dyn Solver 
 
 /// Returns the responses with all joints free and with all joints stuck, and the reasons for
 /// missing ones.
-pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>) {
+pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, Vec<String>) {
     let prepared = work.case();
     let between = omegas.windows(2).flat_map(|pair| {
         (0..REFERENCE_POINTS).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / REFERENCE_POINTS as f64)
@@ -67,17 +68,17 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
     let mut absent = Vec::new();
     // only the amplitudes are kept: an orbit with many places takes megabytes
     let amplitudes = |orbit: Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
-    let mut follow = |reference: Reference| -> Option<Vec<Option<Vec<f64>>>> {
+    let mut follow = |reference: LinearReference| -> Option<Vec<Option<Vec<f64>>>> {
         // the check of the study reports laws without a reference
         let model = reference.model(&prepared.case.model).ok()?;
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
             Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok().map(amplitudes)).collect())
         });
-        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.missing(&why)))).ok()
+        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.no_reference(&why)))).ok()
     };
-    let curves = Reference::ALL.map(|reference| (reference.name(), follow(reference)));
-    let mut rows = Rows::linear();
+    let curves = LinearReference::ALL.map(|reference| (reference.name(), follow(reference)));
+    let mut rows = TableBuilder::for_linear_motions();
     for (i, omega) in omegas.iter().enumerate() {
         rows.varied(&prepared.case);
         rows.number(DRIVE, hertz(*omega));
@@ -88,8 +89,8 @@ pub(super) fn references(work: &Work<'_>, omegas: &[f64]) -> (Rows, Vec<String>)
                 rows.number(&amplitude_in(&format!("{name}_{what}"), along.unit()), amplitude);
             }
         }
-        rows.reduced(prepared.system.reduction_evidence());
-        rows.end();
+        rows.reduction_error(prepared.system.reduction_evidence());
+        rows.end_row();
     }
     (rows, absent)
 }

@@ -1,9 +1,9 @@
 //! The tables of a response: names, columns, and their content as typed values.
 
-use crate::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY, amplitude_of};
-use crate::dataset::Dataset;
+use crate::case::study::{Study, VariedValue};
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY, amplitude_of};
+use crate::results::dataset::Dataset;
 use crate::results::{Peak, Results, ResultsError};
-use crate::study::{Study, VariedValue};
 
 /// Name of the kind.
 pub(super) const NAME: &str = "response";
@@ -18,19 +18,19 @@ pub(super) const AMPLIFICATION: &str = "amplification";
 /// One row per peak of a disk at which no other place moves more, with the shape there.
 pub(super) const SHAPES: &str = "peak_shapes";
 /// One row per orbit that only the reverse sweep finds.
-pub(super) const WAY_BACK: &str = "way_back";
+pub(super) const REVERSE_SWEEP: &str = "way_back";
 /// Frequency of the peak of the tuned disk.
 pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";
 /// Amplitude of that peak.
 pub(super) const TUNED_AMPLITUDE: &str = "tuned_amplitude_m";
 /// Largest amplitude over that of the tuned disk.
-pub(super) const RATIO: &str = "amplification";
+pub(super) const AMPLIFICATION_RATIO: &str = "amplification";
 /// The mass that has a peak.
 pub(super) const MASS: &str = "mass";
 
 /// The response of one case.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct ResponseCurve {
     /// The varied parameters of the case.
     pub varied: Vec<VariedValue>,
     /// Excitation frequencies, Hz, in table order.
@@ -88,33 +88,33 @@ impl MassCurve {
 /// frequency = { from = "0.5 rad/s", to = "1.5 rad/s", points = 3 }
 /// "#;
 /// let study = read_study("oscillator.toml", text, &[]).unwrap();
-/// let dataset = run(&study, &Context::unwatched(1)).unwrap();
+/// let dataset = run(&study, &Context::without_progress(1)).unwrap();
 /// let curves = response::curves(&study, &dataset).unwrap();
 /// assert!((curves[0].masses[0].amplitude[1] - 1.0).abs() < 1e-12);   // F/(c ω) at ω = √(k/m)
 /// ```
-pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsError> {
-    let results = Results::of(NAME, study, dataset)?;
+pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, ResultsError> {
+    let results = Results::new(NAME, study, dataset)?;
     let Some(curve) = results.table(CURVE)? else { return Ok(Vec::new()) };
     let keys = study.varied().len();
     let frequency = curve.numbers(FREQUENCY)?;
     let system = study.case(0).ok().and_then(|case| case.model.assemble().ok());
-    let system = system.ok_or_else(|| curve.other_rows())?;
+    let system = system.ok_or_else(|| curve.foreign_rows())?;
     let displacements = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
     let places: Vec<String> = displacements.map(|(place, _)| place.clone()).collect();
     let amplitudes =
         places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;
-    let stretches = results.stretches(&curve, keys)?;
-    let mut curves: Vec<Curve> = stretches
+    let cases = results.case_rows(&curve, keys)?;
+    let mut curves: Vec<ResponseCurve> = cases
         .iter()
-        .map(|stretch| Curve {
-            varied: stretch.varied.clone(),
-            frequency: frequency[stretch.rows.clone()].to_vec(),
+        .map(|case_rows| ResponseCurve {
+            varied: case_rows.varied.clone(),
+            frequency: frequency[case_rows.rows.clone()].to_vec(),
             masses: places
                 .iter()
                 .zip(&amplitudes)
                 .map(|(place, amplitude)| MassCurve {
                     mass: place.clone(),
-                    amplitude: amplitude[stretch.rows.clone()].to_vec(),
+                    amplitude: amplitude[case_rows.rows.clone()].to_vec(),
                     peaks: Vec::new(),
                 })
                 .collect(),
@@ -123,12 +123,12 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<Curve>, ResultsErr
     let Some(peaks) = results.table(PEAKS)? else { return Ok(curves) };
     let (masses, frequency) = (peaks.texts(MASS)?, peaks.numbers(FREQUENCY)?);
     let (amplitude, at_range_end) = (peaks.numbers(AMPLITUDE)?, peaks.flags(AT_RANGE_END)?);
-    for stretch in results.stretches(&peaks, keys)? {
-        let case = stretches.iter().position(|of_curve| of_curve.case == stretch.case);
-        for row in stretch.rows {
+    for case_rows in results.case_rows(&peaks, keys)? {
+        let case = cases.iter().position(|of_curve| of_curve.case == case_rows.case);
+        for row in case_rows.rows {
             let mass = places.iter().position(|place| *place == masses[row]);
             let (Some(case), Some(mass), Some(at_range_end)) = (case, mass, at_range_end[row]) else {
-                return Err(peaks.other_rows());
+                return Err(peaks.foreign_rows());
             };
             let peak = Peak { frequency: frequency[row], amplitude: amplitude[row], at_range_end };
             curves[case].masses[mass].peaks.push(peak);

@@ -9,7 +9,7 @@ use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::{Method, Options, Solver};
 use stickslip::model::System;
 use stickslip::orbit::{Orbit, OrbitError};
-use stickslip_study::dataset::{Column, Table, Values};
+use stickslip_study::dataset::{Column, Table, CellValues};
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::{Study, read_file, read_study};
 use stickslip_verification::loose_dampers::loose_damper;
@@ -90,7 +90,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
 
 fn tables(study: Study) -> Result<Vec<Table>, String> {
     check(&study).map_err(|error| error.to_string())?;
-    Ok(run(&study, &Context::unwatched(1)).map_err(|error| error.to_string())?.tables)
+    Ok(run(&study, &Context::without_progress(1)).map_err(|error| error.to_string())?.tables)
 }
 
 fn random_study(seed: u64) -> Item {
@@ -152,11 +152,11 @@ fn points(name: &str, system: &System, solver: &mut dyn Solver, rates: &[f64]) -
         .collect();
     let number = |name: String, value: &dyn Fn(&Orbit) -> f64| Column {
         name,
-        values: Values::Number(found.iter().map(|found| found.as_ref().map_or(f64::NAN, value)).collect()),
+        values: CellValues::Number(found.iter().map(|found| found.as_ref().map_or(f64::NAN, value)).collect()),
     };
     let mut columns = vec![Column {
         name: "frequency_Hz".to_owned(),
-        values: Values::Number(rates.iter().map(|w| w / TAU).collect()),
+        values: CellValues::Number(rates.iter().map(|w| w / TAU).collect()),
     }];
     for place in 0..system.places().len() {
         columns.push(number(format!("amplitude_{place}_m"), &|orbit| orbit.places[place].amplitude()));
@@ -165,11 +165,11 @@ fn points(name: &str, system: &System, solver: &mut dyn Solver, rates: &[f64]) -
     let iterations = |found: &Result<Orbit, OrbitError>| found.as_ref().map_or(0, |o| o.evidence.iterations as u64);
     columns.push(Column {
         name: "iterations".to_owned(),
-        values: Values::Integer(found.iter().map(iterations).collect()),
+        values: CellValues::Integer(found.iter().map(iterations).collect()),
     });
     let text = |name: &str, value: &dyn Fn(&Result<Orbit, OrbitError>) -> &'static str| Column {
         name: name.to_owned(),
-        values: Values::Text(found.iter().map(|found| value(found).to_owned()).collect()),
+        values: CellValues::Text(found.iter().map(|found| value(found).to_owned()).collect()),
     };
     columns.push(text("found_by", &|found| found.as_ref().map_or("", |orbit| orbit.evidence.found_by)));
     columns.push(text("status", &|found| match found {

@@ -55,7 +55,7 @@ struct Differences {
     points: usize,
     /// Points by their old and new status, where these differ.
     statuses: BTreeMap<(String, String), usize>,
-    /// Values beyond the reported errors: the excess, and the place in words.
+    /// CellValues beyond the reported errors: the excess, and the place in words.
     values: Vec<(f64, String)>,
     /// Tables that only one record has, or that have another shape.
     shapes: Vec<String>,

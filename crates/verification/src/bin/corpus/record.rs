@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use stickslip_study::dataset::{Table, Values};
+use stickslip_study::dataset::{Table, CellValues};
 
 /// Name of the file with the reason why an item has no tables.
 pub const REFUSED: &str = "refused.txt";
@@ -89,10 +89,10 @@ fn csv(table: &Table) -> String {
         for (k, column) in table.columns.iter().enumerate() {
             let comma = if k > 0 { "," } else { "" };
             let written = match &column.values {
-                Values::Number(values) => write!(text, "{comma}{:?}", values[row]),
-                Values::Integer(values) => write!(text, "{comma}{}", values[row]),
-                Values::Text(values) => write!(text, "{comma}{}", values[row].replace(',', ";")),
-                Values::Flag(values) => write!(text, "{comma}{:?}", values[row]),
+                CellValues::Number(values) => write!(text, "{comma}{:?}", values[row]),
+                CellValues::Integer(values) => write!(text, "{comma}{}", values[row]),
+                CellValues::Text(values) => write!(text, "{comma}{}", values[row].replace(',', ";")),
+                CellValues::Flag(values) => write!(text, "{comma}{:?}", values[row]),
             };
             written.expect("a string takes all text");
         }
@@ -118,16 +118,16 @@ impl Counts {
         let Ok(tables) = tables else { return Counts { refused: 1, ..counts } };
         for (table, column) in tables.iter().flat_map(|table| table.columns.iter().map(move |c| (table, c))) {
             match (&column.values, column.name.as_str()) {
-                (Values::Text(words), "status") => {
+                (CellValues::Text(words), "status") => {
                     words.iter().for_each(|word| *counts.status.entry(word.clone()).or_default() += 1);
                 }
-                (Values::Text(words), "found_by") => {
+                (CellValues::Text(words), "found_by") => {
                     words.iter().for_each(|word| *counts.found_by.entry(word.clone()).or_default() += 1);
                 }
-                (Values::Integer(values), "iterations") => counts.iterations += values.iter().sum::<u64>(),
+                (CellValues::Integer(values), "iterations") => counts.iterations += values.iter().sum::<u64>(),
                 _ => {}
             }
-            if let Values::Number(values) = &column.values {
+            if let CellValues::Number(values) = &column.values {
                 let bits = values.iter().flat_map(|value| value.to_bits().to_le_bytes());
                 counts.hash = counts.hash.wrapping_add(fnv(table.name.bytes().chain(bits)));
             }

@@ -1,0 +1,292 @@
+//! Summary of a study before its run: linear modes, first slip of the joints, likely mistakes,
+//! memory and time.
+//!
+//! All results come from the linear structure and from counting; no orbit is computed.
+//!
+//! - `text`: the summary in words;
+//! - `structure`: the summary of a structure given by matrices;
+//! - `bodies`: the rigid bodies in words;
+//! - `warnings`: likely mistakes, as sentences.
+
+mod bodies;
+mod structure;
+mod text;
+mod warnings;
+
+pub use structure::{DIRECTIONS, StructureSummary, mass_along};
+
+use crate::case::study::Study;
+use crate::check::cost::{Cost, CostInputs, StudySize};
+use crate::check::survey::{SurveyedCase, frequency_range};
+use crate::kinds;
+use crate::run::work::WorkUnits;
+use crate::syntax::error::StudyError;
+use serde_json::{Value as Json, json};
+use std::f64::consts::TAU;
+use stickslip::model::{Modes, Onset, System};
+
+/// Summary of a study before it is run.
+#[derive(Debug, Clone)]
+pub struct ModelSummary {
+    /// The case that the summary shows: its varied parameters in words, empty if nothing is
+    /// varied.
+    pub case: String,
+    /// Number of cases.
+    pub cases: usize,
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// The structure given by matrices, if there is one.
+    pub structure: Option<StructureSummary>,
+    /// The rigid bodies in words; on a disk, those of the first sector.
+    pub bodies: Vec<String>,
+    /// True if the model has too many degrees of freedom for the modes, which are then absent.
+    pub too_large: bool,
+    /// Modes with all joints free.
+    pub free: Modes,
+    /// Modes with all joints stuck.
+    pub stuck: Modes,
+    /// The joints, in the order of the model.
+    pub joints: Vec<JointSummary>,
+    /// Number of orbits at one frequency, with the reason if there may be several. `None` if
+    /// the study has no excitation or no joint, or if the structure is too large for a quick
+    /// answer.
+    pub orbits: Option<OrbitCount>,
+    /// Lowest and highest excitation frequency of the study, rad/s.
+    pub range: Option<(f64, f64)>,
+    /// Likely mistakes: sentences that begin with `warning: `.
+    pub warnings: Vec<String>,
+    /// Size of the results and the memory.
+    pub size: StudySize,
+    /// Usual time on one thread, s; a rough estimate.
+    pub usual_time_s: f64,
+    /// Time without the work that only some results need, s, and the condition for it, in
+    /// words.
+    pub time_without: Option<(f64, &'static str)>,
+    /// Time if orbits are hard to find, s; a rough estimate on the high side.
+    pub longest_time_s: f64,
+}
+
+/// Number of orbits at one frequency.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum OrbitCount {
+    /// One orbit, except for the offsets of stuck contacts: no two motions under the same
+    /// excitation separate.
+    One,
+    /// Possibly several, for this reason.
+    Several(String),
+}
+
+impl OrbitCount {
+    fn new(system: &System) -> Option<OrbitCount> {
+        let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
+        let mut reasons: Vec<String> =
+            separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
+        if reasons.is_empty() {
+            // on a large structure the answer takes three factorizations
+            return match system.structure().is_sparse() {
+                true => None,
+                false if system.contracts() => Some(OrbitCount::One),
+                false => Some(OrbitCount::Several("the structure feeds energy into some motion".to_owned())),
+            };
+        }
+        if let Some(more @ 1..) = reasons.len().checked_sub(MAX_NAMED_JOINTS) {
+            reasons.truncate(MAX_NAMED_JOINTS);
+            reasons.push(format!("{more} more"));
+        }
+        Some(OrbitCount::Several(reasons.join(", ")))
+    }
+}
+
+/// Number of joints that are named as the reason for several orbits.
+const MAX_NAMED_JOINTS: usize = 2;
+
+/// State of a joint at rest, and its first slip.
+#[derive(Debug, Clone)]
+pub struct JointSummary {
+    /// Name of the joint.
+    pub name: String,
+    /// Slip limit, N.
+    pub limit: f64,
+    /// Relative displacement at which it begins to slip, m; `None` if it is rigid until then.
+    pub displacement: Option<f64>,
+    /// True if it slips gradually before: micro-slip first, macro-slip at the limit.
+    pub micro_slip: bool,
+    /// For the normal direction of a contact: its force if nothing deforms, N, zero if it is
+    /// open. `None` for directions that slip.
+    pub normal_force: Option<f64>,
+    /// The normal force at rest, after the structure has deformed, N; `None` if it is unknown.
+    pub normal_force_at_rest: Option<f64>,
+    /// Load by the excitation while all joints stick. `None` if the study has no excitation or
+    /// the model is too large for a quick answer.
+    pub onset: Option<Onset>,
+}
+
+/// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
+/// the model is true for all of them.
+const MAX_CHECKED_CASES: usize = 9;
+/// The summary states the longest time if it exceeds the usual time by the factor
+/// [`LONG_TIME_FACTOR`] and exceeds [`SHORT_TIME`], s.
+const LONG_TIME_FACTOR: f64 = 3.0;
+const SHORT_TIME: f64 = 5.0;
+/// Duration above which a run announces its expected time at the start, s.
+const LONG_RUN: f64 = 3600.0;
+/// Degrees of freedom above which only the first case is checked, so that a summary takes at
+/// most a second.
+const MAX_DOFS_ALL_CASES: usize = 60;
+
+/// Factor on the excitation above which the first slip is due to rounding. Symmetry keeps the
+/// load from some joints, but rounding errors of the other loads remain. A load above this
+/// multiple of the slip limit comes from an undamped resonance, which has no bound.
+const ROUNDING_SLIP_FACTOR: f64 = 1e6;
+
+/// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
+/// rounding.
+fn relative_load(onset: &Onset) -> f64 {
+    if onset.largest * ROUNDING_SLIP_FACTOR < 1.0 { 0.0 } else { onset.largest }
+}
+
+impl ModelSummary {
+    /// Summarizes a study.
+    ///
+    /// # Errors
+    /// [`StudyError`]: a case cannot be resolved. The cases of a study that was read have been
+    /// checked.
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_study::{read_study, summary::ModelSummary, templates};
+    /// let text = templates::find("blade-couple").unwrap().study;
+    /// let summary = ModelSummary::new(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
+    /// assert_eq!((summary.dofs, summary.free.elastic.len(), summary.warnings.len()), (3, 3, 0));
+    /// assert!(summary.to_string().contains("120.94"));   // a stuck mode, Hz
+    /// ```
+    pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
+        let mut cases = vec![SurveyedCase::new(study, 0)?];
+        let last = study.cases().saturating_sub(1);
+        let others = if cases[0].survey.dofs() > MAX_DOFS_ALL_CASES { 0 } else { last.min(MAX_CHECKED_CASES - 1) };
+        for i in 1..=others {
+            cases.push(SurveyedCase::new(study, last * i / others)?);
+        }
+        // the first case in which the most joints have a positive limit: zero limits tell
+        // nothing
+        let holds = |one: &SurveyedCase| one.survey.first_slip().iter().filter(|slip| slip.limit > 0.0).count();
+        let most = cases.iter().map(holds).max().unwrap_or(0);
+        let shown = cases.iter().find(|one| holds(one) == most).unwrap_or(&cases[0]);
+        let range = frequency_range(&shown.case);
+        let first = &shown.survey;
+        let onsets = range.and_then(|(from, to)| first.onset(from, to));
+        let joints = first.first_slip().into_iter().enumerate().map(|(index, slip)| JointSummary {
+            name: slip.joint,
+            limit: slip.limit,
+            displacement: slip.displacement,
+            micro_slip: slip.gradual,
+            normal_force: slip.pressed,
+            normal_force_at_rest: slip.at_rest,
+            onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
+        });
+        let joints = joints.collect();
+        let kind = kinds::kind_of(study);
+        let all_inputs: Vec<CostInputs<'_>> = cases.iter().map(|one| CostInputs::new(study, one)).collect();
+        // the time of all cases if they were like this one
+        let time = |inputs: &CostInputs<'_>| inputs.seconds(&(kind.cost)(inputs));
+        let mean = |times: &dyn Fn(&CostInputs<'_>) -> f64| {
+            all_inputs.iter().map(times).sum::<f64>() / all_inputs.len() as f64
+        };
+        let (usual_seconds, seconds) = (mean(&|one| time(&one.typical())), mean(&time));
+        let (slow, usual) = (&all_inputs[0], all_inputs[0].typical());
+        let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
+        let whole = usual.seconds(&usual_cost);
+        let spared = usual_cost.conditional_work.map(|(work, place)| {
+            let rest = Cost { work: usual_cost.work - work, ..usual_cost };
+            (usual_seconds * usual.seconds(&rest) / whole, place)
+        });
+        Ok(ModelSummary {
+            case: shown.case.label(),
+            cases: study.cases(),
+            dofs: first.dofs(),
+            structure: StructureSummary::new(study, &cases[0]),
+            bodies: bodies::described(&cases[0].case.model),
+            too_large: first.is_too_large(),
+            free: first.free().clone(),
+            stuck: first.stuck().clone(),
+            joints,
+            orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| OrbitCount::new(first.system())),
+            range,
+            warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
+            size: slow.size(&cost, WorkUnits::new(study, (kind.unit_size)(study)).len()),
+            usual_time_s: usual_seconds,
+            time_without: spared,
+            longest_time_s: seconds.max(usual_seconds),
+        })
+    }
+
+    /// Returns the announcement of a long run; `None` for a short one. The estimate is rough
+    /// and for one thread.
+    pub fn long_run(&self) -> Option<String> {
+        (self.longest_time_s >= LONG_RUN).then(|| {
+            let time = self.time();
+            format!(
+                "this run takes {time}; `check` estimates this in advance; Ctrl-C ends the run and keeps the \
+                finished points"
+            )
+        })
+    }
+
+    /// Describes the expected time in words.
+    pub(crate) fn time(&self) -> String {
+        let mut usual = format!("{} on one thread", crate::syntax::format::format_estimate(self.usual_time_s));
+        if let Some((seconds, place)) = self.time_without
+            && self.usual_time_s >= (LONG_TIME_FACTOR * seconds).max(SHORT_TIME)
+        {
+            usual += &format!(", {} {place}", crate::syntax::format::format_estimate(seconds));
+        }
+        if self.longest_time_s < LONG_TIME_FACTOR * self.usual_time_s || self.longest_time_s < SHORT_TIME {
+            return usual;
+        }
+        format!(
+            "{usual}, up to {} if orbits are hard to find",
+            crate::syntax::format::format_duration(self.longest_time_s)
+        )
+    }
+
+    /// Returns the summary for the record of a run, in SI except frequencies in Hz.
+    pub fn to_json(&self) -> Json {
+        let modes = |modes: &Modes| {
+            json!({
+                "frequencies_Hz": modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>(),
+                "damping_ratios": modes.elastic.iter().map(|mode| mode.damping).collect::<Vec<_>>(),
+                "rigid": modes.rigid,
+                "lost": modes.lost,
+            })
+        };
+        let joint = |joint: &JointSummary| {
+            json!({
+                "name": joint.name,
+                "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
+                "slips_gradually": joint.micro_slip,
+                "pressed_N": joint.normal_force,
+                "pressed_at_rest_N": joint.normal_force_at_rest,
+                "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
+                "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / relative_load(onset)).filter(|x| x.is_finite()),
+                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| relative_load(onset) > 0.0).map(|onset| onset.at / TAU),
+                "slips_Hz": joint.onset.as_ref()
+                    .map(|onset| onset.slips.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
+            })
+        };
+        json!({
+            "case": self.case,
+            "degrees_of_freedom": self.dofs,
+            "bodies": self.bodies,
+            "structure": self.structure.as_ref().map(StructureSummary::to_json),
+            "joints_free": modes(&self.free),
+            "joints_stuck": modes(&self.stuck),
+            "joints": self.joints.iter().map(joint).collect::<Vec<_>>(),
+            "one_orbit_at_a_frequency": self.orbits.as_ref().map(|orbits| *orbits == OrbitCount::One),
+            "rows": self.size.rows,
+            "result_bytes": self.size.results,
+            "memory_bytes": self.size.memory,
+            "usual_time_s": self.usual_time_s,
+            "estimated_time_s": self.longest_time_s,
+        })
+    }
+}

@@ -1,0 +1,227 @@
+//! The summary in words, for a terminal.
+
+use super::{JointSummary, ModelSummary, OrbitCount, ROUNDING_SLIP_FACTOR, relative_load};
+use crate::syntax::format::{format_bytes, format_significant, format_with_prefix, plural_suffix};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
+use std::fmt;
+use stickslip::model::{LinearMode, Modes};
+
+/// Largest number of listed modes and joints.
+const MAX_LISTED: usize = 10;
+/// Largest number of listed frequency ranges with slip per joint.
+const MAX_SLIP_RANGES: usize = 3;
+/// Width of the first column.
+const WIDTH: usize = 14;
+
+impl ModelSummary {
+    fn modes(&self, modes: &Modes) -> String {
+        if self.too_large {
+            return format!("not computed for {} degrees of freedom", self.dofs);
+        }
+        let mut order: Vec<&LinearMode> = modes.elastic.iter().collect();
+        let count = order.len();
+        if let Some((from, to)) = self.range.filter(|_| count > MAX_LISTED) {
+            // the modes nearest to the range, by ascending frequency
+            let distance = |omega: f64| if omega < from { from / omega } else { (omega / to).max(1.0) };
+            order.sort_by(|a, b| distance(a.omega).total_cmp(&distance(b.omega)));
+        }
+        order.truncate(MAX_LISTED);
+        order.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        let list = |read: &dyn Fn(&LinearMode) -> String| order.iter().map(|m| read(m)).collect::<Vec<_>>().join(", ");
+        let mut parts = Vec::new();
+        if count > MAX_LISTED {
+            let which = if self.range.is_some() { "nearest the range" } else { "lowest" };
+            parts.push(format!("{count} modes, the {MAX_LISTED} {which}:"));
+        }
+        if count == 0 {
+            parts.push("no mode".to_owned());
+        } else {
+            let damping: Vec<String> = order.iter().map(|m| format_significant(100.0 * m.damping, 2)).collect();
+            let damping = match damping.iter().all(|d| *d == damping[0]) {
+                true => damping[0].clone(),
+                false => damping.join(", "),
+            };
+            parts.push(format!("{} Hz, damping {damping} %", list(&|m| format_significant(m.omega / TAU, 5))));
+        }
+        let mut text = parts.join(" ");
+        if modes.rigid > 0 {
+            text += &format!("; {} rigid-body motion{}", modes.rigid, plural_suffix(modes.rigid));
+        }
+        if modes.lost > 0 {
+            text += &format!("; {} lost in rounding, because other stiffnesses are much higher", modes.lost);
+        }
+        text
+    }
+
+    fn joint(&self, joint: &JointSummary) -> String {
+        match joint.normal_force {
+            Some(0.0) => return "open in static equilibrium: it closes and opens".to_owned(),
+            Some(preload) => return normal_force_text(preload, joint.normal_force_at_rest),
+            None => {}
+        }
+        if joint.limit == 0.0 {
+            return "free: no force in static equilibrium".to_owned();
+        }
+        if joint.limit.is_infinite() {
+            return "acts as a spring, never slips".to_owned();
+        }
+        let (limit, slip) =
+            (format_with_prefix(joint.limit, "N"), if joint.micro_slip { "macro-slip" } else { "slip" });
+        let mut text = match joint.displacement {
+            Some(displacement) => {
+                let verb = if joint.micro_slip { "macro-slip at" } else { "slips at" };
+                let before = if joint.micro_slip { ", micro-slip before" } else { "" };
+                format!("{verb} {limit}, {} of relative displacement{before}", format_with_prefix(displacement, "m"))
+            }
+            None => format!("slips at {limit}, rigid until then"),
+        };
+        let Some(onset) = &joint.onset else { return text };
+        let several = self.range.is_some_and(|(from, to)| from < to);
+        let hertz = |omega: f64| format_significant(omega / TAU, 7);
+        let at = if several { format!(" at {} Hz", hertz(onset.at)) } else { String::new() };
+        if !onset.largest.is_finite() {
+            return text + "; the imposed motion makes it slip";
+        }
+        let factor = format_significant(1.0 / onset.largest, 3);
+        let resonant = onset.largest > ROUNDING_SLIP_FACTOR;
+        if onset.largest == 0.0 {
+            text += "; the excitation does not reach it";
+        } else if relative_load(onset) == 0.0 {
+            text += "; sticks, even under a million times the excitation";
+        } else if onset.slips.is_empty() && joint.micro_slip {
+            let share = format_significant(100.0 * onset.largest, 3);
+            text += &format!("; only micro-slip, up to {share} % of the slip limit{at}");
+        } else if onset.slips.is_empty() {
+            text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
+        } else if several {
+            let mut ranges: Vec<String> = onset
+                .slips
+                .iter()
+                .take(MAX_SLIP_RANGES)
+                .map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b)))
+                .collect();
+            if let Some(more @ 1..) = onset.slips.len().checked_sub(MAX_SLIP_RANGES) {
+                ranges.push(format!("{more} more"));
+            }
+            let ranges = ranges.join(", ");
+            text += &match resonant {
+                true => {
+                    format!("; {slip} at {ranges}; any excitation is enough at its undamped resonance{at}")
+                }
+                false => format!("; {slip} at {ranges}; {factor} of the excitation is enough{at}"),
+            };
+        } else {
+            text += &format!("; {slip} occurs; {factor} of the excitation is enough");
+        }
+        text
+    }
+}
+
+/// Returns the joint of a direction.
+fn joint_of_direction(name: &str) -> &str {
+    name.split('.').next().unwrap_or(name)
+}
+
+/// Rounds a load to the significant digits, so that joints that are equal by symmetry keep
+/// their order.
+fn rounded_load(load: f64) -> f64 {
+    format!("{load:.4e}").parse().unwrap_or(load)
+}
+
+/// Relative change of a preload by the structure below which it is ignored.
+const PRELOAD_CHANGE: f64 = 1e-3;
+
+/// Describes the normal load at rest that a preload produces.
+fn normal_force_text(preload: f64, at_rest: Option<f64>) -> String {
+    let newtons = |force: f64| format_with_prefix(force, "N");
+    match at_rest {
+        None => {
+            format!("pressed with {} if the structure is rigid: it opens and closes", newtons(preload))
+        }
+        Some(force) if (force - preload).abs() <= PRELOAD_CHANGE * preload => {
+            format!("pressed with {} in static equilibrium: it opens and closes", newtons(force))
+        }
+        Some(force) if force > preload => format!(
+            "pressed with {} in static equilibrium, by its preload of {} and {} of the constant forces: it opens and \
+             closes",
+            newtons(force),
+            newtons(preload),
+            newtons(force - preload)
+        ),
+        Some(force) if force > 0.0 => format!(
+            "pressed with {} in static equilibrium; the structure carries {} of its preload of {}: it opens and closes",
+            newtons(force),
+            newtons(preload - force),
+            newtons(preload)
+        ),
+        Some(_) => format!(
+            "open in static equilibrium, because the structure carries its preload of {}: it closes and opens",
+            newtons(preload)
+        ),
+    }
+}
+
+impl fmt::Display for ModelSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // each direction of a joint has a line
+        let names: BTreeSet<&str> = self.joints.iter().map(|joint| joint_of_direction(&joint.name)).collect();
+        let joints = names.len();
+        let dofs =
+            if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
+        let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
+        let mut line = |name: &str, text: &str| writeln!(f, "  {name:<WIDTH$} {text}");
+        line("model", &format!("{dofs}, {joints} joint{}{shown}", plural_suffix(joints)))?;
+        for (name, text) in self.structure.iter().flat_map(|structure| structure.lines()) {
+            line(name, &text)?;
+        }
+        for (number, body) in self.bodies.iter().enumerate() {
+            line(if number == 0 { "bodies" } else { "" }, body)?;
+        }
+        if self.dofs > 0 {
+            line(if joints > 0 { "joints free" } else { "modes" }, &self.modes(&self.free))?;
+            if joints > 0 {
+                line("joints stuck", &self.modes(&self.stuck))?;
+            }
+        }
+        // with many joints, those with the largest load come first, each with all its
+        // directions
+        let mut order: Vec<&JointSummary> = self.joints.iter().collect();
+        let lines = self.joints.len();
+        if lines > MAX_LISTED {
+            let mut loads: BTreeMap<&str, f64> = BTreeMap::new();
+            for joint in &self.joints {
+                let load = joint.onset.as_ref().map_or(0.0, relative_load);
+                let most = loads.entry(joint_of_direction(&joint.name)).or_default();
+                *most = most.max(rounded_load(load));
+            }
+            order.sort_by(|a, b| loads[joint_of_direction(&b.name)].total_cmp(&loads[joint_of_direction(&a.name)]));
+        }
+        for joint in order.iter().take(MAX_LISTED) {
+            line(&joint.name, &self.joint(joint))?;
+        }
+        if let Some(more @ 1..) = lines.checked_sub(MAX_LISTED) {
+            line("", &format!("and {more} more joint{}", plural_suffix(more)))?;
+        }
+        match &self.orbits {
+            Some(OrbitCount::One) => {
+                line("orbits", "one at each frequency, apart from offsets that stuck contacts keep")?
+            }
+            Some(OrbitCount::Several(why)) => {
+                let what = "the table states the stability of each orbit if it is known; kind `branch` follows \
+                    connected orbits if it supports the laws";
+                line("orbits", &format!("several may exist at one frequency ({why}): {what}"))?;
+            }
+            None => {}
+        }
+        let Self { size, cases, .. } = self;
+        let rows = format!("{} row{}", size.rows, if size.rows == 1 { "" } else { "s" });
+        let cases = format!("{cases} case{}", plural_suffix(*cases));
+        let results = format!(
+            "{cases}, {rows}, {} of numbers, {} of memory",
+            format_bytes(size.results),
+            format_bytes(size.memory)
+        );
+        line("results", &format!("{results}; {}", self.time()))
+    }
+}

@@ -1,0 +1,367 @@
+//! Warnings about valid studies that look like mistakes: sentences that begin with `warning: `.
+
+use crate::case::linear_reference::LinearReference;
+use crate::case::study::{Study, evaluate};
+use crate::check::survey::SurveyedCase;
+use crate::compile::compiled::{CompiledTable, Environment};
+use crate::results::notes::WARNING;
+use crate::syntax::expression::quantity_text;
+use crate::syntax::format::format_significant;
+use std::collections::{BTreeSet, HashMap};
+use std::f64::consts::{PI, TAU};
+use stickslip::dimension::Dimension;
+use stickslip::model::{Axis, FirstSlip, Loose, Modes};
+use stickslip::structure::ReducedComponent;
+
+/// Largest number of names that a warning lists; for more it states the number.
+const MAX_NAMED: usize = 6;
+
+/// Returns all warnings: those of the kind, and those of every study.
+pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -> Vec<String> {
+    let mut warnings = of_kind;
+    warnings.extend(loose_parts(cases));
+    warnings.extend(motionless_joints(&cases[0]));
+    warnings.extend(massless(&cases[0]));
+    warnings.extend(overstiff(&cases[0]));
+    warnings.extend(structure(&cases[0]));
+    warnings.extend(unused(study));
+    if let Some(environment) = first_values(study) {
+        warnings.extend(bare_numbers(study, &environment));
+        warnings.extend(bare_angles(study, &environment));
+    }
+    warnings.extend(no_references(study, cases));
+    warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
+}
+
+/// Lists names in a sentence: `a, b and 3 more`.
+fn list_names(names: &[String]) -> String {
+    let shown: Vec<String> = names.iter().take(MAX_NAMED).map(|name| format!("`{name}`")).collect();
+    match names.len().checked_sub(MAX_NAMED) {
+        None | Some(0) => shown.join(", "),
+        Some(more) => format!("{} and {more} more", shown.join(", ")),
+    }
+}
+
+fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
+    let pronoun = |count: usize| if count == 1 { "it" } else { "them" };
+    let one = |one: &Loose| {
+        let names = list_names(&one.masses);
+        let them = pronoun(one.masses.len());
+        if one.held_by_friction {
+            format!("no spring holds {names}: only friction keeps {them} in place, and nothing does if all joints slip")
+        } else {
+            format!("{names} can move freely: no spring and no joint connects {them} to `ground`")
+        }
+    };
+    // bodies on preloaded faces are correct; bodies between unloaded faces have a separate
+    // warning
+    let survey = &cases[0].survey;
+    let between = |loose: &&Loose| !loose.held_by_friction && !loose.faces.is_empty();
+    let unpressed: Vec<&Loose> = survey.loose().iter().filter(between).collect();
+    let open = unpressed.first().map(|_| {
+        let bodies: Vec<String> = unpressed.iter().flat_map(|one| one.masses.clone()).collect();
+        let mut joints: Vec<String> = unpressed.iter().flat_map(|one| one.faces.clone()).collect();
+        joints.dedup();
+        format!(
+            "{} can move freely in static equilibrium: only the faces of {} touch {}, and they have no preload; add \
+             a preload, or hold {} by a spring",
+            list_names(&bodies),
+            list_names(&joints),
+            pronoun(bodies.len()),
+            pronoun(bodies.len())
+        )
+    });
+    let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
+    let others = others.filter(|one| !between(one) && !one.held_in_motion);
+    others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
+}
+
+/// Warns of a preload that no constant force balances, for the first such case.
+fn unbalanced_preload(cases: &[SurveyedCase]) -> Option<String> {
+    let (case, found) = cases.iter().find_map(|case| Some((case, case.survey.unpressed()?)))?;
+    let pushed = case.survey.loose().iter().filter(|one| one.contacts.iter().any(|name| found.joints.contains(name)));
+    let bodies: Vec<String> = pushed.flat_map(|one| one.masses.clone()).collect();
+    if bodies.is_empty() {
+        return None;
+    }
+    let (names, joints) = (list_names(&bodies), list_names(&found.joints));
+    let preload = quantity_text(found.preload, Some(Dimension::FORCE));
+    Some(format!(
+        "the preload of {joints}, {preload} in total, pushes {names} away: no spring holds {}, and no constant force \
+         presses the faces; add a force with `harmonic = 0` that presses them",
+        if bodies.len() == 1 { "it" } else { "them" }
+    ))
+}
+
+/// Warns of a model without mass.
+fn massless(one: &SurveyedCase) -> Option<String> {
+    let (model, structure) = (&one.case.model, one.survey.system().structure());
+    let none = model.substructure.is_none() && model.masses.iter().all(|mass| mass.mass == 0.0);
+    (none && structure.dofs() > 0).then(|| {
+        let names: Vec<String> = model.masses.iter().map(|mass| mass.name.clone()).collect();
+        let verb = if names.len() == 1 { "is" } else { "are" };
+        format!(
+            "the mass of {} {verb} zero and the model has no other mass: it has no resonance, only the response of \
+             the springs",
+            list_names(&names)
+        )
+    })
+}
+
+/// Warns of a stiffness that gives an implausible frequency.
+fn overstiff(one: &SurveyedCase) -> Option<String> {
+    let (model, survey) = (&one.case.model, &one.survey);
+    if model.substructure.is_some() || survey.is_too_large() {
+        return None;
+    }
+    let highest = |modes: &Modes| modes.elastic.last().map_or(0.0, |mode| mode.omega) / TAU;
+    let (free, stuck) = (highest(survey.free()), highest(survey.stuck()));
+    if free.max(stuck) <= PLAUSIBLE_FREQUENCIES.1 {
+        return None;
+    }
+    let spring = model
+        .springs
+        .iter()
+        .max_by(|a, b| a.stiffness.total_cmp(&b.stiffness))
+        .filter(|_| free > PLAUSIBLE_FREQUENCIES.1);
+    let slips = survey.first_slip();
+    let stiffness = |slip: &FirstSlip| slip.displacement.map_or(0.0, |u| if u > 0.0 { slip.limit / u } else { 0.0 });
+    let joint = slips.iter().filter(|slip| slip.limit.is_finite());
+    let joint = joint.max_by(|a, b| stiffness(a).total_cmp(&stiffness(b)));
+    let stiffness_text = |stiffness: f64| quantity_text(stiffness, Some(Dimension::STIFFNESS));
+    let hertz = format_significant(free.max(stuck), 3);
+    Some(match (spring, joint) {
+        (Some(spring), _) => {
+            let [a, b] = &spring.between;
+            format!(
+                "the highest natural frequency is {hertz} Hz; check the stiffness between `{a}` and `{b}`, {}",
+                stiffness_text(spring.stiffness)
+            )
+        }
+        (None, Some(joint)) => format!(
+            "with all joints stuck the highest natural frequency is {hertz} Hz; check the stiffness of `{}`, {}; for \
+             a joint that is rigid until it slips, use the law `coulomb`",
+            joint.joint,
+            stiffness_text(stiffness(joint))
+        ),
+        (None, None) => format!("the highest natural frequency is {hertz} Hz; check stiffnesses and masses"),
+    })
+}
+
+/// Warns of joints between equal places: both use the same rows, or both are fixed.
+fn motionless_joints(case: &SurveyedCase) -> Option<String> {
+    let moves = |axis: &Axis| {
+        let mut weights: HashMap<usize, (f64, f64)> = HashMap::new();
+        for (row, weight) in axis.rows() {
+            let (sum, size) = weights.entry(*row).or_default();
+            (*sum, *size) = (*sum + weight, *size + weight.abs());
+        }
+        !axis.imposed().is_empty() || weights.values().any(|(sum, size)| sum.abs() > WEIGHT_ROUNDING * size)
+    };
+    let joints = case.survey.system().joints().iter();
+    let names: Vec<String> =
+        joints.filter(|joint| !joint.axes().iter().any(moves)).map(|joint| joint.name().to_owned()).collect();
+    let (those, do_not) = if names.len() == 1 {
+        ("the joint", "never moves, because its two places are")
+    } else {
+        ("the joints", "never move, because their two places are")
+    };
+    (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", list_names(&names)))
+}
+
+/// Relative rounding below which the weights of a row cancel.
+const WEIGHT_ROUNDING: f64 = 1e-12;
+
+/// Plausible frequencies of a structure of machine size, Hz. Mistaken units shift frequencies
+/// by powers of ten, beyond these limits.
+const PLAUSIBLE_FREQUENCIES: (f64, f64) = (0.1, 2e5);
+/// Error of a reduction above which it is visible in a response.
+const REDUCTION_ERROR: f64 = 1e-3;
+
+/// Warns of probable mistakes in a structure given by matrices.
+fn structure(case: &SurveyedCase) -> Vec<String> {
+    let system = case.survey.system();
+    let mut found = system.reduced().map_or_else(Vec::new, coordinates);
+    let Some(reduction) = system.reduction_evidence() else { return found };
+    let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
+    if reduction.error > REDUCTION_ERROR {
+        let worst = system.reduced().map_or(reduction.up_to, ReducedComponent::worst_at);
+        found.push(format!(
+            "the reduced model has an error of {} % at {}; use more modes, or `reduce = {{ up_to = … }}`, which \
+             chooses the number of modes",
+            format_significant(100.0 * reduction.error, 3),
+            hertz(worst)
+        ));
+    }
+    let beyond = crate::check::survey::frequency_range(&case.case).filter(|(_, high)| *high > reduction.up_to);
+    if let Some((_, high)) = beyond {
+        found.push(format!(
+            "the excitation frequency reaches {}, but the error of the reduced model is known only up to {}",
+            hertz(high),
+            hertz(reduction.up_to)
+        ));
+    }
+    found
+}
+
+/// Warns of implausible frequencies of a reduced model.
+fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
+    let mut found = Vec::new();
+    let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
+    let lowest = reduced.frequencies().get(reduced.free()).copied();
+    match lowest {
+        Some(lowest) if lowest / TAU < PLAUSIBLE_FREQUENCIES.0 || lowest / TAU > PLAUSIBLE_FREQUENCIES.1 => {
+            found.push(format!("the lowest natural frequency of the structure is {}; check `units`", hertz(lowest)));
+        }
+        None => found.push(format!(
+            "the structure has no natural frequency up to {}; check `units` and `reduce`",
+            hertz(reduced.up_to())
+        )),
+        Some(_) => {}
+    }
+    found
+}
+
+fn unused(study: &Study) -> Option<String> {
+    let used = used_parameters(study);
+    let from_template = |index: usize| {
+        let source = study.parameters[index].quantity.location.source;
+        study.structure.template.as_ref().is_some_and(|template| template.source == source)
+    };
+    let varied: BTreeSet<usize> = study.varied.iter().map(|varied| varied.index).collect();
+    let unused = (0..study.names.len()).filter(|i| !used.contains(i) && (varied.contains(i) || !from_template(*i)));
+    let (idle_varied, idle): (Vec<usize>, Vec<usize>) = unused.partition(|index| varied.contains(index));
+    let names = |indices: &[usize]| list_names(&indices.iter().map(|i| study.names[*i].clone()).collect::<Vec<_>>());
+    match (idle_varied.is_empty(), idle.is_empty()) {
+        (true, true) => None,
+        (true, false) => Some(format!("no value of the study uses the parameter {}", names(&idle))),
+        (false, _) => {
+            let all: Vec<usize> = idle_varied.iter().chain(&idle).copied().collect();
+            let varied = names(&idle_varied);
+            let others = if idle.is_empty() { String::new() } else { format!("; unused are {}", names(&all)) };
+            Some(format!("no value of the study uses {varied}, so `vary` only repeats equal cases{others}"))
+        }
+    }
+}
+
+/// Returns the parameters on which a value of the model, the study or the method depends.
+fn used_parameters(study: &Study) -> BTreeSet<usize> {
+    let mut open: Vec<usize> = Vec::new();
+    let mut from = |table: &CompiledTable| {
+        table.each_quantity(&mut |_, quantity, _| open.extend(quantity.expression.parameters()));
+    };
+    from(&study.study);
+    from(&study.method);
+    let lists = &study.structure.lists;
+    study.structure.matrices.iter().for_each(|matrices| from(&matrices.table));
+    for list in lists.all() {
+        list.iter().for_each(&mut from);
+    }
+    if let Some(disk) = &lists.disk {
+        from(&disk.table);
+    }
+    open.extend(lists.disk.iter().flat_map(|disk| disk.mistuned_parameter(&study.names)));
+    let mut used = BTreeSet::new();
+    while let Some(index) = open.pop() {
+        if used.insert(index) {
+            open.extend(study.parameters[index].quantity.expression.parameters());
+            let varied = study.varied.iter().filter(|varied| varied.index == index);
+            open.extend(varied.flat_map(|v| v.points.quantities()).flat_map(|q| q.expression.parameters()));
+        }
+    }
+    used
+}
+
+/// Warns of a missing reference curve that the figure requests; the first case represents all
+/// cases.
+fn no_references(study: &Study, cases: &[SurveyedCase]) -> Vec<String> {
+    if !study.requests_references() {
+        return Vec::new();
+    }
+    if study.draws().is_some() {
+        let why = "`references` has no effect with [sample], because every draw has different linear responses; \
+            remove it, or run the study without [sample]";
+        return vec![why.to_owned()];
+    }
+    LinearReference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
+}
+
+/// A bare length from this value on, m, was probably meant in millimetres: gaps and imposed
+/// motions of machines are tenths of a millimetre.
+const SUSPICIOUS_LENGTH: f64 = 0.01;
+
+/// Returns the assumed unit of an easily mistaken bare number, another unit, and the value in
+/// that unit.
+///
+/// A number computed with pi is in radians.
+fn likely_unit(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
+    match dimension? {
+        Dimension::ANGLE if si != 0.0 && !with_pi => Some(("rad", "deg", si * 180.0 / PI)),
+        Dimension::LENGTH if si.abs() >= SUSPICIOUS_LENGTH => Some(("m", "mm", si * 1e3)),
+        _ => None,
+    }
+}
+
+/// Returns the parameters of the first case.
+fn first_values(study: &Study) -> Option<Environment<'_>> {
+    let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
+    let values = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]).ok()?;
+    Some(Environment { names: &study.names, values })
+}
+
+/// Warns of bare parameters in `sin`, `cos` or `tan` that exceed a turn in radians: they are
+/// probably degrees.
+fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
+    let mut turned: BTreeSet<usize> =
+        study.parameters.iter().flat_map(|parameter| parameter.quantity.expression.angles()).collect();
+    let lists = &study.structure.lists;
+    for list in lists.all() {
+        for table in list {
+            table.each_quantity(&mut |_, quantity, _| turned.extend(quantity.expression.angles()));
+        }
+    }
+    let values = &first.values;
+    let bare = |index: &usize| values[*index].dimension.is_none() && values[*index].si.abs() > TAU;
+    let sentence = |index: usize| {
+        let (name, number) = (&study.names[index], quantity_text(values[index].si, None));
+        format!(
+            "the parameter `{name}` is the bare number {number} in `sin`, `cos` or `tan`, which means {number} rad; \
+             state the unit: \"{number} deg\""
+        )
+    };
+    turned.into_iter().filter(bare).take(MAX_NAMED).map(sentence).collect()
+}
+
+/// Warns of bare numbers whose unit is easily mistaken: angles count as radians, lengths as
+/// metres.
+fn bare_numbers(study: &Study, first: &Environment<'_>) -> Vec<String> {
+    let mut found: Vec<(String, String, usize)> = Vec::new();
+    let lists = &study.structure.lists;
+    for (list, tables) in [("joint", &lists.joint), ("force", &lists.force), ("motion", &lists.motion)] {
+        for (index, table) in tables.iter().enumerate() {
+            table.each_quantity(&mut |key, quantity, dimension| {
+                let Ok(value) = quantity.value(key, first) else { return };
+                let easily = likely_unit(dimension, value.si, value.with_pi);
+                let Some((unit, other, converted)) = easily.filter(|_| value.dimension.is_none()) else { return };
+                let text = format!("{key} = {}", quantity.text.trim());
+                match found.iter_mut().find(|(known, _, _)| *known == text) {
+                    Some((_, _, more)) => *more += 1,
+                    None => {
+                        let (number, converted) = (quantity_text(value.si, None), format_significant(converted, 4));
+                        let sentence = format!(
+                            "`{key}` of {list} {} is the bare number {number}, which means {number} {unit} \
+                             ({converted} {other}); state the unit: \"{number} {other}\" or \"{number} {unit}\"",
+                            index + 1
+                        );
+                        found.push((text, sentence, 0));
+                    }
+                }
+            });
+        }
+    }
+    let sentence = |(_, sentence, more): (String, String, usize)| match more {
+        0 => sentence,
+        more => format!("{sentence} (and {more} more)"),
+    };
+    found.into_iter().take(MAX_NAMED).map(sentence).collect()
+}

@@ -1,0 +1,35 @@
+//! A case with the survey of its linear structure, known before anything is computed.
+
+use crate::case::study::{Case, Study};
+use crate::syntax::error::StudyError;
+use stickslip::method::StaticEquilibrium;
+use stickslip::model::{Survey, System};
+
+/// A case with the survey of its model.
+#[derive(Debug)]
+pub struct SurveyedCase {
+    pub(crate) case: Case,
+    pub(crate) survey: Survey,
+}
+
+impl SurveyedCase {
+    /// Surveys case `index` of a study.
+    pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
+        let case = study.case(index)?;
+        // contacts that a constant load closes count as closed
+        let forces = |system: &System| Some(StaticEquilibrium::under_load(system)?.forces());
+        let survey = case.model.survey_under_load(&forces);
+        let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
+        Ok(SurveyedCase { case, survey })
+    }
+}
+
+/// Returns the lowest and the highest excitation frequency of a case, rad/s.
+pub(crate) fn frequency_range(case: &Case) -> Option<(f64, f64)> {
+    if let Some(run_up) = case.values.table("run_up") {
+        let (a, b) = (run_up.quantity("from")?, run_up.quantity("to")?);
+        return Some((a.min(b), a.max(b)));
+    }
+    let frequencies = case.frequencies.as_ref()?;
+    Some((frequencies.lowest()?, frequencies.highest()?))
+}

@@ -1,0 +1,401 @@
+//! Compiled statements of a study file: expressions are parsed and locations are known, but
+//! nothing is evaluated.
+
+use crate::case::values::{Frequencies, ResolvedValue, Values};
+use crate::syntax::error::{Location, Problem};
+use crate::syntax::expression::{Expression, ExpressionValue, dimension_text, quantity_text};
+use crate::syntax::key::Bounds;
+use std::collections::BTreeMap;
+use stickslip::dimension::Dimension;
+use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
+
+/// A quantity as it stands in a text.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CompiledQuantity {
+    pub location: Location,
+    /// Start of its text in the source, see [`crate::syntax::document::TomlValue::Text`].
+    pub text_start: Option<usize>,
+    pub text: String,
+    pub expression: Expression,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct CompiledTable {
+    pub location: Location,
+    /// The indices of the repetition that states the table, in words; empty without a
+    /// repetition.
+    pub repetition: String,
+    pub entries: Vec<CompiledEntry>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct CompiledEntry {
+    pub key: &'static str,
+    /// Location of the value; that of the table if the value is a default.
+    pub location: Location,
+    pub value: CompiledValue,
+}
+
+/// Names of rows with their locations and weights.
+pub(crate) type Weights = Vec<(String, Location, CompiledQuantity)>;
+
+/// Permitted order of the ends of a range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RangeOrder {
+    Rising,
+    /// The second end may lie below the first, but must differ from it.
+    Any,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum CompiledValue {
+    Fixed(ResolvedValue),
+    Names(Vec<(String, Location)>),
+    Quantity { quantity: CompiledQuantity, dimension: Dimension, within: Bounds, example: &'static str },
+    List(Vec<CompiledQuantity>, Bounds),
+    Range { from: CompiledQuantity, to: CompiledQuantity, points: usize, within: Bounds, order: RangeOrder },
+    Adaptive { from: CompiledQuantity, to: CompiledQuantity, tolerance: CompiledQuantity },
+    ByName(Vec<(String, Location, CompiledQuantity)>, Dimension),
+    Vector(Vec<CompiledQuantity>, Dimension, &'static str),
+    Quantities(Vec<CompiledQuantity>, Dimension, Bounds, &'static str),
+    Sums(Vec<Weights>),
+    Law(&'static LawInfo, CompiledTable),
+    Table(CompiledTable),
+}
+
+impl CompiledTable {
+    pub fn entry(&self, key: &str) -> Option<&CompiledEntry> {
+        self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    /// Appends the indices of the repetition to a message.
+    pub fn with_repetition(&self, message: &str) -> String {
+        if self.repetition.is_empty() { message.to_owned() } else { format!("{message} ({})", self.repetition) }
+    }
+
+    /// Calls `each` with the key, the quantity and its dimension (if the schema defines it) for
+    /// every quantity in the table.
+    pub fn each_quantity(&self, each: &mut dyn FnMut(&'static str, &CompiledQuantity, Option<Dimension>)) {
+        for entry in &self.entries {
+            match &entry.value {
+                CompiledValue::Fixed(_) | CompiledValue::Names(_) => {}
+                CompiledValue::Quantity { quantity, dimension, .. } => each(entry.key, quantity, Some(*dimension)),
+                CompiledValue::Vector(parts, dimension, _) | CompiledValue::Quantities(parts, dimension, ..) => {
+                    parts.iter().for_each(|q| each(entry.key, q, Some(*dimension)));
+                }
+                CompiledValue::Sums(sums) => {
+                    sums.iter().flatten().for_each(|(_, _, q)| each(entry.key, q, Some(Dimension::NONE)));
+                }
+                CompiledValue::List(list, _) => {
+                    list.iter().for_each(|q| each(entry.key, q, Some(Dimension::FREQUENCY)))
+                }
+                CompiledValue::Range { from, to, .. } => {
+                    each(entry.key, from, None);
+                    each(entry.key, to, None);
+                }
+                CompiledValue::Adaptive { from, to, tolerance } => {
+                    each(entry.key, from, None);
+                    each(entry.key, to, None);
+                    each(entry.key, tolerance, Some(Dimension::NONE));
+                }
+                CompiledValue::ByName(list, dimension) => {
+                    list.iter().for_each(|(_, _, q)| each(entry.key, q, Some(*dimension)));
+                }
+                CompiledValue::Law(_, table) | CompiledValue::Table(table) => table.each_quantity(each),
+            }
+        }
+    }
+
+    /// Returns the location of a key's value, or of a name in it; that of the table if the key
+    /// is absent.
+    pub fn location_of(&self, key: &str, name: Option<&str>) -> &Location {
+        let Some(entry) = self.entry(key) else { return &self.location };
+        let inside = name.and_then(|name| match &entry.value {
+            CompiledValue::Names(names) => names.iter().find(|(n, _)| n == name).map(|(_, location)| location),
+            CompiledValue::ByName(names, _) => {
+                names.iter().find(|(n, _, _)| n == name).map(|(_, location, _)| location)
+            }
+            CompiledValue::Sums(sums) => {
+                sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, location, _)| location)
+            }
+            _ => None,
+        });
+        inside.unwrap_or(&entry.location)
+    }
+}
+
+/// The values of the parameters of one case, by index.
+pub(crate) struct Environment<'a> {
+    pub names: &'a [String],
+    pub values: Vec<ExpressionValue>,
+}
+
+/// The dimension and the range that a key requires of a quantity.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Expected {
+    pub dimension: Dimension,
+    pub within: Bounds,
+}
+
+impl Expected {
+    /// Any finite number of this dimension.
+    fn finite(dimension: Dimension) -> Self {
+        Expected { dimension, within: Bounds::Finite }
+    }
+}
+
+impl CompiledQuantity {
+    /// Returns the value, of any dimension.
+    pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
+        self.expression
+            .evaluate(&environment.values)
+            .map_err(|fault| Problem::from_text_error(&self.location, self.text_start, key, fault))
+    }
+
+    /// Returns the value in SI. It must have this dimension and lie in this range.
+    pub fn number(
+        &self,
+        key: &str,
+        expected: Expected,
+        example: &str,
+        environment: &Environment<'_>,
+    ) -> Result<f64, Problem> {
+        let Expected { dimension, within } = expected;
+        let value = self.value(key, environment)?;
+        let number = self.convert(value, dimension, key, example, environment)?;
+        if within.contains(number) {
+            return Ok(number);
+        }
+        let message = format!("must be {}, found {}", within.description(), quantity_text(number, Some(dimension)));
+        Err(self.problem(key, message))
+    }
+
+    /// Converts `value`, the value of this quantity, to a number of this dimension.
+    pub fn convert(
+        &self,
+        value: ExpressionValue,
+        dimension: Dimension,
+        key: &str,
+        example: &str,
+        environment: &Environment<'_>,
+    ) -> Result<f64, Problem> {
+        let number = value.written_as(&self.text, dimension).map_err(|(message, help)| {
+            let bare = self.expression.parameters().find(|i| environment.values[*i].dimension.is_none());
+            let help = help
+                .or_else(|| {
+                    let name = &environment.names[bare?];
+                    Some(format!(
+                        "`{name}` has no unit and counts as a pure number in this product; give it a unit in \
+                         [parameters]"
+                    ))
+                })
+                .or_else(|| (!example.is_empty()).then(|| format!("write it as in {key} = {example}")));
+            self.problem(key, message).maybe_help(help)
+        })?;
+        if number.is_finite() {
+            return Ok(number);
+        }
+        Err(self.problem(key, "this is not a finite number"))
+    }
+
+    /// Returns the value of this quantity for the parameter `name`, in the dimension that the
+    /// parameter must have.
+    pub fn parameter_value(
+        &self,
+        name: &str,
+        dimension: Option<Dimension>,
+        environment: &Environment<'_>,
+    ) -> Result<ExpressionValue, Problem> {
+        let value = self.value(name, environment)?;
+        self.convert_parameter(value, name, dimension, environment)
+    }
+
+    /// Converts `value`, the value of this quantity, to the dimension that the parameter `name`
+    /// must have.
+    pub fn convert_parameter(
+        &self,
+        value: ExpressionValue,
+        name: &str,
+        dimension: Option<Dimension>,
+        environment: &Environment<'_>,
+    ) -> Result<ExpressionValue, Problem> {
+        let Some(dimension) = dimension else { return Ok(value) };
+        let number = self.convert(value, dimension, name, "", environment).map_err(|problem| match problem.help {
+            None => problem.help(format!("the parameter `{name}` is {}", dimension_text(dimension))),
+            Some(_) => problem,
+        })?;
+        Ok(ExpressionValue::new(number, dimension))
+    }
+
+    pub fn problem(&self, key: &str, message: impl Into<String>) -> Problem {
+        let span = match self.text_start {
+            Some(start) => start..start + self.text.len(),
+            None => self.location.span.clone(),
+        };
+        Problem::new(&Location { source: self.location.source, span }, key, message)
+    }
+}
+
+impl CompiledTable {
+    /// Returns the values of all keys. Errors go to `problems`; their keys are left out.
+    pub fn values(&self, environment: &Environment<'_>, problems: &mut Vec<Problem>) -> Values {
+        let before = problems.len();
+        let mut entries = Vec::with_capacity(self.entries.len());
+        for entry in &self.entries {
+            match entry.value.evaluate(entry.key, environment, problems) {
+                Ok(given) => entries.push((entry.key, given)),
+                Err(problem) => problems.push(problem),
+            }
+        }
+        if !self.repetition.is_empty() {
+            for problem in &mut problems[before..] {
+                problem.message = self.with_repetition(&problem.message);
+            }
+        }
+        Values { entries }
+    }
+}
+
+impl CompiledValue {
+    fn evaluate(
+        &self,
+        key: &'static str,
+        environment: &Environment<'_>,
+        problems: &mut Vec<Problem>,
+    ) -> Result<ResolvedValue, Problem> {
+        Ok(match self {
+            CompiledValue::Fixed(given) => given.clone(),
+            CompiledValue::Names(names) => ResolvedValue::Names(names.iter().map(|(name, _)| name.clone()).collect()),
+            CompiledValue::Quantity { quantity, dimension, within, example } => ResolvedValue::Quantity(
+                quantity.number(key, Expected { dimension: *dimension, within: *within }, example, environment)?,
+                *dimension,
+            ),
+            CompiledValue::List(list, within) => {
+                let frequency = Expected { dimension: Dimension::FREQUENCY, within: *within };
+                let numbers = list.iter().map(|q| q.number(key, frequency, "\"121 Hz\"", environment));
+                ResolvedValue::Frequencies(Frequencies::List(numbers.collect::<Result<_, _>>()?))
+            }
+            CompiledValue::Range { from, to, points, within, order } => {
+                let frequency = Expected { dimension: Dimension::FREQUENCY, within: *within };
+                let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
+                let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
+                if *order == RangeOrder::Rising || start == end {
+                    check_range(start, end, to, Some(Dimension::FREQUENCY))?;
+                }
+                ResolvedValue::Frequencies(Frequencies::Range { from: start, to: end, points: *points })
+            }
+            CompiledValue::Adaptive { from, to, tolerance } => {
+                let frequency = Expected { dimension: Dimension::FREQUENCY, within: Bounds::Positive };
+                let start = from.number("from", frequency, "\"119 Hz\"", environment)?;
+                let end = to.number("to", frequency, "\"123 Hz\"", environment)?;
+                check_range(start, end, to, Some(Dimension::FREQUENCY))?;
+                let positive = Expected { dimension: Dimension::NONE, within: Bounds::Positive };
+                let share = tolerance.number("tolerance", positive, "\"1 %\"", environment)?;
+                if !(MIN_ADAPTIVE_TOLERANCE..=MAX_ADAPTIVE_TOLERANCE).contains(&share) {
+                    let message = format!(
+                        "must lie between {MIN_ADAPTIVE_TOLERANCE} and {MAX_ADAPTIVE_TOLERANCE}, found {share}"
+                    );
+                    return Err(tolerance.problem("tolerance", message).help("1 % makes a smooth figure"));
+                }
+                ResolvedValue::Frequencies(Frequencies::Adaptive { from: start, to: end, tolerance: share })
+            }
+            CompiledValue::ByName(names, dimension) => {
+                let mut table = BTreeMap::new();
+                for (name, _, quantity) in names {
+                    let number = quantity.number(name, Expected::finite(*dimension), "", environment)?;
+                    table.insert(name.clone(), number);
+                }
+                ResolvedValue::ByName(table, *dimension)
+            }
+            CompiledValue::Vector(parts, dimension, example) => {
+                let mut vector = [0.0; 3];
+                for (value, part) in vector.iter_mut().zip(parts) {
+                    *value = part.number(key, Expected::finite(*dimension), example, environment)?;
+                }
+                ResolvedValue::Vector(vector)
+            }
+            CompiledValue::Quantities(parts, dimension, within, example) => {
+                let number = |part: &CompiledQuantity| {
+                    part.number(key, Expected { dimension: *dimension, within: *within }, example, environment)
+                };
+                ResolvedValue::Quantities(parts.iter().map(number).collect::<Result<_, _>>()?, *dimension)
+            }
+            CompiledValue::Sums(sums) => {
+                let one = |sum: &Weights| {
+                    let weight = |(name, _, quantity): &(String, Location, CompiledQuantity)| {
+                        let weight = quantity.number(name, Expected::finite(Dimension::NONE), "", environment)?;
+                        Ok((name.clone(), weight))
+                    };
+                    sum.iter().map(weight).collect::<Result<Vec<_>, Problem>>()
+                };
+                ResolvedValue::Sums(sums.iter().map(one).collect::<Result<_, Problem>>()?)
+            }
+            CompiledValue::Law(row, table) => ResolvedValue::Law(law(row, table, key, environment, problems)?),
+            CompiledValue::Table(table) => ResolvedValue::Table(table.values(environment, problems)),
+        })
+    }
+}
+
+/// Builds a law from the values of its table. A parameter whose dimension depends on another
+/// parameter (as an exponent) is read after that one.
+fn law(
+    row: &'static LawInfo,
+    table: &CompiledTable,
+    key: &'static str,
+    environment: &Environment<'_>,
+    problems: &mut Vec<Problem>,
+) -> Result<SharedLaw, Problem> {
+    let before = problems.len();
+    let mut numbers: BTreeMap<&str, f64> = BTreeMap::new();
+    let (raised, plain): (Vec<&Parameter>, Vec<&Parameter>) = row.parameters.iter().partition(|p| p.power.is_some());
+    for parameter in plain.into_iter().chain(raised) {
+        let Some(entry) = table.entry(parameter.key) else { continue };
+        let CompiledValue::Quantity { quantity, within, example, .. } = &entry.value else { continue };
+        let value = |key: &str| {
+            let default = || row.parameters.iter().find(|p| p.key == key)?.default;
+            numbers.get(key).copied().or_else(default)
+        };
+        // with an exponent that is not a whole number: a plain number in SI
+        let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
+        let expected = Expected { dimension, within: *within };
+        match quantity.number(parameter.key, expected, example, environment) {
+            Ok(value) if !parameter.range.has(value) => {
+                let Parameter { key, range, .. } = *parameter;
+                let error = LawError::Value { law: row.name, key, dimension, range, value };
+                problems.push(quantity.problem(key, error.to_string()));
+                // the parameters with this exponent cannot be checked
+                break;
+            }
+            Ok(value) => {
+                numbers.insert(parameter.key, value);
+            }
+            Err(problem) => problems.push(problem),
+        }
+    }
+    if problems.len() > before {
+        // The error was reported already. The caller only needs to know that there is no law.
+        return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.location, key, "")));
+    }
+    row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
+}
+
+/// Bounds of the tolerance of adaptive frequencies. A finer tolerance costs too many points, a
+/// coarser one hides the shape of the curve.
+const MIN_ADAPTIVE_TOLERANCE: f64 = 1e-5;
+const MAX_ADAPTIVE_TOLERANCE: f64 = 0.5;
+
+/// Refuses a range whose end is not above its start.
+pub(crate) fn check_range(
+    from: f64,
+    to: f64,
+    end: &CompiledQuantity,
+    dimension: Option<Dimension>,
+) -> Result<(), Problem> {
+    if from < to {
+        return Ok(());
+    }
+    let (from, to) = (quantity_text(from, dimension), quantity_text(to, dimension));
+    Err(end
+        .problem("to", format!("the range is empty: `to` must be greater than `from`, found {from} to {to}"))
+        .help("exchange both values, or write a single value"))
+}

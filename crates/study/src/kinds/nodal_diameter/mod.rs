@@ -1,0 +1,209 @@
+//! Frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck,
+//! and mode shapes.
+
+mod figure;
+
+use super::shared::disk_shape::place_and_sector;
+use super::shared::keys::no_requirements;
+use crate::case::values::{Values, hertz};
+use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::kinds::info::{KeyError, KindInfo};
+use crate::kinds::kind::Kind;
+use crate::results::columns::{FREQUENCY, phase_of, shape_of};
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
+use crate::syntax::key::{ValueType, default, optional};
+use stickslip::dimension::Dimension;
+use stickslip::model::{Model, WaveModes};
+
+/// Names of the table and its columns.
+const TABLE: &str = "nodal_diameters";
+const DIAMETER: &str = "nodal_diameter";
+const MODE: &str = "mode";
+const JOINTS: &str = "joints";
+/// Both states of the joints, as written in the column `joints`.
+pub(super) const STATES: [&str; 2] = ["free", "stuck"];
+/// Largest number of shapes drawn per case.
+const MAX_SHAPES: usize = 4;
+
+pub(super) const KIND: Kind = Kind {
+    info: KindInfo {
+        name: "nodal-diameter",
+        summary: "natural frequencies of a tuned disk over its nodal diameters, with all joints free and all stuck, \
+            and mode shapes",
+        keys: &[
+            default("modes", ValueType::Count(1, 100), "4", "lowest modes of every nodal diameter", "4"),
+            default(SHAPES, ValueType::Flag, "true", "draws the mode shapes; the table always contains them", "false"),
+            optional(
+                DIAMETER,
+                ValueType::Count(0, 100_000),
+                "the nodal diameter whose lowest modes are drawn; default: the first mode (or `mode`) of the lowest \
+                 nodal diameters",
+                "3",
+            ),
+            optional(
+                MODE,
+                ValueType::Count(1, 100),
+                "number of the drawn mode, by ascending frequency in its nodal diameter",
+                "1",
+            ),
+            default(
+                JOINTS,
+                ValueType::Choice(states),
+                STATES[0],
+                "state of the joints in the drawn shapes",
+                "\"stuck\"",
+            ),
+        ],
+        check,
+        axes: [Some(Dimension::NONE), Some(Dimension::FREQUENCY)],
+        uses_method: false,
+        needs: no_requirements,
+        adapts: false,
+        tables: &[TABLE],
+    },
+    unit_size: |_| UnitSize::Case,
+    cost,
+    warnings: |_| Vec::new(),
+    compute,
+    draw: figure::draw,
+};
+
+const SHAPES: &str = "shapes";
+
+fn states() -> Vec<(&'static str, &'static str)> {
+    vec![(STATES[0], "no joint carries a force"), (STATES[1], "no joint slips")]
+}
+
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
+    check_disk(model)?;
+    let (most, sectors) = (values.count("modes").unwrap_or(4), model.ring.map_or(0, |ring| ring.sectors as u64));
+    if let Some(diameter) = values.count(DIAMETER).filter(|diameter| 2 * diameter > sectors) {
+        let message = format!("a disk of {sectors} sectors has no {diameter} nodal diameters");
+        return Err(KeyError::new(DIAMETER, message, format!("choose a nodal diameter from 0 to {}", sectors / 2)));
+    }
+    if let Some(mode) = values.count(MODE).filter(|mode| *mode > most) {
+        let message = format!("mode {mode} is not among the {most} lowest that are computed");
+        return Err(KeyError::new(MODE, message, format!("write modes = {mode}, or a mode from 1 to {most}")));
+    }
+    Ok(())
+}
+
+/// Checks that the model is a disk of equal sectors.
+fn check_disk(model: &Model) -> Result<(), KeyError> {
+    match model.ring {
+        Some(ring) if ring.equal => Ok(()),
+        Some(_) => {
+            let message = "the sectors differ, so the modes of this mistuned disk have no nodal diameter";
+            Err(KeyError::new(
+                "kind",
+                message,
+                "remove `mistuning` from [disk], or use kind = \"modes\" for the modes of the whole ring",
+            ))
+        }
+        None => {
+            let message = "the model is not a disk; only disks have nodal diameters";
+            Err(KeyError::new("kind", message, "state one sector, and add [disk] with `sectors`"))
+        }
+    }
+}
+
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let modes = inputs.case.values.count("modes").unwrap_or(4) as f64;
+    let sectors = inputs.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
+    let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * inputs.dofs / sectors);
+    let rows = inputs.cases * waves * 2.0 * modes;
+    let shapes = 2.0 * inputs.places / sectors;
+    Cost {
+        tables: vec![TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 }],
+        drawn: rows,
+        unit: if each > MAX_DENSE_SIZE { FACTOR * each } else { 8.0 * each * each },
+        conditional_work: None,
+        work: inputs.cases
+            * waves
+            * if each > MAX_DENSE_SIZE { LOWEST_MODES * each.powf(1.5) } else { EIGEN * each.powi(3) },
+    }
+}
+
+/// Size above which sparse factors give only the lowest modes.
+const MAX_DENSE_SIZE: f64 = 700.0;
+/// Time of an eigenvalue problem per cube of its size, s.
+const EIGEN: f64 = 1e-8;
+/// Time of the lowest modes of a wave, free and stuck, per size to the power of 1.5, s.
+/// Measured: 8 s for a sector of 1935 rows in seven waves.
+const LOWEST_MODES: f64 = 4.6e-6;
+/// Bytes of matrices and factors per row. Measured: 0.7 GB for 61,000 rows.
+const FACTOR: f64 = 12e3;
+
+/// Error text for sectors whose modes cannot be computed.
+const TOO_LARGE: &str = "the sectors are too large to compute all their modes, or have no mass; for a sector given \
+    by matrices, set `reduce` in [structure]";
+
+/// Returns the lowest modes by nodal diameter.
+///
+/// # Errors
+/// Returns a text if the sectors are too large or the modes are not found.
+pub(super) fn waves(model: &Model, most: usize) -> Result<Vec<WaveModes>, String> {
+    match model.wave_modes(most) {
+        Ok(Some(waves)) => Ok(waves),
+        Ok(None) => Err(TOO_LARGE.to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn compute(work: &UnitTask<'_>) -> Computed {
+    let prepared = work.case();
+    let mut part = UnitResult::default();
+    let mut rows = TableBuilder::default();
+    let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
+    match waves(&prepared.case.model, most) {
+        Ok(waves) => {
+            part.count(|| location_of(prepared), CONVERGED, None);
+            write(prepared, &waves, &mut rows);
+        }
+        Err(reason) => part.count(|| location_of(prepared), "failed", Some(reason)),
+    }
+    (work.context.finished)();
+    part.tables = vec![rows];
+    Ok(part)
+}
+
+fn location_of(prepared: &PreparedCase) -> String {
+    prepared.case.label()
+}
+
+fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) {
+    let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
+    let places = places(&prepared.case.model);
+    for (state, name) in STATES.into_iter().enumerate() {
+        for wave in waves {
+            let (modes, shapes) = [(&wave.free, &wave.free_shapes), (&wave.stuck, &wave.stuck_shapes)][state];
+            for (mode, found) in modes.elastic.iter().take(most).enumerate() {
+                rows.varied(&prepared.case);
+                rows.text(JOINTS, name);
+                rows.integer(DIAMETER, wave.diameter as u64);
+                rows.integer(MODE, mode as u64 + 1);
+                rows.number(FREQUENCY, hertz(found.omega));
+                rows.number("damping_ratio", found.damping);
+                for (i, (name, place)) in places.iter().enumerate() {
+                    // rotations of a mode of unit modal mass are left out: their unit is rad/(m
+                    // √kg), not 1/√kg
+                    if prepared.case.model.is_rotation(name) {
+                        continue;
+                    }
+                    let at = shapes.get(mode).map(|shape| shape[i].to_polar());
+                    rows.number(&shape_of(place), at.map_or(f64::NAN, |(size, _)| size));
+                    rows.number(&phase_of(place), at.map_or(f64::NAN, |(_, phase)| phase.to_degrees()));
+                }
+                rows.reduction_error(prepared.system.reduction_evidence());
+                rows.end_row();
+            }
+        }
+    }
+}
+
+/// Returns the places of the first sector: name in the ring and name in the sector.
+fn places(model: &Model) -> Vec<(String, String)> {
+    let both = |name: String| place_and_sector(&name).map(|(place, _)| (name, place));
+    model.sector_places().into_iter().filter_map(both).collect()
+}

@@ -1,0 +1,64 @@
+//! The figure of orbits.
+
+use crate::results::dataset::{Axis, Figure, Panel, Series};
+use crate::results::draw_panels;
+use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, join_title, largest, numbers};
+use crate::syntax::format::{format_hertz, prefixed_unit};
+use std::ops::Range;
+
+/// Draws displacements of the places and forces of the joints over time: two panels per orbit.
+pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
+    let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
+    // a table from another source may lack columns
+    let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
+    let times_of = |rows: Range<usize>| numbers(motion, "time_s", rows);
+    let longest = times_of(0..motion.rows()).into_iter().fold(0.0, f64::max);
+    let orbit_panels = |title: &str, rows: Range<usize>| {
+        let times = times_of(rows.clone());
+        // draws in one panel share one unit
+        let last = if drawing.study.draws().is_some() { longest } else { times.last().copied().unwrap_or(0.0) };
+        let (time_unit, time_factor) = prefixed_unit(last, "s");
+        let x: Vec<f64> = times.iter().map(|time| time * time_factor).collect();
+        let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
+            let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
+            let (unit, factor) = prefixed_unit(largest(motion, columns.clone()), si);
+            let line = |(i, column): (usize, &String)| {
+                let y = numbers(motion, column, rows.clone()).iter().map(|value| value * factor).collect();
+                Series::line(names[i], x.clone(), y, colour + i)
+            };
+            Panel {
+                title: format!("{what}, {title}"),
+                x: Axis::new("time", time_unit.clone()),
+                y: Axis::new(what, unit),
+                series: columns.iter().enumerate().map(line).collect(),
+                ..Panel::default()
+            }
+        };
+        let mut panels = Vec::new();
+        if !system.places().is_empty() {
+            let shown = drawing.displacements(&system);
+            let names = shown.iter().map(|(name, _)| name.as_str()).collect();
+            panels.push(panel("displacement", "m", names, "displacement_m", 0));
+        }
+        if !system.joints().is_empty() {
+            let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
+            let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
+            panels.push(panel("joint force", "N", names, "force_N", system.places().len()));
+        }
+        panels.retain(|panel| !panel.series.is_empty());
+        panels
+    };
+    let case_panels = |case_rows: &CaseRows, title: String| -> Vec<Panel> {
+        let mut from = case_rows.rows.start;
+        let runs = frequencies[case_rows.rows.clone()].chunk_by(|a, b| a == b).take(MAX_PANELS);
+        let run_panels = |run: &[f64]| {
+            let rows = from..from + run.len();
+            from = rows.end;
+            orbit_panels(&join_title([title.clone(), format_hertz(run[0])]), rows)
+        };
+        runs.flat_map(run_panels).collect()
+    };
+    let mut panels = draw_panels::panels(drawing, &drawing.case_rows(motion), &case_panels);
+    panels.truncate(MAX_PANELS);
+    Figure { panels, ..Figure::default() }
+}

@@ -1,0 +1,168 @@
+//! Orbits over one period, in time.
+
+mod figure;
+
+use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
+use super::shared::orbit_sweep;
+use crate::case::values::hertz;
+use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::warnings::excitation_warnings;
+use crate::kinds::info::KindInfo;
+use crate::kinds::kind::Kind;
+use crate::results::notes::Note;
+use crate::results::table_builder::TableBuilder;
+use crate::run::point_row::{PointRow, describe_location};
+use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
+use crate::syntax::key::{ValueType, default};
+use stickslip::dimension::Dimension;
+use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
+
+/// Length of the state, with the states of joints, up to which the return of an orbit is
+/// checked for every method. Measured: 12 s for a mistuned ring of 48 blades and joints, whose
+/// state has length 144.
+const MAX_CHECKED_STATES: usize = 200;
+
+pub(super) const KIND: Kind = Kind {
+    info: KindInfo {
+        name: "orbit",
+        summary: "an orbit over one period: displacements, velocities, joint forces",
+        keys: &[
+            FREQUENCY,
+            SAMPLES,
+            OUTPUT,
+            default(
+                "multipliers",
+                ValueType::Flag,
+                "false",
+                "computes all Floquet multipliers into `multipliers.csv`; `stable` needs only the largest one",
+                "true",
+            ),
+        ],
+        check: |values, _, _| check_output(values),
+        axes: [Some(Dimension::TIME), None],
+        uses_method: true,
+        needs: no_requirements,
+        adapts: false,
+        tables: &["orbit", "orbits", "multipliers"],
+    },
+    unit_size: orbit_sweep::grain,
+    cost,
+    warnings: excitation_warnings,
+    compute,
+    draw: figure::draw,
+};
+
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let points = inputs.points();
+    let rows = points * inputs.instants();
+    let orbits = inputs.orbits(points);
+    let wanted = inputs.case.values.flag("multipliers") == Some(true);
+    // the return check of a harmonic balance orbit takes one period; multipliers take one more,
+    // with the derivative
+    let followed = if inputs.is_series() { inputs.period() } else { 0.0 };
+    let (multipliers, map) = if wanted { (points * 2.0 * inputs.dofs, inputs.period()) } else { (0.0, 0.0) };
+    Cost {
+        tables: vec![
+            inputs.motion(rows),
+            TableShape { numbers: orbits.numbers + 4.0, ..orbits },
+            TableShape { rows: multipliers, numbers: inputs.varied + 5.0, words: 0.0 },
+        ],
+        // the panels beyond the limit are also built
+        drawn: rows * (inputs.places + inputs.joints),
+        unit: inputs.kept_orbits(),
+        conditional_work: None,
+        work: points
+            * (inputs.orbit() + followed + map + inputs.output_seconds() + inputs.evaluation(inputs.instants())),
+    }
+}
+
+fn compute(work: &UnitTask<'_>) -> Computed {
+    let mut part = UnitResult::default();
+    let (mut motion, mut summary, mut multipliers) =
+        (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
+    let prepared = work.case();
+    for (orbit, stable) in orbit_sweep::converged_orbits(work, &mut part)? {
+        let omega = orbit.omega;
+        continuum_note(prepared, &orbit).into_iter().for_each(|note| note.merge_into(&mut part.notes));
+        summary.varied(&prepared.case);
+        summary.number("frequency_Hz", hertz(omega));
+        let mut row = PointRow::with_stability(prepared, &orbit, stable);
+        if orbit.start.len() <= MAX_CHECKED_STATES {
+            row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
+        }
+        row.write(prepared, &mut summary);
+        summary.number("work_in_J", orbit.energy.work_in);
+        summary.number("viscous_J", orbit.energy.viscous);
+        summary.number("friction_J", orbit.energy.friction);
+        summary.integer("switches", orbit.evidence.switches as u64);
+        summary.end_row();
+        let wanted = prepared.case.values.flag("multipliers") == Some(true);
+        let all = if wanted { orbit.multipliers() } else { Some(Vec::new()) };
+        if all.is_none() {
+            let place = describe_location(&prepared.case, omega);
+            let text = "the multipliers are unknown, because the orbit has no return map.";
+            Note::for_case(&place, text).merge_into(&mut part.notes);
+        }
+        for (index, multiplier) in all.unwrap_or_default().iter().enumerate() {
+            multipliers.varied(&prepared.case);
+            multipliers.number("frequency_Hz", hertz(omega));
+            multipliers.integer("index", index as u64 + 1);
+            multipliers.number("real", multiplier.re);
+            multipliers.number("imaginary", multiplier.im);
+            multipliers.number("modulus", multiplier.norm());
+            multipliers.reduction_error(prepared.system.reduction_evidence());
+            multipliers.end_row();
+        }
+        for time in orbit_sweep::times(&orbit, prepared.case.values.count("samples").unwrap_or(720) as usize) {
+            motion.varied(&prepared.case);
+            motion.number("frequency_Hz", hertz(omega));
+            motion.number("time_s", time);
+            write_sample(prepared, &orbit.sample(time), &mut motion);
+            motion.end_row();
+        }
+    }
+    part.tables = vec![motion, summary, multipliers];
+    Ok(part)
+}
+
+/// Returns the note that a permanently stuck joint makes the orbit one of a continuum.
+///
+/// It covers orbits with half-period symmetry; [`Note::StuckOffset`] covers the others.
+fn continuum_note(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
+    (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
+        let stuck = orbit.evidence.stuck.join(", ");
+        let text =
+            format!("permanently stuck: {stuck}; the orbit is one of a continuum, and the symmetric orbit is shown.");
+        Note::for_case(&describe_location(&prepared.case, orbit.omega), text)
+    })
+}
+
+/// Writes the cells of one instant.
+pub(super) fn write_sample(prepared: &PreparedCase, sample: &Sample, rows: &mut TableBuilder) {
+    let system = &prepared.system;
+    for (place, along) in system.places().iter().zip(system.seen()) {
+        let (what, unit) = if along.is_rotation() { ("rotation", "rad") } else { ("displacement", "m") };
+        rows.number(&format!("{place}_{what}_{unit}"), along.along(&sample.displacement));
+        rows.number(&format!("{place}_velocity_{unit}_per_s"), along.along(&sample.velocity));
+    }
+    for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
+        for (a, label) in joint.labels().enumerate() {
+            rows.number(&format!("{label}_displacement_m"), state.displacement[a]);
+            rows.number(&format!("{label}_velocity_m_per_s"), state.velocity[a]);
+            rows.number(&format!("{label}_force_N"), state.force[a]);
+        }
+        let contact = if joint.law().has_faces() { word(state.contact) } else { "" };
+        rows.text(&format!("{}_contact", joint.name()), contact);
+    }
+}
+
+fn word(contact: Contact) -> &'static str {
+    match contact {
+        Contact::Stick => "stick",
+        Contact::SlipForward => "slip+",
+        Contact::SlipBackward => "slip-",
+        Contact::Slip => "slip",
+        Contact::Touch => "touch",
+        Contact::Open => "open",
+    }
+}

@@ -1,0 +1,13 @@
+//! Shared by several study kinds.
+//!
+//! - `keys`: keys of `[study]`, and checks of their values;
+//! - `peak_of`: the key `peak_of`;
+//! - `orbit_sweep`: the orbits of a unit, their instants, and failures;
+//! - `contact_states`: panels of contact states;
+//! - `disk_shape`: pictures of a disk.
+
+pub(super) mod contact_states;
+pub(super) mod disk_shape;
+pub(super) mod keys;
+pub(super) mod orbit_sweep;
+pub(super) mod peak_of;

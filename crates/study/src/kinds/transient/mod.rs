@@ -1,0 +1,364 @@
+//! Transients: the motion in time from rest or from given displacements; free decay,
+//! switched-on excitation, or run-up.
+
+mod figure;
+
+use super::orbit::write_sample;
+use super::shared::keys::MAX_SAMPLES;
+use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, begin_values, held_equilibrium, state_vector};
+use crate::case::names::ModelNames;
+use crate::case::values::{Values, hertz};
+use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::warnings::motion_warnings;
+use crate::kinds::info::{KeyError, KindInfo};
+use crate::kinds::kind::Kind;
+use crate::results::decay::{Decay, PlaceMotionFn};
+use crate::results::drawing::MAX_PANELS;
+use crate::results::notes::{Note, WARNING};
+use crate::results::table_builder::TableBuilder;
+use crate::run::point_row::describe_location;
+use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
+use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optional, required};
+use std::f64::consts::TAU;
+use stickslip::dimension::Dimension;
+use stickslip::method::WIDTH;
+use stickslip::method::time_history::{Excitation, Instant, TimeHistory, TimeHistoryError};
+use stickslip::model::Model;
+use stickslip::orbit::Sample;
+
+/// Name of the time column.
+const TIME: &str = "time_s";
+
+const FREQUENCY: ValueType = ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive);
+const DURATION: ValueType = ValueType::Quantity(Dimension::TIME, Bounds::Positive);
+
+/// Largest number of samples of one transient.
+const MAX_STEPS: f64 = 1e7;
+
+const RUN_UP: &[Key] = &[
+    required("from", FREQUENCY, "excitation frequency at the start", "\"110 Hz\""),
+    required("to", FREQUENCY, "excitation frequency at the end; it may be lower than `from`", "\"130 Hz\""),
+    required("duration", DURATION, "time of the linear ramp", "\"10 s\""),
+];
+
+pub(super) const KIND: Kind = Kind {
+    info: KindInfo {
+        name: "transient",
+        summary: "motion in time from rest or given displacements: free decay, switched-on excitation, run-up",
+        keys: &[
+            optional(
+                "frequency",
+                ValueType::Frequencies(FREQUENCY_RANGE),
+                "excitation frequency; without it and without `run_up` the motion is a free decay",
+                "\"121 Hz\"",
+            ),
+            optional(
+                "run_up",
+                ValueType::Table(RUN_UP),
+                "excitation frequency that changes linearly in time, in steps of one cycle: each cycle has a \
+                 constant frequency and ends when the cycle of the linear ramp ends",
+                "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
+            ),
+            optional("duration", DURATION, "computed time; default for a run-up: its duration", "\"2 s\""),
+            optional("cycles", ValueType::Count(1, 1_000_000), "computed time in periods of `frequency`", "200"),
+            optional(
+                "start",
+                ValueType::ByName(Dimension::LENGTH),
+                "initial displacements of masses that are pulled and released, see `begin`; default: zero",
+                "{ blade1 = \"1 mm\" }",
+            ),
+            optional(
+                "begin",
+                ValueType::Choice(begin_values),
+                "initial state of the other masses and joints; default: `equilibrium` with `start`, otherwise \
+                 `unloaded`",
+                "\"unloaded\"",
+            ),
+            optional(
+                "start_velocity",
+                ValueType::ByName(Dimension::VELOCITY),
+                "initial velocities; default: zero",
+                "{ blade1 = \"0.1 m/s\" }",
+            ),
+            default(
+                "samples_per_cycle",
+                ValueType::Count(8, MAX_SAMPLES),
+                "64",
+                "points of the table per excitation period (for a run-up: of its highest frequency)",
+                "64",
+            ),
+            optional("time_step", DURATION, "time step of the table; required for a free decay", "\"0.1 ms\""),
+        ],
+        check,
+        axes: [Some(Dimension::TIME), Some(Dimension::LENGTH)],
+        // exact and smooth laws are both integrated in time; no orbit is computed
+        uses_method: false,
+        needs: |_, options, system| TimeHistory::check(system, options.get(WIDTH).copied()),
+        adapts: false,
+        tables: &["motion", "motion_summary", "decay", "decay_summary"],
+    },
+    unit_size: |_| UnitSize::Case,
+    cost,
+    warnings: motion_warnings,
+    compute,
+    draw: figure::draw,
+};
+
+/// Returns the duration of one transient (s) and the number of its samples.
+fn lengths(inputs: &CostInputs<'_>) -> (f64, f64) {
+    let values = &inputs.case.values;
+    let (low, high) = inputs.range().unzip();
+    let period = |omega: f64| TAU / omega;
+    let cycles = values.count("cycles").zip(low).map(|(cycles, omega)| cycles as f64 * period(omega));
+    let run_up = values.table("run_up").and_then(|table| table.quantity("duration"));
+    let duration = values.quantity("duration").or(cycles).or(run_up).unwrap_or(0.0);
+    let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+    let step = values.quantity("time_step").or(high.map(|omega| period(omega) / per_cycle));
+    (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
+}
+
+fn cost(inputs: &CostInputs<'_>) -> Cost {
+    let (duration, samples) = lengths(inputs);
+    let points = inputs.points();
+    let table = inputs.motion(points * samples);
+    // the steps resolve both the excitation and the modes
+    let fastest = inputs.range().map_or(0.0, |(_, high)| high).max(inputs.slowest_mode());
+    let periods = duration * fastest / TAU;
+    // the cycles of a free decay, and their summary
+    let free = inputs.range().is_none();
+    let cycles = if free { points * periods.floor() } else { 0.0 };
+    let summaries = if free { points } else { 0.0 };
+    Cost {
+        tables: vec![
+            TableShape { numbers: table.numbers + inputs.frequency_columns(), ..table },
+            TableShape {
+                rows: points * inputs.places,
+                numbers: inputs.varied + inputs.frequency_columns() + 2.0,
+                words: 1.0,
+            },
+            TableShape { rows: cycles, numbers: inputs.varied + 4.0, words: 1.0 },
+            TableShape { rows: summaries, numbers: inputs.varied + 10.0, words: 1.0 },
+        ],
+        drawn: points.min(MAX_PANELS as f64) * samples * inputs.places,
+        unit: 0.0,
+        conditional_work: None,
+        work: points * (periods * inputs.period() + inputs.patterns(periods) + inputs.evaluation(samples)),
+    }
+}
+
+fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
+    let free = ModelNames::free_displacements(model);
+    for key in ["start", "start_velocity"] {
+        for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
+            free.single_label(key, "free mass", name)?;
+        }
+    }
+    let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
+    let (duration, cycles) = (values.quantity("duration"), values.count("cycles"));
+    if run_up.is_some() && drive.is_some() {
+        return Err(KeyError::new("run_up", "`frequency` and `run_up` exclude each other", "remove one of them"));
+    }
+    if duration.is_some() && cycles.is_some() {
+        return Err(KeyError::new("cycles", "`duration` and `cycles` exclude each other", "remove one of them"));
+    }
+    if cycles.is_some() && drive.is_none() {
+        let help = "write `duration` instead, or add `frequency`";
+        return Err(KeyError::new("cycles", "`cycles` counts periods of `frequency`, which is absent", help));
+    }
+    if let Some(run_up) = run_up
+        && run_up.quantity("from") == run_up.quantity("to")
+    {
+        let help = "write `frequency` for a constant excitation frequency";
+        return Err(KeyError::new("run_up", "`from` and `to` are the same frequency", help));
+    }
+    let lowest = drive.map(|f| f.iter().fold(f64::INFINITY, f64::min));
+    let highest = match (drive, run_up) {
+        (Some(f), _) => Some(f.iter().fold(0.0, f64::max)),
+        (None, Some(r)) => r.quantity("from").into_iter().chain(r.quantity("to")).reduce(f64::max),
+        (None, None) => None,
+    };
+    let period = |omega: f64| TAU / omega;
+    let time = duration
+        .or_else(|| Some(cycles? as f64 * period(lowest?)))
+        .or_else(|| run_up.and_then(|run_up| run_up.quantity("duration")));
+    let Some(time) = time else {
+        let help = if drive.is_some() { "add `duration` or `cycles`" } else { "add `duration`" };
+        return Err(KeyError::new("duration", "the duration of the motion is missing", help));
+    };
+    let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+    let Some(step) = values.quantity("time_step").or(highest.map(|omega| period(omega) / per_cycle)) else {
+        let help = "add `time_step`, for example \"0.1 ms\"";
+        return Err(KeyError::new("time_step", "a free decay has no period to divide into samples", help));
+    };
+    if time / step > MAX_STEPS {
+        let message = format!("the study needs {:.3e} samples; the limit is {MAX_STEPS:e}", time / step);
+        return Err(KeyError::new("duration", message, "shorten `duration` or use fewer samples"));
+    }
+    Ok(())
+}
+
+fn compute(work: &UnitTask<'_>) -> Computed {
+    let prepared = work.case();
+    let case = &prepared.case;
+    let values = &case.values;
+    let run_up = values.table("run_up").map(|table| Excitation::RunUp {
+        from: table.quantity("from").unwrap_or(0.0),
+        to: table.quantity("to").unwrap_or(0.0),
+        duration: table.quantity("duration").unwrap_or(0.0),
+    });
+    let drives: Vec<Option<f64>> = match &case.frequencies {
+        Some(frequencies) => frequencies.iter().map(Some).collect(),
+        None => vec![None],
+    };
+    let mut part = UnitResult::default();
+    let start_values = values.by_name("start");
+    let begin = values.text("begin").unwrap_or(if start_values.is_some() { EQUILIBRIUM } else { UNLOADED });
+    let start_state =
+        if begin == EQUILIBRIUM { held_equilibrium(&case.model, &prepared.system, start_values) } else { None };
+    if begin == EQUILIBRIUM && start_state.is_none() {
+        let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
+            with begin = \"unloaded\"";
+        part.notes.push(Note::for_case(&case.label(), format!("{WARNING}{text}")));
+    }
+    let start = start_state
+        .unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, start_values), states: Vec::new() });
+    let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
+    let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
+    for drive in drives {
+        let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
+        let fastest = match excitation {
+            Excitation::Free => None,
+            Excitation::Steady(omega) => Some(omega),
+            Excitation::RunUp { from, to, .. } => Some(from.max(to)),
+        };
+        let cycles = values.count("cycles").zip(drive).map(|(cycles, omega)| cycles as f64 * TAU / omega);
+        let run_up_time = values.table("run_up").and_then(|table| table.quantity("duration"));
+        // `check` ensures that both values are given
+        let duration = values.quantity("duration").or(cycles).or(run_up_time).unwrap_or(0.0);
+        let per_cycle = values.count("samples_per_cycle").unwrap_or(64) as f64;
+        let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
+        let transient = TimeHistory {
+            displacement: start.displacement.clone(),
+            velocity: state_vector(&prepared.system, values.by_name("start_velocity")),
+            states: start.states.clone(),
+            excitation,
+            duration,
+            step,
+            width: case.method.options.get(WIDTH).copied(),
+        };
+        let (mut sampled, mut stopped) = (false, false);
+        // largest displacement of every place, and its time
+        let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
+        let mut decays = vec![Decay::default(); prepared.system.places().len()];
+        let end = transient.visit(&prepared.system, &mut |instant| {
+            let Instant { time, omega, state: sample, since } = instant;
+            rows.varied(case);
+            if work.several_frequencies() {
+                rows.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
+            }
+            rows.number(TIME, time);
+            rows.number("frequency_Hz", hertz(omega));
+            write_sample(prepared, sample, &mut rows);
+            rows.end_row();
+            sampled = true;
+            // the turning points are located exactly only for the place that moves most
+            let most = largest_range(&decays).filter(|_| excitation == Excitation::Free);
+            for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
+                let motion_along = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
+                let [x, v] = motion_along(sample);
+                let motion = |time: f64| motion_along(&since(time));
+                decay.add([time, x, v], (Some(i) == most).then_some(&motion as &PlaceMotionFn<'_>));
+                if x.abs() > largest[i].0 {
+                    largest[i] = (x.abs(), time);
+                }
+            }
+            stopped = work.context.stopped();
+            !stopped
+        });
+        // a motion without a sample has no largest displacement
+        let displacements = prepared.system.seen().iter().map(|along| !along.is_rotation());
+        let places = prepared.system.places().iter().zip(largest).zip(displacements).filter(|(_, counts)| *counts);
+        for (place, (displacement, time)) in places.map(|(of, _)| of).filter(|_| sampled) {
+            extremes.varied(case);
+            if work.several_frequencies() {
+                extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
+            }
+            extremes.text("mass", place);
+            extremes.number("largest_displacement_m", displacement);
+            extremes.number(TIME, time);
+            extremes.reduction_error(prepared.system.reduction_evidence());
+            extremes.end_row();
+        }
+        if let Some(reduction) = prepared.system.reduction_evidence().filter(|_| !prepared.system.joints().is_empty()) {
+            Note::TimeHistory(reduction.up_to).merge_into(&mut part.notes);
+        }
+        if excitation == Excitation::Free {
+            let unread = write_decay(prepared, &decays, step, &mut decay, &mut summary);
+            part.notes.extend(unread.map(|text| Note::for_case(&case.label(), text)));
+        }
+        (work.context.finished)();
+        let location = || drive.map_or_else(|| case.label(), |omega| describe_location(case, omega));
+        match end {
+            Ok(()) if stopped => part.count(location, NOT_REACHED, None),
+            Ok(()) => part.count(location, CONVERGED, None),
+            Err(TimeHistoryError::Method(error)) => return Err((case.index, error)),
+            Err(error) => part.count(location, "breakdown", Some(error.to_string())),
+        }
+    }
+    part.tables = vec![rows, extremes, decay, summary];
+    Ok(part)
+}
+
+/// Returns the place with the largest range of samples.
+fn largest_range(decays: &[Decay]) -> Option<usize> {
+    (0..decays.len()).max_by(|&a, &b| decays[a].extent().total_cmp(&decays[b].extent()))
+}
+
+/// Samples per cycle that turning points need.
+///
+/// With 20 the damping ratio has an error of 1e-3 of the decrement of a cycle; with 3 it is
+/// meaningless.
+const PER_CYCLE: f64 = 20.0;
+
+/// Writes frequency and damping, cycle by cycle, of the place that moves most.
+///
+/// Returns the warning for too few samples.
+fn write_decay(
+    prepared: &PreparedCase,
+    decays: &[Decay],
+    step: f64,
+    rows: &mut TableBuilder,
+    summary: &mut TableBuilder,
+) -> Option<&'static str> {
+    let displacements = (0..decays.len()).filter(|place| !prepared.system.seen()[*place].is_rotation());
+    let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
+    let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
+    if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
+        return Some(
+            "warning: the samples are too far apart to compute damping from the decay: use a `time_step` below a \
+             twentieth of the period",
+        );
+    }
+    for cycle in &cycles {
+        rows.varied(&prepared.case);
+        rows.number(TIME, cycle.time);
+        rows.text("mass", mass);
+        rows.number("amplitude_m", cycle.amplitude);
+        rows.number("frequency_Hz", cycle.frequency);
+        rows.number("damping_ratio", cycle.damping_ratio);
+        rows.reduction_error(prepared.system.reduction_evidence());
+        rows.end_row();
+    }
+    let highest = cycles.iter().max_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
+    let (Some(first), Some(last), Some(highest)) = (cycles.first(), cycles.last(), highest) else { return None };
+    summary.varied(&prepared.case);
+    summary.text("mass", mass);
+    summary.integer("cycles", cycles.len() as u64);
+    let named = [("first", first), ("largest", highest), ("last", last)];
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_damping_ratio"), cycle.damping_ratio));
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_amplitude_m"), cycle.amplitude));
+    named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_frequency_Hz"), cycle.frequency));
+    summary.reduction_error(prepared.system.reduction_evidence());
+    summary.end_row();
+    None
+}

@@ -1,0 +1,202 @@
+//! Damping from a free decay, cycle by cycle.
+//!
+//! Three consecutive turning points form a cycle of two swings `s` and `s'`. A swing is half
+//! the distance between two turning points, so an offset cancels. A drifting mean, as friction
+//! with memory has, lengthens every other swing, but it cancels in the sum of two consecutive
+//! swings. So the logarithmic decrement of a cycle compares two such sums, half a cycle apart:
+//!
+//! `δ = 2 ln((s + s')/(s' + s''))`, with the next swing `s''`.
+//!
+//! The formula is exact for a linear oscillator. The last cycle has no next swing and uses the
+//! previous one. `ζ = δ/√(4π² + δ²)` is the damping ratio of the linear oscillator with the
+//! same decrement.
+
+use std::f64::consts::TAU;
+
+/// Swings below this share of the largest swing count as rest.
+const SMALLEST_SWING: f64 = 1e-9;
+
+/// One cycle of a decay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// Start time, s.
+    pub time: f64,
+    /// Mean of its two swings, m.
+    pub amplitude: f64,
+    /// Inverse of its duration, Hz.
+    pub frequency: f64,
+    /// Damping ratio of the linear oscillator with the same decrement.
+    pub damping_ratio: f64,
+}
+
+/// Displacement (m) and velocity (m/s) of a place at a time (s) between two samples.
+pub type PlaceMotionFn<'a> = dyn Fn(f64) -> [f64; 2] + 'a;
+
+/// The turning points of one place, detected as samples arrive.
+#[derive(Debug, Clone, Default)]
+pub struct Decay {
+    last: Option<[f64; 3]>,
+    turns: Vec<(f64, f64)>,
+    /// Smallest and largest displacement of a sample, m.
+    extent: Option<(f64, f64)>,
+}
+
+impl Decay {
+    /// Adds a sample: time (s), displacement (m), velocity (m/s).
+    ///
+    /// Locates a turning point since the last sample by `motion`, or by the cubic through both
+    /// samples if `motion` is `None`. The cubic has an error where the acceleration jumps, as
+    /// at the turning points of dry friction.
+    pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&PlaceMotionFn<'_>>) {
+        match self.last {
+            // a motion that begins at rest begins with a turning point
+            None if velocity == 0.0 => self.turns.push((time, displacement)),
+            Some([t, x, v]) if v != 0.0 && v * velocity <= 0.0 => {
+                let cubic = cubic([t, x, v], [time, displacement, velocity]);
+                self.turns.push(turning_point(motion.unwrap_or(&cubic), [t, time], v));
+            }
+            _ => {}
+        }
+        let (low, high) = self.extent.unwrap_or((displacement, displacement));
+        self.extent = Some((low.min(displacement), high.max(displacement)));
+        self.last = Some([time, displacement, velocity]);
+    }
+
+    /// Returns the range of the displacements so far, m.
+    pub fn extent(&self) -> f64 {
+        self.extent.map_or(0.0, |(low, high)| high - low)
+    }
+
+    /// Returns the largest swing, m.
+    pub fn largest(&self) -> f64 {
+        self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).fold(0.0, f64::max)
+    }
+
+    /// Returns the consecutive cycles until the motion rests.
+    pub fn cycles(&self) -> Vec<Cycle> {
+        let least = SMALLEST_SWING * self.largest();
+        let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
+        let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
+        let (swings, turns) = (&swings[..moves], &self.turns);
+        let cycles = (1..swings.len()).step_by(2).map_while(|second| {
+            let duration = turns[second + 1].0 - turns[second - 1].0;
+            (duration > 0.0).then(|| {
+                let decrement = decrement(swings, second);
+                Cycle {
+                    time: turns[second - 1].0,
+                    amplitude: 0.5 * (swings[second - 1] + swings[second]),
+                    frequency: 1.0 / duration,
+                    damping_ratio: decrement / TAU.hypot(decrement),
+                }
+            })
+        });
+        cycles.collect()
+    }
+}
+
+/// Returns the logarithmic decrement of the cycle whose second swing has index `second`.
+fn decrement(swings: &[f64], second: usize) -> f64 {
+    let cycle = swings[second - 1] + swings[second];
+    match (swings.get(second + 1), second.checked_sub(2)) {
+        (Some(next), _) => 2.0 * (cycle / (swings[second] + next)).ln(),
+        (None, Some(before)) => 2.0 * ((swings[before] + swings[second - 1]) / cycle).ln(),
+        // the decay has two swings only
+        (None, None) => 2.0 * (swings[second - 1] / swings[second]).ln(),
+    }
+}
+
+fn swing(a: (f64, f64), b: (f64, f64)) -> f64 {
+    0.5 * (a.1 - b.1).abs()
+}
+
+/// Returns the cubic through two samples and their velocities.
+fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64; 2] {
+    let step = t1 - t0;
+    // x = x0 + step (v0 s + b s² + c s³) with 0 <= s <= 1
+    let mean = (x1 - x0) / step;
+    let (b, c) = (3.0 * mean - 2.0 * v0 - v1, v0 + v1 - 2.0 * mean);
+    move |time| {
+        let s = (time - t0) / step;
+        [x0 + step * s * (v0 + s * (b + s * c)), v0 + s * (2.0 * b + s * 3.0 * c)]
+    }
+}
+
+/// Returns time and displacement of the first turning point, or onset of stick, between two
+/// times.
+///
+/// The motion has velocity `v0` at the first time; the search ends where the velocity in the
+/// direction of `v0` vanishes.
+fn turning_point(motion: &PlaceMotionFn<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if motion(middle)[1] * v0 > 0.0 { low = middle } else { high = middle }
+    }
+    let time = 0.5 * (low + high);
+    (time, motion(time)[0])
+}
+
+/// Number of bisections of the time between two samples: all bits of a double.
+const BISECTIONS: usize = 53;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decay(motion: impl Fn(f64) -> (f64, f64), duration: f64, step: f64) -> Vec<Cycle> {
+        let mut decay = Decay::default();
+        for i in 0..=(duration / step) as usize {
+            let time = i as f64 * step;
+            let (x, v) = motion(time);
+            decay.add([time, x, v], None);
+        }
+        decay.cycles()
+    }
+
+    /// `x = e^(-ζ ω t) cos(ω_d t)` with an offset.
+    #[test]
+    fn a_linear_oscillator_has_its_damping_ratio_in_every_cycle() {
+        let (zeta, omega) = (0.03f64, TAU * 10.0);
+        let damped = omega * (1.0 - zeta * zeta).sqrt();
+        let motion = |t: f64| {
+            let fall = (-zeta * omega * t).exp();
+            let (cos, sin) = ((damped * t).cos(), (damped * t).sin());
+            (0.2 + fall * cos, -fall * (zeta * omega * cos + damped * sin))
+        };
+        let cycles = decay(motion, 1.0, 1e-3);
+        assert!(cycles.len() >= 8, "{}", cycles.len());
+        for cycle in &cycles {
+            // samples are 1/100 of a period apart; the cubic has an error of 1e-7
+            assert!((cycle.damping_ratio - zeta).abs() < 1e-5, "{cycle:?}");
+            assert!((cycle.frequency - damped / TAU).abs() < 1e-4, "{cycle:?}");
+        }
+    }
+
+    /// The mean drifts by more than the decay of the amplitude: linearly, and with a mean that
+    /// comes to rest.
+    #[test]
+    fn a_drifting_mean_does_not_change_the_damping() {
+        let (zeta, omega) = (0.002f64, TAU * 10.0);
+        let damped = omega * (1.0 - zeta * zeta).sqrt();
+        for creep in [-0.3, 0.3] {
+            let motion = |t: f64| {
+                let fall = (-zeta * omega * t).exp();
+                let (cos, sin) = ((damped * t).cos(), (damped * t).sin());
+                let (mean, rate) = (-creep * (-t).exp(), creep * (-t).exp());
+                (mean + fall * cos, rate - fall * (zeta * omega * cos + damped * sin))
+            };
+            let cycles = decay(motion, 2.0, 1e-3);
+            assert!(cycles.len() >= 18, "{}", cycles.len());
+            for cycle in &cycles {
+                // the remaining error is the second difference of the drift over half a cycle,
+                // 0.3 (1/20)² of an amplitude of 1, over 2π
+                assert!((cycle.damping_ratio - zeta).abs() < 1.3e-4, "{cycle:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rest_and_a_single_swing_have_no_cycle() {
+        assert!(decay(|_| (1.0, 0.0), 1.0, 0.01).is_empty());
+        assert!(decay(|t| (t * t, 2.0 * t), 1.0, 0.01).is_empty());
+    }
+}

@@ -1,0 +1,30 @@
+//! Results of a study: tables, figures and notes, and their typed values.
+//!
+//! - `dataset`: tables, figures and the record of a run, independent of file formats;
+//! - `typed`: reads results back as typed values;
+//! - `columns`: names of columns that several kinds write;
+//! - `table_builder`: builds tables row by row;
+//! - `notes`: notes for the reader;
+//! - `drawing`: tools for kinds to draw figures from finished tables;
+//! - `draw_panels`: panels of many random draws;
+//! - `percentiles`: bands of many curves;
+//! - `histogram`: histograms, and for maxima the fitted distribution;
+//! - `weibull`: the Weibull distribution of maxima;
+//! - `decay`: damping from a free decay;
+//! - `decimation`: decimation of long tables for their figure.
+
+pub(crate) mod columns;
+pub mod dataset;
+pub(crate) mod decay;
+pub mod decimation;
+pub(crate) mod draw_panels;
+pub(crate) mod drawing;
+pub(crate) mod histogram;
+pub(crate) mod notes;
+pub(crate) mod percentiles;
+pub(crate) mod table_builder;
+mod typed;
+pub(crate) mod weibull;
+
+pub(crate) use typed::Results;
+pub use typed::{Evidence, Peak, ResultsError, worst_evidence};

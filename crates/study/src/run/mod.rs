@@ -1,0 +1,19 @@
+//! Runs a study.
+//!
+//! - `runner`: checks a study, computes its units on all threads, and records the run;
+//! - `work`: units of work, and the results of one unit;
+//! - `result_block`: the results of consecutive units;
+//! - `point_row`: the table row of one orbit;
+//! - `output_columns`: additional columns that `output` selects;
+//! - `basis_check`: the check of the reduction basis.
+
+pub(crate) mod basis_check;
+pub(crate) mod output_columns;
+pub(crate) mod point_row;
+pub mod result_block;
+mod runner;
+pub mod work;
+
+pub use runner::{
+    CONVERGED, CheckedStudy, Context, NOT_REACHED, PreparedCase, check, draw, figure_of_tables, run, units,
+};
