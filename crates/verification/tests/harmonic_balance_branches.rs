@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
+use stickslip::curve::continuation::Trace;
 use stickslip::curve::performance::Performance;
-use stickslip::curve::trace::Trace;
 use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};

@@ -5,7 +5,7 @@
 //! its ends. Bisection proceeds level by level, so the points are identical for any number of
 //! threads.
 
-use super::onward;
+use super::branch_following;
 use super::peak::Point;
 use crate::method::{Method, MethodError, OrbitError};
 use crate::model::System;
@@ -71,7 +71,7 @@ impl Adaptive {
             let chunks: Vec<Result<Vec<Kept<R>>, MethodError>> = omegas
                 .par_chunks(chunk)
                 .map(|chunk| {
-                    let mut solver = onward::solver(method, system)?;
+                    let mut solver = branch_following::solver(method, system)?;
                     let mut kept = Vec::with_capacity(chunk.len());
                     let mut last: Option<Vec<f64>> = None;
                     for (omega, start) in chunk {

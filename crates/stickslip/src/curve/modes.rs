@@ -20,14 +20,14 @@
 //! mode ends ([`Lost`]).
 //! Source: the extended periodic motion concept of Krack (2015).
 
-mod follow;
+mod mode_curve;
 
-pub use follow::{Lost, Reason, Turn};
+pub use mode_curve::{Lost, Reason, Turn};
 
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
 use crate::method::{MethodError, ways};
 use crate::model::System;
-use follow::ModeCurve;
+use mode_curve::ModeCurve;
 use num_complex::Complex64;
 use stickslip_numerics::leading::leading;
 

@@ -6,8 +6,8 @@
 //! damper: free at the left, stuck at the right, with a minimum between.
 //! Source: Griffin (1980), Fig. 4.
 
-use super::both_ways::{BothWays, stretches};
-use super::onward;
+use super::bidirectional_sweep::{BothWays, stretches};
+use super::branch_following;
 use super::peak::{Peak, Point, highest};
 use super::sweep::{Watch, stretch};
 use crate::method::{Method, MethodError};
@@ -42,7 +42,7 @@ pub struct Row {
     /// The highest peak; `None` if no orbit converged.
     pub peak: Option<Peak>,
     /// True if only the reverse sweep has this peak, in a system that allows several orbits at a
-    /// frequency ([`super::both_ways`]).
+    /// frequency ([`super::bidirectional_sweep`]).
     pub way_back: bool,
     /// Number of grid orbits that were not found, plus one if the peak is unsettled.
     pub failed: usize,
@@ -112,7 +112,7 @@ impl<E: Send> Performance<'_, E> {
     /// The system cannot be built, or the method does not support it.
     pub fn peak(&self, value: f64) -> Result<Row, PerformanceError<E>> {
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
-        let mut solver = onward::solver(self.method, &system).map_err(PerformanceError::Method)?;
+        let mut solver = branch_following::solver(self.method, &system).map_err(PerformanceError::Method)?;
         let last = self.points.max(3) - 1;
         let omegas: Vec<f64> =
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();

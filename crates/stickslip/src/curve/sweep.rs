@@ -8,7 +8,7 @@
 //! then solved in reverse, from the first orbit found after them. A point that is found from
 //! neither side is solved without initial guess.
 
-use super::onward;
+use super::branch_following;
 use crate::method::{Method, MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -81,7 +81,7 @@ pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 /// # Errors
 /// The method does not support the system.
 pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-    onward::solver(method, system)
+    branch_following::solver(method, system)
 }
 
 /// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as initial

@@ -9,7 +9,7 @@
 //! The law gives no energy in a closed motion for any `beta >= 0`: at the same z, the slope in
 //! loading does not exceed that in unloading.
 
-use super::kink::{power, size};
+use super::kernels::kink::{power, size};
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -116,7 +116,7 @@ impl RateLaw for BoucWen {
         let (zero, v, z) = (S::from(0.0), motion.velocity[0], z[0]);
         let sum = self.beta + self.gamma;
         // |z|^(n-1) z |u'| = |z|^n sgn z |u'|
-        let loop_making = size(v) * super::kink::sign(z.re()) * (self.beta / sum);
+        let loop_making = size(v) * super::kernels::kink::sign(z.re()) * (self.beta / sum);
         rate[0] = (v - power(z, self.exponent) * (loop_making + v * (self.gamma / sum))) / self.bound();
         [z * self.scale(), zero, zero]
     }

@@ -3,7 +3,7 @@
 //! `|f| <= limit` in stick, `f = limit u'/|u'|` in slip: the isotropic friction disk.
 //! Source: Coulomb (1785); as a set-valued law Moreau (1988).
 
-use super::plane::radial;
+use super::kernels::planar_slip::radial;
 use super::{Coulomb, Coulomb2dArctan, Law, LawInfo, Parameter, Prox, SharedLaw};
 use num_complex::Complex64;
 use std::sync::Arc;

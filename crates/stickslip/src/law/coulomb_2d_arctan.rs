@@ -4,8 +4,8 @@
 //! `coulomb-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2), made isotropic in a plane.
 
-use super::plane::dot;
-use super::plane::radial;
+use super::kernels::planar_slip::dot;
+use super::kernels::planar_slip::radial;
 use super::{CoulombArctan, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;

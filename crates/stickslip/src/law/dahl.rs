@@ -5,7 +5,7 @@
 //! without reaching it. It is the Bouc-Wen law with `n = 1`, `gamma = 0`, `beta = k / limit`.
 //! Source: Dahl, "A solid friction model" (1968), exponent 1.
 
-use super::kink::size;
+use super::kernels::kink::size;
 use super::{Law, LawInfo, Parameter, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;

@@ -16,7 +16,7 @@
 //! The law has no regularized version: the state rate of a tangential spring with an arctangent
 //! slider is unbounded as the load goes to zero.
 
-use super::plane;
+use super::kernels::planar_slip;
 use super::{
     Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Reach, SharedLaw, Step, StepLaw, StepSlopes, TANGENTS,
 };
@@ -171,7 +171,7 @@ impl StepLaw for FrictionContact {
             }
             [one, two, ..] => {
                 let way = [0, 1].map(|a| (to[a] - from[a]) * closed);
-                [*one, *two] = plane::step([*one, *two], way, self.tangential, [first, last]);
+                [*one, *two] = planar_slip::step([*one, *two], way, self.tangential, [first, last]);
             }
             [] => {}
         }
@@ -213,7 +213,7 @@ impl StepLaw for FrictionContact {
                 let (force, own) = along_a_line(*force, way[0], self.tangential, limits[1]);
                 ([force, 0.0], own)
             }
-            _ => plane::step_with_slopes([z[0], z[1]], way, self.tangential, limits),
+            _ => planar_slip::step_with_slopes([z[0], z[1]], way, self.tangential, limits),
         };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force);
         let slip = [if closes { 0.0 } else { self.friction }, self.friction].map(|by| by * self.normal);
@@ -249,11 +249,11 @@ impl StepLaw for FrictionContact {
     }
 }
 
-/// Computes [`plane::step_with_slopes`] for a single direction, where the limit at the end of
+/// Computes [`planar_slip::step_with_slopes`] for a single direction, where the limit at the end of
 /// the step decides.
-fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, plane::Slopes) {
+fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, planar_slip::Slopes) {
     let trial = force + way * stiffness;
-    let mut slopes = plane::Slopes::NONE;
+    let mut slopes = planar_slip::Slopes::NONE;
     if trial.abs() > limit {
         slopes.by_limits[0][1] = trial.signum();
         return (limit.copysign(trial), slopes);

@@ -20,9 +20,9 @@
 //! need discrete sliders. The force of first loading is then exact at the edges of the bins and
 //! too large between them.
 
-use super::describing;
-use super::masing::{LEGS, Masing, advance, counted, first_that_goes_on, share, stiffness};
-use super::pieces::STUCK;
+use super::interface::describing_function;
+use super::interface::ideal_elements::STUCK;
+use super::interface::masing::{LEGS, Masing, advance, counted, first_that_goes_on, share, stiffness};
 use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Step, StepLaw, StepSlopes};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -189,7 +189,7 @@ impl Law for Iwan {
         match (self.masing(), amplitude > 0.0) {
             (Some(law), true) => stiffness(law, amplitude),
             (Some(_), false) => self.stiffness.into(),
-            (None, _) => describing::stiffness(self.pieces(), None, None, (None, 1), (amplitude, omega)),
+            (None, _) => describing_function::stiffness(self.pieces(), None, None, (None, 1), (amplitude, omega)),
         }
     }
     fn is_incrementally_passive(&self) -> bool {

@@ -7,7 +7,7 @@
 //! constraint having two-dimensional motion" (1998); step by Krieg and Key (1977), exact for
 //! straight steps.
 
-use super::plane;
+use super::kernels::planar_slip;
 use super::{
     Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, Reach, SharedLaw, Step, StepLaw, StepSlopes,
 };
@@ -94,7 +94,7 @@ impl StepLaw for Jenkins2d {
         z: &mut [S],
     ) -> [S; MOST_DIRECTIONS] {
         let way = [to[0] - from[0], to[1] - from[1]];
-        let force = plane::step([z[0], z[1]], way, self.stiffness, [S::from(self.limit); 2]);
+        let force = planar_slip::step([z[0], z[1]], way, self.stiffness, [S::from(self.limit); 2]);
         z.copy_from_slice(&force);
         [force[0], force[1], S::from(0.0)]
     }
@@ -106,7 +106,7 @@ impl StepLaw for Jenkins2d {
         StepSlopes { force: forces, state: states, .. }: StepSlopes<'_>,
     ) -> Option<[f64; MOST_DIRECTIONS]> {
         let way = [to[0] - from[0], to[1] - from[1]];
-        let (force, slopes) = plane::step_with_slopes([z[0], z[1]], way, self.stiffness, [self.limit; 2]);
+        let (force, slopes) = planar_slip::step_with_slopes([z[0], z[1]], way, self.stiffness, [self.limit; 2]);
         z.copy_from_slice(&force);
         for (a, row) in states.chunks_exact_mut(6).enumerate() {
             let (way, before) = (slopes.by_way[a], slopes.by_force[a]);

@@ -5,7 +5,7 @@
 //! law `jenkins-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, made isotropic in a plane.
 
-use super::plane::dot;
+use super::kernels::planar_slip::dot;
 use super::{Coulomb2dArctan, Jenkins, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;

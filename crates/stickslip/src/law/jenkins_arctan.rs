@@ -5,7 +5,7 @@
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
-use super::describing;
+use super::interface::describing_function;
 use super::{CoulombArctan, Law, LawInfo, Mean, Parameter, Piece, Prox, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -76,7 +76,7 @@ impl Law for JenkinsArctan {
     }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
         // The exact law is a sufficient initial guess for the smooth one.
-        describing::of_piece(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
+        describing_function::of_piece(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
     }
 }
 

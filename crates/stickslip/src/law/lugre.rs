@@ -12,9 +12,9 @@
 //! that does not go into the bristles' elastic energy is `|v| (g q² + s1 |v| (1 - q)) + s2 v²`
 //! with `q = s0 z sgn(v) / g`. Under this condition the bracket is never negative.
 
-use super::kink::size;
-use super::parameter::STATIC_LIMIT;
-use super::stribeck_curve::falling;
+use super::interface::parameter::STATIC_LIMIT;
+use super::kernels::kink::size;
+use super::kernels::stribeck_curve::falling;
 use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -106,7 +106,7 @@ impl Law for LuGre {
         Contact::by_limit(self.steady(velocity[0]), velocity, &[force[0] - self.viscous * velocity[0]])
     }
     fn consistent(&self) -> Result<(), String> {
-        super::stribeck_curve::limits_fit(self.limit, self.static_limit)?;
+        super::kernels::stribeck_curve::limits_fit(self.limit, self.static_limit)?;
         if self.limit == 0.0 && self.static_limit > 0.0 {
             return Err("`limit` is zero, but `static_limit` is positive: the law divides by the \
                  friction force, which is `limit` at high velocity; make `limit` positive"

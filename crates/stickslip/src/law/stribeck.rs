@@ -6,8 +6,8 @@
 //! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its
 //! influence on the critical velocity of stick-slip motion" (1982).
 
-use super::parameter::STATIC_LIMIT;
-use super::stribeck_curve::limits_fit;
+use super::interface::parameter::STATIC_LIMIT;
+use super::kernels::stribeck_curve::limits_fit;
 use super::{
     Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, SharedLaw, Slider, Sliding, StribeckArctan,
 };
@@ -199,7 +199,7 @@ mod tests {
             let y = -4.0 + 0.04 * f64::from(k);
             let (force, slope) = resolve(y);
             let velocity = (y - force) / penalty;
-            let friction: f64 = super::super::stribeck_curve::falling(velocity, 2.0, 2.5, 0.01);
+            let friction: f64 = super::super::kernels::stribeck_curve::falling(velocity, 2.0, 2.5, 0.01);
             if velocity == 0.0 {
                 assert!(force.abs() <= 2.5);
             } else {

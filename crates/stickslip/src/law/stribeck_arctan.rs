@@ -6,8 +6,8 @@
 //! Source: the arctangent of Pust, Pesek, Radolfova (2015), Eq. (2), multiplied by the Stribeck
 //! curve.
 
-use super::parameter::STATIC_LIMIT;
-use super::stribeck_curve::{falling, limits_fit};
+use super::interface::parameter::STATIC_LIMIT;
+use super::kernels::stribeck_curve::{falling, limits_fit};
 use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::f64::consts::FRAC_2_PI;

@@ -11,7 +11,7 @@
 //! The law gives no energy in a closed motion: apart from the spring Et, the slope at a given
 //! force is never larger in loading than in unloading.
 
-use super::kink::{sign, size};
+use super::kernels::kink::{sign, size};
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;

@@ -22,7 +22,7 @@ use super::switched::flow::SwitchedFlow;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
 use crate::model::System;
-use crate::orbit::measure::{NO_WORK, measure};
+use crate::orbit::postprocess::{NO_WORK, measure};
 use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;

@@ -5,7 +5,7 @@ use super::drive::Drive;
 use super::steps::{Instant, Steps};
 use crate::law::{Contact, MOST_DIRECTIONS, Relative};
 use crate::model::{Axis, System};
-use crate::orbit::measure::{Faces, Shares, Signals, extremes, sticks};
+use crate::orbit::postprocess::{Faces, Shares, Signals, extremes, sticks};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;

@@ -3,8 +3,8 @@
 
 use super::coordinates::{Coordinates, combined};
 use super::error::{Element, ModelError};
+use super::name_resolution::{End, Of, Places};
 use super::place::places_of;
-use super::places::{End, Of, Places};
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::reduction::Row;

@@ -11,9 +11,9 @@
 use super::Model;
 use super::body::Body;
 use super::error::{Element, ModelError};
-use super::part::{Entries, Part};
+use super::name_resolution::{Of, Places};
 use super::place::Place;
-use super::places::{Of, Places};
+use super::substructure::{Entries, Part};
 use crate::structure::reduction::Row;
 use crate::structure::{DampedModes, ReducedComponent};
 use nalgebra::DMatrix;

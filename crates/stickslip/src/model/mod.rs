@@ -6,24 +6,24 @@
 
 mod assemble;
 mod body;
-mod contraction;
+mod collinear;
 mod coordinates;
 mod disk;
 mod error;
 pub mod example;
-mod line;
-mod part;
+mod incremental_stability;
+mod name_resolution;
 mod place;
-mod places;
+mod substructure;
 mod survey;
 mod system;
 
 pub use body::{Body, ROTATIONS, TRANSLATIONS, with_rotations};
+pub(crate) use collinear::{Line, PARALLEL};
 pub use disk::{Around, Disk, LEAST_SECTORS, Mistuned, NEXT, Ring, normal_pattern, too_far};
 pub use error::{Element, ModelError};
-pub(crate) use line::{Line, PARALLEL};
+pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};
-pub use places::{is_identifier, is_place};
 pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, Unpressed, WaveModes};
 pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
 

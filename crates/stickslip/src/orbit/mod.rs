@@ -6,10 +6,10 @@
 
 mod error;
 mod evidence;
-pub(crate) mod measure;
 mod motion;
 mod path;
-mod sampled;
+pub(crate) mod postprocess;
+mod sampled_path;
 mod stability;
 
 pub use crate::law::Contact;
@@ -181,11 +181,11 @@ impl Orbit {
         if start.len() < 2 * n || !start.iter().all(|z| z.is_finite()) {
             return Err(wrong("has a `start` without finite displacements and velocities of all degrees of freedom"));
         }
-        let sampled = sampled::Sampled::new(system, path.as_ref(), omega, period);
+        let sampled = sampled_path::Sampled::new(system, path.as_ref(), omega, period);
         if !sampled.fits() {
             return Err(wrong("has samples with a wrong number of values, or with NaN or infinity"));
         }
-        let Ok(measured) = measure::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
+        let Ok(measured) = postprocess::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
         let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
         let apart =
             |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSES * size);

@@ -3,11 +3,11 @@
 //! The matrices come from finite-element programs. A component has named rows and gives its
 //! full or reduced form for observed places.
 
-use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
     Damping, Deviation, EXTENTS, Free, Lacking, Mixed, NominalRing, Reduce, Reduced, ReducedSector, Reduction,
     ReductionError, ReductionKind, Reference, RingModes, Row, STEPS, Whole,
 };
+use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
 use super::{DampedModes, StructureError, free_vibrations, symmetric};
 use nalgebra::DMatrix;
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! The dynamic stiffness of a structure: `(s² M + s C + K) x = F` at `s = jhΩ`.
 
-use super::modal::WithModes;
+use super::modal_damping::WithModes;
 use super::{Form, Structure};
 use num_complex::Complex64;
 use stickslip_numerics::dense::ComplexLu;

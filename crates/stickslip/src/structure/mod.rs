@@ -3,27 +3,27 @@
 //! No other module stores these matrices.
 
 mod component;
-mod cyclic;
 mod dynamic;
-mod faces;
 mod free_vibration;
-mod modal;
+mod modal_damping;
 pub mod reduction;
 mod sector;
-mod uncoupled;
+mod sector_boundary;
+mod sector_faces;
+mod uncoupled_modes;
 
 pub use component::{BetweenComponent, Component, ReducedComponent, SectorComponent};
 pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
-pub use cyclic::{Axis, BladeError, Boundary, BoundaryError};
-pub(crate) use cyclic::{CyclicSector, RingEntry, RingRow};
 pub use dynamic::DynamicStiffness;
-pub use faces::{Faces, FacesError, Node};
 pub(crate) use free_vibration::free_vibrations;
-pub use modal::DampedModes;
+pub use modal_damping::DampedModes;
 pub use reduction::{Reduction, ReductionKind};
 pub(crate) use sector::turn;
 pub use sector::{Sector, Wave, WaveStiffness};
-pub(crate) use uncoupled::UncoupledModes;
+pub use sector_boundary::{Axis, BladeError, Boundary, BoundaryError};
+pub(crate) use sector_boundary::{CyclicSector, RingEntry, RingRow};
+pub use sector_faces::{Faces, FacesError, Node};
+pub(crate) use uncoupled_modes::UncoupledModes;
 
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};

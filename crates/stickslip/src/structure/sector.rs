@@ -90,7 +90,7 @@ pub(super) fn in_wave(
 
 impl Sector {
     /// Returns the first of `sectors` equal sectors, whose degrees of freedom are stored sector
-    /// by sector in `ring`.
+    /// by sector in `cyclic_basis`.
     ///
     /// Returns `None` if the sectors differ, or if modal damping couples all sectors.
     pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {

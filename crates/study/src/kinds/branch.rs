@@ -24,7 +24,7 @@ use crate::values::{Frequencies, Values, hertz};
 use crate::warnings::{resonant, undamped};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
-use stickslip::curve::trace::{Branch, End, Trace, TraceError};
+use stickslip::curve::continuation::{Branch, End, Trace, TraceError};
 use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;

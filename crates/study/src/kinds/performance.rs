@@ -21,7 +21,7 @@ use crate::study::{VariedValue, varied_text};
 use crate::values::{Values, hertz};
 use crate::warnings::sampled;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
-use stickslip::curve::both_ways;
+use stickslip::curve::bidirectional_sweep;
 use stickslip::curve::peak::held;
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
 use stickslip::dimension::Dimension;
@@ -54,7 +54,7 @@ const OPTIMUM: f64 = 35.0;
 
 fn cost(costing: &Costing<'_>) -> Cost {
     let (cases, curves) = (costing.cases, costing.curves());
-    let back = f64::from(u8::from(both_ways::is_followed(costing.system())));
+    let back = f64::from(u8::from(bidirectional_sweep::is_followed(costing.system())));
     let peak = costing.frequencies * costing.orbit() + (back * costing.frequencies + REFINING) * costing.between();
     let tried = if costing.study.last_varied() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
     Cost {
@@ -118,7 +118,7 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
-        if both_ways::is_followed(&prepared.system) {
+        if bidirectional_sweep::is_followed(&prepared.system) {
             rows.flag(WAY_BACK, row.peak.map(|_| row.way_back));
         }
         rows.integer(tables::FAILED, row.failed as u64);

@@ -31,7 +31,7 @@ use drawn::SINGLE;
 use peaks::{Found, Sought};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::Adaptive;
-use stickslip::curve::both_ways::{self, BothWays, Other};
+use stickslip::curve::bidirectional_sweep::{self, BothWays, Other};
 use stickslip::curve::peak::Point;
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, OrbitError, advised};
@@ -129,7 +129,7 @@ fn cost(costing: &Costing<'_>) -> Cost {
         Some(_) => peaks,
         None => 0.0,
     };
-    let back = if both_ways::is_followed(costing.system()) { points } else { 0.0 };
+    let back = if bidirectional_sweep::is_followed(costing.system()) { points } else { 0.0 };
     let curves = costing.cases.min(MOST_CURVES as f64) * costing.places.min(MOST_PANELS as f64 + SINGLE as f64);
     Cost {
         tables: vec![
@@ -199,7 +199,7 @@ fn compute(work: &Work<'_>) -> Computed {
             peaks.number(DRIVE, hertz(found.peak.omega));
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
-            if both_ways::is_followed(&prepared.system) {
+            if bidirectional_sweep::is_followed(&prepared.system) {
                 peaks.flag(WAY_BACK, Some(found.way_back));
             }
             peaks.reduced(prepared.system.reduction_evidence());

@@ -1,6 +1,6 @@
 //! The search for peaks between three points of a curve, with orbits that all quantities share.
 
-use super::shrink::{Shrink, form, parabola};
+use super::bracket_reduction::{Shrink, form, parabola};
 use super::{Peak, PeakOf, Point, Unsettled};
 use crate::method::Solver;
 use crate::orbit::Orbit;

@@ -4,10 +4,10 @@
 //! all others.
 
 mod bracket;
+mod bracket_reduction;
 mod point;
-mod shrink;
 
-use super::onward;
+use super::branch_following;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -141,7 +141,7 @@ pub fn all(
     let tops: Vec<(&[Point], Vec<usize>)> = tops.collect();
     let found: Vec<Result<Vec<PeakOf>, MethodError>> = tops
         .par_iter()
-        .map(|(near, wanted)| Ok(refine(&mut *onward::solver(method, system)?, near, wanted, quantities)))
+        .map(|(near, wanted)| Ok(refine(&mut *branch_following::solver(method, system)?, near, wanted, quantities)))
         .collect();
     let mut peaks = Vec::new();
     for some in found {
@@ -162,7 +162,7 @@ fn is_maximum(near: &[Point], quantity: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::shrink::RISE;
+    use super::bracket_reduction::RISE;
     use super::*;
     use crate::method::event_driven::EventDriven;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};

@@ -8,7 +8,7 @@ use crate::method::Breakdown;
 use crate::method::periodic::{Closed, norm};
 use crate::method::vibration;
 use crate::model::{Axis, System};
-use crate::orbit::measure::{Faces, NO_WORK, Shares, Signals, measure};
+use crate::orbit::postprocess::{Faces, NO_WORK, Shares, Signals, measure};
 use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;

@@ -6,7 +6,7 @@ use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::measure::{Faces, Shares, Signals, measure, sticks};
+use crate::orbit::postprocess::{Faces, Shares, Signals, measure, sticks};
 use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;

@@ -8,22 +8,22 @@
 //! two, because springs and constraints only raise the frequency of every mode (Courant,
 //! Fischer).
 
-mod hold;
-mod known;
-mod linear;
-mod loose;
-mod onset;
+mod linear_modes;
 mod preload;
-mod waves;
+mod results;
+mod rigid_body;
+mod slip_onset;
+mod stuck_joint;
+mod wave_modes;
 
-pub use known::{FirstSlip, LinearMode, Loose, Modes, Onset, Unpressed};
-pub use waves::WaveModes;
+pub use results::{FirstSlip, LinearMode, Loose, Modes, Onset, Unpressed};
+pub use wave_modes::WaveModes;
 
 use super::{Model, ModelError, System, SystemJoint};
 use crate::law::{MOST_DIRECTIONS, SharedLaw};
-use hold::{Hold, Stuck};
-use linear::{LARGEST, Linear, Link};
+use linear_modes::{LARGEST, Linear, Link};
 use std::collections::HashMap;
+use stuck_joint::{Hold, Stuck};
 
 /// Linear properties of a model: modes, onset of slip, loose bodies, preload.
 #[derive(Debug, Clone)]

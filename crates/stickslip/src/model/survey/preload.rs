@@ -5,8 +5,8 @@
 
 use super::super::System;
 use super::Unpressed;
-use super::hold::{Hold, Stuck};
-use super::linear::LARGEST;
+use super::linear_modes::LARGEST;
+use super::stuck_joint::{Hold, Stuck};
 use nalgebra::{DMatrix, DVector};
 
 /// Fraction of the preload below which a contact force is zero. In directions that nothing

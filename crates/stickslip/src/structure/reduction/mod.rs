@@ -4,49 +4,49 @@
 //! use only a few displacements. These are its *ports*, weighted sums of rows. `M̂ = Tᵀ M T`,
 //! `Ĉ = Tᵀ C T`, `K̂ = Tᵀ K T` preserve symmetry and definiteness for any columns of `T`:
 //!
-//! - Rubin, MacNeal (`free`): free modes, and the static response of the omitted modes at the
+//! - Rubin, MacNeal (`rubin`): free modes, and the static response of the omitted modes at the
 //!   ports.
 //! - Craig-Bampton (`craig_bampton`): modes with fixed ports, and static responses to unit
 //!   displacements of the ports.
 //!
 //! Harmonic balance needs receptances only and can also use modes and a series of residuals
-//! (`series`). Residual vectors of J orders make the first 2 J terms of this series exact in
+//! (`residual_series`). Residual vectors of J orders make the first 2 J terms of this series exact in
 //! any method.
 //!
 //! The other files:
 //!
-//! - `evidence` compares a reduction with the whole structure; `mistuned` does this for a
+//! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does this for a
 //!   ring with different blades.
-//! - `choice`: [`Reduce`] uses as many modes as a given error requires.
-//! - `ring` reduces a sector for all waves of its ring at once.
-//! - `between` builds one basis for two stiffnesses and all between them.
-//! - `nominal` transforms a ring with different blades to its own modes.
+//! - `automatic`: [`Reduce`] uses as many modes as a given error requires.
+//! - `cyclic_basis` reduces a sector for all waves of its ring at once.
+//! - `common_basis` builds one basis for two stiffnesses and all between them.
+//! - `nominal_modes` transforms a ring with different blades to its own modes.
 //!
 //! Damping is a part of the whole structure and is reduced like the other matrices. [`Damping`]
 //! defines a modal damping ratio beyond the retained modes.
 
-mod between;
-mod choice;
+mod automatic;
+mod common_basis;
 mod craig_bampton;
-mod evidence;
-mod free;
-mod mistuned;
-mod nominal;
+mod cyclic_basis;
+mod mistuning_error;
+mod nominal_modes;
+mod receptance_error;
 mod request;
-mod residual;
-mod ring;
-mod series;
+mod residual_flexibility;
+mod residual_series;
+mod rubin;
 
-pub use choice::{Chosen, Reduce};
-pub use evidence::{Deviation, Reference};
-pub use free::Free;
-pub(in crate::structure) use mistuned::Lacking;
-pub(crate) use nominal::RingModes;
-pub(in crate::structure) use nominal::{EXTENTS, Mixed, NominalRing};
+pub use automatic::{Chosen, Reduce};
+pub(crate) use cyclic_basis::ReducedSector;
+pub(in crate::structure) use cyclic_basis::STEPS;
+pub(in crate::structure) use mistuning_error::Lacking;
+pub(crate) use nominal_modes::RingModes;
+pub(in crate::structure) use nominal_modes::{EXTENTS, Mixed, NominalRing};
+pub use receptance_error::{Deviation, Reference};
 pub use request::{Reduction, ReductionKind};
-pub(crate) use ring::ReducedSector;
-pub(in crate::structure) use ring::STEPS;
-pub use series::Series;
+pub use residual_series::Series;
+pub use rubin::Free;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;

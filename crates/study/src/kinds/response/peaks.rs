@@ -2,7 +2,7 @@
 
 use super::super::peak_of::{named_places, worst};
 use crate::work::{Prepared, Work};
-use stickslip::curve::both_ways::stretches;
+use stickslip::curve::bidirectional_sweep::stretches;
 use stickslip::curve::peak::{self, Peak, Point, held};
 use stickslip::method::MethodError;
 use stickslip::model::System;

@@ -1,0 +1,142 @@
+//! The rate view: force and rates of the internal states, as smooth functions of the motion.
+
+use super::derivatives::{FEW, Slopes, WIDTH, seeded};
+use super::relative_motion::{MOST_DIRECTIONS, Relative};
+use std::fmt::Debug;
+use stickslip_numerics::dual::{Dual, Real};
+
+/// A law in rate form, written once for numbers and for dual numbers: `f = h(u, u', z)`,
+/// `z' = g(u, u', z)`. Both functions are continuous. They are smooth except at kinks, such as
+/// `|u'|` at a velocity reversal, where time integration shortens its steps.
+pub trait RateLaw {
+    /// Returns the number of internal states `z`.
+    fn states(&self) -> usize {
+        0
+    }
+    /// Returns the typical magnitude of the internal states, in their own unit. Error estimates
+    /// of the states are relative to it.
+    fn state_scale(&self) -> f64 {
+        1.0
+    }
+    /// Writes into `z` the states at which the law carries a `force` (N) in its directions.
+    /// Returns `false` if the force does not determine the states.
+    fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
+        false
+    }
+    /// Returns the force (N) and writes the rates at one instant. `z` and `rate` have length
+    /// [`RateLaw::states`]; the law defines their units.
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; MOST_DIRECTIONS];
+}
+
+/// The rate view as methods use it; every [`RateLaw`] implements it.
+pub trait Rate: Debug + Send + Sync {
+    /// Returns the number of internal states.
+    fn states(&self) -> usize;
+    /// Returns the typical magnitude of the states, see [`RateLaw::state_scale`].
+    fn state_scale(&self) -> f64;
+    /// Writes the states at which the law carries a force, see [`RateLaw::state_under`].
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool;
+    /// Returns the force (N) and writes the rates at one instant.
+    fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS];
+    /// Evaluates force and rates with exact derivatives, in the first `directions`.
+    fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint);
+}
+
+/// Force and rates of a law at one instant, with derivatives. The arguments are `u` in all
+/// directions, `u'` in all directions, then `z`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RatePoint {
+    /// Force in each direction, N.
+    pub force: [f64; MOST_DIRECTIONS],
+    /// Rates of the internal states.
+    pub rate: Vec<f64>,
+    /// Derivatives: one row per force, then one row per rate; one column per argument.
+    slopes: Slopes,
+}
+
+impl RatePoint {
+    /// Allocates a point for a law with these numbers of directions and internal states.
+    pub fn new(directions: usize, states: usize) -> Self {
+        RatePoint { force: [0.0; MOST_DIRECTIONS], rate: vec![0.0; states], slopes: Slopes::new(directions, states) }
+    }
+
+    /// Returns the derivatives of force `a` with respect to all arguments.
+    pub fn force_slope(&self, a: usize) -> &[f64] {
+        self.slopes.force(a)
+    }
+
+    /// Returns the derivatives of the rate of state `s` with respect to all arguments.
+    pub fn rate_slope(&self, s: usize) -> &[f64] {
+        self.slopes.state(s)
+    }
+
+    /// Returns all derivatives for writing, for a law that computes them without dual numbers.
+    /// One row per force, then one row per rate.
+    pub fn slopes_mut(&mut self) -> &mut [f64] {
+        self.slopes.all_mut()
+    }
+}
+
+impl<L: RateLaw + Debug + Send + Sync> Rate for L {
+    fn states(&self) -> usize {
+        RateLaw::states(self)
+    }
+    fn state_scale(&self) -> f64 {
+        RateLaw::state_scale(self)
+    }
+    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+        RateLaw::state_under(self, force, z)
+    }
+    #[inline]
+    fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS] {
+        self.evaluate(motion, z, rate)
+    }
+    fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint) {
+        match 2 * directions + z.len() {
+            0..=2 => pass::<2, L>(self, directions, motion, z, 0, point),
+            3 => pass::<3, L>(self, directions, motion, z, 0, point),
+            4 => pass::<4, L>(self, directions, motion, z, 0, point),
+            5 | 6 => pass::<6, L>(self, directions, motion, z, 0, point),
+            arguments => {
+                for first in (0..arguments).step_by(WIDTH) {
+                    pass::<WIDTH, L>(self, directions, motion, z, first, point);
+                }
+            }
+        }
+    }
+}
+
+/// Computes the derivatives with respect to `N` arguments, starting at argument `first`.
+#[inline]
+fn pass<const N: usize, L: RateLaw>(
+    law: &L,
+    directions: usize,
+    motion: &Relative<f64>,
+    z: &[f64],
+    first: usize,
+    point: &mut RatePoint,
+) {
+    let seeded = |value: f64, argument: usize| -> Dual<N> { seeded(value, argument, first) };
+    let mut moving = Relative::along(Dual::from(0.0), Dual::from(0.0));
+    for a in 0..directions {
+        moving.displacement[a] = seeded(motion.displacement[a], a);
+        moving.velocity[a] = seeded(motion.velocity[a], directions + a);
+    }
+    let zero = Dual::<N>::from(0.0);
+    let mut few = [zero; 2 * FEW];
+    let mut many = vec![zero; if z.len() > FEW { 2 * z.len() } else { 0 }];
+    let both = if z.len() > FEW { &mut many[..] } else { &mut few[..2 * z.len()] };
+    let (state, rate) = both.split_at_mut(z.len());
+    for (s, (dual, &value)) in state.iter_mut().zip(z).enumerate() {
+        *dual = seeded(value, 2 * directions + s);
+    }
+    let force = law.evaluate(&moving, state, rate);
+    for a in 0..directions {
+        point.force[a] = force[a].re;
+        point.slopes.keep(a, first, &force[a]);
+    }
+    for (s, rate) in rate.iter().enumerate() {
+        point.rate[s] = rate.re;
+        point.slopes.keep(directions + s, first, rate);
+    }
+}

@@ -1,0 +1,44 @@
+//! The linear references of a law: the joint without friction, and the stuck joint.
+
+use super::linear_springs::Springs;
+use crate::law::interface::ideal_elements::STUCK;
+use crate::law::interface::parameter::{LIMIT, STATIC_LIMIT};
+use crate::law::{Law, SharedLaw};
+
+/// Indices into the stiffnesses of [`Law::springs`].
+const FREE: usize = 0;
+const HELD: usize = 1;
+
+impl dyn Law + '_ {
+    /// Returns the law with another slip limit (N), dynamic and static; `None` if it has no slip
+    /// limit.
+    fn limited(&self, limit: f64) -> Option<SharedLaw> {
+        let law = self.with(LIMIT, limit)?;
+        Some(law.with(STATIC_LIMIT, limit).unwrap_or(law))
+    }
+
+    /// Returns the joint as linear springs, if the law defines them. `which` is `FREE` or
+    /// `HELD`.
+    fn as_springs(&self, which: usize) -> Option<SharedLaw> {
+        self.springs().map(|springs| Springs::shared(&springs[which]))
+    }
+
+    /// Returns the linear reference without friction: the slip limit is zero, or the faces stay
+    /// apart. `None` if the law has neither a slip limit nor faces that separate.
+    pub fn free(&self) -> Option<SharedLaw> {
+        match self.closed() {
+            Some(along) => Some(Springs::shared(&vec![0.0; along.len()])),
+            None => self.as_springs(FREE).or_else(|| self.limited(0.0)),
+        }
+    }
+
+    /// Returns the linear reference that is permanently stuck: no force reaches the slip limit,
+    /// and the faces stay closed. `None` if the law has neither a slip limit nor faces that
+    /// separate.
+    pub fn stuck(&self) -> Option<SharedLaw> {
+        match self.closed() {
+            Some(along) => Some(Springs::shared(&along)),
+            None => self.as_springs(HELD).or_else(|| self.limited(STUCK)),
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Linear springs in the directions of a joint, `f = k u`: a contact whose faces stay closed, or
+//! stay apart.
+//!
+//! This law is not in the table. It replaces other laws in the linear references, see
+//! [`crate::law::Law::closed`].
+
+use crate::dimension::Dimension;
+use crate::law::interface::ideal_elements::STUCK;
+use crate::law::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
+use std::sync::Arc;
+use stickslip_numerics::dual::Real;
+
+const fn along(key: &'static str) -> Parameter {
+    Parameter::new(key, Dimension::STIFFNESS, Range::ZeroOrMore, "stiffness along this direction")
+}
+
+static INFO: LawInfo = LawInfo {
+    name: "springs",
+    summary: "linear springs, f = stiffness u along every direction",
+    parameters: &[
+        along("first"),
+        along("second"),
+        along("third"),
+        Parameter::new("directions", Dimension::NONE, Range::Count(3), "number of directions"),
+    ],
+    sample: &[1e4, 1e4, 1e4, 3.0],
+    build: |values| Springs::shared(&values[..(values[3] as usize).clamp(1, MOST_DIRECTIONS)]),
+};
+
+/// Linear springs in one to three directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::law) struct Springs {
+    /// Stiffness, N/m; zero beyond `directions`.
+    stiffness: [f64; MOST_DIRECTIONS],
+    directions: usize,
+}
+
+impl Springs {
+    /// Returns a shared law with these stiffnesses, N/m, one per direction.
+    pub fn shared(along: &[f64]) -> SharedLaw {
+        let stiffness = std::array::from_fn(|a| along.get(a).copied().unwrap_or(0.0));
+        Arc::new(Springs { stiffness, directions: along.len() })
+    }
+}
+
+impl Law for Springs {
+    fn info(&self) -> &'static LawInfo {
+        &INFO
+    }
+    fn values(&self) -> Vec<f64> {
+        self.stiffness.iter().copied().chain([self.directions as f64]).collect()
+    }
+    fn is_odd(&self) -> bool {
+        true
+    }
+    fn directions(&self) -> usize {
+        self.directions
+    }
+    fn scale(&self) -> f64 {
+        if self.stiffness.iter().all(|k| *k == 0.0) { 0.0 } else { f64::INFINITY }
+    }
+    /// In one direction, exact methods take the spring as a slider that never slips, or as
+    /// nothing.
+    fn pieces(&self) -> Option<Vec<Piece>> {
+        match (self.directions, self.stiffness[0]) {
+            (1, 0.0) => Some(Vec::new()),
+            (1, stiffness) => Some(vec![Piece::slider(Some(stiffness), STUCK)]),
+            _ => None,
+        }
+    }
+    fn rate(&self) -> Option<&dyn Rate> {
+        Some(self)
+    }
+    fn is_incrementally_passive(&self) -> bool {
+        true // springs store the energy that they receive
+    }
+}
+
+impl RateLaw for Springs {
+    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; MOST_DIRECTIONS] {
+        std::array::from_fn(|a| motion.displacement[a] * self.stiffness[a])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{FrictionContact, Gap};
+
+    #[test]
+    fn faces_that_stay_together_are_their_springs() {
+        let contact = FrictionContact { tangential: 3.0, normal: 5.0, friction: 0.1, preload: 1.0, tangents: 1 };
+        let law: &dyn Law = &contact;
+        let (stuck, free) = (law.stuck().unwrap(), law.free().unwrap());
+        let at = Relative { displacement: [2.0, -1.0, 0.0], velocity: [1.0; 3] };
+        let force = |law: &SharedLaw| law.rate().unwrap().value(&at, &[], &mut []);
+        // The stuck reference also carries tension.
+        assert_eq!((force(&stuck), force(&free)), ([6.0, -5.0, 0.0], [0.0; 3]));
+        assert!(free.is_free() && !stuck.is_free() && stuck.directions() == 2);
+        assert!(stuck.check().is_ok() && *(INFO.build)(&stuck.values()) == *stuck);
+        let gap: &dyn Law = &Gap { gap: 1e-3, stiffness: 7.0 };
+        assert_eq!((gap.stuck().unwrap().values()[0], gap.free().unwrap().is_free()), (7.0, true));
+        assert!(gap.free().unwrap().sliders().is_some_and(|sliders| sliders.is_empty()));
+    }
+}
