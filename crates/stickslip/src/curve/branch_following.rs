@@ -40,19 +40,19 @@ pub fn is_followed(system: &System) -> bool {
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = advised(method, system)?;
     Ok(if is_followed(system) {
-        Box::new(Onward { solver, last: None, told: None, end: None, spent: false })
+        Box::new(BranchFollower { solver, last: None, told: None, end: None, spent: false })
     } else {
         solver
     })
 }
 
-struct Onward<'a> {
+struct BranchFollower<'a> {
     solver: Box<dyn Solver + Send + 'a>,
-    last: Option<Last>,
+    last: Option<BranchPoint>,
     /// The orbit that [`Solver::begin_at`] announced.
-    told: Option<Last>,
+    told: Option<BranchPoint>,
     /// The end of a branch at which smaller steps failed.
-    end: Option<End>,
+    end: Option<BranchEnd>,
     /// True after the steps in an interval exceeded the work limit. No interval is repeated
     /// after that.
     spent: bool,
@@ -60,14 +60,14 @@ struct Onward<'a> {
 
 /// The end of a branch: the last orbit on it, and a nearby frequency (rad/s) at which the branch
 /// has no orbit.
-struct End {
-    last: Last,
+struct BranchEnd {
+    last: BranchPoint,
     beyond: f64,
 }
 
-impl End {
+impl BranchEnd {
     /// Tells whether the interval from an orbit to a frequency contains this end.
-    fn lies_between(&self, from: &Last, omega: f64) -> bool {
+    fn lies_between(&self, from: &BranchPoint, omega: f64) -> bool {
         let ahead = (self.beyond - self.last.omega).signum();
         (self.beyond - from.omega) * ahead > 0.0 && (omega - self.beyond) * ahead >= 0.0 && from.is_near(&self.last)
     }
@@ -75,33 +75,33 @@ impl End {
 
 /// The last orbit of a curve.
 #[derive(Clone)]
-struct Last {
+struct BranchPoint {
     omega: f64,
     start: Vec<f64>,
     /// Amplitude (m) and first harmonic of every place.
     places: Vec<(f64, Complex64)>,
 }
 
-impl Last {
+impl BranchPoint {
     fn new(orbit: &Orbit) -> Self {
         let places = orbit.places.iter().map(|place| (place.amplitude(), place.first_harmonic)).collect();
-        Last { omega: orbit.omega, start: orbit.start.clone(), places }
+        BranchPoint { omega: orbit.omega, start: orbit.start.clone(), places }
     }
 
     /// Tells whether an orbit can be the next one of the branch.
     fn leads_to(&self, orbit: &Orbit) -> bool {
-        self.is_near(&Last::new(orbit))
+        self.is_near(&BranchPoint::new(orbit))
     }
 
     /// Tells whether amplitudes and phases differ little.
-    fn is_near(&self, other: &Last) -> bool {
+    fn is_near(&self, other: &BranchPoint) -> bool {
         let pairs = || self.places.iter().zip(&other.places);
         let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
         pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= STRIDE * largest)
     }
 }
 
-impl Onward<'_> {
+impl BranchFollower<'_> {
     fn solve(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
         if between { self.solver.between(omega, start) } else { self.solver.orbit(omega, start) }
     }
@@ -117,12 +117,12 @@ impl Onward<'_> {
         {
             found = Ok(orbit);
         }
-        self.last = found.as_ref().ok().map(Last::new);
+        self.last = found.as_ref().ok().map(BranchPoint::new);
         found
     }
 
     /// Returns the orbit at `omega` if smaller steps reach it.
-    fn followed(&mut self, mut last: Last, omega: f64, between: bool) -> Option<Orbit> {
+    fn followed(&mut self, mut last: BranchPoint, omega: f64, between: bool) -> Option<Orbit> {
         let from = last.omega;
         let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
         let mut beyond;
@@ -136,12 +136,12 @@ impl Onward<'_> {
             match found.ok().filter(|orbit| last.leads_to(orbit)) {
                 Some(orbit) if arrives => return Some(orbit),
                 _ if self.spent => return None,
-                Some(orbit) => (last, at, step, beyond) = (Last::new(&orbit), share, 2.0 * step, omega),
+                Some(orbit) => (last, at, step, beyond) = (BranchPoint::new(&orbit), share, 2.0 * step, omega),
                 None => (step, beyond) = (0.5 * step, target),
             }
             step = step.min(1.0 - at);
             if step < FINEST {
-                self.end = Some(End { last, beyond });
+                self.end = Some(BranchEnd { last, beyond });
                 return None;
             }
         }
@@ -149,7 +149,7 @@ impl Onward<'_> {
     }
 }
 
-impl Solver for Onward<'_> {
+impl Solver for BranchFollower<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.next(omega, start, false)
     }
@@ -165,7 +165,7 @@ impl Solver for Onward<'_> {
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
         if [&self.last, &self.told].into_iter().flatten().all(|last| last.start != start) {
             let orbit = self.solver.between(omega, Some(start));
-            self.told = orbit.ok().map(|orbit| Last { start: start.to_vec(), ..Last::new(&orbit) });
+            self.told = orbit.ok().map(|orbit| BranchPoint { start: start.to_vec(), ..BranchPoint::new(&orbit) });
         }
         self.solver.begin_at(omega, start);
     }

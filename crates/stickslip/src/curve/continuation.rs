@@ -92,17 +92,17 @@ const LOCATED: f64 = 1e-9;
 const SAME: f64 = 1e-6;
 
 /// A point, with its unknowns and its parameter.
-type Passed = (TracePoint, (Vec<f64>, f64));
+type PathPoint = (TracePoint, (Vec<f64>, f64));
 
 /// The computed part of a curve, in order of arc length.
 #[derive(Default)]
-struct Way {
-    points: Vec<Passed>,
+struct CurvePart {
+    points: Vec<PathPoint>,
     /// True if there is one orbit at every value, so that the curve does not return.
     single: bool,
 }
 
-impl Way {
+impl CurvePart {
     /// Follows the curve from a point, also outside of the range if it returns from there.
     fn follow(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) -> End {
         let mut from = (from, steps);
@@ -116,7 +116,7 @@ impl Way {
             });
             let leaves = end == End::Border && !self.single;
             let Some((_, last)) = self.points.last().filter(|_| leaves) else { return end };
-            match Way::excursion(equations, last.clone(), steps) {
+            match CurvePart::excursion(equations, last.clone(), steps) {
                 Some(back) if !self.has(&back.0) => from = back,
                 _ => return end,
             }
@@ -125,7 +125,7 @@ impl Way {
 
     /// Leaves the range from a point at its border, and follows the curve if it returns.
     fn outside(&mut self, equations: &mut BranchEquations<'_>, from: (Vec<f64>, f64), steps: Steps) {
-        if let Some((back, steps)) = Way::excursion(equations, from, steps) {
+        if let Some((back, steps)) = CurvePart::excursion(equations, from, steps) {
             self.follow(equations, back, steps);
         }
     }
@@ -187,11 +187,11 @@ impl Trace<'_> {
         let start = equations.start(self.range.0)?;
         let steps = Steps::between(self.range.0, self.range.1, self.step);
         let single = (self.at)(self.range.0).0.contracts();
-        let mut way = Way { single, ..Way::default() };
+        let mut way = CurvePart { single, ..CurvePart::default() };
         let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
         if !single && end == End::Border {
             // In the opposite direction, the same curve may return into the range.
-            let mut before = Way::default();
+            let mut before = CurvePart::default();
             let out = Steps { direction: -steps.direction, ..steps };
             before.outside(&mut equations, (start, self.range.0), out);
             before.points.reverse();
@@ -199,7 +199,7 @@ impl Trace<'_> {
         }
         let mut branch = self.told(&mut equations, way, end);
         if end == End::Border && !branch.reaches(self.range.1) {
-            let mut way = Way { single, ..Way::default() };
+            let mut way = CurvePart { single, ..CurvePart::default() };
             if let Ok(start) = equations.start(self.range.1) {
                 way.follow(&mut equations, (start, self.range.1), Steps { direction: -steps.direction, ..steps });
             }
@@ -210,7 +210,7 @@ impl Trace<'_> {
     }
 
     /// Computes peaks and turning points of the curve.
-    fn told(&self, equations: &mut BranchEquations<'_>, way: Way, end: End) -> Branch {
+    fn told(&self, equations: &mut BranchEquations<'_>, way: CurvePart, end: End) -> Branch {
         let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = way.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
         let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));

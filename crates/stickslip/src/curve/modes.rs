@@ -141,7 +141,7 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
     let last = request.points.max(2) - 1;
-    let followed = Followed::new(&mut equations, request);
+    let followed = ModeBranches::new(&mut equations, request);
     let larger = |a: &(f64, ModeState), b: &(f64, ModeState)| a.1.damping.total_cmp(&b.1.damping);
     let largest = followed.curves().filter_map(|curve| curve.largest(&mut equations, (low, high))).max_by(larger);
     let merges = followed.curves().flat_map(|curve| curve.merges(&equations)).filter(|a| (low..high).contains(a));
@@ -168,12 +168,12 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
 
 /// The curve of a mode: a branch from large amplitudes downwards. A branch from small amplitudes
 /// upwards is added if the first one does not reach them.
-struct Followed {
+struct ModeBranches {
     falling: Option<ModeCurve>,
     rising: Option<ModeCurve>,
 }
 
-impl Followed {
+impl ModeBranches {
     fn new(equations: &mut ModeEquations<'_>, request: ModeRequest) -> Self {
         let (low, high) = request.range;
         // A single mode has the same number at both ends. For a law with memory, large motions
@@ -183,13 +183,13 @@ impl Followed {
             false => None,
         };
         if rising.as_ref().is_some_and(|rising| rising.top() >= high) {
-            return Followed { falling: None, rising };
+            return ModeBranches { falling: None, rising };
         }
         let falling = ModeCurve::follow(equations, request.mode, request.range);
         let end = falling.end().min(high);
         let is_sought = rising.is_none() && falling.lost.is_some() && end > low;
         let below = if is_sought { ModeCurve::from_rest(equations, request.mode, (low, end)) } else { None };
-        Followed { falling: Some(falling), rising: rising.or(below) }
+        ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
 
     fn curves(&self) -> impl Iterator<Item = &ModeCurve> {

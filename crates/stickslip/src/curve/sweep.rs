@@ -90,7 +90,7 @@ pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Sol
 pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, watch: Watch<'_>, see: &mut See<'_>) {
     let mut start: Option<Vec<f64>> = None;
     // points without an orbit, until the next orbit is found
-    let mut missing: Vec<Missing> = Vec::new();
+    let mut missing: Vec<PendingPoint> = Vec::new();
     let mut omegas = omegas.peekable();
     while let Some(omega) = omegas.next() {
         if watch.stop.load(Ordering::Relaxed) {
@@ -104,7 +104,7 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
         // far away.
         start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
         let found = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
-        missing.push(Missing { omega, outcome, led });
+        missing.push(PendingPoint { omega, outcome, led });
         if found.is_none() && omegas.peek().is_some() {
             continue;
         }
@@ -150,14 +150,14 @@ pub fn back(
 }
 
 /// A point whose outcome is not yet reported.
-struct Missing {
+struct PendingPoint {
     omega: f64,
     outcome: Result<Orbit, OrbitError>,
     /// True if the search began from the previous orbit.
     led: bool,
 }
 
-impl Missing {
+impl PendingPoint {
     /// Tells whether another initial guess may help. It does not for a series that is too short.
     fn is_sought_again(&self) -> bool {
         self.outcome.as_ref().is_err_and(|error| !matches!(error, OrbitError::Truncation { .. }))
@@ -172,9 +172,9 @@ impl Missing {
 }
 
 /// Solves the missing points in reverse from the next orbit, until one of them fails.
-fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing], watch: Watch<'_>) {
+fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [PendingPoint], watch: Watch<'_>) {
     let mut start = behind.to_vec();
-    for Missing { omega, outcome, led } in missing.iter_mut().rev().take_while(|point| point.is_sought_again()) {
+    for PendingPoint { omega, outcome, led } in missing.iter_mut().rev().take_while(|point| point.is_sought_again()) {
         if watch.stop.load(Ordering::Relaxed) {
             return;
         }

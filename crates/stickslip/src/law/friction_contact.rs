@@ -251,9 +251,9 @@ impl StepLaw for FrictionContact {
 
 /// Computes [`planar_slip::step_with_slopes`] for a single direction, where the limit at the end of
 /// the step decides.
-fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, planar_slip::Slopes) {
+fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, planar_slip::PlanarDerivatives) {
     let trial = force + way * stiffness;
-    let mut slopes = planar_slip::Slopes::NONE;
+    let mut slopes = planar_slip::PlanarDerivatives::NONE;
     if trial.abs() > limit {
         slopes.by_limits[0][1] = trial.signum();
         return (limit.copysign(trial), slopes);

@@ -5,7 +5,7 @@ use super::drive::Drive;
 use super::steps::{Instant, Steps};
 use crate::law::{Contact, MOST_DIRECTIONS, Relative};
 use crate::model::{Axis, System};
-use crate::orbit::postprocess::{Faces, Shares, Signals, extremes, sticks};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -252,7 +252,7 @@ fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64];
 }
 
 /// A signal is the list of its values at the nodes.
-impl Signals for SteppedPath {
+impl PathSignals for SteppedPath {
     type Signal = Vec<f64>;
     type Error = Infallible;
 
@@ -291,12 +291,12 @@ impl Signals for SteppedPath {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let shares = if self.steps.nodes.len() > 1 {
-            Shares::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
+            ContactFractions::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
         } else {
             let nodes = self.steps.each().enumerate();
-            Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.time(i).1)))
+            ContactFractions::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.time(i).1)))
         };
         let at_end = |step: usize| self.steps.contact_at_end(step)[joint];
         let steps = self.steps.spans.len();
@@ -306,6 +306,6 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        Faces { shares, switches, rests: sticks(self.steps.each().map(|node| node.contact[joint])) }
+        ContactSummary { shares, switches, rests: sticks(self.steps.each().map(|node| node.contact[joint])) }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::coordinates::{Coordinates, combined};
 use super::error::{Element, ModelError};
-use super::name_resolution::{End, Of, Places};
+use super::name_resolution::{PlaceSource, PlaceTarget, Places};
 use super::place::places_of;
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
@@ -109,7 +109,7 @@ struct Assembler<'a> {
 }
 
 /// Matrices over the free coordinates, followed by the moved coordinates.
-struct Matrices {
+struct AssembledMatrices {
     mass: Matrix,
     damping: Matrix,
     /// Damped modes, in addition to `damping`.
@@ -117,7 +117,7 @@ struct Matrices {
     stiffness: Matrix,
 }
 
-impl Matrices {
+impl AssembledMatrices {
     /// Returns an entry of the total damping.
     fn damping(&self, row: usize, column: usize) -> f64 {
         self.damping.get(row, column) + self.modes.as_ref().map_or(0.0, |modes| modes.get(row, column))
@@ -130,11 +130,11 @@ type Harmonics = BTreeMap<u32, Complex64>;
 impl Assembler<'_> {
     /// Returns the sum of places with the given signs, as weights of the free and then the
     /// moved coordinates.
-    fn along(&self, ends: &[(End, f64)]) -> Row {
+    fn along(&self, ends: &[(PlaceTarget, f64)]) -> Row {
         let parts = ends.iter().flat_map(|(end, sign)| {
             let row: &[(usize, f64)] = match end {
-                End::Ground => &[],
-                End::At(place) => &self.coordinates.places[*place],
+                PlaceTarget::Ground => &[],
+                PlaceTarget::At(place) => &self.coordinates.places[*place],
             };
             row.iter().map(move |(at, weight)| (*at, weight * sign))
         });
@@ -142,9 +142,9 @@ impl Assembler<'_> {
     }
 
     /// Checks that a spring connects two rotations or two displacements.
-    fn alike(&self, between: &[String; 2], ends: [End; 2], element: Element) -> Result<(), ModelError> {
+    fn alike(&self, between: &[String; 2], ends: [PlaceTarget; 2], element: Element) -> Result<(), ModelError> {
         let turns = ends.map(|end| self.places.is_rotation(end));
-        if turns[0] == turns[1] || ends.contains(&End::Ground) {
+        if turns[0] == turns[1] || ends.contains(&PlaceTarget::Ground) {
             return Ok(());
         }
         let (angle, other) = if turns[0] { (&between[0], &between[1]) } else { (&between[1], &between[0]) };
@@ -155,14 +155,14 @@ impl Assembler<'_> {
         Err(ModelError::new(element, "between", message))
     }
 
-    fn matrices(&self) -> Result<Matrices, ModelError> {
+    fn matrices(&self) -> Result<AssembledMatrices, ModelError> {
         let total = self.coordinates.free + self.coordinates.moved;
         for (i, mass) in self.model.masses.iter().enumerate() {
             finite_at_least_zero(mass.mass, Element::Mass(i), "mass", "kg")?;
         }
         let [mut mass, mut damping, mut stiffness] = self.coordinates.entries.clone();
         for (place, row) in self.places.stated.iter().zip(&self.coordinates.places) {
-            if let Of::Own(own) = place.of {
+            if let PlaceSource::Own(own) = place.of {
                 add_along(&mut mass, row, own);
             }
         }
@@ -183,11 +183,11 @@ impl Assembler<'_> {
         }
         let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| whole(&error));
         let modes = self.coordinates.modes.clone();
-        Ok(Matrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
+        Ok(AssembledMatrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
     }
 
     /// Returns the structure of the free coordinates.
-    fn structure(&self, matrices: &Matrices) -> Result<Structure, ModelError> {
+    fn structure(&self, matrices: &AssembledMatrices) -> Result<Structure, ModelError> {
         let Coordinates { free: n, moved, names, .. } = &self.coordinates;
         let block = |matrix: &Matrix| {
             if *moved == 0 {
@@ -239,7 +239,7 @@ impl Assembler<'_> {
         for (i, motion) in self.model.motions.iter().enumerate() {
             let element = Element::Motion(i);
             let value = harmonic_amplitude(motion.amplitude, motion.phase, element)?;
-            if let End::At(place) = self.places.find(&motion.on, element, "on")?
+            if let PlaceTarget::At(place) = self.places.find(&motion.on, element, "on")?
                 && let Some(k) = self.coordinates.moved_number(&self.places, place)
             {
                 *motions[k].entry(motion.harmonic).or_default() += value;
@@ -254,7 +254,7 @@ impl Assembler<'_> {
         for (i, force) in self.model.forces.iter().enumerate() {
             let element = Element::Force(i);
             let value = harmonic_amplitude(force.amplitude, force.phase, element)?;
-            let End::At(place) = self.places.find(&force.on, element, "on")? else {
+            let PlaceTarget::At(place) = self.places.find(&force.on, element, "on")? else {
                 return Err(ModelError::new(
                     element,
                     "on",
@@ -284,7 +284,7 @@ impl Assembler<'_> {
     fn loads_of_motions(
         &self,
         mut builder: SystemBuilder,
-        matrices: &Matrices,
+        matrices: &AssembledMatrices,
         motions: &[Harmonics],
     ) -> SystemBuilder {
         let (n, zero) = (self.coordinates.free, Complex64::new(0.0, 0.0));
@@ -340,7 +340,7 @@ impl Assembler<'_> {
     fn moved(
         &self,
         mut builder: SystemBuilder,
-        matrices: &Matrices,
+        matrices: &AssembledMatrices,
         (motions, forces): (&[Harmonics], &[Harmonics]),
         signs: &[Vec<f64>],
     ) -> SystemBuilder {

@@ -54,7 +54,7 @@ pub struct Body {
 }
 
 /// A fault of a body: the key and the message.
-type Wrong = (&'static str, String);
+type BodyFault = (&'static str, String);
 
 impl Body {
     /// Creates a body that moves along two of x, y, z and rotates about the third axis.
@@ -128,7 +128,7 @@ impl Body {
 
     /// Checks directions, mass and inertia. Duplicate directions are detected together with
     /// those of all nodes.
-    pub(super) fn check(&self) -> Result<(), Wrong> {
+    pub(super) fn check(&self) -> Result<(), BodyFault> {
         let known = |name: &String| TRANSLATIONS.iter().chain(&ROTATIONS).any(|known| known == name);
         if let Some(other) = self.directions.iter().find(|name| !known(name)) {
             let message = format!(
@@ -187,18 +187,20 @@ impl Body {
     }
 
     /// Returns the principal axes of its inertia, within the axes of its rotations.
-    pub(super) fn principal(&self) -> Vec<Principal> {
+    pub(super) fn principal(&self) -> Vec<PrincipalAxis> {
         let about = self.rotations();
         let matrix = DMatrix::from_fn(about.len(), about.len(), |i, k| self.inertia[about[i]][about[k]]);
         let diagonal = (0..about.len()).all(|i| (0..i).all(|k| matrix[(i, k)] == 0.0));
         let mut found = Vec::with_capacity(about.len());
         if diagonal {
-            found.extend(about.iter().map(|axis| Principal { moment: self.inertia[*axis][*axis], axis: unit(*axis) }));
+            found.extend(
+                about.iter().map(|axis| PrincipalAxis { moment: self.inertia[*axis][*axis], axis: unit(*axis) }),
+            );
         } else if let Some(eigen) = eigen::symmetric(matrix) {
             for (moment, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
                 let mut axis = [0.0; 3];
                 about.iter().zip(vector.iter()).for_each(|(at, share)| axis[*at] = *share);
-                found.push(Principal { moment: *moment, axis });
+                found.push(PrincipalAxis { moment: *moment, axis });
             }
         }
         found
@@ -213,14 +215,14 @@ impl Body {
         }
         let Some(axis) = ROTATIONS.iter().position(|name| *name == direction) else { return Row::new() };
         let first = first + displacements().count();
-        let weight = |principal: Principal| principal.axis[axis] / (principal.moment / self.mass).sqrt();
+        let weight = |principal: PrincipalAxis| principal.axis[axis] / (principal.moment / self.mass).sqrt();
         let weights = self.principal().into_iter().map(weight).enumerate();
         weights.filter(|(_, weight)| *weight != 0.0).map(|(at, weight)| (first + at, weight)).collect()
     }
 }
 
 /// A principal axis of the inertia, of unit length, and its moment, kg m².
-pub(super) struct Principal {
+pub(super) struct PrincipalAxis {
     pub moment: f64,
     pub axis: [f64; 3],
 }

@@ -16,7 +16,7 @@ pub(crate) const PARALLEL: f64 = 64.0 * f64::EPSILON;
 
 /// An axis in a form that can be compared with other axes.
 #[derive(Debug, Clone)]
-pub(crate) struct Line {
+pub(crate) struct CollinearAxis {
     /// Degrees of freedom with their weights, sorted; each degree of freedom occurs once.
     rows: Vec<(usize, f64)>,
     /// The entry with the largest absolute weight.
@@ -26,18 +26,18 @@ pub(crate) struct Line {
     imposed: Vec<(u32, Complex64)>,
 }
 
-impl Line {
+impl CollinearAxis {
     pub fn of(axis: &Axis) -> Self {
         let mut rows = BTreeMap::new();
         axis.rows().iter().for_each(|&(row, weight)| *rows.entry(row).or_insert(0.0) += weight);
         let rows: Vec<(usize, f64)> = rows.into_iter().collect();
         let lead = rows.iter().copied().max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
-        Line { rows, lead, imposed: axis.imposed().iter().copied().filter(|(h, _)| *h > 0).collect() }
+        CollinearAxis { rows, lead, imposed: axis.imposed().iter().copied().filter(|(h, _)| *h > 0).collect() }
     }
 
     /// Returns the factor `velocity along self = factor · velocity along other`, if one factor
     /// holds at all times.
-    pub fn along(&self, other: &Line) -> Option<f64> {
+    pub fn along(&self, other: &CollinearAxis) -> Option<f64> {
         let (lead, weight) = other.lead?;
         let factor = self.weight(lead) / weight;
         if !factor.is_finite() || factor == 0.0 {

@@ -11,9 +11,9 @@
 use super::Model;
 use super::body::Body;
 use super::error::{Element, ModelError};
-use super::name_resolution::{Of, Places};
+use super::name_resolution::{PlaceSource, Places};
 use super::place::Place;
-use super::substructure::{Entries, Part};
+use super::substructure::{Entries, SubstructureParts};
 use crate::structure::reduction::Row;
 use crate::structure::{DampedModes, ReducedComponent};
 use nalgebra::DMatrix;
@@ -42,7 +42,7 @@ pub(super) struct Coordinates {
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
-/// Largest number of places for which [`Turned::unseen`] decouples the moved displacements. The
+/// Largest number of places for which [`MotionElimination::unseen`] decouples the moved displacements. The
 /// Gram matrix of more places would be large.
 const MOST_UNSEEN: usize = 2000;
 /// Relative tolerance: a moved place whose free part is smaller depends on other places and is
@@ -51,7 +51,10 @@ const DEPENDENT: f64 = 1e-10;
 
 impl Coordinates {
     pub fn new(model: &Model, places: &Places) -> Result<Self, ModelError> {
-        let part = model.substructure.as_ref().map_or_else(|| Ok(Part::default()), |own| Part::new(own, model))?;
+        let part = model
+            .substructure
+            .as_ref()
+            .map_or_else(|| Ok(SubstructureParts::default()), |own| SubstructureParts::new(own, model))?;
         let of_disk = model.substructure.as_ref().is_some_and(|own| own.disk.is_some());
         let masses: usize = model.masses.iter().map(|mass| mass.directions.len().max(1)).sum();
         let bodies: usize = model.bodies.iter().map(|body| body.directions.len()).sum();
@@ -59,15 +62,15 @@ impl Coordinates {
         let ring = model.ring.filter(|ring| of_disk || whole_sectors(ring.sectors, [part.names.len(), masses, bodies]));
         let sectors = ring.map_or(1, |ring| ring.sectors);
         let [part_each, masses_each, bodies_each] = [part.names.len(), masses, bodies].map(|count| count / sectors);
-        let order = Order { sectors, part: part_each, masses: masses_each, bodies: bodies_each };
+        let order = SectorOrder { sectors, part: part_each, masses: masses_each, bodies: bodies_each };
         let mut names = vec![String::new(); part.names.len() + masses + bodies];
-        let of_bodies = Bodies::new(model, &order);
+        let of_bodies = BodyCoordinates::new(model, &order);
         part.names.into_iter().enumerate().for_each(|(at, name)| names[order.of_part(at)] = name);
         let mut own = 0;
         let mut rows: Vec<Row> = Vec::with_capacity(places.stated.len());
         for place in &places.stated {
             rows.push(match place.of {
-                Of::Component(index, along) => match part.places.get(index) {
+                PlaceSource::Component(index, along) => match part.places.get(index) {
                     Some(rows) => rows[along].iter().map(|(at, weight)| (order.of_part(*at), *weight)).collect(),
                     None => {
                         let message = "the model has no structure for this place; add [structure]";
@@ -75,8 +78,8 @@ impl Coordinates {
                     }
                 },
                 // filled in below, after the rows of the nodes
-                Of::View(..) => Row::new(),
-                Of::Own(_) => {
+                PlaceSource::View(..) => Row::new(),
+                PlaceSource::Own(_) => {
                     let at = if own < masses { order.of_mass(own) } else { names.len() };
                     match names.get_mut(at) {
                         Some(name) => name.clone_from(&place.name),
@@ -85,7 +88,7 @@ impl Coordinates {
                     own += 1;
                     vec![(at, 1.0)]
                 }
-                Of::Body(index, along) => {
+                PlaceSource::Body(index, along) => {
                     let at = of_bodies.first[index];
                     names[at + along].clone_from(&place.name);
                     model.bodies[index].coordinates(&model.bodies[index].directions[along], at)
@@ -93,7 +96,7 @@ impl Coordinates {
             });
         }
         for (place, stated) in places.stated.iter().enumerate() {
-            if let Of::View(index, along) = stated.of {
+            if let PlaceSource::View(index, along) = stated.of {
                 rows[place] = view(&model.places[index], along, places, &rows);
             }
         }
@@ -116,7 +119,7 @@ impl Coordinates {
             .filter(|(place, _)| place.moved)
             .map(|(place, row)| (place.name.as_str(), row))
             .collect();
-        let mut turned = Turned::new(names.len(), &moved)?;
+        let mut turned = MotionElimination::new(names.len(), &moved)?;
         // a body has more points than coordinates, so that a moved point moves other points
         let of_body: Vec<bool> = match model.bodies.is_empty() {
             true => vec![false; rows.len()],
@@ -160,7 +163,7 @@ fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
 }
 
 /// The order of the coordinates of a substructure, of masses and of bodies: sector by sector.
-struct Order {
+struct SectorOrder {
     sectors: usize,
     /// Number of coordinates of the substructure in a sector.
     part: usize,
@@ -168,7 +171,7 @@ struct Order {
     bodies: usize,
 }
 
-impl Order {
+impl SectorOrder {
     fn of_part(&self, at: usize) -> usize {
         at + at / self.part * (self.masses + self.bodies)
     }
@@ -190,19 +193,19 @@ fn whole_sectors(sectors: usize, counts: [usize; 3]) -> bool {
 }
 
 /// Index of the first coordinate of every body.
-struct Bodies {
+struct BodyCoordinates {
     first: Vec<usize>,
 }
 
-impl Bodies {
-    fn new(model: &Model, order: &Order) -> Self {
+impl BodyCoordinates {
+    fn new(model: &Model, order: &SectorOrder) -> Self {
         let mut next = 0;
         let first = |body: &Body| {
             let at = order.of_body(next);
             next += body.directions.len();
             at
         };
-        Bodies { first: model.bodies.iter().map(first).collect() }
+        BodyCoordinates { first: model.bodies.iter().map(first).collect() }
     }
 
     /// Returns their mass entries. Every coordinate of a body has the mass of the body, because
@@ -247,14 +250,14 @@ fn follows(
 }
 
 /// The transformation `x = T (q, u)`, in which moved displacements replace some coordinates.
-struct Turned {
+struct MotionElimination {
     free: usize,
     /// Marks the replaced coordinates.
     pivot: Vec<bool>,
     rows: Vec<Row>,
 }
 
-impl Turned {
+impl MotionElimination {
     fn new(count: usize, moved: &[(&str, &Row)]) -> Result<Self, ModelError> {
         // x_p = Σ a x + Σ b u for every replaced coordinate; the indices of u begin at `count`
         let mut given: BTreeMap<usize, Row> = BTreeMap::new();
@@ -287,7 +290,7 @@ impl Turned {
             Some(row) => row.iter().map(|(at, weight)| (renumber(*at), *weight)).collect(),
             None => vec![(renumber(at), 1.0)],
         };
-        Ok(Turned { free, rows: (0..count).map(row).collect(), pivot })
+        Ok(MotionElimination { free, rows: (0..count).map(row).collect(), pivot })
     }
 
     /// Changes the transformation so that none of the places `others` depends directly on a

@@ -19,7 +19,7 @@ mod survey;
 mod system;
 
 pub use body::{Body, ROTATIONS, TRANSLATIONS, with_rotations};
-pub(crate) use collinear::{Line, PARALLEL};
+pub(crate) use collinear::{CollinearAxis, PARALLEL};
 pub use disk::{Around, Disk, LEAST_SECTORS, Mistuned, NEXT, Ring, normal_pattern, too_far};
 pub use error::{Element, ModelError};
 pub use name_resolution::{is_identifier, is_place};

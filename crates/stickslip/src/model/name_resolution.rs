@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The target of a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum End {
+pub(super) enum PlaceTarget {
     Ground,
     /// A place, by its index in [`Places::stated`].
     At(usize),
@@ -19,7 +19,7 @@ pub(super) enum End {
 
 /// The source of a place's displacement.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Of {
+pub(super) enum PlaceSource {
     /// Rows of the component: index of the place, and index of its direction.
     Component(usize, usize),
     /// Another view of a node of masses: index of the place, and index of its direction.
@@ -32,23 +32,23 @@ pub(super) enum Of {
 
 /// A declared place.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stated {
+pub(super) struct DeclaredPlace {
     pub name: String,
-    pub of: Of,
+    pub of: PlaceSource,
     pub moved: bool,
     /// Radius of gyration for an angle, m.
     pub radius: Option<f64>,
 }
 
 /// A direction of a joint: its name, if there are several directions, and both ends.
-pub(super) type Along<'a> = (Option<&'a str>, [End; 2]);
+pub(super) type JointDirection<'a> = (Option<&'a str>, [PlaceTarget; 2]);
 
 /// All places of a model, and the directions of all nodes.
 pub(super) struct Places {
     /// In this order: places of the component, masses, bodies, other views of these, places
     /// that exist only by their imposed motion.
-    pub stated: Vec<Stated>,
-    ends: BTreeMap<String, End>,
+    pub stated: Vec<DeclaredPlace>,
+    ends: BTreeMap<String, PlaceTarget>,
     /// Directions of each node, in their order.
     directions: BTreeMap<String, Vec<String>>,
 }
@@ -114,8 +114,8 @@ impl Places {
             };
             return Err(ModelError::new(Element::Whole, "mass", message));
         }
-        let ends = BTreeMap::from([(GROUND.to_owned(), End::Ground)]);
-        let mut collected = Collected {
+        let ends = BTreeMap::from([(GROUND.to_owned(), PlaceTarget::Ground)]);
+        let mut collected = PlaceCollector {
             places: Places { stated: Vec::new(), ends, directions: BTreeMap::new() },
             columns: BTreeSet::new(),
             motions: model.motions.iter().map(|motion| motion.on.as_str()).collect(),
@@ -132,21 +132,21 @@ impl Places {
                 return Err(ModelError::new(element, "normal", message));
             }
             if place.of.is_none() {
-                collected.node(element, (&place.name, &place.directions), |along| Of::Component(i, along))?;
+                collected.node(element, (&place.name, &place.directions), |along| PlaceSource::Component(i, along))?;
             }
         }
         for (i, mass) in model.masses.iter().enumerate() {
-            collected.node(Element::Mass(i), (&mass.name, &mass.directions), |_| Of::Own(mass.mass))?;
+            collected.node(Element::Mass(i), (&mass.name, &mass.directions), |_| PlaceSource::Own(mass.mass))?;
         }
         for (i, body) in model.bodies.iter().enumerate() {
             collected.body(i, body)?;
         }
         for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_some()) {
             viewed(model, place, Element::Place(i))?;
-            collected.node(Element::Place(i), (&place.name, &place.directions), |along| Of::View(i, along))?;
+            collected.node(Element::Place(i), (&place.name, &place.directions), |along| PlaceSource::View(i, along))?;
         }
         collected.moved(model)?;
-        let Collected { places, columns, .. } = collected;
+        let PlaceCollector { places, columns, .. } = collected;
         let mut joints = BTreeSet::new();
         for (i, joint) in model.joints.iter().enumerate() {
             let element = Element::Joint(i);
@@ -160,7 +160,7 @@ impl Places {
     }
 
     /// Returns the target of a place name.
-    pub fn find(&self, name: &str, element: Element, key: &'static str) -> Result<End, ModelError> {
+    pub fn find(&self, name: &str, element: Element, key: &'static str) -> Result<PlaceTarget, ModelError> {
         if let Some(end) = self.ends.get(name) {
             return Ok(*end);
         }
@@ -180,8 +180,8 @@ impl Places {
     }
 
     /// Returns whether the target of a name is an angle.
-    pub fn is_rotation(&self, end: End) -> bool {
-        matches!(end, End::At(place) if self.stated[place].radius.is_some())
+    pub fn is_rotation(&self, end: PlaceTarget) -> bool {
+        matches!(end, PlaceTarget::At(place) if self.stated[place].radius.is_some())
     }
 
     /// Returns both ends of a joint along each of its `count` directions. `normal` is the index
@@ -191,7 +191,7 @@ impl Places {
         between: &[String; 2],
         (count, normal): (usize, Option<usize>),
         element: Element,
-    ) -> Result<Vec<Along<'_>>, ModelError> {
+    ) -> Result<Vec<JointDirection<'_>>, ModelError> {
         let key = "between";
         let nodes: Vec<&Vec<String>> = between.iter().filter_map(|name| self.directions.get(name)).collect();
         let Some(directions) = nodes.first().copied() else {
@@ -242,7 +242,11 @@ impl Places {
             .iter()
             .map(|along| {
                 let end = |name: &String| {
-                    if name == GROUND { Ok(End::Ground) } else { self.find(&format!("{name}.{along}"), element, key) }
+                    if name == GROUND {
+                        Ok(PlaceTarget::Ground)
+                    } else {
+                        self.find(&format!("{name}.{along}"), element, key)
+                    }
                 };
                 Ok((Some(along.as_str()), [end(&between[0])?, end(&between[1])?]))
             })
@@ -279,7 +283,7 @@ fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelErr
 }
 
 /// The places during collection.
-struct Collected<'a> {
+struct PlaceCollector<'a> {
     places: Places,
     /// Column names of results: names of places with `_` instead of the point.
     columns: BTreeSet<String>,
@@ -287,13 +291,13 @@ struct Collected<'a> {
     motions: BTreeSet<&'a str>,
 }
 
-impl Collected<'_> {
+impl PlaceCollector<'_> {
     /// Adds a node, or a place with one displacement.
     fn node(
         &mut self,
         element: Element,
         (name, directions): (&String, &Vec<String>),
-        of: impl Fn(usize) -> Of,
+        of: impl Fn(usize) -> PlaceSource,
     ) -> Result<(), ModelError> {
         identifier(name, element, "name", is_identifier)?;
         if directions.len() > crate::law::MOST_DIRECTIONS {
@@ -311,7 +315,7 @@ impl Collected<'_> {
         }
         for (along, place) in places_of(name, directions).into_iter().enumerate() {
             let moved = self.motions.contains(place.as_str());
-            self.place(Stated { name: place, of: of(along), moved, radius: None }, element, "name")?;
+            self.place(DeclaredPlace { name: place, of: of(along), moved, radius: None }, element, "name")?;
         }
         if !directions.is_empty() {
             self.places.directions.insert(name.clone(), directions.clone());
@@ -332,19 +336,23 @@ impl Collected<'_> {
                 return twice(name, element, "directions");
             }
             let (moved, radius) = (self.motions.contains(place.as_str()), body.radius(name));
-            self.place(Stated { name: place, of: Of::Body(index, along), moved, radius }, element, "name")?;
+            self.place(
+                DeclaredPlace { name: place, of: PlaceSource::Body(index, along), moved, radius },
+                element,
+                "name",
+            )?;
         }
         let displacements = body.directions.iter().filter(|name| TRANSLATIONS.contains(&name.as_str()));
         self.places.directions.insert(body.name.clone(), displacements.cloned().collect());
         Ok(())
     }
 
-    fn place(&mut self, place: Stated, element: Element, key: &'static str) -> Result<(), ModelError> {
+    fn place(&mut self, place: DeclaredPlace, element: Element, key: &'static str) -> Result<(), ModelError> {
         let column = place.name.replace('.', "_");
         if !self.columns.insert(column.clone()) {
             return twice(&column, element, key);
         }
-        self.places.ends.insert(place.name.clone(), End::At(self.places.stated.len()));
+        self.places.ends.insert(place.name.clone(), PlaceTarget::At(self.places.stated.len()));
         self.places.stated.push(place);
         Ok(())
     }
@@ -361,7 +369,7 @@ impl Collected<'_> {
                 // returns the error that a direction is missing
                 self.places.find(&motion.on, element, "on")?;
             }
-            let place = Stated { name: motion.on.clone(), of: Of::Own(0.0), moved: true, radius: None };
+            let place = DeclaredPlace { name: motion.on.clone(), of: PlaceSource::Own(0.0), moved: true, radius: None };
             self.place(place, element, "on")?;
             if let Some((node, along)) = motion.on.split_once('.') {
                 self.places.directions.entry(node.to_owned()).or_default().push(along.to_owned());

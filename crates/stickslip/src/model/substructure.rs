@@ -6,7 +6,7 @@ use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Substructure, SubstructureDamping};
 use crate::structure::reduction::{Damping, Reduced, ReductionError, Row};
 use crate::structure::{
-    DampedModes, KeptSector, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBlade,
+    BladeCache, DampedModes, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorCache,
 };
 use std::sync::Arc;
 use stickslip_numerics::sparse::ModesError;
@@ -17,7 +17,7 @@ pub(super) type Entries = Vec<(usize, usize, f64)>;
 /// The substructure in its own coordinates. For a ring, the coordinates of all sectors, one
 /// sector after the other.
 #[derive(Default)]
-pub(super) struct Part {
+pub(super) struct SubstructureParts {
     pub names: Vec<String>,
     /// Rows for each place of the model and each of its directions.
     pub places: Vec<Vec<Row>>,
@@ -28,7 +28,7 @@ pub(super) struct Part {
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
-impl Part {
+impl SubstructureParts {
     pub fn new(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
         let n = substructure.component.dofs();
         for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_none()) {
@@ -43,7 +43,7 @@ impl Part {
             }
         }
         match (model.ring, &substructure.disk) {
-            (Some(ring), Some(of)) => return Part::ring(substructure, of, ring.sectors, model),
+            (Some(ring), Some(of)) => return SubstructureParts::ring(substructure, of, ring.sectors, model),
             // without a ring, places of all sectors would refer to one sector
             (None, Some(_)) => {
                 let message = "a sector given by matrices needs a ring, which defines the number of sectors: create \
@@ -54,8 +54,8 @@ impl Part {
             (_, None) => {}
         }
         match substructure.reduction {
-            Reduction::None { up_to } => Part::whole(substructure, up_to, model),
-            _ => Part::reduced(substructure, model),
+            Reduction::None { up_to } => SubstructureParts::whole(substructure, up_to, model),
+            _ => SubstructureParts::reduced(substructure, model),
         }
     }
 
@@ -82,7 +82,7 @@ impl Part {
             SubstructureDamping::RatioUpTo { ratio, up_to } => modal(ratio, up_to)?,
         };
         let named = |(at, name): (usize, &String)| row_name(at, name);
-        Ok(Part {
+        Ok(SubstructureParts {
             names: substructure.component.rows().iter().enumerate().map(named).collect(),
             places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
             entries: [entries, damping, springs],
@@ -95,7 +95,7 @@ impl Part {
         let own = model.places.iter().filter(|place| place.of.is_none());
         let seen: Vec<Row> = own.flat_map(|place| place.rows.iter().cloned()).collect();
         let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(failed)?;
-        let ReducedForm::Alone(reduced) = component.form() else { return Ok(Part::default()) };
+        let ReducedForm::Alone(reduced) = component.form() else { return Ok(SubstructureParts::default()) };
         let damped = damping_law(substructure, &component).map(|damping| reduced.damped(&damping));
         let damped = damped.transpose().map_err(failed)?;
         let reduced = damped.as_ref().unwrap_or(reduced);
@@ -113,7 +113,7 @@ impl Part {
             next += place.rows.len();
             place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<_>>())
         };
-        Ok(Part {
+        Ok(SubstructureParts {
             names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [entries(mass), entries(damping), entries(stiffness)],
@@ -152,11 +152,11 @@ impl Part {
         let blade = blade.transpose();
         let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
         let one = match (reduction, &blade) {
-            (Reduction::None { .. }, _) => OneSector::whole(substructure, &kept, &seen, blade.as_deref())?,
-            (_, None) => OneSector::reduced(substructure, &kept, &seen, sectors)?,
+            (Reduction::None { .. }, _) => SectorParts::whole(substructure, &kept, &seen, blade.as_deref())?,
+            (_, None) => SectorParts::reduced(substructure, &kept, &seen, sectors)?,
             (_, Some(blade)) => {
                 let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(failed)?;
-                return Part::in_modes(substructure, component, model);
+                return SubstructureParts::in_modes(substructure, component, model);
             }
         };
         let n = one.names.len();
@@ -188,7 +188,7 @@ impl Part {
             places.push(place.displacements(&rows.collect::<Vec<Row>>()));
         }
         let names = (0..sectors).flat_map(|s| one.names.iter().map(move |name| format!("{name}, sector {s}")));
-        Ok(Part {
+        Ok(SubstructureParts {
             names: names.collect(),
             places,
             entries: [mass, damping, stiffness],
@@ -213,7 +213,7 @@ impl Part {
                 .map(|row| modes.seen.row(row).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect());
             place.displacements(&rows.collect::<Vec<Row>>())
         };
-        Ok(Part {
+        Ok(SubstructureParts {
             names: (1..=modes.own.len()).map(|number| format!("mode {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [own(0), damping, own(1)],
@@ -224,7 +224,7 @@ impl Part {
 }
 
 /// One sector as a part of a ring.
-struct OneSector {
+struct SectorParts {
     names: Vec<String>,
     /// One row for each observed displacement.
     places: Vec<RingRow>,
@@ -234,12 +234,12 @@ struct OneSector {
     reduced: Option<Arc<ReducedComponent>>,
 }
 
-impl OneSector {
+impl SectorParts {
     fn whole(
         substructure: &Substructure,
-        kept: &KeptSector,
+        kept: &SectorCache,
         seen: &[Row],
-        blade: Option<&SectorBlade>,
+        blade: Option<&BladeCache>,
     ) -> Result<Self, ModelError> {
         let sector = &kept.sector;
         let damping = match substructure.damping {
@@ -250,7 +250,7 @@ impl OneSector {
             SubstructureDamping::Ratio(_) | SubstructureDamping::RatioUpTo { .. } => return Err(no_modes()),
         };
         let rows = substructure.component.rows();
-        Ok(OneSector {
+        Ok(SectorParts {
             names: sector.kept.iter().map(|&row| row_name(row, &rows[row])).collect(),
             places: seen.iter().map(|row| sector.row(row)).collect(),
             entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
@@ -261,7 +261,7 @@ impl OneSector {
 
     fn reduced(
         substructure: &Substructure,
-        kept: &KeptSector,
+        kept: &SectorCache,
         seen: &[Row],
         sectors: usize,
     ) -> Result<Self, ModelError> {
@@ -273,7 +273,7 @@ impl OneSector {
         };
         let mut places = vec![RingRow::new(); seen.len()];
         sector.ports.iter().for_each(|&(port, at, shift, weight)| places[port].push((at, shift, weight)));
-        Ok(OneSector {
+        Ok(SectorParts {
             names: (1..=sector.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places,
             entries: [sector.mass.clone(), damping, sector.stiffness.clone()],

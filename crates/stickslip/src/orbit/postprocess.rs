@@ -1,6 +1,6 @@
 //! Postprocessing of a periodic motion: amplitudes, first harmonics, means, energies, slip.
 //!
-//! A method supplies its signals ([`Signals`]) as closed forms, values at quadrature nodes, or
+//! A method supplies its signals ([`PathSignals`]) as closed forms, values at quadrature nodes, or
 //! samples. This file computes all results from them, independently of the method.
 
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
@@ -13,7 +13,7 @@ use stickslip_numerics::radau::quintic;
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// The signals of a motion over one return: half a period or a full period.
-pub(crate) trait Signals {
+pub(crate) trait PathSignals {
     /// A function of time over the return.
     type Signal: Clone;
     /// Why a result cannot be computed.
@@ -39,7 +39,7 @@ pub(crate) trait Signals {
     /// Returns the smallest and the largest relative displacement along an axis, m.
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Self::Error>;
     /// Returns the contact states of a joint.
-    fn faces(&self, joint: usize) -> Faces;
+    fn faces(&self, joint: usize) -> ContactSummary;
     /// Combines signals of the degrees of freedom into the signal of a place.
     fn along(&self, place: &Axis, of: impl Fn(usize) -> Self::Signal) -> Self::Signal {
         match *place.rows() {
@@ -62,9 +62,9 @@ pub(crate) trait Signals {
 }
 
 /// Contact states of a joint over a return.
-pub(crate) struct Faces {
+pub(crate) struct ContactSummary {
     /// Fractions of the return in each state.
-    pub shares: Shares,
+    pub shares: ContactFractions,
     /// Number of changes of the state or of the slip direction.
     pub switches: usize,
     /// True if the joint sticks during the whole return. A joint that stays open neither slips
@@ -88,30 +88,30 @@ pub(crate) fn sticks(mut contact: impl Iterator<Item = Contact>) -> bool {
 /// Fractions of a return in which the faces stick, slip, and are separated. If a stop touches,
 /// the sum is less than one.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Shares {
+pub(crate) struct ContactFractions {
     pub stick: f64,
     pub slip: f64,
     pub open: f64,
 }
 
-impl Shares {
+impl ContactFractions {
     /// Computes the fractions from contact states and their durations. All sums run in the same
     /// order, so a joint that always slips has a fraction of exactly one.
-    pub fn of(contacts: impl Iterator<Item = (Contact, f64)>) -> Shares {
-        let (mut times, mut all) = (Shares::default(), 0.0);
+    pub fn of(contacts: impl Iterator<Item = (Contact, f64)>) -> ContactFractions {
+        let (mut times, mut all) = (ContactFractions::default(), 0.0);
         for (contact, weight) in contacts {
             all += weight;
             times.stick += if contact == Contact::Stick { weight } else { 0.0 };
             times.slip += if contact.slips() { weight } else { 0.0 };
             times.open += if contact == Contact::Open { weight } else { 0.0 };
         }
-        Shares { stick: times.stick / all, slip: times.slip / all, open: times.open / all }
+        ContactFractions { stick: times.stick / all, slip: times.slip / all, open: times.open / all }
     }
 }
 
 /// Results of a periodic motion.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Measured {
+pub(crate) struct OrbitResults {
     pub places: Vec<PlaceMotion>,
     pub joints: Vec<JointMotion>,
     pub energy: Energy,
@@ -124,12 +124,12 @@ pub(crate) struct Measured {
 
 /// Computes the results of a motion under an excitation of `omega` (rad/s) that repeats after
 /// `period` (s).
-pub(crate) fn measure<S: Signals>(
+pub(crate) fn measure<S: PathSignals>(
     system: &System,
     signals: &S,
     omega: f64,
     (symmetry, period): (Symmetry, f64),
-) -> Result<Measured, S::Error> {
+) -> Result<OrbitResults, S::Error> {
     let half = symmetry == Symmetry::HalfPeriod;
     let times = if half { 2.0 } else { 1.0 };
     let mirrored = |(low, high): (f64, f64)| {
@@ -156,7 +156,7 @@ pub(crate) fn measure<S: Signals>(
         first = axes.end;
         let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
-        let Faces { shares, switches, rests } = signals.faces(j);
+        let ContactSummary { shares, switches, rests } = signals.faces(j);
         // A law without a slip limit never slips, and a smooth law always creeps. Neither counts
         // as stuck, because their orbits are unique.
         if rests && joint.law().scale().is_finite() && joint.law().rate().is_none() {
@@ -175,12 +175,12 @@ pub(crate) fn measure<S: Signals>(
     let (energy, possible) = energy(system, signals, omega, &forces);
     let friction = joints.iter().map(|joint| joint.dissipation).sum();
     let energy = Energy { work_in: times * energy.0, viscous: times * energy.1, friction };
-    Ok(Measured { places, joints, energy, possible: times * possible, stuck })
+    Ok(OrbitResults { places, joints, energy, possible: times * possible, stuck })
 }
 
 /// Returns the work of the loads and of imposed motion, the loss in dampers, and the bound of
 /// the exchanged work, over the return.
-fn energy<S: Signals>(system: &System, signals: &S, omega: f64, forces: &[S::Signal]) -> ((f64, f64), f64) {
+fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S::Signal]) -> ((f64, f64), f64) {
     let n = system.dofs();
     let velocity: Vec<S::Signal> = (0..n).map(|row| signals.velocity(row)).collect();
     let excitation = system.excitation(omega);
@@ -297,7 +297,7 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
 /// is nearly conservative.
 pub(crate) const NO_WORK: f64 = 1e-6;
 
-impl Measured {
+impl OrbitResults {
     /// Returns `|work in - viscous - friction|` relative to the work. `least` is the smallest
     /// reference energy, J.
     pub fn energy_gap(&self, least: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! Results of any path from its samples alone, by Gauss quadrature between its transitions.
 
-use super::postprocess::{Faces, Shares, Signals, extremes, sticks};
+use super::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
 use super::{Path, Sample};
 use crate::model::{Axis, System};
 use num_complex::Complex64;
@@ -65,7 +65,7 @@ impl<'a> Sampled<'a> {
 }
 
 /// Signals are values at the nodes.
-impl Signals for Sampled<'_> {
+impl PathSignals for Sampled<'_> {
     type Signal = Vec<f64>;
     type Error = Infallible;
 
@@ -119,11 +119,11 @@ impl Signals for Sampled<'_> {
         };
         Ok(self.range_of(at))
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let contact = |i: usize| self.samples[i % self.nodes.len()].joints[joint].contact;
         let count = self.nodes.len();
-        Faces {
-            shares: Shares::of((0..count).map(|i| (contact(i), self.nodes[i].1))),
+        ContactSummary {
+            shares: ContactFractions::of((0..count).map(|i| (contact(i), self.nodes[i].1))),
             switches: (0..count).filter(|&i| contact(i) != contact(i + 1)).count(),
             rests: sticks((0..count).map(contact)),
         }

@@ -4,8 +4,8 @@
 //! full or reduced form for observed places.
 
 use super::reduction::{
-    Damping, Deviation, EXTENTS, Free, Lacking, Mixed, NominalRing, Reduce, Reduced, ReducedSector, Reduction,
-    ReductionError, ReductionKind, Reference, RingModes, Row, STEPS, Whole,
+    Damping, Deviation, EXTENTS, Free, MistunedModes, MistuningError, NominalRing, Reduce, Reduced, ReducedSector,
+    Reduction, ReductionError, ReductionKind, Reference, RingModes, Row, STEPS, Whole,
 };
 use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
 use super::{DampedModes, StructureError, free_vibrations, symmetric};
@@ -40,67 +40,67 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, Wanted, columns};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone)]
-pub struct Component(Arc<Kept>);
+pub struct Component(Arc<ComponentData>);
 
-struct Kept {
+struct ComponentData {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
     whole: Whole,
     /// True if the mass matrix is positive definite.
     definite_mass: bool,
     /// Stored reductions by request, because the cases of a study repeat requests.
-    reductions: Known<Asked, Answer>,
+    reductions: Cache<ReductionRequest, ReducedResult>,
     /// Stored modal damping, by ratio and largest frequency.
-    damped: Known<(f64, f64), Damped>,
+    damped: Cache<(f64, f64), Damped>,
     /// Stored numbers of modes below a frequency.
-    counts: Known<f64, Option<usize>>,
+    counts: Cache<f64, Option<usize>>,
     /// The component as a sector of a ring, by boundary and number of sectors.
-    sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
+    sectors: Mutex<Vec<(Boundary, usize, Arc<SectorCache>)>>,
 }
 
 /// A component as a sector of a ring, with its stored results.
 #[derive(Debug)]
-pub(crate) struct KeptSector {
+pub(crate) struct SectorCache {
     pub sector: CyclicSector,
-    reductions: Known<Asked, Answer>,
-    blades: Known<Vec<usize>, KeptBlade>,
+    reductions: Cache<ReductionRequest, ReducedResult>,
+    blades: Cache<Vec<usize>, KeptBlade>,
 }
 
 /// The blade of a sector, with its stored results.
 #[derive(Debug)]
-pub(crate) struct SectorBlade {
+pub(crate) struct BladeCache {
     blade: Blade,
     entries: OnceLock<Vec<(usize, usize, f64)>>,
     /// Stored reductions, by request and number of steps of blade vectors.
-    reductions: Known<(Asked, usize), Relieved>,
+    reductions: Cache<(ReductionRequest, usize), ReducedRingResult>,
     /// Stored results, by request and deviations of all blades.
-    mistuned: Known<Pattern, Arc<ReducedComponent>>,
+    mistuned: Cache<Pattern, Arc<ReducedComponent>>,
 }
 
-type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
+type KeptBlade = Result<Arc<BladeCache>, BladeError>;
 /// A request, and the deviations of all blades.
-type Pattern = (Asked, Vec<f64>);
-type Relieved = Result<Arc<InFew>, ReductionError>;
+type Pattern = (ReductionRequest, Vec<f64>);
+type ReducedRingResult = Result<Arc<ReducedRing>, ReductionError>;
 
 /// A reduced sector, the ring in its coordinates, and the estimate of its error.
 #[derive(Debug)]
-struct InFew {
+struct ReducedRing {
     component: Arc<ReducedComponent>,
     ring: NominalRing,
-    lacking: Lacking,
+    lacking: MistuningError,
 }
 
 /// Requests with their results.
-type Known<K, V> = Mutex<Vec<(K, V)>>;
-type Asked = (Vec<Row>, Reduction);
-type Answer = Result<Arc<ReducedComponent>, ReductionError>;
+type Cache<K, V> = Mutex<Vec<(K, V)>>;
+type ReductionRequest = (Vec<Row>, Reduction);
+type ReducedResult = Result<Arc<ReducedComponent>, ReductionError>;
 /// Factor of the stiffness, s, and the remaining modal damping.
 type Damped = Result<(f64, DampedModes), ReductionError>;
 
 /// A reduced component, with its error relative to the full component.
 #[derive(Debug, Clone)]
 pub struct ReducedComponent {
-    form: Form,
+    form: ReducedForm,
     deviation: Deviation,
     /// Computed frequencies of the full component, rad/s.
     frequencies: Vec<f64>,
@@ -150,7 +150,7 @@ pub struct SectorComponent {
 
 /// The reduced matrices.
 #[derive(Debug, Clone)]
-pub(crate) enum Form {
+pub(crate) enum ReducedForm {
     /// A single component, without its basis.
     Alone(Arc<Reduced>),
     /// One sector of a ring.
@@ -200,7 +200,16 @@ impl Component {
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Ok(Component(Arc::new(Kept { rows, index, whole, definite_mass, reductions, damped, counts, sectors })))
+        Ok(Component(Arc::new(ComponentData {
+            rows,
+            index,
+            whole,
+            definite_mass,
+            reductions,
+            damped,
+            counts,
+            sectors,
+        })))
     }
 
     /// Returns the number of rows of the matrices.
@@ -308,7 +317,7 @@ impl Component {
     /// # Errors
     /// [`ReductionError`]: no place, a failure of the mode computation, or no reduction within
     /// the tolerance.
-    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
+    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
         once(&self.0.reductions, &(seen.to_vec(), *how), || {
             self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
         })
@@ -381,7 +390,7 @@ impl Component {
     ) -> Result<SectorComponent, ReductionError> {
         let kept = self.sector(boundary, sectors);
         let few = kept.reduced(seen, how)?;
-        let Form::Sector(reduced) = few.form() else { return Err(ReductionError::NoPorts) };
+        let ReducedForm::Sector(reduced) = few.form() else { return Err(ReductionError::NoPorts) };
         let r = reduced.dofs();
         let columns = kept.sector.whole_columns(&reduced.basis);
         let (mass, damping, stiffness) = self.matrices();
@@ -418,13 +427,13 @@ impl Component {
     }
 
     /// Returns the component as one of `sectors` sectors of a ring.
-    pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<KeptSector> {
+    pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<SectorCache> {
         let mut known = self.0.sectors.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((.., kept)) = known.iter().find(|(own, count, _)| own == boundary && *count == sectors) {
             return kept.clone();
         }
         let sector = CyclicSector::new(self.matrices(), boundary, sectors);
-        let kept = Arc::new(KeptSector { sector, reductions: Mutex::default(), blades: Mutex::default() });
+        let kept = Arc::new(SectorCache { sector, reductions: Mutex::default(), blades: Mutex::default() });
         known.push((boundary.clone(), sectors, kept.clone()));
         kept
     }
@@ -439,7 +448,7 @@ fn sparse(dense: &DMatrix<f64>) -> Result<Matrix, ReductionError> {
 
 /// Returns a stored result, or computes it once. Concurrent identical requests wait for the
 /// first one.
-fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
+fn once<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
     let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, answer)) = known.iter().find(|(key, _)| key == asked) {
         return answer.clone();
@@ -449,16 +458,16 @@ fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute:
     answer
 }
 
-impl KeptSector {
+impl SectorCache {
     /// Returns the reduced sector.
-    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
+    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
         once(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
     }
 
-    fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> Answer {
+    fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> ReducedResult {
         let chosen = self.sector.reduced(seen, how, blade)?;
         let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
-        let form = Form::Sector(Arc::new(chosen.reduced));
+        let form = ReducedForm::Sector(Arc::new(chosen.reduced));
         Ok(Arc::new(ReducedComponent {
             form,
             deviation,
@@ -474,7 +483,7 @@ impl KeptSector {
         once(&self.blades, &blade.to_vec(), || {
             let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
             let (reductions, mistuned) = (Mutex::default(), Mutex::default());
-            Ok(Arc::new(SectorBlade { blade, entries: OnceLock::new(), reductions, mistuned }))
+            Ok(Arc::new(BladeCache { blade, entries: OnceLock::new(), reductions, mistuned }))
         })
     }
 
@@ -483,7 +492,7 @@ impl KeptSector {
     ///
     /// The sector basis receives as many blade vectors as the error requires, or the number
     /// with the smallest error.
-    pub fn mistuned(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+    pub fn mistuned(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
         let asked = ((seen.to_vec(), *how), deviations.to_vec());
         let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
@@ -500,13 +509,13 @@ impl KeptSector {
         Ok(answer)
     }
 
-    fn nearest(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+    fn nearest(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
         // the number of modes is fixed, without blade vectors
         let (steps, enough) = match *how {
             Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
             _ => (0..1, f64::INFINITY),
         };
-        let mut best: Option<(Arc<InFew>, Mixed, Deviation)> = None;
+        let mut best: Option<(Arc<ReducedRing>, MistunedModes, Deviation)> = None;
         for step in steps {
             // a later failure keeps the earlier result
             let few = match (self.few(blade, seen, how, step), &best) {
@@ -533,27 +542,27 @@ impl KeptSector {
             }
         }
         let deviation = if left_out.error > deviation.error { left_out } else { deviation };
-        let form = Form::Ring(Arc::new(modes));
+        let form = ReducedForm::Ring(Arc::new(modes));
         Ok(Arc::new(ReducedComponent { form, deviation, ..ReducedComponent::clone(&few.component) }))
     }
 
     /// Reduces the sector with the blade vectors of this step; step 0 has none.
-    fn few(&self, blade: &SectorBlade, seen: &[Row], how: &Reduction, step: usize) -> Relieved {
+    fn few(&self, blade: &BladeCache, seen: &[Row], how: &Reduction, step: usize) -> ReducedRingResult {
         once(&blade.reductions, &((seen.to_vec(), *how), step), || {
             let component = match step {
                 0 => self.reduced(seen, how)?,
                 _ => self.chosen(seen, how, Some((&blade.blade, step)))?,
             };
-            let Form::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
+            let ReducedForm::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
             let (of_blade, up_to) = (blade.blade.along(sector.n, &sector.basis), component.up_to);
-            let lacking = Lacking::new((&self.sector, seen), &blade.blade, sector, up_to)?;
+            let lacking = MistuningError::new((&self.sector, seen), &blade.blade, sector, up_to)?;
             let ring = NominalRing::new(sector, of_blade, self.sector.sectors, up_to)?;
-            Ok(Arc::new(InFew { component, ring, lacking }))
+            Ok(Arc::new(ReducedRing { component, ring, lacking }))
         })
     }
 }
 
-impl SectorBlade {
+impl BladeCache {
     /// Returns the stiffness entries for a relative deviation of one, over all remaining rows.
     pub fn entries(&self) -> &[(usize, usize, f64)] {
         self.entries.get_or_init(|| self.blade.entries())
@@ -580,14 +589,14 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 }
 
 fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
-    let Fewer { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
+    let ReductionResult { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.free());
-    let form = Form::Alone(Arc::new(reduced.in_metres()));
+    let form = ReducedForm::Alone(Arc::new(reduced.in_metres()));
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
 
 /// A reduced form of the whole component.
-struct Fewer {
+struct ReductionResult {
     reduced: Reduced,
     deviation: Deviation,
     /// The modes that it uses.
@@ -598,13 +607,13 @@ struct Fewer {
     serves: f64,
 }
 
-fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
+fn in_few(whole: &Whole, how: &Reduction) -> Result<ReductionResult, ReductionError> {
     Ok(match *how {
         Reduction::None { .. } => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
             let chosen = Reduce { up_to, tolerance, kind }.of(whole)?;
             let (reduced, deviation, modes) = (chosen.reduced, chosen.deviation, chosen.modes);
-            Fewer { reduced, deviation, modes, up_to, serves: up_to }
+            ReductionResult { reduced, deviation, modes, up_to, serves: up_to }
         }
         Reduction::Modes { modes: count, kind, orders, up_to } => {
             let modes = whole.lowest_modes(count)?;
@@ -615,7 +624,7 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
                 ReductionKind::CraigBampton => whole.held(Wanted::Lowest(count))?,
             };
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
-            Fewer { reduced, deviation, modes, up_to, serves }
+            ReductionResult { reduced, deviation, modes, up_to, serves }
         }
     })
 }
@@ -625,18 +634,18 @@ impl ReducedComponent {
     /// of one sector.
     pub fn dofs(&self) -> usize {
         match &self.form {
-            Form::Alone(reduced) => reduced.dofs(),
-            Form::Sector(sector) => sector.dofs(),
-            Form::Ring(modes) => modes.own.len(),
+            ReducedForm::Alone(reduced) => reduced.dofs(),
+            ReducedForm::Sector(sector) => sector.dofs(),
+            ReducedForm::Ring(modes) => modes.own.len(),
         }
     }
 
     /// Returns a description of the reduction.
     pub fn kind(&self) -> &str {
         match &self.form {
-            Form::Alone(reduced) => &reduced.kind,
-            Form::Sector(sector) => &sector.kind,
-            Form::Ring(modes) => &modes.kind,
+            ReducedForm::Alone(reduced) => &reduced.kind,
+            ReducedForm::Sector(sector) => &sector.kind,
+            ReducedForm::Ring(modes) => &modes.kind,
         }
     }
 
@@ -673,7 +682,7 @@ impl ReducedComponent {
     }
 
     /// Returns the reduced matrices.
-    pub(crate) fn form(&self) -> &Form {
+    pub(crate) fn form(&self) -> &ReducedForm {
         &self.form
     }
 }

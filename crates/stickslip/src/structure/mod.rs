@@ -13,7 +13,7 @@ mod sector_faces;
 mod uncoupled_modes;
 
 pub use component::{BetweenComponent, Component, ReducedComponent, SectorComponent};
-pub(crate) use component::{Form as ReducedForm, KeptSector, SectorBlade};
+pub(crate) use component::{BladeCache, ReducedForm, SectorCache};
 pub use dynamic::DynamicStiffness;
 pub(crate) use free_vibration::free_vibrations;
 pub use modal_damping::DampedModes;
@@ -36,12 +36,12 @@ use stickslip_numerics::sparse::{Analysis, Asymmetry, Matrix, MatrixError};
 /// are stored full if there are few degrees of freedom or many entries, otherwise sparse. The
 /// storage affects the computing time, but not the results.
 #[derive(Debug, Clone)]
-pub struct Structure(Arc<Kept>);
+pub struct Structure(Arc<StructureData>);
 
 #[derive(Debug)]
-struct Kept {
+struct StructureData {
     places: Vec<String>,
-    form: Form,
+    form: Storage,
     /// Largest absolute entries of mass, damping and stiffness.
     largest: [f64; 3],
     dissipates: OnceLock<bool>,
@@ -50,7 +50,7 @@ struct Kept {
 
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant)] // one per structure, behind a reference
-enum Form {
+enum Storage {
     Full(Arc<Matrices>),
     Sparse {
         mass: Matrix,
@@ -172,7 +172,7 @@ impl Structure {
         let filled = [&full.mass, &full.damping, &full.stiffness]
             .map(|matrix| matrix.iter().filter(|value| **value != 0.0).count());
         if is_full(n, filled) {
-            return Structure::checked(places, Form::Full(Arc::new(full)));
+            return Structure::checked(places, Storage::Full(Arc::new(full)));
         }
         let entries = |matrix: &DMatrix<f64>| {
             let all = (0..n).flat_map(|column| (0..n).map(move |row| (row, column)));
@@ -222,10 +222,10 @@ impl Structure {
         }
         let (analysis, full) = (OnceLock::new(), OnceLock::new());
         let form = if is_full(n, [&mass, &damping, &stiffness].map(Matrix::len)) {
-            Form::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
+            Storage::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
         } else {
             let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
-            Form::Sparse { mass, damping, stiffness, modes: None, analysis, full }
+            Storage::Sparse { mass, damping, stiffness, modes: None, analysis, full }
         };
         Structure::checked(places, form)
     }
@@ -237,20 +237,20 @@ impl Structure {
             rows.iter().flat_map(move |&(i, w)| rows.iter().map(move |&(l, v)| (i, l, w * v * k)))
         });
         let form = match &self.0.form {
-            Form::Full(full) => {
+            Storage::Full(full) => {
                 let mut full = Matrices::clone(full);
                 added.for_each(|(i, l, k)| full.stiffness[(i, l)] += k);
-                Form::Full(Arc::new(full))
+                Storage::Full(Arc::new(full))
             }
-            Form::Sparse { mass, damping, stiffness, modes, .. } => {
+            Storage::Sparse { mass, damping, stiffness, modes, .. } => {
                 let stiffness = Matrix::from_triplets(self.dofs(), stiffness.entries().chain(added)).ok()?;
                 let (mass, damping, modes) = (mass.clone(), damping.clone(), modes.clone());
-                Form::Sparse { mass, damping, stiffness, modes, analysis: OnceLock::new(), full: OnceLock::new() }
+                Storage::Sparse { mass, damping, stiffness, modes, analysis: OnceLock::new(), full: OnceLock::new() }
             }
         };
         let largest = match &form {
-            Form::Full(full) => full.stiffness.amax(),
-            Form::Sparse { stiffness, .. } => stiffness.largest(),
+            Storage::Full(full) => full.stiffness.amax(),
+            Storage::Sparse { stiffness, .. } => stiffness.largest(),
         };
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
@@ -267,36 +267,36 @@ impl Structure {
         assert_eq!(of.n(), n, "columns of another length");
         let [mass, mut most, stiffness] = self.0.largest;
         let form = match &self.0.form {
-            Form::Full(full) => {
+            Storage::Full(full) => {
                 let mut full = Matrices::clone(full);
                 of.add_to(&mut full.damping);
                 most = full.damping.amax();
-                Form::Full(Arc::new(full))
+                Storage::Full(Arc::new(full))
             }
-            Form::Sparse { mass, damping, stiffness, .. } => {
+            Storage::Sparse { mass, damping, stiffness, .. } => {
                 let (mass, damping, stiffness) = (mass.clone(), damping.clone(), stiffness.clone());
                 // the largest entry of a positive semidefinite matrix is on the diagonal
                 most = (0..n).fold(most, |most, i| most.max((damping.get(i, i) + of.get(i, i)).abs()));
                 let (modes, analysis, full) = (Some(of.clone()), OnceLock::new(), OnceLock::new());
-                Form::Sparse { mass, damping, stiffness, modes, analysis, full }
+                Storage::Sparse { mass, damping, stiffness, modes, analysis, full }
             }
         };
         Structure::kept(self.0.places.clone(), form, [mass, most, stiffness])
     }
 
-    fn checked(places: Vec<String>, form: Form) -> Result<Self, StructureError> {
+    fn checked(places: Vec<String>, form: Storage) -> Result<Self, StructureError> {
         let mut names: Vec<&String> = places.iter().collect();
         names.sort_unstable();
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(StructureError::Twice(pair[0].clone()));
         }
         let largest = match &form {
-            Form::Full(full) => {
+            Storage::Full(full) => {
                 full.check()?;
                 [&full.mass, &full.damping, &full.stiffness]
                     .map(|matrix| if matrix.is_empty() { 0.0 } else { matrix.amax() })
             }
-            Form::Sparse { mass, damping, stiffness, .. } => {
+            Storage::Sparse { mass, damping, stiffness, .. } => {
                 let is_diagonal = mass.entries().all(|(row, column, _)| row == column);
                 let negative = mass.entries().any(|(row, column, value)| row == column && value < 0.0);
                 if (negative || !is_diagonal) && sparse_definite(mass).is_none() {
@@ -308,8 +308,14 @@ impl Structure {
         Ok(Structure::kept(places, form, largest))
     }
 
-    fn kept(places: Vec<String>, form: Form, largest: [f64; 3]) -> Self {
-        Structure(Arc::new(Kept { places, form, largest, dissipates: OnceLock::new(), uncoupled: OnceLock::new() }))
+    fn kept(places: Vec<String>, form: Storage, largest: [f64; 3]) -> Self {
+        Structure(Arc::new(StructureData {
+            places,
+            form,
+            largest,
+            dissipates: OnceLock::new(),
+            uncoupled: OnceLock::new(),
+        }))
     }
 
     /// Returns the number of degrees of freedom, n.
@@ -324,7 +330,7 @@ impl Structure {
 
     /// Returns whether the matrices are stored sparse.
     pub fn is_sparse(&self) -> bool {
-        matches!(self.0.form, Form::Sparse { .. })
+        matches!(self.0.form, Storage::Sparse { .. })
     }
 
     /// Returns the full matrices, for methods whose cost grows with the cube of n.
@@ -334,8 +340,8 @@ impl Structure {
     /// [`Structure::dynamic_stiffness`].
     pub fn full(&self) -> &Arc<Matrices> {
         match &self.0.form {
-            Form::Full(full) => full,
-            Form::Sparse { mass, damping, stiffness, modes, full, .. } => full.get_or_init(|| {
+            Storage::Full(full) => full,
+            Storage::Sparse { mass, damping, stiffness, modes, full, .. } => full.get_or_init(|| {
                 let mut full = written_out(mass, damping, stiffness);
                 modes.iter().for_each(|modes| modes.add_to(&mut full.damping));
                 Arc::new(full)
@@ -361,8 +367,8 @@ impl Structure {
     /// Returns the diagonal entry of the mass matrix in a row, kg.
     pub fn own_mass(&self, row: usize) -> f64 {
         match &self.0.form {
-            Form::Full(full) => full.mass[(row, row)],
-            Form::Sparse { mass, .. } => mass.get(row, row),
+            Storage::Full(full) => full.mass[(row, row)],
+            Storage::Sparse { mass, .. } => mass.get(row, row),
         }
     }
 
@@ -370,8 +376,8 @@ impl Structure {
     /// motion has kinetic energy.
     pub fn has_definite_mass(&self) -> bool {
         match &self.0.form {
-            Form::Full(full) => semidefinite(&full.mass) == Some(self.dofs()),
-            Form::Sparse { mass, .. } => sparse_definite(mass) == Some(true),
+            Storage::Full(full) => semidefinite(&full.mass) == Some(self.dofs()),
+            Storage::Sparse { mass, .. } => sparse_definite(mass) == Some(true),
         }
     }
 
@@ -384,8 +390,8 @@ impl Structure {
     /// all damping and return `None`.
     pub fn damped_modes(&self) -> Option<&DampedModes> {
         match &self.0.form {
-            Form::Full(_) => None,
-            Form::Sparse { modes, .. } => modes.as_ref(),
+            Storage::Full(_) => None,
+            Storage::Sparse { modes, .. } => modes.as_ref(),
         }
     }
 
@@ -396,13 +402,13 @@ impl Structure {
     pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
         let n = self.dofs();
         match &self.0.form {
-            Form::Full(full) => Box::new(
+            Storage::Full(full) => Box::new(
                 (0..n)
                     .flat_map(move |i| (0..n).map(move |k| (i, k)))
                     .map(|at| (at.0, at.1, [full.mass[at], full.damping[at], full.stiffness[at]]))
                     .filter(|(_, _, values)| values.iter().any(|v| *v != 0.0)),
             ),
-            Form::Sparse { mass, damping, stiffness, .. } => Box::new((0..n).flat_map(move |column| {
+            Storage::Sparse { mass, damping, stiffness, .. } => Box::new((0..n).flat_map(move |column| {
                 let mut rows: Vec<(usize, [f64; 3])> = Vec::new();
                 for (kind, matrix) in [mass, damping, stiffness].into_iter().enumerate() {
                     for (row, value) in matrix.column(column) {
@@ -427,8 +433,8 @@ impl Structure {
     /// scaled by its largest entry, is definite.
     pub fn dissipates(&self) -> bool {
         *self.0.dissipates.get_or_init(|| match &self.0.form {
-            Form::Full(full) => full.dissipates(),
-            Form::Sparse { mass, damping, stiffness, .. } => {
+            Storage::Full(full) => full.dissipates(),
+            Storage::Sparse { mass, damping, stiffness, .. } => {
                 let n = self.dofs();
                 // the gyroscopic part of the damping does no work
                 let halves = damping.entries().flat_map(|(i, k, c)| [(i, k, 0.5 * c), (k, i, 0.5 * c)]);
@@ -453,10 +459,10 @@ impl PartialEq for Structure {
         Arc::ptr_eq(&self.0, &other.0)
             || (self.0.places == other.0.places
                 && match (&self.0.form, &other.0.form) {
-                    (Form::Full(a), Form::Full(b)) => a == b,
+                    (Storage::Full(a), Storage::Full(b)) => a == b,
                     (
-                        Form::Sparse { mass: a, damping: b, stiffness: c, modes, .. },
-                        Form::Sparse { mass: d, damping: e, stiffness: f, modes: others, .. },
+                        Storage::Sparse { mass: a, damping: b, stiffness: c, modes, .. },
+                        Storage::Sparse { mass: d, damping: e, stiffness: f, modes: others, .. },
                     ) => a == d && b == e && c == f && modes == others,
                     _ => false,
                 })

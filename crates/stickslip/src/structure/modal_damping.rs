@@ -69,7 +69,7 @@ fn dot(u: &[f64], v: &[f64]) -> f64 {
 
 /// A factored dynamic stiffness with the damping of modes.
 #[derive(Debug, Clone)]
-pub(super) struct WithModes {
+pub(super) struct ModallyDampedFactor {
     without: ComplexFactor,
     modes: DampedModes,
     /// `s Z⁻¹ U`.
@@ -78,7 +78,7 @@ pub(super) struct WithModes {
     small: ComplexLu,
 }
 
-impl WithModes {
+impl ModallyDampedFactor {
     /// Creates it from the factor at complex frequency s.
     pub fn new(without: ComplexFactor, modes: &DampedModes, s: Complex64) -> Result<Self, Singular> {
         let mut answers: Vec<Complex64> = modes.columns.iter().map(|u| s * u).collect();
@@ -88,7 +88,7 @@ impl WithModes {
         (0..count).for_each(|k| small[k * count + k] += 1.0);
         // the small system mixes all rows, so that the error names row 0
         let small = ComplexLu::new(small, count).map_err(|_| Singular { row: 0 })?;
-        Ok(WithModes { without, modes: modes.clone(), answers, small })
+        Ok(ModallyDampedFactor { without, modes: modes.clone(), answers, small })
     }
 
     pub fn bytes(&self) -> usize {

@@ -1,6 +1,6 @@
 //! The search for peaks between three points of a curve, with orbits that all quantities share.
 
-use super::bracket_reduction::{Shrink, form, parabola};
+use super::bracket_reduction::{BracketReduction, form, parabola};
 use super::{Peak, PeakOf, Point, Unsettled};
 use crate::method::Solver;
 use crate::orbit::Orbit;
@@ -65,7 +65,7 @@ impl Bracket {
     /// Computes orbits until the peak of a quantity is found.
     pub(super) fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
         let points = &mut self.points;
-        let mut shrink = Shrink::default();
+        let mut shrink = BracketReduction::default();
         let (mut failures, mut effort) = (0, 0.0);
         for _ in 0..ORBITS {
             let best = best(points, quantity);

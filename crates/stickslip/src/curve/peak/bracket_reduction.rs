@@ -27,7 +27,7 @@ const CREEPING: f64 = 0.5;
 /// State of the bracket reduction for one quantity. Parabolas are used while their predictions
 /// are confirmed; otherwise intersecting lines and bisection.
 #[derive(Debug, Default)]
-pub(super) struct Shrink {
+pub(super) struct BracketReduction {
     /// Value that the last trial was predicted to reach.
     promised: Option<f64>,
     /// Number of failed predictions since the last confirmed one.
@@ -41,7 +41,7 @@ pub(super) struct Shrink {
     pub(super) found: bool,
 }
 
-impl Shrink {
+impl BracketReduction {
     /// Returns the frequency of the next orbit; `None` if the peak is found.
     pub(super) fn next(&mut self, points: &[Point], best: usize, quantity: usize, closest: f64) -> Option<f64> {
         let [left, middle, right] = [best - 1, best, best + 1].map(|i| points[i].omega);

@@ -11,16 +11,16 @@ pub(in crate::law) const FEW: usize = 8;
 /// One row per force, then one row per state (or per state rate). The columns are two vectors in
 /// all directions, then the states.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(in crate::law) struct Slopes {
+pub(in crate::law) struct Derivatives {
     values: Vec<f64>,
     directions: usize,
     arguments: usize,
 }
 
-impl Slopes {
+impl Derivatives {
     pub fn new(directions: usize, states: usize) -> Self {
         let arguments = 2 * directions + states;
-        Slopes { values: vec![0.0; (directions + states) * arguments], directions, arguments }
+        Derivatives { values: vec![0.0; (directions + states) * arguments], directions, arguments }
     }
 
     /// Returns the row of force `a`.

@@ -1,6 +1,6 @@
 //! The rate view: force and rates of the internal states, as smooth functions of the motion.
 
-use super::derivatives::{FEW, Slopes, WIDTH, seeded};
+use super::derivatives::{Derivatives, FEW, WIDTH, seeded};
 use super::relative_motion::{MOST_DIRECTIONS, Relative};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
@@ -51,13 +51,17 @@ pub struct RatePoint {
     /// Rates of the internal states.
     pub rate: Vec<f64>,
     /// Derivatives: one row per force, then one row per rate; one column per argument.
-    slopes: Slopes,
+    slopes: Derivatives,
 }
 
 impl RatePoint {
     /// Allocates a point for a law with these numbers of directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
-        RatePoint { force: [0.0; MOST_DIRECTIONS], rate: vec![0.0; states], slopes: Slopes::new(directions, states) }
+        RatePoint {
+            force: [0.0; MOST_DIRECTIONS],
+            rate: vec![0.0; states],
+            slopes: Derivatives::new(directions, states),
+        }
     }
 
     /// Returns the derivatives of force `a` with respect to all arguments.

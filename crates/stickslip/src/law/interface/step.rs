@@ -1,7 +1,7 @@
 //! The step view (return map): the force at the end of a step, from the displacements at both
 //! ends and the state before it.
 
-use super::derivatives::{FEW, Slopes, WIDTH, seeded};
+use super::derivatives::{Derivatives, FEW, WIDTH, seeded};
 use super::relative_motion::MOST_DIRECTIONS;
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
@@ -118,13 +118,17 @@ pub struct StepPoint {
     /// States at the end of the step.
     pub state: Vec<f64>,
     /// Derivatives: one row per force, then one row per state; one column per argument.
-    slopes: Slopes,
+    slopes: Derivatives,
 }
 
 impl StepPoint {
     /// Allocates a point for a law with these numbers of directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
-        StepPoint { force: [0.0; MOST_DIRECTIONS], state: vec![0.0; states], slopes: Slopes::new(directions, states) }
+        StepPoint {
+            force: [0.0; MOST_DIRECTIONS],
+            state: vec![0.0; states],
+            slopes: Derivatives::new(directions, states),
+        }
     }
 
     /// Returns the derivatives of force `a` with respect to all arguments.

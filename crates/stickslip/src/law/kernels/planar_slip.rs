@@ -136,33 +136,33 @@ pub(in crate::law) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, 
 /// Derivatives of the force after a step, `[component][by component]`, with respect to the force
 /// before, the path, and the two limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::law) struct Slopes {
+pub(in crate::law) struct PlanarDerivatives {
     pub(in crate::law) by_force: [[f64; 2]; 2],
     pub(in crate::law) by_way: [[f64; 2]; 2],
     pub(in crate::law) by_limits: [[f64; 2]; 2],
 }
 
-impl Slopes {
-    pub(in crate::law) const NONE: Slopes =
-        Slopes { by_force: [[0.0; 2]; 2], by_way: [[0.0; 2]; 2], by_limits: [[0.0; 2]; 2] };
+impl PlanarDerivatives {
+    pub(in crate::law) const NONE: PlanarDerivatives =
+        PlanarDerivatives { by_force: [[0.0; 2]; 2], by_way: [[0.0; 2]; 2], by_limits: [[0.0; 2]; 2] };
 }
 
 /// Derivatives of a scalar with respect to the components of the force, those of the path, and
 /// the limits.
 #[derive(Debug, Clone, Copy)]
-struct Gradient {
+struct ScalarGradient {
     force: [f64; 2],
     way: [f64; 2],
     limits: [f64; 2],
 }
 
-impl Gradient {
-    const NONE: Gradient = Gradient { force: [0.0; 2], way: [0.0; 2], limits: [0.0; 2] };
+impl ScalarGradient {
+    const NONE: ScalarGradient = ScalarGradient { force: [0.0; 2], way: [0.0; 2], limits: [0.0; 2] };
 
     /// `a self + b other`.
-    fn combined(self, a: f64, other: Gradient, b: f64) -> Gradient {
+    fn combined(self, a: f64, other: ScalarGradient, b: f64) -> ScalarGradient {
         let pair = |x: [f64; 2], y: [f64; 2]| [a * x[0] + b * y[0], a * x[1] + b * y[1]];
-        Gradient {
+        ScalarGradient {
             force: pair(self.force, other.force),
             way: pair(self.way, other.way),
             limits: pair(self.limits, other.limits),
@@ -172,10 +172,11 @@ impl Gradient {
 
 /// `radial δsize + size across δangle`, for a force `size radial`.
 #[inline]
-fn turning(radial: [f64; 2], last: f64, angle: Gradient) -> Slopes {
+fn turning(radial: [f64; 2], last: f64, angle: ScalarGradient) -> PlanarDerivatives {
     let across = [-radial[1] * last, radial[0] * last];
     let outer = |by: [f64; 2]| across.map(|across| [across * by[0], across * by[1]]);
-    let mut slopes = Slopes { by_force: outer(angle.force), by_way: outer(angle.way), by_limits: outer(angle.limits) };
+    let mut slopes =
+        PlanarDerivatives { by_force: outer(angle.force), by_way: outer(angle.way), by_limits: outer(angle.limits) };
     for (slope, radial) in slopes.by_limits.iter_mut().zip(radial) {
         slope[1] += radial;
     }
@@ -191,26 +192,33 @@ pub(in crate::law) fn step_with_slopes(
     way: [f64; 2],
     stiffness: f64,
     limits: [f64; 2],
-) -> ([f64; 2], Slopes) {
+) -> ([f64; 2], PlanarDerivatives) {
     let [first, last] = limits;
     if last <= 0.0 {
-        return ([0.0; 2], Slopes::NONE);
+        return ([0.0; 2], PlanarDerivatives::NONE);
     }
     let trial = beyond(force, stiffness, way);
     if dot(trial, trial) <= last * last {
         let one = [[1.0, 0.0], [0.0, 1.0]];
-        return (trial, Slopes { by_force: one, by_way: one.map(|row| row.map(|x| stiffness * x)), ..Slopes::NONE });
+        return (
+            trial,
+            PlanarDerivatives {
+                by_force: one,
+                by_way: one.map(|row| row.map(|x| stiffness * x)),
+                ..PlanarDerivatives::NONE
+            },
+        );
     }
     let length = dot(way, way).sqrt();
     if length == 0.0 {
         let size = dot(trial, trial).sqrt();
         let radial = [trial[0] / size, trial[1] / size];
         let by_force = [-radial[1] / size, radial[0] / size];
-        let angle = Gradient { force: by_force, way: by_force.map(|x| stiffness * x), ..Gradient::NONE };
+        let angle = ScalarGradient { force: by_force, way: by_force.map(|x| stiffness * x), ..ScalarGradient::NONE };
         return ([radial[0] * last, radial[1] * last], turning(radial, last, angle));
     }
     let ahead = [way[0] / length, way[1] / length];
-    let heading = Gradient { way: [-ahead[1] / length, ahead[0] / length], ..Gradient::NONE };
+    let heading = ScalarGradient { way: [-ahead[1] / length, ahead[0] / length], ..ScalarGradient::NONE };
     // beginning of slip
     let change = last - first;
     let a = length * length * (stiffness * stiffness) - change * change;
@@ -238,17 +246,17 @@ pub(in crate::law) fn step_with_slopes(
     // derivatives of the fraction s, from |held| = first + s · change
     let begins = if root > 0.0 {
         let by = -2.0 / root;
-        Gradient {
+        ScalarGradient {
             force: [by * held[0], by * held[1]],
             way: held.map(|x| by * share * stiffness * x),
             limits: [-by * size * (1.0 - share), -by * size * share],
         }
     } else {
-        Gradient::NONE
+        ScalarGradient::NONE
     };
     // derivatives of a component of `held`
     let of_held = |along: [f64; 2]| {
-        let own = Gradient { force: along, way: along.map(|x| share * stiffness * x), ..Gradient::NONE };
+        let own = ScalarGradient { force: along, way: along.map(|x| share * stiffness * x), ..ScalarGradient::NONE };
         own.combined(1.0, begins, stiffness * dot(way, along))
     };
     let turns = of_held([-direction[1] / size, direction[0] / size]);
@@ -268,10 +276,10 @@ pub(in crate::law) fn step_with_slopes(
     let out = beyond([ahead[0] * along, ahead[1] * along], turned, across);
     // signed sine of the angle from the motion to the force
     let sine = ahead[0] * out[1] - ahead[1] * out[0];
-    let of_rest = Gradient {
+    let of_rest = ScalarGradient {
         way: ahead.map(|x| (1.0 - share) * stiffness * mean * x),
         limits: [0.0, rest * by_last],
-        ..Gradient::NONE
+        ..ScalarGradient::NONE
     };
     let exponent =
         of_rest.combined(1.0, begins, -length * stiffness * mean).combined(1.0, of_held(direction), rest * by_size);

@@ -1,6 +1,6 @@
 //! The linear references of a law: the joint without friction, and the stuck joint.
 
-use super::linear_springs::Springs;
+use super::linear_springs::LinearSprings;
 use crate::law::interface::ideal_elements::STUCK;
 use crate::law::interface::parameter::{LIMIT, STATIC_LIMIT};
 use crate::law::{Law, SharedLaw};
@@ -20,14 +20,14 @@ impl dyn Law + '_ {
     /// Returns the joint as linear springs, if the law defines them. `which` is `FREE` or
     /// `HELD`.
     fn as_springs(&self, which: usize) -> Option<SharedLaw> {
-        self.springs().map(|springs| Springs::shared(&springs[which]))
+        self.springs().map(|springs| LinearSprings::shared(&springs[which]))
     }
 
     /// Returns the linear reference without friction: the slip limit is zero, or the faces stay
     /// apart. `None` if the law has neither a slip limit nor faces that separate.
     pub fn free(&self) -> Option<SharedLaw> {
         match self.closed() {
-            Some(along) => Some(Springs::shared(&vec![0.0; along.len()])),
+            Some(along) => Some(LinearSprings::shared(&vec![0.0; along.len()])),
             None => self.as_springs(FREE).or_else(|| self.limited(0.0)),
         }
     }
@@ -37,7 +37,7 @@ impl dyn Law + '_ {
     /// separate.
     pub fn stuck(&self) -> Option<SharedLaw> {
         match self.closed() {
-            Some(along) => Some(Springs::shared(&along)),
+            Some(along) => Some(LinearSprings::shared(&along)),
             None => self.as_springs(HELD).or_else(|| self.limited(STUCK)),
         }
     }

@@ -24,26 +24,26 @@ static INFO: LawInfo = LawInfo {
         Parameter::new("directions", Dimension::NONE, Range::Count(3), "number of directions"),
     ],
     sample: &[1e4, 1e4, 1e4, 3.0],
-    build: |values| Springs::shared(&values[..(values[3] as usize).clamp(1, MOST_DIRECTIONS)]),
+    build: |values| LinearSprings::shared(&values[..(values[3] as usize).clamp(1, MOST_DIRECTIONS)]),
 };
 
 /// Linear springs in one to three directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::law) struct Springs {
+pub(in crate::law) struct LinearSprings {
     /// Stiffness, N/m; zero beyond `directions`.
     stiffness: [f64; MOST_DIRECTIONS],
     directions: usize,
 }
 
-impl Springs {
+impl LinearSprings {
     /// Returns a shared law with these stiffnesses, N/m, one per direction.
     pub fn shared(along: &[f64]) -> SharedLaw {
         let stiffness = std::array::from_fn(|a| along.get(a).copied().unwrap_or(0.0));
-        Arc::new(Springs { stiffness, directions: along.len() })
+        Arc::new(LinearSprings { stiffness, directions: along.len() })
     }
 }
 
-impl Law for Springs {
+impl Law for LinearSprings {
     fn info(&self) -> &'static LawInfo {
         &INFO
     }
@@ -76,7 +76,7 @@ impl Law for Springs {
     }
 }
 
-impl RateLaw for Springs {
+impl RateLaw for LinearSprings {
     fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; MOST_DIRECTIONS] {
         std::array::from_fn(|a| motion.displacement[a] * self.stiffness[a])
     }

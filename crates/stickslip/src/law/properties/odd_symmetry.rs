@@ -19,7 +19,7 @@ const APART: f64 = 1e-9;
 const WAY: [[f64; MOST_DIRECTIONS]; 6] =
     [[0.3, 0.2, -0.1], [1.0, -0.4, 0.6], [0.4, -1.0, 1.0], [-0.2, -0.7, 0.3], [-0.9, 0.5, -0.8], [-0.1, 0.8, -0.3]];
 
-type Force = [f64; MOST_DIRECTIONS];
+type ForceVector = [f64; MOST_DIRECTIONS];
 
 /// Tells whether any view of the law violates the symmetry.
 pub(in crate::law) fn is_broken(law: &dyn Law) -> bool {
@@ -43,17 +43,17 @@ fn newton(law: &dyn Law) -> f64 {
 }
 
 /// NaN counts as no difference; solvers stop at NaN.
-fn differ(forces: impl Fn(f64) -> Vec<Force>) -> bool {
+fn differ(forces: impl Fn(f64) -> Vec<ForceVector>) -> bool {
     let (there, back) = (forces(1.0), forces(-1.0));
     let all = || there.iter().flatten();
     let largest = all().fold(0.0f64, |most, force| most.max(force.abs()));
     all().zip(back.iter().flatten()).any(|(a, b)| (a + b).abs() > APART * largest)
 }
 
-fn by_rate(rate: &dyn Rate, size: f64) -> Vec<Force> {
+fn by_rate(rate: &dyn Rate, size: f64) -> Vec<ForceVector> {
     let (mut z, mut rates) = (vec![0.0; rate.states()], vec![0.0; rate.states()]);
     let mut before = [0.0; MOST_DIRECTIONS];
-    let along = |way: &Force| {
+    let along = |way: &ForceVector| {
         let displacement = way.map(|u| u * size);
         let velocity = std::array::from_fn(|a| PACE * (displacement[a] - before[a]));
         before = displacement;
@@ -64,10 +64,10 @@ fn by_rate(rate: &dyn Rate, size: f64) -> Vec<Force> {
     WAY.iter().map(along).collect()
 }
 
-fn by_step(step: &dyn Step, size: f64) -> Vec<Force> {
+fn by_step(step: &dyn Step, size: f64) -> Vec<ForceVector> {
     let mut z = vec![0.0; step.states()];
     let mut before = [0.0; MOST_DIRECTIONS];
-    let along = |way: &Force| {
+    let along = |way: &ForceVector| {
         let to = way.map(|u| u * size);
         let force = step.value(&before, &to, &mut z);
         before = to;
@@ -76,7 +76,7 @@ fn by_step(step: &dyn Step, size: f64) -> Vec<Force> {
     WAY.iter().map(along).collect()
 }
 
-fn by_force(prox: &dyn Prox, directions: usize, size: f64) -> Vec<Force> {
+fn by_force(prox: &dyn Prox, directions: usize, size: f64) -> Vec<ForceVector> {
     let penalty = 2.0 * prox.least_penalty().max(0.5);
     let asked = FORCES.iter().zip(&WAY).map(|(share, way)| {
         let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);

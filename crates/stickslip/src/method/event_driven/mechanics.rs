@@ -8,7 +8,7 @@
 
 use crate::law::{Contact, Law, Piece};
 use crate::method::{MethodError, Refusal};
-use crate::model::{Line, System};
+use crate::model::{CollinearAxis, System};
 use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
@@ -143,7 +143,7 @@ impl Share {
 /// A rigid slider of a joint, before those along one line are combined.
 struct Slider {
     joint: usize,
-    line: Line,
+    line: CollinearAxis,
     direction: DVector<f64>,
     limit: f64,
     static_limit: f64,
@@ -152,7 +152,7 @@ struct Slider {
 /// Rigid sliders along one line, with their common part.
 struct Group {
     part: usize,
-    line: Line,
+    line: CollinearAxis,
     members: Vec<Member>,
 }
 
@@ -329,7 +329,7 @@ impl Mechanics {
                     Piece::Slider(slider) => match slider.stiffness {
                         None => {
                             let (limit, static_limit) = (slider.limit, slider.static_limit);
-                            let line = Line::of(axis);
+                            let line = CollinearAxis::of(axis);
                             gathered.push_rigid(Slider { joint: j, line, direction, limit, static_limit });
                             continue;
                         }

@@ -8,7 +8,7 @@ use crate::method::Breakdown;
 use crate::method::periodic::{Closed, norm};
 use crate::method::vibration;
 use crate::model::{Axis, System};
-use crate::orbit::postprocess::{Faces, NO_WORK, Shares, Signals, measure};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, NO_WORK, PathSignals, measure};
 use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -306,7 +306,7 @@ impl<'a> Measuring<'a> {
 
 /// A signal is the list of its coefficients, piece by piece. Each law acts along one axis, so
 /// that axes and joints have the same indices.
-impl Signals for Measuring<'_> {
+impl PathSignals for Measuring<'_> {
     type Signal = Vec<Complex64>;
     type Error = Breakdown;
 
@@ -374,14 +374,18 @@ impl Signals for Measuring<'_> {
         }
         sum
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
             // a joint without force slips all the time
-            return Faces { shares: Shares { slip: 1.0, ..Shares::default() }, switches: 0, rests: false };
+            return ContactSummary {
+                shares: ContactFractions { slip: 1.0, ..ContactFractions::default() },
+                switches: 0,
+                rests: false,
+            };
         }
         let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
-        let shares = Shares::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
+        let shares = ContactFractions::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
         let slips = |segment: &Segment| path.of_joint(joint).any(|share| segment.contacts[share.part].slips());
         let pairs = path.pieces.windows(2).map(|pair| (&pair[0].segment.contacts, &pair[1].segment.contacts));
         let parts = || path.of_joint(joint).map(|share| share.part);
@@ -391,7 +395,7 @@ impl Signals for Measuring<'_> {
             switches += parts().filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
         let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
-        Faces { shares, switches, rests }
+        ContactSummary { shares, switches, rests }
     }
 }
 

@@ -6,7 +6,7 @@ use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::postprocess::{Faces, Shares, Signals, measure, sticks};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, measure, sticks};
 use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -340,7 +340,7 @@ impl Measuring<'_> {
 
 /// Signals are lists of harmonics. If the motion has a half-period symmetry, all harmonics are
 /// odd and orthogonal over half a period too.
-impl Signals for Measuring<'_> {
+impl PathSignals for Measuring<'_> {
     type Signal = Vec<Complex64>;
     type Error = Infallible;
 
@@ -396,12 +396,12 @@ impl Signals for Measuring<'_> {
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let contact = &self.contact[joint];
         let runs: Vec<_> = contact.chunk_by(PartialEq::eq).map(|run| (run[0], run.len() as f64)).collect();
         let changes = runs.len() - usize::from(contact.first() == contact.last());
-        Faces {
-            shares: Shares::of(runs.into_iter()),
+        ContactSummary {
+            shares: ContactFractions::of(runs.into_iter()),
             switches: changes / self.halves,
             rests: sticks(contact.iter().copied()),
         }

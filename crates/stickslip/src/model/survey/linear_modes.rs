@@ -3,7 +3,7 @@
 //! A single eigenvalue problem cannot resolve stiffnesses of very different magnitude. They are
 //! split into levels: for the lower modes, the stiffest springs count as rigid.
 
-use super::rigid_body::Groups;
+use super::rigid_body::DisjointSets;
 use super::{LinearMode, Modes};
 use crate::structure::reduction::natural;
 use crate::structure::{Matrices, free_vibrations};
@@ -11,7 +11,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use stickslip_numerics::eigen;
 
 /// A spring and damper along a direction of the free places.
-pub(super) struct Link {
+pub(super) struct SpringDamper {
     pub(super) at: Vec<(usize, f64)>,
     pub(super) stiffness: f64,
     pub(super) damping: f64,
@@ -19,7 +19,7 @@ pub(super) struct Link {
 
 /// The modes of a linear structure, with their shapes.
 #[derive(Debug, Clone)]
-pub(super) struct Linear {
+pub(super) struct LinearStructure {
     pub(super) modes: Modes,
     /// Shapes of the elastic modes with `φᵀMφ = 1`, one per column. `None` if some stiffnesses
     /// had to count as rigid.
@@ -49,7 +49,7 @@ const ZERO: f64 = 1e-12;
 pub(super) const LARGEST: usize = 700;
 
 /// A structure in its undamped modes, `q'' + D q' + Λ q`.
-struct Modal {
+struct ModalStructure {
     /// Λ, squared frequencies in ascending order.
     squares: Vec<f64>,
     /// Number of free motions among them.
@@ -58,11 +58,11 @@ struct Modal {
     damping: DMatrix<f64>,
 }
 
-impl Modal {
-    fn new(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Option<Modal> {
+impl ModalStructure {
+    fn new(full: &Matrices, links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> Option<ModalStructure> {
         let n = full.mass.nrows();
         let order: Vec<usize> = (0..n).collect();
-        let basis = Basis::new(n, &order, rigid);
+        let basis = ConstraintBasis::new(n, &order, rigid);
         let mut turn = DMatrix::zeros(n, basis.kept.len());
         for (row, parts) in basis.rows.iter().enumerate() {
             parts.iter().for_each(|(column, weight)| turn[(row, *column)] += weight);
@@ -80,7 +80,7 @@ impl Modal {
         let free = squares.partition_point(|value| *value < FREE * usual);
         let shapes = shapes.columns(0, squares.len()).into_owned();
         let damping = shapes.tr_mul(&(damping * &shapes));
-        Some(Modal { squares, free, shapes: turn * shapes, damping })
+        Some(ModalStructure { squares, free, shapes: turn * shapes, damping })
     }
 
     fn elastic_shapes(&self) -> DMatrix<f64> {
@@ -93,10 +93,10 @@ impl Modal {
         LinearMode { omega, damping: self.damping[(k, k)] / (2.0 * omega) }
     }
 
-    fn linear(self) -> Linear {
+    fn linear(self) -> LinearStructure {
         let elastic = (self.free..self.squares.len()).map(|k| self.mode(k)).collect();
         let modes = Modes { elastic, rigid: self.free, lost: 0 };
-        Linear { modes, shapes: Some(self.elastic_shapes()), turning: false }
+        LinearStructure { modes, shapes: Some(self.elastic_shapes()), turning: false }
     }
 
     /// Returns the modes of free vibration if the damping has a gyroscopic part, otherwise
@@ -111,15 +111,15 @@ impl Modal {
     }
 }
 
-impl Linear {
+impl LinearStructure {
     /// Returns the modes of a structure with springs at joints and constraints `Σ w x = 0`.
     /// With a gyroscopic matrix, they are the modes of free vibration.
-    pub(super) fn of_matrices(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
-        let Some(modal) = Modal::new(full, links, rigid) else { return Linear::unknown(full) };
+    pub(super) fn of_matrices(full: &Matrices, links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> LinearStructure {
+        let Some(modal) = ModalStructure::new(full, links, rigid) else { return LinearStructure::unknown(full) };
         match modal.turning() {
             Some(elastic) => {
                 let modes = Modes { elastic, rigid: modal.free, lost: 0 };
-                Linear { modes, shapes: Some(modal.elastic_shapes()), turning: true }
+                LinearStructure { modes, shapes: Some(modal.elastic_shapes()), turning: true }
             }
             None => modal.linear(),
         }
@@ -127,17 +127,17 @@ impl Linear {
 
     /// Returns the modes of a structure in a travelling wave, which has twice the size.
     /// Gyroscopic damping is not included.
-    pub(super) fn of_wave(full: &Matrices, links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
-        Modal::new(full, links, rigid).map_or_else(|| Linear::unknown(full), |modal| modal.linear())
+    pub(super) fn of_wave(full: &Matrices, links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> LinearStructure {
+        ModalStructure::new(full, links, rigid).map_or_else(|| LinearStructure::unknown(full), |modal| modal.linear())
     }
 
-    fn unknown(full: &Matrices) -> Linear {
-        Linear { modes: Modes { lost: full.mass.nrows(), ..Modes::default() }, shapes: None, turning: false }
+    fn unknown(full: &Matrices) -> LinearStructure {
+        LinearStructure { modes: Modes { lost: full.mass.nrows(), ..Modes::default() }, shapes: None, turning: false }
     }
 
     /// Returns the modes of masses with springs and constraints `Σ w x = 0`. A place without
     /// mass has zero in `mass`.
-    pub(super) fn new(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Linear {
+    pub(super) fn new(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> LinearStructure {
         let total = reduced(mass, links, rigid);
         let (elastic, rigid_motions) = (total.elastic(), rigid_motions(mass, links, rigid));
         let dofs = total.frequencies.len();
@@ -146,7 +146,7 @@ impl Linear {
             let shapes = total.shapes(expected);
             let lowest = elastic.len() - expected; // rounding can give a rigid motion a frequency
             let modes = Modes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, lost: 0 };
-            return Linear { modes, shapes: Some(shapes), turning: false };
+            return LinearStructure { modes, shapes: Some(shapes), turning: false };
         }
         // some modes are too far below the stiffest springs; those springs count as rigid for
         // these modes
@@ -154,7 +154,7 @@ impl Linear {
         let (mut links, mut rigid) = (links.to_vec(), rigid.to_vec());
         for _ in 0..LEVELS {
             let stiffest = links.iter().map(|link| link.stiffness).fold(0.0, f64::max);
-            let (above, below): (Vec<&Link>, Vec<&Link>) =
+            let (above, below): (Vec<&SpringDamper>, Vec<&SpringDamper>) =
                 links.iter().partition(|link| link.stiffness > STIFFEST * stiffest);
             if below.is_empty() {
                 break;
@@ -182,20 +182,20 @@ impl Linear {
             }
         }
         let lost = expected - high.len();
-        Linear { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None, turning: false }
+        LinearStructure { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None, turning: false }
     }
 }
 
 /// Modes of the places with mass. Squared frequencies are in ascending order and can be
 /// rounding errors around zero.
-struct Reduced {
+struct CondensedModes {
     frequencies: Vec<f64>,
     damping: Vec<f64>,
     /// Shapes with `φᵀMφ = 1` at the places of the model, one per column.
     vectors: DMatrix<f64>,
 }
 
-impl Reduced {
+impl CondensedModes {
     fn above(&self, share: f64) -> Vec<LinearMode> {
         let floor = share * self.frequencies.last().map_or(0.0, |w| w.abs());
         let pairs = self.frequencies.iter().zip(&self.damping).filter(|(w, _)| **w > floor);
@@ -212,11 +212,11 @@ impl Reduced {
 }
 
 /// Returns the number of motions with mass that neither a spring nor a constraint resists.
-fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> usize {
+fn rigid_motions(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> usize {
     let n = mass.len();
     let held = links.iter().filter(|link| link.stiffness > 0.0).map(|link| link.at.as_slice());
     let held: Vec<&[(usize, f64)]> = held.chain(rigid.iter().copied()).collect();
-    let mut groups = Groups::new(n + 1); // place n is the ground
+    let mut groups = DisjointSets::new(n + 1); // place n is the ground
     for at in &held {
         match at {
             [(a, _)] => groups.join((*a, n)),
@@ -237,18 +237,18 @@ fn rigid_motions(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> us
 fn unresisted(mass: &[f64], held: &[&[(usize, f64)]]) -> usize {
     let (light, heavy): (Vec<usize>, Vec<usize>) = (0..mass.len()).partition(|i| mass[*i] == 0.0);
     let all = [light.as_slice(), &heavy].concat();
-    Basis::new(mass.len(), &all, held).kept.len() - Basis::new(mass.len(), &light, held).kept.len()
+    ConstraintBasis::new(mass.len(), &all, held).kept.len() - ConstraintBasis::new(mass.len(), &light, held).kept.len()
 }
 
 /// Eliminates constraints and places without mass, and solves for the modes of the remaining
 /// places.
-fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced {
+fn reduced(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> CondensedModes {
     let n = mass.len();
     // places without mass come first, so that constraints eliminate them and the remaining mass
     // matrix stays positive definite
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by_key(|i| mass[*i] > 0.0);
-    let basis = Basis::new(n, &order, rigid);
+    let basis = ConstraintBasis::new(n, &order, rigid);
     let r = basis.kept.len();
     let light = basis.kept.iter().take_while(|place| mass[**place] == 0.0).count();
     let (mut m, mut c, mut k) = (DMatrix::zeros(r, r), DMatrix::zeros(r, r), DMatrix::zeros(r, r));
@@ -266,8 +266,11 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
     let part = |matrix: &DMatrix<f64>| matrix.view((light, light), (heavy, heavy)).into_owned();
     let (m, c, k) = (part(&m), part(&c), part(&k));
     // without a solution, every mode is lost
-    let unknown =
-        || Reduced { frequencies: vec![0.0; heavy], damping: vec![0.0; heavy], vectors: DMatrix::zeros(n, heavy) };
+    let unknown = || CondensedModes {
+        frequencies: vec![0.0; heavy],
+        damping: vec![0.0; heavy],
+        vectors: DMatrix::zeros(n, heavy),
+    };
     if heavy == 0 {
         return unknown();
     }
@@ -294,7 +297,7 @@ fn reduced(mass: &[f64], links: &[&Link], rigid: &[&[(usize, f64)]]) -> Reduced 
             vectors[(place, column)] = basis.rows[place].iter().map(|(j, t)| t * y[*j]).sum();
         }
     }
-    Reduced { frequencies, damping, vectors }
+    CondensedModes { frequencies, damping, vectors }
 }
 
 /// Computes `matrix += value · row rowᵀ`.
@@ -352,15 +355,15 @@ fn inverse_root(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Coordinates that satisfy constraints: every place as a sum of the kept places.
-struct Basis {
+struct ConstraintBasis {
     /// The kept places, in the order of the input.
     kept: Vec<usize>,
     /// Pairs (coordinate, factor) of every place.
     rows: Vec<Vec<(usize, f64)>>,
 }
 
-impl Basis {
-    fn new(n: usize, order: &[usize], rigid: &[&[(usize, f64)]]) -> Basis {
+impl ConstraintBasis {
+    fn new(n: usize, order: &[usize], rigid: &[&[(usize, f64)]]) -> ConstraintBasis {
         let mut a = DMatrix::<f64>::zeros(rigid.len(), n);
         for (row, at) in rigid.iter().enumerate() {
             at.iter().for_each(|(place, w)| a[(row, *place)] += w);
@@ -394,7 +397,7 @@ impl Basis {
                 }
             }
         }
-        Basis { kept, rows }
+        ConstraintBasis { kept, rows }
     }
 
     /// Returns a direction of the places in the coordinates.

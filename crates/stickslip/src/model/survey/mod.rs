@@ -21,19 +21,19 @@ pub use wave_modes::WaveModes;
 
 use super::{Model, ModelError, System, SystemJoint};
 use crate::law::{MOST_DIRECTIONS, SharedLaw};
-use linear_modes::{LARGEST, Linear, Link};
+use linear_modes::{LARGEST, LinearStructure, SpringDamper};
 use std::collections::HashMap;
-use stuck_joint::{Hold, Stuck};
+use stuck_joint::{StuckAxis, StuckState};
 
 /// Linear properties of a model: modes, onset of slip, loose bodies, preload.
 #[derive(Debug, Clone)]
 pub struct Survey {
     system: System,
-    joints: Vec<Stuck>,
-    free: Linear,
-    stuck: Linear,
+    joints: Vec<StuckAxis>,
+    free: LinearStructure,
+    stuck: LinearStructure,
     /// Modes with open faces closed, if any faces are apart in static equilibrium.
-    closed: Option<Linear>,
+    closed: Option<LinearStructure>,
     /// Contact forces in static equilibrium without rigid friction, N; see
     /// [`FirstSlip::at_rest`].
     at_rest: Vec<Option<f64>>,
@@ -103,9 +103,9 @@ impl Model {
         };
         let of_joint = |(index, joint): (usize, &SystemJoint)| {
             let found = pressed(index, joint);
-            Stuck::of_joint((index, joint), found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
+            StuckAxis::of_joint((index, joint), found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
         };
-        let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(of_joint).collect();
+        let joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
         let loose = self.loose(&system, &joints);
         let mut at_rest = preload::carried(&system, &joints);
         for (stuck, carried) in joints.iter().zip(&mut at_rest).filter(|(stuck, _)| stuck.pressed.is_some()) {
@@ -116,27 +116,28 @@ impl Model {
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
         if system.dofs() > LARGEST {
             let lost = system.dofs();
-            let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None, turning: false };
+            let unknown =
+                || LinearStructure { modes: Modes { lost, ..Modes::default() }, shapes: None, turning: false };
             let (free, stuck) = (unknown(), unknown());
             return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
         }
-        let faces: Vec<Link> = joints
+        let faces: Vec<SpringDamper> = joints
             .iter()
             .filter(|joint| joint.closed > 0.0 && !joint.at.is_empty())
-            .map(|joint| Link { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
+            .map(|joint| SpringDamper { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
             .collect();
         let moving = || joints.iter().filter(|joint| !joint.at.is_empty());
-        let held: Vec<Link> = moving().filter_map(Stuck::held).collect();
-        let dampers: Vec<Link> = moving().filter_map(Stuck::free).collect();
-        let dampers: Vec<&Link> = dampers.iter().collect();
+        let held: Vec<SpringDamper> = moving().filter_map(StuckAxis::held).collect();
+        let dampers: Vec<SpringDamper> = moving().filter_map(StuckAxis::free).collect();
+        let dampers: Vec<&SpringDamper> = dampers.iter().collect();
         let rigid: Vec<&[(usize, f64)]> = joints
             .iter()
-            .filter(|joint| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty())
+            .filter(|joint| matches!(joint.hold, StuckState::Rigid { .. }) && !joint.at.is_empty())
             .map(|joint| joint.at.as_slice())
             .collect();
         if self.substructure.is_some() || self.moves_bodies() {
-            let free = Linear::of_matrices(system.structure().full(), &dampers, &[]);
-            let stuck = |held: &[&Link]| Linear::of_matrices(system.structure().full(), held, &rigid);
+            let free = LinearStructure::of_matrices(system.structure().full(), &dampers, &[]);
+            let stuck = |held: &[&SpringDamper]| LinearStructure::of_matrices(system.structure().full(), held, &rigid);
             let (stuck, closed) = with_faces(&held, &faces, &stuck);
             return Ok(Survey { free, stuck, closed, at_rest, system, joints, loose, unpressed });
         }
@@ -146,17 +147,17 @@ impl Model {
             let rows = ends.filter_map(|(name, sign)| Some((system.seen()[*index.get(name.as_str())?].rows(), sign)));
             rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
         };
-        let springs: Vec<Link> = self
+        let springs: Vec<SpringDamper> = self
             .springs
             .iter()
-            .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
+            .map(|s| SpringDamper { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
             .filter(|link| !link.at.is_empty())
             .collect();
         let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
-        let free = Linear::new(&mass, &springs.iter().chain(dampers).collect::<Vec<_>>(), &[]);
-        let stuck = |held: &[&Link]| {
-            let all: Vec<&Link> = springs.iter().chain(held.iter().copied()).collect();
-            Linear::new(&mass, &all, &rigid)
+        let free = LinearStructure::new(&mass, &springs.iter().chain(dampers).collect::<Vec<_>>(), &[]);
+        let stuck = |held: &[&SpringDamper]| {
+            let all: Vec<&SpringDamper> = springs.iter().chain(held.iter().copied()).collect();
+            LinearStructure::new(&mass, &all, &rigid)
         };
         let (stuck, closed) = with_faces(&held, &faces, &stuck);
         Ok(Survey { system, joints, free, stuck, closed, at_rest, loose, unpressed })
@@ -165,9 +166,13 @@ impl Model {
 
 /// Returns the linear structure with the joints of the stuck state, and the structure with
 /// closed faces if some faces are apart.
-fn with_faces(held: &[Link], faces: &[Link], linear: &dyn Fn(&[&Link]) -> Linear) -> (Linear, Option<Linear>) {
-    let at_rest: Vec<&Link> = held.iter().collect();
-    let closed: Vec<&Link> = held.iter().chain(faces).collect();
+fn with_faces(
+    held: &[SpringDamper],
+    faces: &[SpringDamper],
+    linear: &dyn Fn(&[&SpringDamper]) -> LinearStructure,
+) -> (LinearStructure, Option<LinearStructure>) {
+    let at_rest: Vec<&SpringDamper> = held.iter().collect();
+    let closed: Vec<&SpringDamper> = held.iter().chain(faces).collect();
     (linear(&at_rest), (!faces.is_empty()).then(|| linear(&closed)))
 }
 
@@ -212,12 +217,12 @@ impl Survey {
 
     /// Returns the onset of slip of each joint, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
-        let rigid = self.joints.iter().any(|joint| matches!(joint.hold, Hold::Rigid { .. }));
-        let one = |(joint, carried): (&Stuck, &Option<f64>)| {
+        let rigid = self.joints.iter().any(|joint| matches!(joint.hold, StuckState::Rigid { .. }));
+        let one = |(joint, carried): (&StuckAxis, &Option<f64>)| {
             let (limit, displacement) = match joint.hold {
-                Hold::Nothing => (0.0, None),
-                Hold::Spring { limit, displacement, .. } => (limit, Some(displacement)),
-                Hold::Rigid { limit } => (limit, None),
+                StuckState::Nothing => (0.0, None),
+                StuckState::Spring { limit, displacement, .. } => (limit, Some(displacement)),
+                StuckState::Rigid { limit } => (limit, None),
             };
             FirstSlip {
                 joint: joint.name.clone(),

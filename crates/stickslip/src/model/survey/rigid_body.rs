@@ -2,12 +2,12 @@
 
 use super::super::{Body, GROUND, Mass, Model, Place, System};
 use super::Loose;
-use super::stuck_joint::{Hold, Stuck};
+use super::stuck_joint::{StuckAxis, StuckState};
 use std::collections::{BTreeSet, HashMap};
 
 impl Model {
     /// Returns the bodies that no spring connects to the ground or to a moved place.
-    pub(super) fn loose(&self, system: &System, joints: &[Stuck]) -> Vec<Loose> {
+    pub(super) fn loose(&self, system: &System, joints: &[StuckAxis]) -> Vec<Loose> {
         let mut index: HashMap<String, usize> = HashMap::from([(GROUND.to_owned(), 0)]);
         for motion in &self.motions {
             index.insert(motion.on.clone(), 0); // moved places count as fixed, like the ground
@@ -28,7 +28,7 @@ impl Model {
         if !held {
             places.extend(of_component);
         }
-        let mut bodies = Groups::new(component + 1);
+        let mut bodies = DisjointSets::new(component + 1);
         for body in self.bodies.iter().map(Body::places) {
             body.windows(2).for_each(|pair| bodies.join((index[&pair[0]], index[&pair[1]])));
         }
@@ -46,7 +46,7 @@ impl Model {
         let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
         self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
         let (mut gripped, mut held) = (bodies.clone(), bodies.clone());
-        let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != Hold::Nothing).map(|j| j.joint).collect();
+        let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != StuckState::Nothing).map(|j| j.joint).collect();
         let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
         // joints with faces at each body: with contact force (touched) and without
         let (mut touched, mut beside) = (Vec::<(usize, &str)>::new(), Vec::<(usize, &str)>::new());
@@ -112,13 +112,13 @@ impl Model {
 
 /// Disjoint sets of connected items.
 #[derive(Debug, Clone)]
-pub(super) struct Groups {
+pub(super) struct DisjointSets {
     parent: Vec<usize>,
 }
 
-impl Groups {
+impl DisjointSets {
     pub(super) fn new(count: usize) -> Self {
-        Groups { parent: (0..count).collect() }
+        DisjointSets { parent: (0..count).collect() }
     }
 
     /// Returns the lowest member of the group of `i`.

@@ -1,7 +1,7 @@
 //! Loads of stuck joints under the excitation, and the motion at which they begin to slip.
 
-use super::linear_modes::Link;
-use super::stuck_joint::{Hold, Stuck};
+use super::linear_modes::SpringDamper;
+use super::stuck_joint::{StuckAxis, StuckState};
 use super::{Onset, Survey};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -117,13 +117,13 @@ impl Survey {
         let shapes = self.stuck.shapes.as_ref().filter(|_| !self.stuck.turning)?;
         let omega = self.stuck.modes.elastic.get(index)?.omega;
         let shape = shapes.column(index).into_owned();
-        let motion = |joint: &Stuck| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
+        let motion = |joint: &StuckAxis| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
         let (n, rigid) = (self.dofs(), self.rigid());
         // the constraint forces balance springs and inertia: W f = ω²Mφ - Kφ - W k u
         let mut rest =
             self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
         for joint in &self.joints {
-            if let Hold::Spring { stiffness, .. } = joint.hold {
+            if let StuckState::Spring { stiffness, .. } = joint.hold {
                 let force = stiffness * motion(joint);
                 joint.at.iter().for_each(|(i, w)| rest[*i] -= w * force);
             }
@@ -134,18 +134,18 @@ impl Survey {
         }
         let normal = w.transpose() * &w + DMatrix::from_diagonal(&DVector::from_vec(self.compliances(&rigid)));
         let forces = Cholesky::new(normal)?.solve(&(w.transpose() * rest));
-        let share = |(index, joint): (usize, &Stuck)| match joint.hold {
-            Hold::Nothing => 0.0,
+        let share = |(index, joint): (usize, &StuckAxis)| match joint.hold {
+            StuckState::Nothing => 0.0,
             // any motion causes partial slip
-            Hold::Spring { .. } if joint.gradual => {
+            StuckState::Spring { .. } if joint.gradual => {
                 if motion(joint) == 0.0 {
                     0.0
                 } else {
                     f64::INFINITY
                 }
             }
-            Hold::Spring { displacement, .. } => motion(joint).abs() / displacement,
-            Hold::Rigid { limit } => {
+            StuckState::Spring { displacement, .. } => motion(joint).abs() / displacement,
+            StuckState::Rigid { limit } => {
                 rigid.iter().position(|r| *r == index).map_or(0.0, |column| forces[column].abs() / limit)
             }
         };
@@ -155,15 +155,15 @@ impl Survey {
     /// Returns the compliances of rigid joints, relative to that of the structure.
     fn compliances(&self, rigid: &[usize]) -> Vec<f64> {
         let limit = |joint: &usize| match self.joints[*joint].hold {
-            Hold::Rigid { limit } => limit,
-            Hold::Nothing | Hold::Spring { .. } => f64::INFINITY,
+            StuckState::Rigid { limit } => limit,
+            StuckState::Nothing | StuckState::Spring { .. } => f64::INFINITY,
         };
         let least = rigid.iter().map(limit).fold(f64::INFINITY, f64::min);
         rigid.iter().map(|joint| COMPLIANCE * (least / limit(joint)).max(STIFFEST)).collect()
     }
 
     fn rigid(&self) -> Vec<usize> {
-        let rigid = |joint: &Stuck| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty();
+        let rigid = |joint: &StuckAxis| matches!(joint.hold, StuckState::Rigid { .. }) && !joint.at.is_empty();
         (0..self.joints.len()).filter(|j| rigid(&self.joints[*j])).collect()
     }
 
@@ -254,11 +254,11 @@ impl Survey {
             }
         }
         let imposed = |index: usize| {
-            let Stuck { joint, axis, .. } = self.joints[index];
+            let StuckAxis { joint, axis, .. } = self.joints[index];
             system.joints()[joint].axes()[axis].imposed_at(h)
         };
         for (index, joint) in self.joints.iter().enumerate() {
-            if let Some(Link { stiffness, damping, .. }) = joint.held() {
+            if let Some(SpringDamper { stiffness, damping, .. }) = joint.held() {
                 let stiffness = Complex64::new(stiffness, w * damping);
                 for (i, wi) in &joint.at {
                     b[*i] -= imposed(index) * (stiffness * *wi);
@@ -278,12 +278,12 @@ impl Survey {
             b[n + row] = -imposed(*joint);
         }
         let x = if n + rigid.len() == 0 { b } else { a.lu().solve(&b)? };
-        let share = |(index, joint): (usize, &Stuck)| match joint.hold {
-            Hold::Nothing => Some(Complex64::ZERO),
-            Hold::Spring { displacement, .. } => {
+        let share = |(index, joint): (usize, &StuckAxis)| match joint.hold {
+            StuckState::Nothing => Some(Complex64::ZERO),
+            StuckState::Spring { displacement, .. } => {
                 Some((joint.at.iter().map(|(i, w)| x[*i] * *w).sum::<Complex64>() + imposed(index)) / displacement)
             }
-            Hold::Rigid { limit } => match rigid.iter().position(|r| *r == index) {
+            StuckState::Rigid { limit } => match rigid.iter().position(|r| *r == index) {
                 Some(row) => Some(x[n + row] / limit),
                 // a joint between a moved place and the ground or another moved place cannot
                 // stick

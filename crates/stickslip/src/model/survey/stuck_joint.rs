@@ -1,19 +1,19 @@
 //! Stiffness, limit and damping of a joint whose sliders do not slip.
 
 use super::super::SystemJoint;
-use super::linear_modes::Link;
+use super::linear_modes::SpringDamper;
 use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
 
 /// One axis of a joint whose sliders do not slip.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stuck {
+pub(super) struct StuckAxis {
     /// Index of the joint in the system.
     pub(super) joint: usize,
     pub(super) axis: usize,
     pub(super) name: String,
     /// The direction `W`, as its entries.
     pub(super) at: Vec<(usize, f64)>,
-    pub(super) hold: Hold,
+    pub(super) hold: StuckState,
     /// Stiffness of open faces after they close and stick, N/m; zero for all other joints.
     pub(super) closed: f64,
     /// For a normal direction: the force that presses the faces together at zero displacement,
@@ -25,43 +25,43 @@ pub(super) struct Stuck {
     pub(super) gradual: bool,
 }
 
-impl Stuck {
+impl StuckAxis {
     /// Returns one entry per axis of a joint. `law` describes the joint in small motion.
     pub(super) fn of_joint((index, joint): (usize, &SystemJoint), law: &dyn Law) -> Vec<Self> {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
             let pressed = (law.normal() == Some(axis)).then(|| force_at_rest(law, axis));
-            let hold = pressed.map_or_else(|| Hold::of(law, axis), |force| Hold::pressed(law, axis, force));
+            let hold = pressed.map_or_else(|| StuckState::of(law, axis), |force| StuckState::pressed(law, axis, force));
             let closed = match hold {
-                Hold::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
-                Hold::Spring { .. } | Hold::Rigid { .. } => 0.0,
+                StuckState::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
+                StuckState::Spring { .. } | StuckState::Rigid { .. } => 0.0,
             };
-            let held = if matches!(hold, Hold::Rigid { .. }) { 0.0 } else { small_damping(law, axis) };
+            let held = if matches!(hold, StuckState::Rigid { .. }) { 0.0 } else { small_damping(law, axis) };
             let damping = [law.free().map_or(0.0, |free| small_damping(&*free, axis)), held];
             let gradual = law.macro_slip().is_some();
-            Stuck { joint: index, axis, name, at: along.rows().to_vec(), hold, closed, pressed, damping, gradual }
+            StuckAxis { joint: index, axis, name, at: along.rows().to_vec(), hold, closed, pressed, damping, gradual }
         })
         .collect()
     }
 }
 
-impl Stuck {
+impl StuckAxis {
     /// Returns the spring and damper of the stuck joint, if it has any.
-    pub(super) fn held(&self) -> Option<Link> {
-        let stiffness = if let Hold::Spring { stiffness, .. } = self.hold { stiffness } else { 0.0 };
+    pub(super) fn held(&self) -> Option<SpringDamper> {
+        let stiffness = if let StuckState::Spring { stiffness, .. } = self.hold { stiffness } else { 0.0 };
         let damping = self.damping[1];
-        (stiffness > 0.0 || damping > 0.0).then(|| Link { at: self.at.clone(), stiffness, damping })
+        (stiffness > 0.0 || damping > 0.0).then(|| SpringDamper { at: self.at.clone(), stiffness, damping })
     }
 
     /// Returns the damper of the joint without friction, if it has one.
-    pub(super) fn free(&self) -> Option<Link> {
+    pub(super) fn free(&self) -> Option<SpringDamper> {
         let damping = self.damping[0];
-        (damping > 0.0).then(|| Link { at: self.at.clone(), stiffness: 0.0, damping })
+        (damping > 0.0).then(|| SpringDamper { at: self.at.clone(), stiffness: 0.0, damping })
     }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Hold {
+pub(super) enum StuckState {
     /// The joint carries no force.
     Nothing,
     /// The sum of its springs, N/m; limit and displacement of the slider that slips first.
@@ -75,45 +75,45 @@ pub(super) enum Hold {
     },
 }
 
-impl Hold {
+impl StuckState {
     /// Returns the stuck state along one axis of the law.
-    fn of(law: &dyn Law, axis: usize) -> Hold {
+    fn of(law: &dyn Law, axis: usize) -> StuckState {
         if let Some(displacement) = law.macro_slip() {
-            return Hold::Spring { stiffness: small_stiffness(law, axis), limit: law.scale(), displacement };
+            return StuckState::Spring { stiffness: small_stiffness(law, axis), limit: law.scale(), displacement };
         }
-        let Some(branches) = law.sliders() else { return Hold::smooth(law, axis) };
+        let Some(branches) = law.sliders() else { return StuckState::smooth(law, axis) };
         let branches = || branches.iter().filter(|branch| branch.static_limit > 0.0);
         let rigid = branches().filter(|branch| branch.stiffness.is_none()).map(|branch| branch.static_limit);
         if let Some(limit) = rigid.reduce(|a, b| a + b) {
-            return Hold::Rigid { limit };
+            return StuckState::Rigid { limit };
         }
         let springs = || branches().filter_map(|branch| Some((branch.stiffness?, branch.limit)));
         let first = springs().min_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
         let stiffness = springs().map(|(stiffness, _)| stiffness).sum();
-        first.map_or(Hold::Nothing, |(k, limit)| Hold::Spring { stiffness, limit, displacement: limit / k })
+        first.map_or(StuckState::Nothing, |(k, limit)| StuckState::Spring { stiffness, limit, displacement: limit / k })
     }
 
     /// Returns the spring of faces that this force (N) presses together. No load makes them
     /// slip. Faces that only touch carry no force.
-    fn pressed(law: &dyn Law, axis: usize, force: f64) -> Hold {
+    fn pressed(law: &dyn Law, axis: usize, force: f64) -> StuckState {
         let stiffness = small_stiffness(law, axis);
         if force > 0.0 && stiffness > 0.0 {
-            Hold::Spring { stiffness, limit: f64::INFINITY, displacement: f64::INFINITY }
+            StuckState::Spring { stiffness, limit: f64::INFINITY, displacement: f64::INFINITY }
         } else {
-            Hold::Nothing
+            StuckState::Nothing
         }
     }
 
     /// Returns the stuck state of a smooth law: its spring in small motion, or rigid if its
     /// resistance is viscous. The approximation improves with the slope of the law.
-    fn smooth(law: &dyn Law, axis: usize) -> Hold {
+    fn smooth(law: &dyn Law, axis: usize) -> StuckState {
         let (limit, stiffness) = (law.scale(), small_stiffness(law, axis));
         match (limit > 0.0, stiffness > 0.0) {
-            (false, _) => Hold::Nothing,
+            (false, _) => StuckState::Nothing,
             // a law of displacement alone acts as its spring and never slips
-            (true, false) if limit.is_infinite() => Hold::Nothing,
-            (true, true) => Hold::Spring { stiffness, limit, displacement: limit / stiffness },
-            (true, false) => Hold::Rigid { limit },
+            (true, false) if limit.is_infinite() => StuckState::Nothing,
+            (true, true) => StuckState::Spring { stiffness, limit, displacement: limit / stiffness },
+            (true, false) => StuckState::Rigid { limit },
         }
     }
 }

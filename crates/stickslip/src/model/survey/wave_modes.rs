@@ -6,8 +6,8 @@
 //! sectors becomes two springs: one along the real part and one along the imaginary part of its
 //! elongation. The modes then occur in pairs, one for each direction of travel.
 
-use super::linear_modes::{LARGEST, Linear, Link};
-use super::stuck_joint::{Hold, Stuck};
+use super::linear_modes::{LARGEST, LinearStructure, SpringDamper};
+use super::stuck_joint::{StuckAxis, StuckState};
 use super::{LinearMode, Model, ModelError, Modes, System};
 use crate::model::{Body, Mass, Place};
 use crate::structure::{Sector, Structure, turn};
@@ -43,14 +43,14 @@ type Row = Vec<(usize, f64)>;
 
 /// Converts a direction over the ring into its form in a wave: the real part and, for a complex
 /// wave, the imaginary part.
-struct Turned {
+struct WaveRows {
     dofs: usize,
     sectors: usize,
     diameter: usize,
     double: bool,
 }
 
-impl Turned {
+impl WaveRows {
     fn rows(&self, at: &[(usize, f64)]) -> Vec<Row> {
         let mut parts = [BTreeMap::new(), BTreeMap::new()];
         for &(row, weight) in at {
@@ -71,7 +71,7 @@ impl Turned {
     }
 
     /// Combines the modes of both joint states, with shapes at the places.
-    fn modes(&self, free: Once, stuck: Once, places: &[Row]) -> WaveModes {
+    fn modes(&self, free: SelectedModes, stuck: SelectedModes, places: &[Row]) -> WaveModes {
         let at_places = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.seen(shape, places)).collect();
         WaveModes {
             diameter: self.diameter,
@@ -94,20 +94,20 @@ impl Turned {
         shapes: Option<DMatrix<f64>>,
         lowest: usize,
         weigh: &dyn Fn(&DVector<f64>) -> DVector<f64>,
-    ) -> Once {
+    ) -> SelectedModes {
         let columns = |shapes: DMatrix<f64>| -> Vec<DVector<f64>> {
             shapes.column_iter().take(lowest).map(|shape| shape.into_owned()).collect()
         };
         if !self.double {
             modes.elastic.truncate(lowest);
-            return Once { modes, shapes: shapes.map_or_else(Vec::new, columns) };
+            return SelectedModes { modes, shapes: shapes.map_or_else(Vec::new, columns) };
         }
         (modes.rigid, modes.lost) = (modes.rigid / 2, modes.lost / 2);
         let most = lowest.min(modes.elastic.len() / 2);
         let split = shapes.and_then(|shapes| self.split(&modes.elastic, &shapes, most, weigh));
         let (kept, shapes) = split.unwrap_or_else(|| ((0..most).map(|mode| 2 * mode).collect(), Vec::new()));
         modes.elastic = kept.into_iter().map(|mode| modes.elastic[mode]).collect();
-        Once { modes, shapes }
+        SelectedModes { modes, shapes }
     }
 
     /// Selects `most` complex shapes from twice as many real ones. Returns their indices and
@@ -176,7 +176,7 @@ impl Turned {
 }
 
 /// The modes of a wave, each once, with their shapes `(a, b)` if they are known.
-struct Once {
+struct SelectedModes {
     modes: Modes,
     shapes: Vec<DVector<f64>>,
 }
@@ -235,34 +235,37 @@ impl Model {
         };
         let springs = &self.springs[..self.springs.len() / sectors];
         let joints = &system.joints()[..system.joints().len() / sectors];
-        let stuck: Vec<Stuck> =
-            joints.iter().enumerate().flat_map(|(i, joint)| Stuck::of_joint((i, joint), &**joint.law())).collect();
+        let stuck: Vec<StuckAxis> =
+            joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint((i, joint), &**joint.law())).collect();
         let own: Vec<f64> = (0..n).map(|i| system.structure().own_mass(i)).collect();
         let places = self.sector_axes(&system);
         let wave = |diameter: usize| {
             let double = !(2 * diameter).is_multiple_of(sectors);
-            let turned = Turned { dofs: n, sectors, diameter, double };
+            let turned = WaveRows { dofs: n, sectors, diameter, double };
             let mass = if double { [own.clone(), own.clone()].concat() } else { own.clone() };
-            let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<Link> {
-                turned.rows(at).into_iter().map(|at| Link { at, stiffness, damping }).collect()
+            let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<SpringDamper> {
+                turned.rows(at).into_iter().map(|at| SpringDamper { at, stiffness, damping }).collect()
             };
-            let springs: Vec<Link> =
+            let springs: Vec<SpringDamper> =
                 springs.iter().flat_map(|s| link(&ends(&s.between), s.stiffness, s.damping)).collect();
-            let of = |one: Link| link(&one.at, one.stiffness, one.damping);
-            let dampers: Vec<Link> = stuck.iter().filter_map(Stuck::free).flat_map(of).collect();
+            let of = |one: SpringDamper| link(&one.at, one.stiffness, one.damping);
+            let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free).flat_map(of).collect();
             let (mut held, mut rigid) = (Vec::new(), Vec::new());
             for joint in &stuck {
                 match joint.hold {
-                    Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
-                    Hold::Nothing | Hold::Spring { .. } => held.extend(joint.held().into_iter().flat_map(of)),
-                    Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
+                    StuckState::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
+                    StuckState::Nothing | StuckState::Spring { .. } => {
+                        held.extend(joint.held().into_iter().flat_map(of))
+                    }
+                    StuckState::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
                 }
             }
             let weigh = |x: &DVector<f64>| x.component_mul(&DVector::from_column_slice(&mass));
-            let once = |linear: Linear| turned.once(linear.modes, linear.shapes, lowest, &weigh);
+            let once = |linear: LinearStructure| turned.once(linear.modes, linear.shapes, lowest, &weigh);
             let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-            let free_ones = once(Linear::new(&mass, &springs.iter().chain(&dampers).collect::<Vec<_>>(), &[]));
-            let stuck_ones = once(Linear::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid));
+            let free_ones = once(LinearStructure::new(&mass, &springs.iter().chain(&dampers).collect::<Vec<_>>(), &[]));
+            let stuck_ones =
+                once(LinearStructure::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid));
             turned.modes(free_ones, stuck_ones, &places)
         };
         Ok(Some((0..=sectors / 2).map(wave).collect()))
@@ -290,30 +293,30 @@ impl Model {
 fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -> Option<Vec<WaveModes>> {
     let sector = Sector::of(system.structure(), sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
-    let stuck: Vec<Stuck> =
-        joints.iter().enumerate().flat_map(|(i, joint)| Stuck::of_joint((i, joint), &**joint.law())).collect();
+    let stuck: Vec<StuckAxis> =
+        joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint((i, joint), &**joint.law())).collect();
     let wave = |diameter: usize| {
         let wave = sector.wave(diameter).ok()?;
         let (structure, double) = (wave.structure(), wave.is_double());
-        let turned = Turned { dofs: sector.dofs(), sectors, diameter, double };
-        let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<Link> {
-            turned.rows(at).into_iter().map(|at| Link { at, stiffness, damping }).collect()
+        let turned = WaveRows { dofs: sector.dofs(), sectors, diameter, double };
+        let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<SpringDamper> {
+            turned.rows(at).into_iter().map(|at| SpringDamper { at, stiffness, damping }).collect()
         };
-        let of = |one: Link| link(&one.at, one.stiffness, one.damping);
-        let dampers: Vec<Link> = stuck.iter().filter_map(Stuck::free).flat_map(of).collect();
+        let of = |one: SpringDamper| link(&one.at, one.stiffness, one.damping);
+        let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free).flat_map(of).collect();
         let (mut held, mut rigid) = (Vec::new(), Vec::new());
         for joint in &stuck {
             match joint.hold {
-                Hold::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
-                Hold::Nothing | Hold::Spring { .. } => held.extend(joint.held().into_iter().flat_map(of)),
-                Hold::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
+                StuckState::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
+                StuckState::Nothing | StuckState::Spring { .. } => held.extend(joint.held().into_iter().flat_map(of)),
+                StuckState::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
             }
         }
-        let modes = |links: &[Link], rigid: &[Row]| -> Option<Once> {
+        let modes = |links: &[SpringDamper], rigid: &[Row]| -> Option<SelectedModes> {
             if structure.dofs() <= LARGEST {
                 let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
-                let Linear { modes, shapes, .. } =
-                    Linear::of_wave(structure.full(), &links.iter().collect::<Vec<_>>(), &rigid);
+                let LinearStructure { modes, shapes, .. } =
+                    LinearStructure::of_wave(structure.full(), &links.iter().collect::<Vec<_>>(), &rigid);
                 return Some(turned.once(modes, shapes, lowest, &|x| &structure.full().mass * x));
             }
             if !rigid.is_empty() {
@@ -330,14 +333,14 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
 
 /// Returns the mass matrix and the lowest modes of a large structure, with both modes of each
 /// pair and their shapes.
-fn of_large(structure: &Structure, links: &[Link], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
+fn of_large(structure: &Structure, links: &[SpringDamper], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
     let n = structure.dofs();
     let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
         let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
         Matrix::from_triplets(n, own.filter(|entry| entry.2 != 0.0).chain(more)).ok()
     };
-    let along = |value: fn(&Link) -> f64| {
-        let entries = |link: &Link| {
+    let along = |value: fn(&SpringDamper) -> f64| {
+        let entries = |link: &SpringDamper| {
             let pairs = link.at.iter().flat_map(|&(i, a)| link.at.iter().map(move |&(k, b)| (i, k, a * b)));
             pairs.map(|(i, k, weight)| (i, k, value(link) * weight)).collect::<Vec<_>>()
         };

@@ -19,7 +19,7 @@ const HELD: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
 /// A structure with both stiffnesses in the same coordinates.
 #[derive(Debug, Clone)]
-pub(in crate::structure) struct Between {
+pub(in crate::structure) struct CommonBasis {
     /// With its own stiffness.
     pub rest: Reduced,
     /// With the other stiffness.
@@ -40,7 +40,7 @@ impl Whole {
         there: &Matrix,
         reduce: impl Fn(&Whole) -> Result<(Reduced, f64), ReductionError>,
         tolerance: f64,
-    ) -> Result<Between, ReductionError> {
+    ) -> Result<CommonBasis, ReductionError> {
         let n = self.dofs();
         if there.n() != n {
             return Err(ReductionError::Size { matrix: "other stiffness", rows: there.n(), n });
@@ -75,7 +75,7 @@ impl Whole {
             let (deviation, at) = worst;
             if deviation.error <= tolerance {
                 let (rest, there) = (project(&wholes[0])?.in_metres(), project(&wholes[last])?.in_metres());
-                return Ok(Between { rest, there, deviation, up_to });
+                return Ok(CommonBasis { rest, there, deviation, up_to });
             }
             if taken.contains(&at) {
                 let (Deviation { error: best, omega: at }, dofs) = (deviation, basis.len() / n.max(1));

@@ -62,7 +62,7 @@ pub(crate) struct ReducedSector {
 
 /// Result of a reduction.
 #[derive(Debug, Clone)]
-pub(in crate::structure) struct ChosenSector {
+pub(in crate::structure) struct SectorReduction {
     pub reduced: ReducedSector,
     pub deviation: Deviation,
     /// Frequencies of the computed waves, rad/s, ascending. Each pair of travelling waves is
@@ -77,7 +77,7 @@ pub(in crate::structure) struct ChosenSector {
 }
 
 /// A computed wave.
-struct Computed {
+struct ComputedWave {
     diameter: usize,
     whole: Whole,
     modes: NaturalModes,
@@ -92,12 +92,12 @@ fn share(orders: usize) -> f64 {
 }
 
 /// The waves of a sector, computed on request.
-struct Waves<'a> {
+struct WaveCollection<'a> {
     sector: &'a CyclicSector,
     seen: &'a [Row],
     /// For different blades: the blade, and the highest frequency of interest.
     blade: Option<(&'a Blade, f64)>,
-    met: Vec<Computed>,
+    met: Vec<ComputedWave>,
 }
 
 impl CyclicSector {
@@ -108,11 +108,11 @@ impl CyclicSector {
         seen: &[Row],
         how: &Reduction,
         blade: Option<(&Blade, usize)>,
-    ) -> Result<ChosenSector, ReductionError> {
+    ) -> Result<SectorReduction, ReductionError> {
         if seen.is_empty() {
             return Err(ReductionError::NoPorts);
         }
-        let mut waves = Waves { sector: self, seen, blade: None, met: Vec::new() };
+        let mut waves = WaveCollection { sector: self, seen, blade: None, met: Vec::new() };
         match *how {
             Reduction::None { .. } => Err(ReductionError::NoPorts),
             Reduction::UpTo { up_to, tolerance, kind } => {
@@ -132,7 +132,7 @@ impl CyclicSector {
     }
 }
 
-impl Waves<'_> {
+impl WaveCollection<'_> {
     /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
     /// of interest.
     fn meet(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
@@ -147,7 +147,7 @@ impl Waves<'_> {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
                     let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
-                    self.met.push(Computed { diameter, whole, modes, extent, reference });
+                    self.met.push(ComputedWave { diameter, whole, modes, extent, reference });
                 }
             }
         }
@@ -160,7 +160,7 @@ impl Waves<'_> {
         tolerance: f64,
         kind: Option<ReductionKind>,
         from: usize,
-    ) -> Result<ChosenSector, ReductionError> {
+    ) -> Result<SectorReduction, ReductionError> {
         for (what, value) in
             [("the largest frequency of a reduction (rad/s)", up_to), ("the tolerance of a reduction", tolerance)]
         {
@@ -203,7 +203,7 @@ impl Waves<'_> {
         count: usize,
         (kind, orders): (ReductionKind, usize),
         up_to: f64,
-    ) -> Result<ChosenSector, ReductionError> {
+    ) -> Result<SectorReduction, ReductionError> {
         let level = 1;
         let (taken, between) = (self.sector.diameters(level), self.sector.diameters(level + 1));
         let mut serves = f64::INFINITY;
@@ -220,14 +220,14 @@ impl Waves<'_> {
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
             let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
-            self.met.push(Computed { diameter, whole, modes, extent: BEYOND, reference });
+            self.met.push(ComputedWave { diameter, whole, modes, extent: BEYOND, reference });
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
         Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }
 
-    fn chosen(&self, reduced: ReducedSector, deviation: Deviation, (up_to, serves): (f64, f64)) -> ChosenSector {
+    fn chosen(&self, reduced: ReducedSector, deviation: Deviation, (up_to, serves): (f64, f64)) -> SectorReduction {
         let (mut frequencies, mut free) = (Vec::new(), 0);
         for wave in &self.met {
             let step = if is_real(wave.diameter, self.sector.sectors) { 1 } else { 2 };
@@ -235,7 +235,7 @@ impl Waves<'_> {
             free += wave.modes.free() / step;
         }
         frequencies.sort_by(f64::total_cmp);
-        ChosenSector { reduced, deviation, frequencies, free, up_to, serves }
+        SectorReduction { reduced, deviation, frequencies, free, up_to, serves }
     }
 
     /// Builds one basis from the waves of these diameters.
@@ -277,7 +277,13 @@ impl Waves<'_> {
 
     /// Returns residual vectors of a wave for the forces of a deviating blade, in its modes up
     /// to a frequency. Both parts of the wave are included.
-    fn relieved(&self, wave: &Computed, blade: &Blade, up_to: f64, order: usize) -> Result<Vec<f64>, ReductionError> {
+    fn relieved(
+        &self,
+        wave: &ComputedWave,
+        blade: &Blade,
+        up_to: f64,
+        order: usize,
+    ) -> Result<Vec<f64>, ReductionError> {
         let (n, modes) = (self.sector.dofs, &wave.modes);
         let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
         let forces = (modes.free()..inside).map(|mode| -> Row {

@@ -46,24 +46,24 @@ pub(super) fn shift(up_to: f64) -> f64 {
 
 /// The forces that the coordinates of a sector cannot represent, wave by wave.
 #[derive(Debug)]
-pub(in crate::structure) struct Lacking {
+pub(in crate::structure) struct MistuningError {
     sectors: usize,
     dofs: usize,
     /// Highest frequency of the estimated modes, rad/s.
     up_to: f64,
-    forms: Vec<Form>,
+    forms: Vec<WaveForm>,
 }
 
 /// Rows `L` such that `|L z|²` is the energy outside the coordinates. `z` contains the inertia
 /// divided by `up_to²`, then the blade forces; each has a real part and, for a complex wave, an
 /// imaginary part.
 #[derive(Debug)]
-struct Form {
+struct WaveForm {
     diameter: usize,
     rows: DMatrix<f64>,
 }
 
-impl Lacking {
+impl MistuningError {
     /// Creates the estimate from a reduced sector with this blade, for frequencies up to
     /// `up_to`, rad/s.
     pub fn new(
@@ -72,10 +72,10 @@ impl Lacking {
         reduced: &ReducedSector,
         up_to: f64,
     ) -> Result<Self, ReductionError> {
-        let form = |diameter: usize| Form::new(&sector.wave(diameter, seen)?, blade, reduced, (diameter, up_to));
+        let form = |diameter: usize| WaveForm::new(&sector.wave(diameter, seen)?, blade, reduced, (diameter, up_to));
         let forms = sector.diameters(LEVEL).into_iter().map(form);
         let forms = forms.collect::<Result<_, _>>()?;
-        Ok(Lacking { sectors: sector.sectors, dofs: reduced.dofs(), up_to, forms })
+        Ok(MistuningError { sectors: sector.sectors, dofs: reduced.dofs(), up_to, forms })
     }
 
     /// Returns the largest error at a resonance of the reduced ring with these blade
@@ -124,13 +124,13 @@ impl Lacking {
         })
     }
 
-    fn nearest(&self, diameter: usize) -> &Form {
-        let apart = |form: &&Form| form.diameter.abs_diff(diameter);
+    fn nearest(&self, diameter: usize) -> &WaveForm {
+        let apart = |form: &&WaveForm| form.diameter.abs_diff(diameter);
         self.forms.iter().min_by_key(apart).expect("a ring has waves")
     }
 }
 
-impl Form {
+impl WaveForm {
     fn new(
         whole: &Whole,
         blade: &Blade,
@@ -168,7 +168,7 @@ impl Form {
         let eigen = eigen::symmetric((&energy + energy.transpose()) * 0.5).ok_or(ReductionError::OutOfRange)?;
         let kept: Vec<usize> = (0..energy.nrows()).filter(|&k| eigen.eigenvalues[k] > ROUNDED * size).collect();
         let row = |i: usize, k: usize| eigen.eigenvectors[(k, kept[i])] * eigen.eigenvalues[kept[i]].sqrt();
-        Ok(Form { diameter, rows: DMatrix::from_fn(kept.len(), energy.nrows(), row) })
+        Ok(WaveForm { diameter, rows: DMatrix::from_fn(kept.len(), energy.nrows(), row) })
     }
 
     /// Returns the energy for the real and imaginary parts of displacements and of forces; the

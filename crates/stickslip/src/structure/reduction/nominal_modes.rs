@@ -67,7 +67,7 @@ pub(in crate::structure) struct NominalRing {
 }
 
 /// The modes of the ring with different blades.
-pub(in crate::structure) struct Mixed {
+pub(in crate::structure) struct MistunedModes {
     /// λ, rad²/s², ascending. They are exact in the coordinates up to the frequency of
     /// interest.
     pub values: Vec<f64>,
@@ -120,7 +120,7 @@ impl NominalRing {
 
     /// Returns the modes of the ring with these blade deviations. The iteration starts from
     /// nominal modes up to `extent`, one of [`EXTENTS`].
-    pub fn mixed(&self, deviations: &[f64], extent: f64) -> Result<Mixed, ReductionError> {
+    pub fn mixed(&self, deviations: &[f64], extent: f64) -> Result<MistunedModes, ReductionError> {
         let (n, highest, shift) = (self.mass.n(), self.up_to * self.up_to, shift(self.up_to));
         let blades = all_blades(&self.of_blade, deviations, self.sector.dofs())?;
         let sum = [(1.0, &self.stiffness), (1.0, &blades), (shift, &self.mass)];
@@ -161,7 +161,7 @@ impl NominalRing {
             let singular = |singular| ReductionError::Singular { omega: self.up_to, singular };
             let at_highest = at_highest.map_err(singular)?;
             if at_highest.negative() == inside {
-                return Ok(Mixed { values, shapes, factor, at_highest });
+                return Ok(MistunedModes { values, shapes, factor, at_highest });
             }
         }
         let found = values.partition_point(|value| *value <= highest);
@@ -172,9 +172,9 @@ impl NominalRing {
     ///
     /// The error is that of the response to loads on all observed displacements. It is
     /// evaluated at the highest frequency of interest, where it is largest.
-    pub fn modes(&self, mixed: &Mixed) -> Result<(RingModes, Deviation), ReductionError> {
+    pub fn modes(&self, mixed: &MistunedModes) -> Result<(RingModes, Deviation), ReductionError> {
         let (n, ports, shift) = (self.mass.n(), self.seen.len(), shift(self.up_to));
-        let Mixed { values, shapes, factor, at_highest } = mixed;
+        let MistunedModes { values, shapes, factor, at_highest } = mixed;
         let low = values.len();
         // modes normalized in A, and residual vectors orthogonal to them in A
         let root: Vec<f64> = values.iter().map(|value| (value + shift).sqrt()).collect();

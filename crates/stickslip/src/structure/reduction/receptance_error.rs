@@ -34,12 +34,12 @@ const ALONE: usize = 96;
 const PROBES: usize = 48;
 
 /// ω in rad/s, and displacements of the ports under the loads in m.
-type Sample = (f64, DMatrix<Complex<f64>>);
+type ReceptanceSample = (f64, DMatrix<Complex<f64>>);
 
 /// Receptances of the whole structure.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    samples: Vec<Sample>,
+    samples: Vec<ReceptanceSample>,
     /// Forces on the ports, one column per load.
     loads: DMatrix<f64>,
     damped: bool,
@@ -146,7 +146,7 @@ struct Factors<'a> {
 impl Factors<'_> {
     /// Computes the receptance of the whole structure at ω, or slightly above if ω is at a
     /// mode. `together` contains loads on all ports; `None` loads each port separately.
-    fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<Sample, ReductionError> {
+    fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<ReceptanceSample, ReductionError> {
         let mut failed = ReductionError::OutOfRange;
         for attempt in 0..ATTEMPTS {
             let omega = omega * (1.0 + NUDGE * attempt as f64);

@@ -9,14 +9,14 @@ use super::{Kernel, Member, Port, Ports, Rigid, StaticState, Times};
 use crate::law::{Piece, Slider};
 use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
-use crate::model::{Line, PARALLEL, SystemJoint};
+use crate::model::{CollinearAxis, PARALLEL, SystemJoint};
 
 /// What there is so far.
 #[derive(Default)]
 pub(super) struct Gathered {
     ports: Ports,
     /// Of force ports: their number, and the lines of their axes.
-    lines: Vec<(usize, Vec<Line>)>,
+    lines: Vec<(usize, Vec<CollinearAxis>)>,
 }
 
 impl Gathered {
@@ -100,7 +100,7 @@ impl Gathered {
 
     /// Adds a force port, or its joint to one that moves as it does.
     fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, measures: (f64, f64, f64)) {
-        let lines: Vec<Line> = of.axes().iter().map(Line::of).collect();
+        let lines: Vec<CollinearAxis> = of.axes().iter().map(CollinearAxis::of).collect();
         let found = self.lines.iter().find_map(|(port, its)| {
             let factor = along(&lines, its)?;
             Some((*port, factor, times(&kernel, &self.ports.list[*port].kernel, factor)?))
@@ -134,7 +134,7 @@ impl Gathered {
 }
 
 /// The factor by which all motions along some axes are those along others.
-fn along(lines: &[Line], others: &[Line]) -> Option<f64> {
+fn along(lines: &[CollinearAxis], others: &[CollinearAxis]) -> Option<f64> {
     if lines.len() != others.len() {
         return None;
     }
